@@ -3,11 +3,11 @@
  * docs/explanation/how-labs-run.md says how it is called:
  *
  *   reserve(name, size) → ArrayBuffer    to be filled from outside: 'wasm', and 'mjb' before each trial
- *   buffer(name)        → ArrayBuffer    one of those, or 'beats': a number that a trial counts up whenever it gets on
+ *   buffer(name)        → ArrayBuffer    one of those, or 'beats': a number that a trial increments whenever it makes progress
  *   boot('')            → ''             compiles and starts the engine; ends before the next call
  *   booted('')          → version        or throws why it did not start
  *   trial(requestJson)  → replyJson
- *   lookUp(pathsJson)   → JSON           what of `data.qpos` and the like exists, with the model in 'mjb'
+ *   lookUp(pathsJson)   → JSON           which of `data.qpos` and the like exist, with the model in 'mjb'
  *   trying('')          → JSON           for a trial that was stopped from outside: `stuck`, the entry whose code may never return, or
  *                                        `null`, and `trying`, the entry that was tried
  */
@@ -19,14 +19,14 @@ import { current } from './lab/core/piece.js'
 import { fromBase64 } from './lab/trial/base64.js'
 import { Guard } from './lab/trial/guard.js'
 import { lookUp } from './lab/trial/names.js'
-import { runTrial, stuck } from './lab/trial/trial.js'
+import { runTrial, stuckEntry } from './lab/trial/trial.js'
 
 const buffers = new Map()
-const printed = []
+const output = []
 let engine = null
 let guard = null
 let failure = 'the engine has not been started'
-const beats = new Uint32Array(1) // counted up whenever a trial gets on, for those who look from outside while it runs
+const beats = new Uint32Array(1) // incremented as a trial makes progress, for the process outside to read
 buffers.set('beats', beats.buffer)
 
 globalThis.setTimeout = () => {
@@ -44,8 +44,8 @@ globalThis.buffer = (name) => buffers.get(name)
 globalThis.boot = () => {
   const module = new WebAssembly.Module(buffers.get('wasm'))
   buffers.delete('wasm')
-  createEngine(loadMujoco, module, (text) => printed.push(text)).then(
-    (started) => (engine = started),
+  createEngine(loadMujoco, module, (text) => output.push(text)).then(
+    (instance) => (engine = instance),
     (error) => (failure = error.message),
   )
   return ''
@@ -59,16 +59,16 @@ globalThis.booted = () => {
 globalThis.trial = (json) => {
   const request = JSON.parse(json)
   const bytes = request.mjb === undefined ? new Uint8Array(buffers.get('mjb')) : fromBase64(request.mjb)
-  printed.length = 0
+  output.length = 0
   guard ??= new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
   const now = () => {
     beats[0]++
     return performance.now()
   }
   const reply = runTrial(engine, request, bytes, now, guard)
-  return JSON.stringify({ ...reply, printed: printed.slice(0, 100) })
+  return JSON.stringify({ ...reply, printed: output.slice(0, 100) })
 }
 
 globalThis.lookUp = (json) => JSON.stringify(lookUp(engine, new Uint8Array(buffers.get('mjb')), JSON.parse(json)))
 
-globalThis.trying = () => JSON.stringify({ stuck: stuck(performance.now()), trying: current.trying ?? [] })
+globalThis.trying = () => JSON.stringify({ stuck: stuckEntry(performance.now()), trying: current.trying ?? [] })

@@ -9,11 +9,11 @@ import { Instrument } from './lab/page/instrument.js'
 import { mountCustom } from './lab/page/custom.js'
 import { Workbench } from './lab/page/workbench.js'
 import { readLink } from './lab/page/share.js'
-import { missing } from './lab/page/support.js'
+import { missingFeature } from './lab/page/support.js'
 import { fill } from './lab/page/words.js'
 
 /**
- * Put a live instrument in the place of a lab's static form, which stays where it cannot run.
+ * Put a live instrument in place of a lab's static form, which stays if the lab cannot run.
  *
  * @param {HTMLElement} element has `data-config`, the address of the lab's JSON
  * @param {(key: string) => string} texts of the interface
@@ -22,7 +22,7 @@ import { fill } from './lab/page/words.js'
 export async function mountLab(element, texts, progress = null) {
   const words = (key, values) => fill(texts(key), values)
   try {
-    const lack = missing()
+    const lack = missingFeature()
     if (lack !== null) throw new Error(words(lack))
     const base = new URL(element.dataset.config, document.baseURI).href
     const response = await fetch(base)
@@ -40,7 +40,7 @@ export async function mountLab(element, texts, progress = null) {
   }
 }
 
-/** A reader who had come to the static form by keyboard goes on in the instrument that hides it. */
+/** Move the keyboard focus from the static form, which is now hidden, into the instrument. */
 function moveFocus(element) {
   if (!element.querySelector('.lab-static')?.contains(document.activeElement)) return
   element.querySelector('.lab-live :is(button, input, select, a[href], [tabindex])')?.focus({ preventScroll: true })

@@ -1,4 +1,4 @@
-/** The course map and the pages of levels: marks of what is read. A script of its own, which only these pages load. */
+/** Marks what is read on the course map and the pages of levels. A separate script, which only these pages load. */
 
 import { showMap } from './progress/map.js'
 

@@ -1,12 +1,12 @@
 /**
- * The page on what is kept: says it, lets the reader choose, and names the page that could not be shown.
+ * The page about offline reading: shows the state, lets the reader choose, and links to the page that could not be shown.
  *
- * Loaded by that page only. Without it the page says that nothing is kept here.
+ * Loaded by that page only. Without it the page says that nothing is stored.
  */
 
 import { FILES, groupsFor, isSparing, parseList } from './offline/list.js'
 import { Store } from './offline/store.js'
-import { begun, storeChoice, storedChoice, visit, workingRoot } from './page/offline.js'
+import { activeWorker, storeChoice, storedChoice, visit, workingRoot } from './page/offline.js'
 import { readWords } from './page/words.js'
 
 const words = readWords(document)
@@ -24,23 +24,23 @@ function fill(key, values) {
   return words(`offline.live.${key}`).replace(/\{(\w+)\}/g, (whole, name) => values[name] ?? whole)
 }
 
-/** Where another page was asked for, a way back to it; as soon as there is a network, by itself. */
+/** Show the page that could not be shown, with a link to it; go there as soon as there is a network. */
 function nameMissing(place) {
-  const from = new URLSearchParams(location.search).get('from')
-  if (!from) return
-  const wanted = new URL(from, location.href)
-  if (wanted.origin !== location.origin || !wanted.pathname.startsWith(root.pathname)) return
+  const failedAddress = new URLSearchParams(location.search).get('from')
+  if (!failedAddress) return
+  const url = new URL(failedAddress, location.href)
+  if (url.origin !== location.origin || !url.pathname.startsWith(root.pathname)) return
   const paragraph = document.createElement('p')
   paragraph.className = 'keep-missing'
   const address = document.createElement('span')
   address.className = 'keep-address'
-  address.textContent = readable(wanted)
+  address.textContent = readable(url)
   const link = document.createElement('a')
-  link.href = wanted.href
+  link.href = url.href
   link.textContent = words('offline.live.retry')
   paragraph.append(words('offline.live.missing'), ' ', address, ' ', link)
   place.before(paragraph)
-  window.addEventListener('online', () => location.replace(wanted.href))
+  window.addEventListener('online', () => location.replace(url.href))
 }
 
 function readable({ pathname, search }) {
@@ -57,35 +57,35 @@ async function begin(place) {
   else await listOnly(place, store)
 }
 
-/** The list as the host has it, where nothing is kept and so no list. */
+/** Offer the choices while nothing is stored. */
 async function listOnly(place, store) {
   await offer(place, store)
   say(place, words('offline.live.never'))
 }
 
-/** Have the worker bring everything up to date, and say how far it is. */
-async function keepUp(place, store, first = () => {}) {
+/** Let the worker update everything, and show its progress. */
+async function keepUp(place, store, onList = () => {}) {
   const keep = storedChoice(document)
-  const worker = await begun(navigator, root)
+  const worker = await activeWorker(navigator, root)
   let offered = false
   const report = async ({ end, here, total, full, lost }) => {
     if (!offered && (end || (await store.lists()).length > 0)) {
       offered = true
-      await first()
+      await onList()
     }
     say(place, fill(!end ? 'busy' : full ? 'full' : lost ? 'lost' : 'done', { n: here, total }))
   }
-  // One report after the other: the first ones have to wait for the store, and must not be said after the last.
-  let reported = Promise.resolve()
-  visit(window, worker, { keep, look: true }, (told) => {
-    reported = reported.then(() => report(told)).catch(({ message }) => say(place, fill('failed', { message })))
+  // One report after the other: the first ones wait for the store, and must not be shown after the last.
+  let lastReport = Promise.resolve()
+  visit(window, worker, { keep, look: true }, (progress) => {
+    lastReport = lastReport.then(() => report(progress)).catch(({ message }) => say(place, fill('failed', { message })))
   })
 }
 
-/** The choices, in the place of what the page says without a script. */
+/** Replace the text of the page without scripts by the choices. */
 async function offer(place, store) {
   const list = await newestList(store)
-  const chosen = storedChoice(document)
+  const stored = storedChoice(document)
   const automatic = list && groupsFor('auto', list, isSparing(navigator.connection)).includes('text') ? 'text' : 'read'
   const group = document.createElement('fieldset')
   const legend = document.createElement('legend')
@@ -97,7 +97,7 @@ async function offer(place, store) {
     button.type = 'radio'
     button.name = 'keep'
     button.value = choice
-    button.checked = choice === (chosen === 'auto' ? automatic : chosen)
+    button.checked = choice === (stored === 'auto' ? automatic : stored)
     button.addEventListener('change', () => choose(place, store, choice))
     const size = list ? megabytes((SIZES[choice] ?? []).reduce((sum, name) => sum + list.bytes[name], 0)) : '…'
     const text = document.createElement('span')
@@ -112,8 +112,8 @@ async function offer(place, store) {
 }
 
 async function newestList(store) {
-  const [kept] = storedChoice(document) === 'none' ? [] : await store.lists()
-  if (kept) return kept.list
+  const [stored] = storedChoice(document) === 'none' ? [] : await store.lists()
+  if (stored) return stored.list
   try {
     return parseList(await (await fetch(new URL(FILES, root))).text())
   } catch {
@@ -129,7 +129,7 @@ async function choose(place, store, choice) {
     await store.remove()
     return say(place, words('offline.live.never'))
   }
-  // What is asked for is not to go when the browser needs room.
+  // Do not let the browser remove what the reader asked for.
   if (choice === 'all') await navigator.storage?.persist?.().catch(() => {})
   await keepUp(place, store)
 }

@@ -1,7 +1,7 @@
 /**
- * What the preview has in the place of a site's service worker: one that goes at once.
+ * The preview's replacement of a site's service worker, which unregisters itself at once.
  *
- * A published site may have been served from the same address before, and its worker would still answer for it.
+ * A published site may have been served from this address before; its worker would still answer.
  */
 
 self.addEventListener('install', () => self.skipWaiting())
@@ -11,6 +11,6 @@ self.addEventListener('activate', (event) => event.waitUntil(leave()))
 async function leave() {
   const { scope } = self.registration
   await self.registration.unregister()
-  const own = (await self.caches.keys()).filter((name) => name.startsWith('coursebuild ') && name.endsWith(` ${scope}`))
-  await Promise.all(own.map((name) => self.caches.delete(name)))
+  const names = (await self.caches.keys()).filter((name) => name.startsWith('coursebuild ') && name.endsWith(` ${scope}`))
+  await Promise.all(names.map((name) => self.caches.delete(name)))
 }

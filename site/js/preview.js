@@ -1,8 +1,8 @@
 /**
- * The preview's part of a page: brings what the author saved into it, and shows what is wrong.
+ * The preview's script: updates the page when the author saves, and shows mistakes.
  *
  * Served by `coursebuild serve` only; a published site does not have it. It runs before the page's other scripts, while the page is
- * still what the server sent.
+ * still as the server sent it.
  */
 
 import { connect } from './preview/connection.js'
@@ -13,82 +13,82 @@ import { holdPlace } from './preview/place.js'
 import { Twin } from './preview/twin.js'
 import { dismissWorkers } from './preview/workers.js'
 
-const own = document.currentScript
-const page = own.dataset.page
+const script = document.currentScript
+const page = script.dataset.page
 const parse = (text) => new DOMParser().parseFromString(text, 'text/html')
 const stateOf = (next) => next.querySelector('script[data-state]')?.dataset.state ?? ''
 
-let state = own.dataset.state // of the page that is shown
-let wanted = state
-let taking = false
+let state = script.dataset.state // of the page on screen
+let target = state // of the page that the server has
+let isTaking = false
 let tool = null
-let latest = null // news
+let latestNews = null
 let head = document.cloneNode(true)
 const twin = new Twin(document.body)
 const panel = new Panel((place) => ask('open', { place }))
 const marks = new Marks((id) => ask('accept', { page, id }))
 
-/** Bring the page to the state that the server has, as often as that is another one by then. */
+/** Bring the page to the server's state, again and again while that changes. */
 async function take() {
-  if (taking) return
-  taking = true
+  if (isTaking) return
+  isTaking = true
   try {
-    while (wanted !== state && wanted !== '') {
+    while (target !== state && target !== '') {
       const response = await fetch(location.href, { cache: 'no-store' })
       const next = parse(await response.text())
       const fresh = stateOf(next)
       if (state === '' || needsLoad(head, next)) return location.reload()
-      if (fresh === '') break // it is gone again; that will be told
+      if (fresh === '') break // the page is gone again; a message will follow
       change(next)
       state = fresh
-      if (wanted !== fresh) await new Promise((again) => setTimeout(again, 20))
+      if (target !== fresh) await new Promise((resolve) => setTimeout(resolve, 20))
     }
   } catch {
-    // The server has gone; what is new is told when it is back.
+    // The server has stopped; it sends its state when it is back.
   } finally {
-    taking = false
+    isTaking = false
   }
 }
 
 function change(next) {
   const keep = holdPlace()
   takeHead(next)
-  const changed = twin.update(next.body)
+  const nodes = twin.update(next.body)
   head = next
-  document.dispatchEvent(new CustomEvent('coursebuild:changed', { detail: changed }))
-  if (latest !== null) marks.show(latest)
+  document.dispatchEvent(new CustomEvent('coursebuild:changed', { detail: nodes }))
+  if (latestNews !== null) marks.show(latestNews)
   keep()
 }
 
-/** Ask the preview to do something; gives why it did not, or nothing. */
-async function ask(what, values) {
+/** Ask the server to do something; returns why it did not, or nothing. */
+async function ask(command, values) {
   try {
-    const response = await fetch(`/.coursebuild/${what}`, { method: 'POST', body: JSON.stringify(values) })
+    const response = await fetch(`/.coursebuild/${command}`, { method: 'POST', body: JSON.stringify(values) })
     return (await response.json()).message
   } catch {
     return 'the preview does not answer'
   }
 }
 
-dismissWorkers(navigator).catch(() => {}) // a browser may keep them from pages
+dismissWorkers(navigator).catch(() => {}) // a browser may hide them from pages
 
 connect(page, {
-  hello(told) {
-    if (tool !== null && tool !== told.tool) location.reload() // another version of the preview itself
-    tool = told.tool
-    panel.state({ lost: false })
+  hello(greeting) {
+    if (tool !== null && tool !== greeting.tool) location.reload() // another version of the preview itself
+    tool = greeting.tool
+    panel.setState({ lost: false })
   },
-  page(now) {
-    wanted = now
-    panel.state({ gone: now === '' && state !== '' })
+  page(newState) {
+    target = newState
+    panel.setState({ gone: newState === '' && state !== '' })
     take()
   },
-  news(told) {
-    latest = told
-    panel.show(told)
+  news(news) {
+    latestNews = news
+    panel.show(news)
     const keep = holdPlace()
-    marks.show(told)
+    marks.show(news)
     keep()
   },
-  lost: () => panel.state({ lost: true }),
+  lost: () => panel.setState({ lost: true }),
 })

@@ -1,4 +1,4 @@
-/** Quizzes, loaded by site.js when one comes near; see page/quizzes.js. */
+/** The script of quizzes, loaded when one comes near; see page/quizzes.js. */
 
 import { leaveQuizzes, mountQuestion, mountQuizzes } from './quiz/mount.js'
 

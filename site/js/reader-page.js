@@ -1,4 +1,4 @@
-/** The pages about the reader's progress. A script of its own, which only these pages load. */
+/** The pages about the reader's progress. A separate script, which only these pages load. */
 
 import { showPage } from './progress/page.js'
 import { showReview } from './progress/review.js'

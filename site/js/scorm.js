@@ -1,8 +1,8 @@
 /**
  * The page that a learning platform opens for a lesson: it shows the lesson in a frame, and speaks SCORM 1.2 for it.
  *
- * The pages in the frame are those of the site. One visit lasts as long as this page: whoever follows a link to the glossary or to
- * another lesson and comes back is still in it, and answers on other lessons' pages are not this lesson's.
+ * The pages in the frame are those of the site. A visit lasts as long as this page: following a link to the glossary or to another
+ * lesson does not end it, and answers on other lessons' pages do not count for this lesson.
  */
 
 import { openProgress } from './progress/store.js'
@@ -17,7 +17,7 @@ const { lesson, src } = main.dataset
 const frame = main.querySelector('iframe')
 const notice = main.querySelector('[role="status"]')
 
-function ownStorage() {
+function openStorage() {
   try {
     return localStorage
   } catch {
@@ -39,11 +39,11 @@ function begin() {
     frame.src = src
     return
   }
-  const visit = new Visit(session, { lesson, course }, openProgress(course), ownStorage())
+  const visit = new Visit(session, { lesson, course }, openProgress(course), openStorage())
   const check = () => say(session.trouble.length ? 'unkept' : '')
   followFrame(frame, lesson, visit, check)
   addEventListener('pagehide', () => visit.ends())
-  // The browser may bring the page back as it was, after its visit has ended.
+  // The browser may restore the page from its cache after the visit has ended.
   addEventListener('pageshow', ({ persisted }) => persisted && location.reload())
   frame.src = session.location ? `${src}#${encodeURIComponent(session.location)}` : src
 }

@@ -1,8 +1,8 @@
 /**
- * The site's service worker: keeps the course in the browser and shows it where there is no network.
+ * The site's service worker: stores the course in the browser and shows it without a network.
  *
- * What it answers is decided in offline/answer.js, what it keeps in offline/update.js. It is the same text for every course. A page
- * tells it, by a message and once it has nothing else to do, that it was visited: that is when anything is fetched.
+ * offline/answer.js decides what it answers, offline/update.js what it stores. Its text is the same for every course. A page that
+ * has nothing else to do sends it the message that it was visited; only then is anything fetched.
  */
 
 import { answer, isOurs } from './offline/answer.js'
@@ -15,18 +15,18 @@ const scope = self.registration.scope
 const store = new Store(self.caches, scope)
 const get = (...request) => self.fetch(...request)
 
-/** Milliseconds for which the host is not asked for its list again. */
+/** Milliseconds before the host is asked for its list again. */
 const FRESH = 60_000
 
-const shownTo = new Map() // page → digest of the state that was kept and shown; the worker may forget it
-let looked = -Infinity
+const storedVersions = new Map() // client id → digest of the stored page that was shown; lost when the browser stops the worker
+let lastCheck = -Infinity
 let running = Promise.resolve()
 
 self.addEventListener('install', () => self.skipWaiting())
 
-self.addEventListener('activate', (event) => event.waitUntil(begin()))
+self.addEventListener('activate', (event) => event.waitUntil(activate()))
 
-async function begin() {
+async function activate() {
   await self.registration.navigationPreload?.enable()
   await store.removeOthers()
   await self.clients.claim()
@@ -35,52 +35,52 @@ async function begin() {
 self.addEventListener('fetch', (event) => {
   const { request, preloadResponse, resultingClientId } = event
   if (!isOurs(request, scope)) return
-  const around = {
+  const services = {
     store,
     fetch: get,
     preload: request.mode === 'navigate' ? preloadResponse : undefined,
-    wait: (time) => new Promise((done) => setTimeout(done, time)),
-    later: (work) => event.waitUntil(work),
-    shown: (digest) => shownTo.set(resultingClientId, digest),
+    wait: (time) => new Promise((resolve) => setTimeout(resolve, time)),
+    waitUntil: (work) => event.waitUntil(work),
+    onStored: (digest) => storedVersions.set(resultingClientId, digest),
   }
-  event.respondWith(answer(request, around))
+  event.respondWith(answer(request, services))
 })
 
 self.addEventListener('message', (event) => {
   const { data, ports, source } = event
   if (data?.coursebuild !== 'visit' || !ports[0]) return
-  // Whatever fails, the page must not wait for ever.
-  const failed = () => ports[0].postMessage({ here: 0, total: 0, full: false, lost: true, end: true, bytes: null, now: '', shown: '' })
-  running = running.then(() => visit(data, ports[0], source)).catch(failed)
+  // Whatever fails, the page must get an end.
+  const reportFailure = () => ports[0].postMessage({ here: 0, total: 0, full: false, lost: true, end: true, bytes: null, now: '', shown: '' })
+  running = running.then(() => visit(data, ports[0], source)).catch(reportFailure)
   event.waitUntil(running)
 })
 
 async function visit({ pages, uses, keep, sparing, look }, port, source) {
-  const own = pages.map((address) => pathOf(address, scope)).filter((path) => path !== null)
-  const used = await needs(uses)
+  const ownPaths = pages.map((address) => pathOf(address, scope)).filter((path) => path !== null)
+  const usedPaths = await pathsUsed(uses)
   const open = await self.clients.matchAll({ type: 'window', includeUncontrolled: true })
   const wish = {
-    paths: [...own.flatMap(pagesFor), ...used],
+    paths: [...ownPaths.flatMap(pagesFor), ...usedPaths],
     keep,
     sparing,
-    look: look || Date.now() - looked > FRESH,
+    look: look || Date.now() - lastCheck > FRESH,
     alone: open.filter(({ url }) => url.startsWith(scope)).length <= 1,
   }
   const files = new Files(scope, get)
   const outcome = await update(store, files, wish, (here, total) => port.postMessage({ here, total }))
-  if (wish.look && !outcome.lost) looked = Date.now()
+  if (wish.look && !outcome.lost) lastCheck = Date.now()
   const [newest] = await store.lists()
   port.postMessage({
     ...outcome,
     end: true,
     bytes: newest?.list.bytes ?? null,
-    now: own.flatMap(pagesFor).map((path) => newest?.list.files.get(path)).find(Boolean) ?? '',
-    shown: shownTo.get(source?.id) ?? '',
+    now: ownPaths.flatMap(pagesFor).map((path) => newest?.list.files.get(path)).find(Boolean) ?? '',
+    shown: storedVersions.get(source?.id) ?? '',
   })
 }
 
-/** The paths of files that a page uses, and of those that its labs name: their engine comes to workers, of which pages do not know. */
-async function needs(addresses) {
+/** The paths of the files that a page uses, and of those that its labs name, as the page does not see what workers fetch. */
+async function pathsUsed(addresses) {
   const paths = new Set()
   const add = (address) => {
     const path = pathOf(address, scope)

@@ -1,4 +1,4 @@
-/** Makes a finished page better: nothing on it depends on this script. */
+/** The script of every page. Pages are complete without it; it adds comfort. */
 
 import { addCopyButtons } from './page/copy.js'
 import { followContents } from './page/contents.js'
@@ -15,7 +15,7 @@ import { addThemeSwitch } from './page/theme.js'
 import { unfoldLinked } from './page/unfold.js'
 import { readWords } from './page/words.js'
 import { showProgress } from './progress/index.js'
-import { settleAnswers } from './progress/settle.js'
+import { rekeyAnswers } from './progress/rekey.js'
 import { openProgress } from './progress/store.js'
 
 let table = readWords(document)
@@ -25,14 +25,14 @@ const progress = openProgress(document.documentElement.dataset.course ?? '')
 function improve(part) {
   addCopyButtons(part, words)
   markScrolling(part)
-  addLineNumbers(part, words) // after it: the numbers stay in reach of the keyboard
+  addLineNumbers(part, words) // after markScrolling: the numbers stay a keyboard stop
   loadLabs(part, words, progress)
   mountQuizzes(part, words, progress)
 }
 
 addThemeSwitch(document, words)
 addSearch(document, words)
-settleAnswers(document, progress)
+rekeyAnswers(document, progress)
 improve(document)
 gatePredictions(document, words, progress)
 followPredictions(document, progress)
@@ -53,7 +53,7 @@ document.addEventListener('coursebuild:changed', ({ detail: { added, removed } }
   addSearch(document, words)
   added.forEach(improve)
   gatePredictions(document, words, progress)
-  addLineNumbers(document, words) // of a listing of which only lines were replaced
+  addLineNumbers(document, words) // for listings of which only some lines were replaced
   leaveContents()
   leaveContents = followContents(document)
   leaveNotes()

@@ -9,8 +9,8 @@ function run(clock, { seconds, frame = 1 / 60, timestep = 0.002, most = Infinity
   let steps = 0
   for (let i = 0; i <= Math.round(seconds / frame); i++) {
     const now = start + i * frame
-    const made = Math.min(clock.owed(now, timestep), most)
-    clock.ran(made, timestep, now)
+    const made = Math.min(clock.stepsDue(now, timestep), most)
+    clock.countSteps(made, timestep, now)
     steps += made
   }
   return steps
@@ -58,36 +58,36 @@ test('a slow model runs slower and says by how much', () => {
 test('a pause of the machine is made up for only in part', () => {
   const clock = new Clock({ catchUp: 0.1 })
   run(clock, { seconds: 1 })
-  assert.equal(clock.owed(61, 0.002), 50)
+  assert.equal(clock.stepsDue(61, 0.002), 50)
 })
 
 test('after a stop nothing is owed', () => {
   const clock = new Clock()
   run(clock, { seconds: 1 })
   clock.stop()
-  assert.equal(clock.owed(100, 0.002), 0)
-  assert.equal(clock.owed(100.01, 0.002), 5)
+  assert.equal(clock.stepsDue(100, 0.002), 0)
+  assert.equal(clock.stepsDue(100.01, 0.002), 5)
 })
 
 test('a clock that goes backwards owes nothing for it', () => {
   const clock = new Clock()
-  clock.owed(5, 0.002)
-  assert.equal(clock.owed(4, 0.002), 0)
-  assert.equal(clock.owed(4.01, 0.002), 5)
+  clock.stepsDue(5, 0.002)
+  assert.equal(clock.stepsDue(4, 0.002), 0)
+  assert.equal(clock.stepsDue(4.01, 0.002), 5)
 })
 
 test('the timestep may change on the way', () => {
   const clock = new Clock()
-  clock.owed(0, 0.002)
-  assert.equal(clock.owed(0.01, 0.002), 5)
-  clock.ran(5, 0.002, 0.01)
-  assert.equal(clock.owed(0.02, 0.001), 10)
+  clock.stepsDue(0, 0.002)
+  assert.equal(clock.stepsDue(0.01, 0.002), 5)
+  clock.countSteps(5, 0.002, 0.01)
+  assert.equal(clock.stepsDue(0.02, 0.001), 10)
 })
 
 test('the wait is until the next step is due', () => {
   const clock = new Clock()
   clock.setSpeed(0.5)
-  clock.owed(0, 0.01)
-  clock.owed(0.004, 0.01)
+  clock.stepsDue(0, 0.01)
+  clock.stepsDue(0.004, 0.01)
   assert.ok(Math.abs(clock.wait(0.01) - 0.016) < 1e-12)
 })

@@ -27,7 +27,7 @@ function framed(xml, direction = DIRECTION) {
   framing.begin()
   const points = []
   for (let i = 0; i < 10; i++) {
-    framing.see(lab)
+    framing.observe(lab)
     points.push(...cloud(lab))
     lab.step(25)
   }
@@ -99,7 +99,7 @@ test('a model in which nothing moves has no camera of its own', () => {
   lab.start()
   const framing = new Framing(lab, DIRECTION)
   framing.begin()
-  framing.see(lab)
+  framing.observe(lab)
   lab.dispose()
   assert.equal(framing.fit(), null)
   assert.equal(framing.floor(), null)
@@ -113,7 +113,7 @@ test('a run in which something flies off is left out', () => {
     framing.begin()
     lab.data.qpos[2] = z
     lab.dirty = true
-    framing.see(lab)
+    framing.observe(lab)
     return framing.fit().distance
   }
   const [first, near, far] = [run(1), run(2), run(90)]

@@ -47,8 +47,8 @@ class Bench {
     while (!this.messages.some((m) => m.lab === lab && ['ready', 'error'].includes(m.type))) await new Promise(setImmediate)
     const session = this.host.sessions.get(lab)
     if (!session?.lab) return
-    const step = session.lab.one.bind(session.lab)
-    session.lab.one = () => {
+    const step = session.lab.stepOnce.bind(session.lab)
+    session.lab.stepOnce = () => {
       this.time += this.cost
       return step()
     }
@@ -373,15 +373,15 @@ test('a model that the reader wrote is compiled here; what MuJoCo says of it is 
 
 test('an engine that cannot be had is told, and tried again for the next lab', async () => {
   const bench = new Bench({ codes: { plain } })
-  const { compile: working } = bench.host.around
-  bench.host.around.compile = async () => {
+  const { compile: working } = bench.host.services
+  bench.host.services.compile = async () => {
     throw new Error('wasm: 503')
   }
   await bench.load('a')
   assert.deepEqual(bench.of('error').map(({ message, fatal }) => [message, fatal]), [
     ['the lab does not load: wasm: 503', false],
   ])
-  bench.host.around.compile = working
+  bench.host.services.compile = working
   await bench.load('b')
   assert.equal(bench.of('ready').length, 1)
 })

@@ -32,8 +32,8 @@ const around = (more = {}) => ({
   store,
   fetch: host.fetch,
   wait: () => new Promise(() => {}),
-  later: (promise) => work.push(promise),
-  shown: (digest) => shown.push(digest),
+  waitUntil: (promise) => work.push(promise),
+  onStored: (digest) => shown.push(digest),
   ...more,
 })
 const page = (path, more) => answer(request(path, { mode: 'navigate' }), around(more))

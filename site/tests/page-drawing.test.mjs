@@ -3,13 +3,13 @@
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { Matrix4, PerspectiveCamera, Scene, Vector3, Vector4 } from 'three'
-import { planeSeen, ropePieces } from '../js/lab/page/geometry.js'
+import { planeGeometry, ropePieces } from '../js/lab/page/geometry.js'
 import { Lights, ambientOf } from '../js/lab/page/lights.js'
 import { Materials, finishOf } from '../js/lab/page/materials.js'
 import { reflect } from '../js/lab/page/mirror.js'
 import { Solid } from '../js/lab/page/solid.js'
 import { Stage } from '../js/lab/page/stage.js'
-import { Flex, stretch } from '../js/lab/page/surfaces.js'
+import { Flex, writeTubeMatrix } from '../js/lab/page/surfaces.js'
 import { World, aim } from '../js/lab/page/world.js'
 import { withSmallTextures } from '../js/lab/trial/record.js'
 
@@ -100,7 +100,7 @@ const described = (parts = {}) => ({
 
 test('a metal has its colour in its highlight, and paint white', () => {
   const materials = new Materials(described({ materials: [{ ...INFO, metallic: 1, roughness: 0.5 }, { ...INFO, roughness: 0.5 }, INFO] }))
-  const [metal, paint, plain] = [0, 1, 2].map((id) => materials.make(id))
+  const [metal, paint, plain] = [0, 1, 2].map((id) => materials.makeMaterial(id))
   for (const material of [metal, paint, plain]) materials.paint(material, 0.8, 0.4, 0.2, 1)
   near(metal.specular.toArray(), [0.8, 0.4, 0.2])
   near(paint.specular.toArray(), [0.04, 0.04, 0.04])
@@ -134,7 +134,7 @@ const moved = (array, at, point) => new Vector3(...point).applyMatrix4(new Matri
 test('a tube is laid from one point to another, with its radius across', () => {
   for (const [a, b] of [[[0, 0, 0], [0, 0, 2]], [[1, 2, 3], [-1, 0.5, 3]], [[0, 0, 0], [0.1, 0, -9]]]) { // prettier-ignore
     const out = new Float32Array(32)
-    stretch(out, 16, Float32Array.from([9, 9, 9, ...a, ...b]), 3, 6, 0.25)
+    writeTubeMatrix(out, 16, Float32Array.from([9, 9, 9, ...a, ...b]), 3, 6, 0.25)
     near(moved(out, 16, [0, 0, -1]), a)
     near(moved(out, 16, [0, 0, 1]), b)
     const along = b.map((x, i) => x - a[i])
@@ -147,7 +147,7 @@ test('a tube is laid from one point to another, with its radius across', () => {
     assert.ok(new Matrix4().fromArray(out, 16).determinant() > 0, 'its outside stays outside')
   }
   const out = new Float32Array(16)
-  stretch(out, 0, [1, 1, 1, 1, 1, 1], 0, 3, 0.5)
+  writeTubeMatrix(out, 0, [1, 1, 1, 1, 1, 1], 0, 3, 0.5)
   assert.ok(out.every(Number.isFinite))
 })
 
@@ -184,14 +184,14 @@ test('from below a plane shows its other side, half seen through and lit as from
   const solid = new Solid(new Scene(), materials, { type: 0 })
   const row = new Float32Array([0, 0, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 2, 2, 1, 0.5, 0.5, 0.5, 1])
   const look = (z) => solid.update(row, 0, 12, 15, { eye: [0, 5, z], target: [0, 0, 0] })
-  const side = () => [solid.below, solid.meshes[0].geometry === planeSeen(true), solid.material.opacity, solid.material.transparent]
+  const side = () => [solid.isBelow, solid.meshes[0].geometry === planeGeometry(true), solid.material.opacity, solid.material.transparent]
   look(2)
   assert.deepEqual(side(), [false, false, 1, false])
   look(0.5)
   assert.deepEqual(side(), [true, true, 0.5, true])
   look(1.5)
   assert.deepEqual(side(), [false, false, 1, false])
-  const [above, below] = [false, true].map(planeSeen)
+  const [above, below] = [false, true].map(planeGeometry)
   assert.deepEqual([...below.attributes.normal.array], [...above.attributes.normal.array])
   assert.deepEqual([...below.attributes.uv.array], [...above.attributes.uv.array])
   assert.notDeepEqual([...below.index.array], [...above.index.array])

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { align, inOrder } from '../js/preview/align.js'
 import { summary } from '../js/preview/panel.js'
-import { stretch } from '../js/preview/text.js'
+import { difference } from '../js/preview/text.js'
 
 const same = (a, b) => a === b
 const alike = (a, b) => a[0] === b[0]
@@ -77,14 +77,14 @@ test('one stretch of a text is replaced', () => {
     ['aa', 'aaa'],
     ['one two three', 'one three'],
   ]) {
-    assert.equal(apply(before, stretch(before, after)), after, `${before} → ${after}`)
+    assert.equal(apply(before, difference(before, after)), after, `${before} → ${after}`)
   }
-  assert.deepEqual(stretch('one two', 'one 2 two'), { start: 4, count: 0, text: '2 ' })
+  assert.deepEqual(difference('one two', 'one 2 two'), { start: 4, count: 0, text: '2 ' })
 })
 
 test('no half of a character is left', () => {
-  assert.deepEqual(stretch('a\u{1f600}b', 'a\u{1f601}b'), { start: 1, count: 2, text: '\u{1f601}' })
-  assert.deepEqual(stretch('\u{1f600}', '\u{1fa00}'), { start: 0, count: 2, text: '\u{1fa00}' })
+  assert.deepEqual(difference('a\u{1f600}b', 'a\u{1f601}b'), { start: 1, count: 2, text: '\u{1f601}' })
+  assert.deepEqual(difference('\u{1f600}', '\u{1fa00}'), { start: 0, count: 2, text: '\u{1fa00}' })
 })
 
 test('the button says how things stand', () => {

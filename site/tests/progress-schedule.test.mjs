@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
-import { agenda, counts, standing, WAITS } from '../js/progress/schedule.js'
+import { agenda, changesSchedule, reviewState, WAITS } from '../js/progress/schedule.js'
 import { random } from './progress-helpers.mjs'
 
 const DAY = 86_400_000
@@ -11,9 +11,9 @@ const wrong = (at) => ({ right: false, at })
 const right = (at) => ({ right: true, at })
 
 test('what was right at the first go does not come back', () => {
-  assert.equal(standing([], START), null)
-  assert.equal(standing([right(START)], START), null)
-  assert.equal(counts([], right(START)), false)
+  assert.equal(reviewState([], START), null)
+  assert.equal(reviewState([right(START)], START), null)
+  assert.equal(changesSchedule([], right(START)), false)
 })
 
 test('a missed question comes back the next evening, then later and later, and leaves', () => {
@@ -21,47 +21,47 @@ test('a missed question comes back the next evening, then later and later, and l
   let day = START
   const gaps = []
   for (let round = 0; round < 5; round++) {
-    const { box, due } = standing(recalls, day)
+    const { box, due } = reviewState(recalls, day)
     assert.equal(box, round)
     assert.ok(due > day && due < day + WAITS[round] + DAY)
     const next = day + Math.ceil((due - day) / DAY) * DAY
     gaps.push((next - day) / DAY)
     day = next
-    assert.ok(counts(recalls, right(day)))
+    assert.ok(changesSchedule(recalls, right(day)))
     recalls = [...recalls, right(day)]
   }
   assert.deepEqual(gaps, [1, 3, 7, 16, 35])
-  assert.equal(standing(recalls, day), null)
+  assert.equal(reviewState(recalls, day), null)
 })
 
 test('missed again, it starts from the first box', () => {
   const recalls = [wrong(START), right(START + DAY), right(START + 4 * DAY), wrong(START + 11 * DAY)]
-  assert.deepEqual(standing(recalls.slice(0, 3), START + 5 * DAY), { box: 2, due: START + 4 * DAY + WAITS[2] })
-  assert.deepEqual(standing(recalls, START + 11 * DAY), { box: 0, due: START + 11 * DAY + WAITS[0] })
+  assert.deepEqual(reviewState(recalls.slice(0, 3), START + 5 * DAY), { box: 2, due: START + 4 * DAY + WAITS[2] })
+  assert.deepEqual(reviewState(recalls, START + 11 * DAY), { box: 0, due: START + 11 * DAY + WAITS[0] })
 })
 
 test('an answer before its day moves nothing and is not kept', () => {
   const recalls = [wrong(START)]
   const early = right(START + 60_000)
-  assert.deepEqual(standing([...recalls, early], START), standing(recalls, START))
-  assert.equal(counts(recalls, early), false)
+  assert.deepEqual(reviewState([...recalls, early], START), reviewState(recalls, START))
+  assert.equal(changesSchedule(recalls, early), false)
 })
 
 test('tries that follow each other are one miss; a miss on another day counts', () => {
-  assert.equal(counts([wrong(START)], wrong(START + 60_000)), false)
-  assert.equal(counts([wrong(START)], wrong(START + DAY / 2)), true)
+  assert.equal(changesSchedule([wrong(START)], wrong(START + 60_000)), false)
+  assert.equal(changesSchedule([wrong(START)], wrong(START + DAY / 2)), true)
 })
 
 test('a clock that was ahead makes a question due at once, not in years', () => {
   const now = START
   const ahead = START + 3650 * DAY
-  assert.deepEqual(standing([wrong(ahead)], now), { box: 0, due: now })
-  assert.equal(standing([wrong(ahead), right(now)], now).box, 1)
-  assert.deepEqual(standing([wrong(now), right(ahead)], now), { box: 1, due: now })
+  assert.deepEqual(reviewState([wrong(ahead)], now), { box: 0, due: now })
+  assert.equal(reviewState([wrong(ahead), right(now)], now).box, 1)
+  assert.deepEqual(reviewState([wrong(now), right(ahead)], now), { box: 1, due: now })
 })
 
 test('a clock that was behind makes a question due at once', () => {
-  const { box, due } = standing([wrong(0)], START)
+  const { box, due } = reviewState([wrong(0)], START)
   assert.equal(box, 0)
   assert.ok(due < START)
 })
@@ -75,8 +75,8 @@ test('leaving out what does not count gives the same standing, in random histori
       at += Math.floor(draw() ** 8 * 30 * DAY)
       const recall = draw() < 0.6 ? right(at) : wrong(at)
       all = [...all, recall]
-      if (counts(kept, recall)) kept = [...kept, recall]
-      assert.deepEqual(standing(all, at), standing(kept, at))
+      if (changesSchedule(kept, recall)) kept = [...kept, recall]
+      assert.deepEqual(reviewState(all, at), reviewState(kept, at))
     }
   }
 })

@@ -95,11 +95,11 @@ test('an entry that is not as it should be is told by its place, and the others 
     assert.deepEqual([...state.answers.get('q').keys()], ['good'], JSON.stringify(entry))
     assert.equal(told.length, 1)
     assert.ok(told[0] instanceof StateError)
-    assert.match(told[0].where, /^answers, q, bad/)
+    assert.match(told[0].path, /^answers, q, bad/)
   }
   const lessons = { a: { place: { tick: 1, section: '', title: '', share: 2, at: '2026-01-01T00:00:00Z' } }, b: { read: { tick: 1, value: 1 } } }
   const told = []
-  assert.equal(decode({ reset: 0, answers: {}, lessons }, (error) => told.push(error.where)).lessons.size, 0)
+  assert.equal(decode({ reset: 0, answers: {}, lessons }, (error) => told.push(error.path)).lessons.size, 0)
   assert.deepEqual(told, ['lessons, a, place', 'lessons, b, read'])
   for (const whole of [null, [], 'x', {}, { answers: {}, lessons: [] }, { answers: {}, lessons: {}, reset: null }]) {
     assert.throws(() => decode(whole, assert.fail), StateError)

@@ -53,7 +53,7 @@ test('whatever the clock says, what is kept can be read again', () => {
     const progress = open(browser, { now: clock(time) })
     for (const at of [undefined, 'now', '+275760-09-13T00:00:00.000Z']) progress.put('q', String(at), answer({ right: false, at }))
     progress.markLesson('1.1', true)
-    progress.readLesson('1.1', { at: '', share: 0.5 })
+    progress.readLesson('1.1', { anchor: '', share: 0.5 })
     assert.equal(open(browser).all().length, 3)
     assert.equal(open(browser).trouble(), null)
     assert.ok(open(browser).lessons().get('1.1').read)
@@ -86,11 +86,11 @@ test('the same answer again is a recall where the caller says so', () => {
 test('lessons: how far, where last, read or not', () => {
   const progress = open()
   assert.equal(progress.last(), null)
-  progress.readLesson('4.2', { at: 'energy', title: 'Energy <b>', share: 0.5 })
-  progress.readLesson('4.1', { at: '', share: 0 })
+  progress.readLesson('4.2', { anchor: 'energy', title: 'Energy <b>', share: 0.5 })
+  progress.readLesson('4.1', { anchor: '', share: 0 })
   assert.equal(progress.last().id, '4.1')
   progress.now.time -= DAY
-  progress.readLesson('4.2', { at: 'work', title: 'Work', share: 0.25 })
+  progress.readLesson('4.2', { anchor: 'work', title: 'Work', share: 0.25 })
   assert.equal(progress.last().id, '4.2', 'whatever the clock says')
   assert.equal(progress.last().section, 'work')
   progress.markLesson('4.1', true)
@@ -106,7 +106,7 @@ test('two tabs see what the other does', () => {
   const browser = new Browser()
   const [one, two] = [open(browser), open(browser)]
   const heard = []
-  const stop = two.onChange(({ here }) => heard.push(here))
+  const stop = two.onChange(({ isLocal }) => heard.push(isLocal))
   one.put('q', 'k', answer())
   assert.deepEqual(two.get('q', 'k'), answer())
   two.put('q', 'l', answer())
@@ -161,7 +161,7 @@ test('what a reset took can be brought back from a file, once, and is then like 
   const one = open(browser)
   one.put('q', 'k', answer({ right: false }))
   one.markLesson('1.1', true)
-  one.readLesson('1.2', { at: '', share: 0 })
+  one.readLesson('1.2', { anchor: '', share: 0 })
   const file = one.exportText()
   one.reset()
   one.put('q', 'new', answer())
@@ -224,7 +224,7 @@ test('two devices exchange files', () => {
   desk.put('q', 'desk', answer())
   desk.markLesson('1.1', true)
   phone.put('q', 'both', answer({ given: 'phone', right: false }))
-  phone.readLesson('1.1', { at: 'start', title: 'Start', share: 0.1 })
+  phone.readLesson('1.1', { anchor: 'start', title: 'Start', share: 0.1 })
   assert.deepEqual(importText(desk, phone.exportText()), { answers: 1, lessons: 1, restorable: 0 })
   assert.deepEqual(importText(phone, desk.exportText()), { answers: 1, lessons: 1, restorable: 0 })
   assert.equal(desk.exportText(), phone.exportText())
@@ -289,8 +289,8 @@ test('a storage that is closed, in every way, keeps for this page', () => {
     assert.equal(importText(progress, progress.exportText()).answers, 0)
     progress.reset()
     assert.deepEqual(progress.all(), [])
-    assert.equal(progress.aside(), null)
-    progress.dropAside()
+    assert.equal(progress.damagedText(), null)
+    progress.dropDamaged()
   }
   Object.defineProperty(globalThis, 'localStorage', { configurable: true, get: broken })
   assert.equal(openProgress('c').trouble(), 'closed')
@@ -349,9 +349,9 @@ test('a damaged text is put aside, what can be read of it is taken over', () => 
     progress.put('q', 'm', answer())
     assert.deepEqual(open(browser).all().map(({ key }) => key), [...left, 'm'])
     assert.equal(open(browser).trouble(), null)
-    assert.equal(progress.aside(), damaged)
-    progress.dropAside()
-    assert.equal(progress.aside(), null)
+    assert.equal(progress.damagedText(), damaged)
+    progress.dropDamaged()
+    assert.equal(progress.damagedText(), null)
   }
 })
 
@@ -389,7 +389,7 @@ test('answers find their questions again by key, else by number and kind', () =>
     { key: 'other', kind: 'order', number: 3 },
     { key: 'a', kind: 'mcq', number: 4 },
   ]
-  const { found, orphans } = matchQuestions(kept, present)
+  const { matched: found, orphans } = matchQuestions(kept, present)
   assert.deepEqual([...found].map(([key, answer]) => [key, answer.key]).sort(), [
     ['a', 'a'],
     ['moved', 'moved'],
@@ -418,7 +418,7 @@ test('random histories of tabs and devices end in the same state everywhere', ()
       if (act < 4) tab.put('q', key, answer({ given: String(step), right: draw() < 0.5, tries: Math.floor(draw() * 3) }))
       else if (act < 5) tab.forget('q', key)
       else if (act < 6) tab.markLesson(key, draw() < 0.5)
-      else if (act < 7) tab.readLesson(key, { at: String(step), share: draw() })
+      else if (act < 7) tab.readLesson(key, { anchor: String(step), share: draw() })
       else if (act < 8 && draw() < 0.2) tab.reset()
       else if (act < 10) tab.tab.deliver()
       else importText(tab, devices[1 - devices.indexOf(device)].tabs[0].exportText())

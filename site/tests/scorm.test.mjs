@@ -4,7 +4,7 @@ import { grade, interaction } from '../js/scorm/answers.js'
 import { findApi } from '../js/scorm/find.js'
 import { clock, decimal, identifier, shortText, signOf, timespan } from '../js/scorm/formats.js'
 import { beginSession } from '../js/scorm/session.js'
-import { packed, unpacked } from '../js/scorm/suspend.js'
+import { pack, unpack } from '../js/scorm/suspend.js'
 import { Visit } from '../js/scorm/visit.js'
 import { openProgress } from '../js/progress/store.js'
 import { StrictApi } from './scorm-api.mjs'
@@ -102,7 +102,7 @@ const kept = (n, given = ['a'], right = true) => ({
 
 test('what is kept comes back', () => {
   const answers = [kept(1), kept(2, 'text', false), kept(3, { text: 'é "\\', mark: 'half' }, null)]
-  const back = unpacked(packed(answers, true))
+  const back = unpack(pack(answers, true))
   const sorted = (all) => [...all].sort((a, b) => (a.key < b.key ? -1 : 1))
   assert.deepEqual(sorted(back.answers), sorted(answers))
   assert.equal(back.read, true)
@@ -110,21 +110,21 @@ test('what is kept comes back', () => {
 
 test('it has room in 4096 characters, and the verdicts stay longest', () => {
   const answers = Array.from({ length: 30 }, (_, n) => kept(n, 'x'.repeat(10 + 40 * n)))
-  const text = packed(answers, false)
+  const text = pack(answers, false)
   assert.ok(text.length <= 4096, String(text.length))
-  const back = unpacked(text).answers
+  const back = unpack(text).answers
   assert.equal(back.length, 30)
   assert.ok(back.some(({ given }) => given === null))
   assert.equal(back.find(({ key }) => key === 'key0').given, 'x'.repeat(10))
-  const many = packed(Array.from({ length: 900 }, (_, n) => kept(n)), false)
+  const many = pack(Array.from({ length: 900 }, (_, n) => kept(n)), false)
   assert.ok(many.length <= 4096 && many.length > 3900, String(many.length))
-  assert.ok(unpacked(many).answers.some(({ key }) => key === 'key899'), 'the newest stays')
+  assert.ok(unpack(many).answers.some(({ key }) => key === 'key899'), 'the newest stays')
 })
 
 test('what is damaged is nothing', () => {
   for (const text of ['', 'x', '[]', 'null', '{"v":2,"q":{}}', '{"v":1,"q":null}', '{"v":1,"q":{"a":null}}', '{"v":1,"q":{"a":{"b":[9,1,1,1,1,1]}}}',
     '{"v":1,"q":{"a":{"b":[0,1,-1,1,1,1]}}}', '{"v":1,"q":{"a":{"b":[0,1,1,1,1,1e300]}}}', '{"v":1,"q":{"a":{"b":"x"}}}']) {
-    assert.deepEqual(unpacked(text), { answers: [], read: false })
+    assert.deepEqual(unpack(text), { answers: [], read: false })
   }
 })
 

@@ -234,7 +234,7 @@ def test_finger_that_rests_where_nothing_is_turns_as_ever(phone: Phone) -> None:
     x, y = middle(page)
     before = camera(page)
     fingers.down((x - 150, y + 100))
-    until(page, "() => made.hands.pointers.size === 1 && made.hands.resting === null")
+    until(page, "() => made.hands.pointers.size === 1 && made.hands.restingFinger === null")
     fingers.move((x - 50, y + 100))
     fingers.up()
     turned(page, before, azimuth=100)

@@ -1,17 +1,17 @@
 /**
- * What the worker answers a page's requests with.
+ * The service worker's answers to the requests of pages.
  *
- * Entry point: `answer(request, around)`; `isOurs` says which requests are answered at all.
+ * Entry point: `answer(request, services)`; `isOurs` says which requests are answered at all.
  *
- * - A page comes from the network. Where that does not answer in time, it comes from here; where it is not here, the page that says so.
- * - A file with a hash in its name comes from here, else from the network, and is kept then: it is the same for ever.
- * - Every other file comes from the network, and from here where that fails.
+ * - A page comes from the network; if that does not answer in time, from the store; if it is not there, the page about this is shown.
+ * - A file with a hash in its name comes from the store, else from the network, and is then stored: it never changes.
+ * - Every other file comes from the network, or from the store if that fails.
  */
 
 import { isWhole, plain } from './fetching.js'
 import { addressOf, isLasting, pagesFor, pathOf, rangeOf } from './list.js'
 
-/** Milliseconds that a page may take before the one that is kept is shown. */
+/** Milliseconds that a page may take before its stored copy is shown. */
 export const PATIENCE = 3000
 export const OFFLINE = 'offline/index.html'
 
@@ -24,95 +24,95 @@ export function isOurs(request, scope) {
 }
 
 /**
- * @typedef {object} Around
+ * @typedef {object} Services
  * @property {import('./store.js').Store} store
  * @property {typeof fetch} fetch
- * @property {Promise<Response | undefined>} [preload] what the browser began to fetch itself
+ * @property {Promise<Response | undefined>} [preload] the browser's own request, begun while the worker started
  * @property {(ms: number) => Promise<void>} wait
- * @property {(work: Promise<unknown>) => void} later keeps the worker alive for work that the answer does not wait for
- * @property {(digest: string) => void} shown is told that a page is one that was kept
+ * @property {(work: Promise<unknown>) => void} waitUntil keeps the worker alive for work that outlasts the answer
+ * @property {(digest: string) => void} onStored is called when a stored page is shown
  */
 
 /**
  * @param {Request} request one that `isOurs`
- * @param {Around} around
+ * @param {Services} services
  * @returns {Promise<Response>}
  */
-export function answer(request, around) {
-  const path = pathOf(request.url, around.store.scope)
-  if (request.mode === 'navigate') return page(request, path, around)
-  if (request.headers.has('Range')) return part(request, path, around)
-  return isLasting(path) ? lasting(request, path, around) : file(request, path, around)
+export function answer(request, services) {
+  const path = pathOf(request.url, services.store.scope)
+  if (request.mode === 'navigate') return answerPage(request, path, services)
+  if (request.headers.has('Range')) return answerPart(request, path, services)
+  return isLasting(path) ? answerLasting(request, path, services) : answerFile(request, path, services)
 }
 
-async function page(request, path, { store, fetch, preload, wait, later, shown }) {
+async function answerPage(request, path, { store, fetch, preload, wait, waitUntil, onStored }) {
   const network = Promise.resolve(preload)
-    .then((loaded) => loaded ?? fetch(request))
+    .then((preloaded) => preloaded ?? fetch(request))
     .then(
       (response) => ({ response }),
       (error) => ({ error }),
     )
-  const early = await Promise.race([network, wait(PATIENCE)])
-  if (early?.response && early.response.status < 500) return early.response
-  const kept = await store.find(pagesFor(path))
-  if (kept) {
-    later(network)
-    shown(kept.digest)
-    return kept.response
+  const earliest = await Promise.race([network, wait(PATIENCE)])
+  if (earliest?.response && earliest.response.status < 500) return earliest.response
+  const stored = await store.find(pagesFor(path))
+  if (stored) {
+    waitUntil(network)
+    onStored(stored.digest)
+    return stored.response
   }
   const { response } = await network
   if (response) return response
   if (pagesFor(path).includes(OFFLINE) || !(await store.find([OFFLINE]))) return Response.error()
-  const from = new URL(request.url)
+  const url = new URL(request.url)
   const place = new URL(addressOf('offline/', store.scope))
-  place.searchParams.set('from', from.pathname + from.search)
+  place.searchParams.set('from', url.pathname + url.search)
   return Response.redirect(place.href, 302)
 }
 
-async function lasting(request, path, { store, fetch, later }) {
-  const kept = (await store.get(path, '')) ?? (await store.find([path]))?.response
-  if (kept) return kept
+async function answerLasting(request, path, { store, fetch, waitUntil }) {
+  const stored = (await store.get(path, '')) ?? (await store.find([path]))?.response
+  if (stored) return stored
   const response = await fetch(request)
-  if (response.status === 200 && response.type === 'basic') later(keep(store, path, response.clone()))
+  if (response.status === 200 && response.type === 'basic') waitUntil(storeUsed(store, path, response.clone()))
   return response
 }
 
-/** Keep a file that was used, where it is the one that its name says. */
-async function keep(store, path, response) {
+/** Store a file that was used, if its content has the hash in its name. */
+async function storeUsed(store, path, response) {
   try {
     const read = await plain(response)
     if ((await store.lists()).length > 0 && (await isWhole(path, '', read.body))) {
       await store.put(path, '', read.response())
     }
   } catch {
-    // It did not come to its end, or there is no room.
+    // The response was cut short, or there is no room.
   }
 }
 
-async function file(request, path, { store, fetch }) {
+async function answerFile(request, path, { store, fetch }) {
   try {
     return await fetch(request)
   } catch (error) {
-    const kept = await store.find([path])
-    if (kept) return kept.response
+    const stored = await store.find([path])
+    if (stored) return stored.response
     throw error
   }
 }
 
-/** A part of a file: films are asked for in parts. */
-async function part(request, path, { store, fetch }) {
-  const kept = isLasting(path) ? await store.get(path, '') : null
-  if (kept) return cut(kept, request.headers.get('Range'))
+/** Answer with a range of a file: browsers request videos in ranges. */
+async function answerPart(request, path, { store, fetch }) {
+  const stored = isLasting(path) ? await store.get(path, '') : null
+  if (stored) return sliceOf(stored, request.headers.get('Range'))
   try {
     return await fetch(request)
   } catch (error) {
-    const found = await store.find([path])
-    if (found) return cut(found.response, request.headers.get('Range'))
+    const fallback = await store.find([path])
+    if (fallback) return sliceOf(fallback.response, request.headers.get('Range'))
     throw error
   }
 }
 
-async function cut(response, header) {
+async function sliceOf(response, header) {
   const body = await response.arrayBuffer()
   const range = rangeOf(header, body.byteLength)
   if (!range) return new Response(null, { status: 416, headers: { 'Content-Range': `bytes */${body.byteLength}` } })

@@ -1,14 +1,14 @@
 /**
- * Fetches files of the site so that what is kept is what the list says.
+ * Fetches the site's files in the versions of the list.
  *
- * Entry point: `new Files(scope, fetch)`. A file comes from the browser's own cache where its hash is the one of the list, else from
- * the host. One that is still another may be changed by the host on its way (some rewrite pages): it is taken where the list is the
- * newest and it is of the right kind. Otherwise a newer build is arriving, and `Changed` says so.
+ * Entry point: `new Files(scope, fetch)`. A file comes from the browser's own cache if its hash is that of the list, else from
+ * the host. If the host's file has another hash, too, the host may rewrite pages: the file is accepted if the list is still the
+ * newest and the file is of the right kind. Otherwise a newer build is being uploaded, and `Changed` is thrown.
  */
 
 import { FILES, addressOf, digitsOf } from './list.js'
 
-/** What is on the host is no more what the list says. */
+/** The host has another version than the list. */
 export class Changed extends Error {}
 
 /** The file is not on the host. */
@@ -24,7 +24,7 @@ export class Files {
     this.#fetch = fetch
   }
 
-  /** The text of the list that is on the host. */
+  /** Fetch the text of the host's list. */
   async list() {
     const response = await this.#fetch(new URL(FILES, this.#scope).href, { cache: 'no-cache' })
     if (!response.ok) throw new Missing(`the host says ${response.status}`)
@@ -32,7 +32,7 @@ export class Files {
     return this.#newest
   }
 
-  /** A file as it may be kept. @returns {Promise<Response>} */
+  /** Fetch a file for the store. @returns {Promise<Response>} */
   async file(path, digest) {
     let last = null
     for (const cache of ['default', 'no-cache']) {
@@ -48,7 +48,7 @@ export class Files {
   }
 }
 
-/** A response that was followed, unpacked and read: it can be kept under another address and be given for a page. */
+/** Read a response into a plain one, without redirects and compression, which can be stored and answer a navigation. */
 export async function plain(response) {
   const body = await response.arrayBuffer()
   const type = response.headers.get('Content-Type')
@@ -56,7 +56,7 @@ export async function plain(response) {
   return { body, type, response: () => new Response(body, { headers }) }
 }
 
-/** Whether bytes are those of a file, by the hash in the list, or else in its name. */
+/** Whether bytes have the hash of a file, which stands in the list or in its name. */
 export async function isWhole(path, digest, body) {
   const bytes = new Uint8Array(await crypto.subtle.digest('SHA-256', body))
   const digits = Array.from(bytes, (byte) => byte.toString(16).padStart(2, '0')).join('')

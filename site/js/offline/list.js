@@ -1,24 +1,24 @@
 /**
- * The list of the site's files (`files.json`), and the addresses of what is in it. Pure.
+ * The list of the site's files (`files.json`), and their addresses. Pure.
  *
- * A path is a file's place in the site, as it is named on disk; an address is what a browser asks for. A file in `assets/` with a hash
- * in its name is the same for ever; of every other file the list holds the first digits of a hash of its content.
+ * A path is a file's place in the site, as on disk; an address is what a browser requests. A file in `assets/` with a hash
+ * in its name never changes; of every other file the list holds the first digits of its content's hash.
  */
 
 export const FILES = 'files.json'
 export const GROUPS = ['shell', 'text', 'rest']
 
-/** Bytes of text that are fetched without being asked for: what a course of some hundred pages has, a few MB as they travel. */
+/** The most bytes of text that are fetched without asking: a course of some hundred pages, a few MB when compressed. */
 export const MODEST = 16_000_000
 
 /**
  * @typedef {object} List
- * @property {Map<string, string>} files digest by path; empty where the name has it
+ * @property {Map<string, string>} files digest by path; '' if the hash is in the name
  * @property {Record<string, string[]>} groups paths by group
  * @property {Record<string, number>} bytes by group
  */
 
-/** @returns {List} what the text of a list says; throws where it is none */
+/** Parse a list; throws on any other text. @returns {List} */
 export function parseList(text) {
   const data = JSON.parse(text)
   if (data?.format !== 1) throw new TypeError('this is no list of files that is understood here')
@@ -35,15 +35,15 @@ export function parseList(text) {
   return list
 }
 
-/** Whether a file is the same for ever. */
+/** Whether a file never changes. */
 export const isLasting = (path) => digitsOf(path) !== null
 
-/** The digits of its content's hash that a file has in its name; `null` where it has none. */
+/** The digits of the content's hash in a file's name, or `null`. */
 export function digitsOf(path) {
   return /^assets\/.*\.([0-9a-f]{8})\.[a-z0-9]+$/.exec(path)?.[1] ?? null
 }
 
-/** The path that an address means; `null` where it lies elsewhere, or cannot be read. */
+/** The path of an address; `null` if it is outside the site, or malformed. */
 export function pathOf(address, scope) {
   const { origin, pathname } = new URL(address)
   const root = new URL(scope)
@@ -60,22 +60,22 @@ export function addressOf(path, scope) {
   return new URL(path.split('/').map(encodeURIComponent).join('/'), scope).href
 }
 
-/** The files that a host may mean by an address, the likeliest first: hosts leave out `index.html`, and some `.html`. */
+/** The files that a host may serve for a path, the likeliest first: hosts add `index.html`, and some `.html`. */
 export function pagesFor(path) {
   if (path === '' || path.endsWith('/')) return [`${path}index.html`]
   return /\.[a-z0-9]+$/i.test(path) ? [path, `${path}.html`] : [path, `${path}.html`, `${path}/index.html`]
 }
 
-/** Whether the network should be spared: where the reader says so, and where it is slow or counted. */
+/** Whether to use the network sparingly: if the reader wants to save data, or it is slow or metered. */
 export function isSparing(connection) {
   if (!connection) return false
   return Boolean(connection.saveData) || connection.type === 'cellular' || /2g|3g/.test(connection.effectiveType ?? '')
 }
 
 /**
- * The groups that are to be here.
+ * The groups to store.
  *
- * @param {'auto' | 'read' | 'text' | 'all' | 'none'} keep what the reader wants; `auto`: has not said
+ * @param {'auto' | 'read' | 'text' | 'all' | 'none'} keep the reader's choice; `auto`: none yet
  * @param {List} list
  * @param {boolean} sparing
  */
@@ -85,7 +85,7 @@ export function groupsFor(keep, list, sparing) {
   return keep === 'auto' && !sparing && list.bytes.shell + list.bytes.text <= MODEST ? ['shell', 'text'] : ['shell']
 }
 
-/** What one asked for of a file, `bytes=2-5`, as [first, behind the last] of so many bytes; `null` where it cannot be had. */
+/** The range of a `Range` header, `bytes=2-5`, in a file of `size` bytes, as [start, end]; `null` if it cannot be satisfied. */
 export function rangeOf(header, size) {
   const match = /^bytes=(\d*)-(\d*)$/.exec(header.trim())
   if (!match || (match[1] === '' && match[2] === '')) return null

@@ -1,9 +1,9 @@
 /**
- * What is kept of one course: files, each under its path and digest, and the lists that say which of them belong together.
+ * The stored files of a course, each under its path and digest, and the lists that say which of them belong together.
  *
- * Entry point: `new Store(caches, scope)`. All of it lies in one cache, whose name has the scope in it, since several courses may have
- * one origin. The newest list comes first; older ones stay as long as pages of theirs are here that have not been fetched anew, so
- * that such a page finds the files that it was made with.
+ * Entry point: `new Store(caches, scope)`. All of it is in one cache, whose name contains the scope, since courses may share an
+ * origin. The newest list comes first; older ones stay as long as pages of theirs have not been fetched anew, so that such a page
+ * finds the files that it was made with.
  */
 
 import { addressOf, parseList } from './list.js'
@@ -11,7 +11,7 @@ import { addressOf, parseList } from './list.js'
 const FORMAT = 1
 const PREFIX = 'coursebuild '
 const LISTS = '?lists'
-/** Lists that are held at most: a reader who saves data may be some builds behind. */
+/** The most lists: a reader who saves data may be some builds behind. */
 const MOST = 3
 
 export class Store {
@@ -38,13 +38,13 @@ export class Store {
     return `${PREFIX}${FORMAT} ${this.#scope}`
   }
 
-  /** Remove what other versions of the tool kept of this course. */
+  /** Remove this course's caches of other versions of the tool. */
   async removeOthers() {
-    const own = (name) => name.startsWith(PREFIX) && name.endsWith(` ${this.#scope}`) && name !== this.name
-    await Promise.all((await this.#caches.keys()).filter(own).map((name) => this.#caches.delete(name)))
+    const isObsolete = (name) => name.startsWith(PREFIX) && name.endsWith(` ${this.#scope}`) && name !== this.name
+    await Promise.all((await this.#caches.keys()).filter(isObsolete).map((name) => this.#caches.delete(name)))
   }
 
-  /** Forget everything. */
+  /** Remove everything. */
   async remove() {
     this.#cache = this.#lists = null
     await this.#caches.delete(this.name)
@@ -53,20 +53,20 @@ export class Store {
   /** @returns {Promise<{text: string, list: import('./list.js').List}[]>} */
   async lists() {
     if (this.#lists === null) {
-      const kept = await (await this.#open()).match(this.#scope + LISTS)
-      this.#lists = kept ? understood(await kept.json().catch(() => [])) : []
+      const response = await (await this.#open()).match(this.#scope + LISTS)
+      this.#lists = response ? readLists(await response.json().catch(() => [])) : []
     }
     return this.#lists
   }
 
-  /** Put a list before the others, or only it in the place of all. Whole or not at all. */
+  /** Replace the lists, newest first, atomically. */
   async setLists(texts) {
     const body = JSON.stringify(texts.slice(0, MOST))
     await (await this.#open()).put(this.#scope + LISTS, new Response(body, { headers: { 'Content-Type': 'application/json' } }))
-    this.#lists = understood(JSON.parse(body))
+    this.#lists = readLists(JSON.parse(body))
   }
 
-  /** The name that a file is kept under. */
+  /** The key under which a file is stored. */
   key(path, digest) {
     return addressOf(path, this.#scope) + (digest && `?${digest}`)
   }
@@ -80,13 +80,13 @@ export class Store {
     await (await this.#open()).put(this.key(path, digest), response)
   }
 
-  /** The names of all files that are here. */
+  /** The keys of all stored files. */
   async keys() {
     const requests = await (await this.#open()).keys()
     return new Set(requests.map((request) => request.url))
   }
 
-  /** A page or file as the newest list that has it here says. @returns {Promise<{response: Response, digest: string} | null>} */
+  /** The stored version of the first of these paths, by the newest list that has one. @returns {Promise<{response: Response, digest: string} | null>} */
   async find(paths) {
     for (const { list } of await this.lists()) {
       for (const path of paths) {
@@ -98,15 +98,15 @@ export class Store {
     return null
   }
 
-  /** Remove what no list has. */
+  /** Remove the files that are in no list. */
   async sweep() {
     const cache = await this.#open()
-    const needed = new Set([this.#scope + LISTS])
+    const keys = new Set([this.#scope + LISTS])
     for (const { list } of await this.lists()) {
-      for (const [path, digest] of list.files) needed.add(this.key(path, digest))
+      for (const [path, digest] of list.files) keys.add(this.key(path, digest))
     }
     for (const request of await cache.keys()) {
-      if (!needed.has(request.url)) await cache.delete(request)
+      if (!keys.has(request.url)) await cache.delete(request)
     }
   }
 
@@ -116,14 +116,14 @@ export class Store {
   }
 }
 
-function understood(texts) {
-  const found = []
+function readLists(texts) {
+  const lists = []
   for (const text of Array.isArray(texts) ? texts : []) {
     try {
-      found.push({ text, list: parseList(text) })
+      lists.push({ text, list: parseList(text) })
     } catch {
       // A damaged list has no files.
     }
   }
-  return found
+  return lists
 }

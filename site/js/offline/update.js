@@ -1,12 +1,12 @@
 /**
- * Brings what is kept of a course up to date. One run at a time; killed at any point it leaves what there was, and the next goes on.
+ * Updates the stored files of a course. One run at a time; killed at any point, it leaves the old state, and the next run goes on.
  *
  * Entry point: `update(store, files, wish, tell)`.
  *
- * 1. The list is fetched. Where it is new, the files that every page needs are fetched first, and only then is it taken over.
- * 2. Missing files follow: the page that was visited and what it uses, pages that are here in an older state, the groups wished for.
- *    What did not change is here already, under the same digest.
- * 3. Once nothing older is in use, old lists are forgotten and files that belong to no list are removed.
+ * 1. Fetch the list. If it is new, fetch the files that every page needs, and only then store it.
+ * 2. Fetch missing files: the visited page and what it uses, pages stored in an older version, the groups wished for.
+ *    Files that did not change are stored already, under the same digest.
+ * 3. Once nothing older is in use, remove old lists and the files that are in no list.
  */
 
 import { Changed, Missing } from './fetching.js'
@@ -18,15 +18,15 @@ const AT_ONCE = 3
  * @typedef {object} Wish
  * @property {string[]} paths that were visited, and what they use
  * @property {'auto' | 'read' | 'text' | 'all' | 'none'} keep
- * @property {boolean} sparing whether the network is to be spared
- * @property {boolean} look whether the host is asked for a newer list
+ * @property {boolean} sparing whether to use the network sparingly
+ * @property {boolean} look whether to ask the host for a newer list
  * @property {boolean} alone whether no other page of the course is open
  */
 
 /**
  * @typedef {object} Outcome
- * @property {number} here files of the wished groups that are here
- * @property {number} total
+ * @property {number} here files of the wished groups that are stored
+ * @property {number} total files of the wished groups
  * @property {boolean} full whether there was no more room
  * @property {boolean} lost whether the network failed
  */
@@ -35,7 +35,7 @@ const AT_ONCE = 3
  * @param {import('./store.js').Store} store
  * @param {import('./fetching.js').Files} files
  * @param {Wish} wish
- * @param {(here: number, total: number) => void} tell how far it is
+ * @param {(here: number, total: number) => void} tell reports progress
  * @returns {Promise<Outcome>}
  */
 export async function update(store, files, wish, tell = () => {}) {
@@ -43,7 +43,7 @@ export async function update(store, files, wish, tell = () => {}) {
   try {
     await attempt(store, files, wish, tell, outcome).catch((error) => {
       if (!(error instanceof Changed)) throw error
-      return attempt(store, files, { ...wish, look: true }, tell, outcome) // a newer build came meanwhile
+      return attempt(store, files, { ...wish, look: true }, tell, outcome) // a newer build was uploaded meanwhile
     })
   } catch (error) {
     outcome.full = error?.name === 'QuotaExceededError'
@@ -54,38 +54,38 @@ export async function update(store, files, wish, tell = () => {}) {
 }
 
 async function attempt(store, files, wish, tell, outcome) {
-  const taken = await takeList(store, files, wish)
+  const isNewList = await takeList(store, files, wish)
   const [{ list }, ...older] = await store.lists()
-  const here = await store.keys()
-  const isHere = (path) => here.has(store.key(path, list.files.get(path)))
-  const outdated = [...list.files.keys()].filter((path) => !isHere(path) && isOlder(store, here, older, path))
+  const storedKeys = await store.keys()
+  const isHere = (path) => storedKeys.has(store.key(path, list.files.get(path)))
+  const outdated = [...list.files.keys()].filter((path) => !isHere(path) && isOlder(store, storedKeys, older, path))
   const wished = groupsFor(wish.keep, list, wish.sparing).flatMap((group) => list.groups[group])
   const visited = wish.paths.filter((path) => list.files.has(path))
-  const wanted = [...new Set([...visited, ...(wish.sparing ? [] : outdated), ...wished])]
-  outcome.total = wanted.length
-  outcome.here = wanted.filter(isHere).length
+  const paths = [...new Set([...visited, ...(wish.sparing ? [] : outdated), ...wished])]
+  outcome.total = paths.length
+  outcome.here = paths.filter(isHere).length
   const fetchOne = async (path) => {
     try {
-      await put(store, files, path, list.files.get(path))
+      await fetchInto(store, files, path, list.files.get(path))
     } catch (error) {
       if (!(error instanceof Missing)) throw error
-      return // it is in the list and not on the host: a build that arrives in parts
+      return // in the list but not on the host: a build is being uploaded
     }
-    here.add(store.key(path, list.files.get(path)))
+    storedKeys.add(store.key(path, list.files.get(path)))
     outcome.here += 1
     tell(outcome.here, outcome.total)
   }
-  await inTurn(wanted.filter((path) => !isHere(path)), fetchOne)
-  if (taken || !wish.alone) return
-  // Whatever is open was loaded after the newest list was taken.
-  const left = outdated.filter((path) => !isHere(path))
-  if (older.length > 0 && left.length === 0) {
+  await forEachInTurn(paths.filter((path) => !isHere(path)), fetchOne)
+  if (isNewList || !wish.alone) return
+  // Every open page was loaded after the newest list was stored.
+  const stale = outdated.filter((path) => !isHere(path))
+  if (older.length > 0 && stale.length === 0) {
     await store.setLists([(await store.lists())[0].text])
     await store.sweep()
   }
 }
 
-/** Take over a newer list, with the files that every page needs; says whether there was one. */
+/** Store a newer list, if any, after the files that every page needs; returns whether there was one. */
 async function takeList(store, files, wish) {
   const lists = await store.lists()
   if (lists.length > 0 && !wish.look) return false
@@ -94,29 +94,29 @@ async function takeList(store, files, wish) {
     text = await files.list()
   } catch (error) {
     if (lists.length === 0) throw error
-    return false // no network, or no such site any more: what is here stays
+    return false // no network, or the site is gone: the stored files stay
   }
   if (text === lists[0]?.text) return false
   const list = parseList(text)
-  const here = await store.keys()
-  const needed = list.groups.shell.filter((path) => !here.has(store.key(path, list.files.get(path))))
-  await inTurn(needed, (path) => put(store, files, path, list.files.get(path)))
-  await store.setLists([text, ...lists.map((one) => one.text)])
+  const storedKeys = await store.keys()
+  const missing = list.groups.shell.filter((path) => !storedKeys.has(store.key(path, list.files.get(path))))
+  await forEachInTurn(missing, (path) => fetchInto(store, files, path, list.files.get(path)))
+  await store.setLists([text, ...lists.map((older) => older.text)])
   return true
 }
 
-async function put(store, files, path, digest) {
+async function fetchInto(store, files, path, digest) {
   await store.put(path, digest, await files.file(path, digest))
 }
 
-/** Whether a file is here in the state of an older list; one with a hash in its name has one state. */
-function isOlder(store, here, older, path) {
+/** Whether a file is stored in the version of an older list; a file with a hash in its name has a single version. */
+function isOlder(store, storedKeys, older, path) {
   if (isLasting(path)) return false
-  return older.some(({ list }) => list.files.has(path) && here.has(store.key(path, list.files.get(path))))
+  return older.some(({ list }) => list.files.has(path) && storedKeys.has(store.key(path, list.files.get(path))))
 }
 
-/** A few at a time; the first failure ends it. */
-async function inTurn(paths, work) {
+/** Do `work` for all paths, a few at a time; the first failure ends it. */
+async function forEachInTurn(paths, work) {
   const rest = paths.values()
   const worker = async () => {
     for (const path of rest) await work(path)

@@ -1,4 +1,4 @@
-/** Marks the section that is being read in the contents list, and keeps it in sight in a long one. */
+/** Marks the current section in the list of contents, and keeps it in sight if the list scrolls. */
 
 /** The index of the last heading at or above `line` (px from the top of the window); -1 above the first. */
 export function currentHeading(tops, line) {
@@ -16,7 +16,7 @@ export function currentHeading(tops, line) {
  * How far a list that scrolls must move so that an entry is in sight, with room for one more on either side.
  * @param {{top: number, bottom: number}} list its edges, in px
  * @param {{top: number, bottom: number}} entry
- * @returns {number} px; 0 where the entry is in sight
+ * @returns {number} px; 0 if the entry is in sight
  */
 export function listMove(list, entry) {
   const room = Math.min(entry.bottom - entry.top, (list.bottom - list.top - entry.bottom + entry.top) / 2)
@@ -25,44 +25,44 @@ export function listMove(list, entry) {
   return 0
 }
 
-/** Gives a function that ends it. */
+/** Follow the reader's scrolling; returns a function that ends it. */
 export function followContents(document) {
   const links = [...document.querySelectorAll('.toc a[href^="#"]')]
   const pairs = links
     .map((link) => ({ link, heading: document.getElementById(decodeURIComponent(link.hash.slice(1))) }))
     .filter(({ heading }) => heading)
   if (pairs.length === 0) return () => {}
-  let marked = null
-  let waiting = false
+  let current = null
+  let isPending = false
   const mark = () => {
-    waiting = false
+    isPending = false
     const atEnd = innerHeight + scrollY >= document.documentElement.scrollHeight - 2
     const tops = pairs.map(({ heading }) => heading.getBoundingClientRect().top)
     const index = atEnd && scrollY > 0 ? lastVisible(tops) : currentHeading(tops, innerHeight * 0.25)
     const link = pairs[index]?.link ?? null
-    if (link === marked) return
-    marked?.removeAttribute('aria-current')
+    if (link === current) return
+    current?.removeAttribute('aria-current')
     link?.setAttribute('aria-current', 'location')
-    marked = link
+    current = link
     keepInSight(link, links[0])
   }
-  const later = () => {
-    if (!waiting) requestAnimationFrame(mark)
-    waiting = true
+  const schedule = () => {
+    if (!isPending) requestAnimationFrame(mark)
+    isPending = true
   }
-  const ended = new AbortController()
-  addEventListener('scroll', later, { passive: true, signal: ended.signal })
-  addEventListener('resize', later, { signal: ended.signal })
+  const abort = new AbortController()
+  addEventListener('scroll', schedule, { passive: true, signal: abort.signal })
+  addEventListener('resize', schedule, { signal: abort.signal })
   mark()
   return () => {
-    ended.abort()
-    marked?.removeAttribute('aria-current')
+    abort.abort()
+    current?.removeAttribute('aria-current')
   }
 }
 
-/** Scrolls a long list to its entry, but not away from somebody who goes through it by the keyboard. */
-function keepInSight(link, first) {
-  const list = first.closest('.toc')
+/** Scroll a long list to its entry, unless somebody is going through it by keyboard. */
+function keepInSight(link, anyLink) {
+  const list = anyLink.closest('.toc')
   if (list.scrollHeight <= list.clientHeight || list.querySelector(':focus-visible')) return
   if (link) list.scrollTop += listMove(list.getBoundingClientRect(), link.getBoundingClientRect())
   else list.scrollTop = 0

@@ -1,9 +1,9 @@
 /**
- * Footnotes beside their marks, where the window has a margin. They stay where they are in the page, a list at its end,
- * and are only shown elsewhere: each is there once, and on paper they are at the end.
+ * Footnotes beside their marks, if the window has a margin. In the document they stay a list at the end, which is where
+ * they are printed; only their position changes.
  *
- * A note stands at the height of its first mark, or below what is in its way: the note before it, and what takes the
- * margin as well. One that would come to stand far from its mark, or whose mark is folded away, is left at the end.
+ * A note stands at the height of its first mark, or below what is in its way: the note before it, and other content in the
+ * margin. A note that would stand far from its mark, or whose mark is folded away, is left at the end.
  */
 
 const WIDE = '(width >= 75rem)'
@@ -13,35 +13,35 @@ const FAR = 700 // px from a mark to its note
 /**
  * Heights at which notes stand, in px.
  *
- * @param {{mark: number | null, height: number}[]} notes in their order; a mark is null where it is not seen
- * @param {{top: number, bottom: number}[]} taken stretches of the margin, from the top
+ * @param {{mark: number | null, height: number}[]} notes in their order; a mark is null if it is not visible
+ * @param {{top: number, bottom: number}[]} obstacles stretches of the margin, from the top
  * @param {number} end of the margin
  * @returns {(number | null)[]} null for a note that finds no place
  */
-export function noteTops(notes, taken, end) {
-  let free = -Infinity
+export function noteTops(notes, obstacles, end) {
+  let nextFree = -Infinity
   return notes.map(({ mark, height }) => {
     if (mark === null) return null
-    let top = below(Math.max(mark, free), height, taken)
+    let top = firstFreeTop(Math.max(mark, nextFree), height, obstacles)
     if (top + height > end) {
-      const higher = end - height // the last may begin above its mark
-      top = higher >= Math.max(free, 0) && below(higher, height, taken) === higher ? higher : null
+      const raised = end - height // the last may begin above its mark
+      top = raised >= Math.max(nextFree, 0) && firstFreeTop(raised, height, obstacles) === raised ? raised : null
     }
     if (top === null || Math.abs(top - mark) > FAR) return null
-    free = top + height + GAP
+    nextFree = top + height + GAP
     return top
   })
 }
 
-/** The first height from `top` on at which nothing is in the way. */
-function below(top, height, taken) {
-  for (const stretch of taken) {
+/** The first height from `top` on at which there is no obstacle. */
+function firstFreeTop(top, height, obstacles) {
+  for (const stretch of obstacles) {
     if (stretch.top < top + height + GAP && top < stretch.bottom + GAP) top = stretch.bottom + GAP
   }
   return top
 }
 
-/** Keep the notes of a page beside their marks; gives a function that ends it. */
+/** Keep the notes of a page beside their marks; returns a function that ends it. */
 export function placeNotes(document) {
   const list = document.querySelector('.prose > .footnotes')
   if (!list) return () => {}
@@ -64,7 +64,7 @@ function arrange(prose, list, wide) {
   if (!wide) return
   const origin = prose.getBoundingClientRect().top
   const sizes = notes.map((note) => ({ mark: heightOf(markOf(note), origin), height: note.offsetHeight }))
-  const tops = noteTops(sizes, stretches(prose, list, notes[0]), list.getBoundingClientRect().top - origin)
+  const tops = noteTops(sizes, obstaclesOf(prose, list, notes[0]), list.getBoundingClientRect().top - origin)
   for (const [n, note] of notes.entries()) {
     note.classList.toggle('aside', tops[n] !== null)
     note.style.top = `${tops[n] ?? 0}px`
@@ -80,8 +80,8 @@ function heightOf(mark, origin) {
   return box ? box.top - origin - 4 : null
 }
 
-/** What reaches into the margin, from the top. */
-function stretches(prose, list, note) {
+/** The content that reaches into the margin, from the top. */
+function obstaclesOf(prose, list, note) {
   const origin = prose.getBoundingClientRect().top
   const { left, right } = note.getBoundingClientRect()
   const boxes = [...prose.querySelectorAll('.prose > :not(.further), .formula')].filter((box) => box !== list)

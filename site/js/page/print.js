@@ -1,4 +1,4 @@
-/** For paper: the running title, and what is folded is opened for browsers whose print styles cannot. */
+/** Prepares for print: sets the running title, and opens folds for browsers in which style sheets cannot. */
 
 /** A text as a string of CSS. */
 export function cssString(text) {
@@ -7,14 +7,14 @@ export function cssString(text) {
 
 export function openForPrint(window) {
   const { documentElement } = window.document
-  let opened = []
+  let openedFolds = []
   window.addEventListener('beforeprint', () => {
     documentElement.style.setProperty('--running-title', cssString(window.document.title))
-    opened = [...window.document.querySelectorAll('details:not([open])')]
-    for (const details of opened) details.open = true
+    openedFolds = [...window.document.querySelectorAll('details:not([open])')]
+    for (const details of openedFolds) details.open = true
   })
   window.addEventListener('afterprint', () => {
-    for (const details of opened) details.open = false
-    opened = []
+    for (const details of openedFolds) details.open = false
+    openedFolds = []
   })
 }

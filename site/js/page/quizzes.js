@@ -1,14 +1,14 @@
 /**
- * Quizzes come alive when they come near. Their script is a plain one, `quiz.js`, since browsers load no modules from a disk; it offers
- * what it can do as `coursebuildQuizzes`. Until it is there, and where it does not arrive, questions have their answers behind folds.
+ * Loads quizzes when they come near. Their script, `quiz.js`, is a classic one, since browsers load no modules from disk; its
+ * functions are in the global `coursebuildQuizzes`. Until it is loaded, and if it cannot be, the answers are behind folds.
  */
 
-import { within } from './within.js'
+import { selectAll } from './select.js'
 
 const NEAR = '800px 0px' // of the window's edge
 
-const waiting = new Set() // parts of the page, each with what is to be done
-let begun = false
+const pendingParts = new Set() // parts of the page, each with the function that mounts its quizzes
+let isLoading = false
 
 /**
  * @param {Document | Element} part of the page
@@ -16,38 +16,38 @@ let begun = false
  * @param {object} progress see progress/store.js
  */
 export function mountQuizzes(part, words, progress) {
-  const questions = within(part, '.question[data-question]')
+  const questions = selectAll(part, '.question[data-question]')
   if (questions.length === 0) return
   const mount = () => globalThis.coursebuildQuizzes.mountQuizzes(part, words, progress)
   if (globalThis.coursebuildQuizzes) return mount()
-  waiting.add({ part, mount })
-  const near = new IntersectionObserver(
+  pendingParts.add({ part, mount })
+  const observer = new IntersectionObserver(
     (entries) => {
       if (!entries.some((entry) => entry.isIntersecting)) return
-      near.disconnect()
+      observer.disconnect()
       load()
     },
     { rootMargin: NEAR },
   )
-  questions.forEach((question) => near.observe(question))
+  questions.forEach((question) => observer.observe(question))
 }
 
-/** End what was begun for a part that has gone from the page. */
+/** End the quizzes in a part that was removed from the page. */
 export function leaveQuizzes(part) {
   globalThis.coursebuildQuizzes?.leaveQuizzes(part)
-  for (const one of waiting) if (one.part === part) waiting.delete(one)
+  for (const pending of pendingParts) if (pending.part === part) pendingParts.delete(pending)
 }
 
 function load() {
   const address = document.getElementById('_words')?.dataset.quizScript
-  if (begun || !address) return
-  begun = true
+  if (isLoading || !address) return
+  isLoading = true
   const script = document.createElement('script')
   script.src = new URL(address, document.baseURI).href
   script.addEventListener('load', () => {
-    for (const { mount } of waiting) mount()
-    waiting.clear()
+    for (const { mount } of pendingParts) mount()
+    pendingParts.clear()
   })
-  script.addEventListener('error', () => (begun = false))
+  script.addEventListener('error', () => (isLoading = false))
   document.head.append(script)
 }

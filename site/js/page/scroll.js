@@ -1,16 +1,16 @@
 /**
- * Boxes that may scroll can be reached by keyboard in the finished page. Where nothing is cut off there is nothing to
- * scroll, and the stop is taken away; where something is, `data-more` says on which side.
+ * Boxes that may scroll are keyboard stops in the page as built. If nothing in a box is cut off, the stop is removed; else
+ * `data-more` says on which side there is more.
  */
 
-import { within } from './within.js'
+import { selectAll } from './select.js'
 
-/** On which sides of a box there is more to see: `start`, `end`, `both`, or nothing. */
+/** The sides of a box on which something is hidden: `start`, `end`, `both`, or ''. */
 export function hiddenSides(scrollLeft, clientWidth, scrollWidth) {
   const position = Math.abs(scrollLeft) // negative where text runs from the right
-  const before = position > 1
-  const after = position + clientWidth < scrollWidth - 1
-  return before && after ? 'both' : before ? 'start' : after ? 'end' : ''
+  const hasBefore = position > 1
+  const hasAfter = position + clientWidth < scrollWidth - 1
+  return hasBefore && hasAfter ? 'both' : hasBefore ? 'start' : hasAfter ? 'end' : ''
 }
 
 export function markScrolling(part) {
@@ -18,12 +18,12 @@ export function markScrolling(part) {
     const sides = hiddenSides(box.scrollLeft, box.clientWidth, box.scrollWidth)
     if (sides) box.dataset.more = sides
     else delete box.dataset.more
-    const below = box.scrollHeight > box.clientHeight + 1 && getComputedStyle(box).overflowY !== 'hidden'
-    if (sides || below) box.tabIndex = 0
+    const overflows = box.scrollHeight > box.clientHeight + 1 && getComputedStyle(box).overflowY !== 'hidden'
+    if (sides || overflows) box.tabIndex = 0
     else box.removeAttribute('tabindex')
   }
   const observer = new ResizeObserver((entries) => entries.forEach(({ target }) => mark(target)))
-  for (const box of within(part, '[tabindex="0"]')) {
+  for (const box of selectAll(part, '[tabindex="0"]')) {
     observer.observe(box)
     box.addEventListener('scroll', () => mark(box), { passive: true })
   }

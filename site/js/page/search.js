@@ -1,11 +1,11 @@
 /**
- * Opens the search: a button in the page's head, Ctrl+K (or Cmd+K), and `/` unless the reader has switched that off.
- * What the search needs is loaded then, and never with a page; the page of the search loads it at once.
+ * Opens the search: by a button in the page's head, Ctrl+K (or Cmd+K), and `/` unless the reader has switched that off.
+ * Its script is loaded only then; the search page loads it at once.
  */
 
 const KEY = 'coursebuild.shortcuts'
 
-/** Whether single keys may do something (WCAG 2.1.4). */
+/** Whether shortcuts of a single key are on (WCAG 2.1.4). */
 export function singleKeys() {
   try {
     return localStorage.getItem(KEY) !== 'off'
@@ -14,18 +14,18 @@ export function singleKeys() {
   }
 }
 
-function setSingleKeys(on) {
+function setSingleKeys(isOn) {
   try {
-    if (on) localStorage.removeItem(KEY)
+    if (isOn) localStorage.removeItem(KEY)
     else localStorage.setItem(KEY, 'off')
   } catch {
-    // Storage is closed: they stay on, as they are on every page.
+    // Storage is blocked: they stay on, as on every page.
   }
 }
 
 const FIELDS = 'input, textarea, select, [contenteditable]:not([contenteditable="false"]), .lab, dialog[open]'
 
-/** Whether keys belong to something else: a field that is written in, a running simulation, another dialog. */
+/** Whether keys belong to something else: a text field, a simulation, another dialog. */
 export const isTaken = (target) => target?.closest?.(FIELDS) != null
 
 /**
@@ -42,7 +42,7 @@ export function meaning({ key, ctrlKey, metaKey, altKey, isComposing }, { taken,
 
 let loading = null
 
-/** The search, loaded once; a load that failed is tried again. */
+/** Load the search, once; a failed load is tried again. */
 function load(document, script) {
   loading ??= new Promise((resolve, reject) => {
     const element = document.createElement('script')
@@ -61,7 +61,7 @@ function load(document, script) {
 let listening = false
 
 /**
- * Add the button, and listen for keys from the first time on.
+ * Add the button, and on the first call listen for keys.
  * @param {Document} document
  * @param {(key: string) => string} words
  */
@@ -77,11 +77,11 @@ export function addSearch(document, words) {
   button.addEventListener('click', () => start(document, words, 'open'))
   tools.prepend(button)
   if (document.querySelector('[data-search-form]')) start(document, words, 'mount')
-  if (!listening) document.addEventListener('keydown', (event) => pressed(event, document, words))
+  if (!listening) document.addEventListener('keydown', (event) => onKey(event, document, words))
   listening = true
 }
 
-function pressed(event, document, words) {
+function onKey(event, document, words) {
   const taken = isTaken(event.target)
   const mac = /^Mac|^iP/.test(navigator.platform)
   if (event.defaultPrevented || meaning(event, { taken, single: singleKeys(), mac }) !== 'open') return
@@ -89,11 +89,11 @@ function pressed(event, document, words) {
   start(document, words, 'open')
 }
 
-async function start(document, words, how) {
+async function start(document, words, action) {
   const { root = '', course = '' } = document.documentElement.dataset
   try {
     const search = await load(document, document.querySelector('[data-search]').dataset.search)
-    await search[how]({ root: new URL(root || './', document.baseURI).href, course, singleKeys, setSingleKeys })
+    await search[action]({ root: new URL(root || './', document.baseURI).href, course, singleKeys, setSingleKeys })
   } catch {
     const button = document.querySelector('.search-open')
     button.textContent = words('search.failed')

@@ -1,9 +1,9 @@
-/** Light, dark or as the system has it; kept in the reader's browser. */
+/** The theme: light, dark or the system's; stored in the reader's browser. */
 
 const KEY = 'coursebuild.theme'
 const THEMES = ['auto', 'light', 'dark']
 
-/** The theme that the reader chose; `auto` where none is kept or storage is closed to the page. */
+/** The theme that the reader chose; `auto` if none is stored or storage is blocked. */
 export function storedTheme() {
   try {
     const theme = localStorage.getItem(KEY)
@@ -18,19 +18,19 @@ function storeTheme(theme) {
     if (theme === 'auto') localStorage.removeItem(KEY)
     else localStorage.setItem(KEY, theme)
   } catch {
-    // Storage is closed: the choice holds for this page.
+    // Storage is blocked: the choice holds for this page.
   }
 }
 
-/** Show a theme: the style sheet reads `data-theme`, the browser's own frame reads the meta element. */
+/** Show a theme: the style sheet reads `data-theme`, the browser's interface the meta element. */
 export function applyTheme(theme) {
   const root = document.documentElement
   if (theme === 'auto') delete root.dataset.theme
   else root.dataset.theme = theme
   for (const meta of document.querySelectorAll('meta[name="theme-color"]')) {
     meta.dataset.media ??= meta.media
-    const own = meta.dataset.media.includes('dark') ? 'dark' : 'light'
-    meta.media = theme === 'auto' ? meta.dataset.media : own === theme ? 'all' : 'not all'
+    const scheme = meta.dataset.media.includes('dark') ? 'dark' : 'light'
+    meta.media = theme === 'auto' ? meta.dataset.media : scheme === theme ? 'all' : 'not all'
   }
 }
 

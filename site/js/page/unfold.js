@@ -1,4 +1,4 @@
-/** Opens what a link leads into: not each browser does, and a script that marks lines has to. */
+/** Opens the folds that a link leads into: not every browser does, and a script that marks lines has to. */
 
 const FOLD = 'details:not([open])'
 
@@ -7,10 +7,10 @@ export function unfold(element) {
   for (let fold = element.closest(FOLD); fold; fold = fold.closest(FOLD)) fold.open = true
 }
 
-/** Open the folds around what the address names, or under its heading, now and when it changes. */
+/** Open the folds around the target of the address, or under it if it is a heading, now and when the address changes. */
 export function unfoldLinked(window) {
   const open = () => {
-    const target = window.document.getElementById(decoded(window.location.hash.slice(1)))
+    const target = window.document.getElementById(decode(window.location.hash.slice(1)))
     const text = target?.matches('.further > :first-child') ? target.nextElementSibling : target
     if (!text?.closest(FOLD)) return
     unfold(text)
@@ -20,8 +20,8 @@ export function unfoldLinked(window) {
   window.addEventListener('hashchange', open)
 }
 
-/** What a part of an address says. */
-export function decoded(text) {
+/** Decode a part of an address, if it is well formed. */
+export function decode(text) {
   try {
     return decodeURIComponent(text)
   } catch {

@@ -1,6 +1,6 @@
-/** The interface's words, which the page carries in its `_words` template. */
+/** The texts of the interface, which are in the page's `_words` template. */
 
-/** @returns {(key: string) => string} the text of a key; the key itself where the page lacks it */
+/** @returns {(key: string) => string} the text of a key, or the key itself if the page lacks it */
 export function readWords(document) {
   const table = new Map()
   const template = document.getElementById('_words')
@@ -11,8 +11,8 @@ export function readWords(document) {
 }
 
 /**
- * The form of a text that goes with a number, in the language of the page: `form(words, 'progress.live.days', 3)` is the
- * text of `progress.live.days.few` where that language has such a form and the page carries it, else of `….other`.
+ * The plural form of a text for a number, in the language of the page: `form(words, 'progress.live.days', 3)` is the
+ * text of `progress.live.days.few` if the language has that form and the page has the text, else of `….other`.
  */
 export function form(words, key, n, language = globalThis.document?.documentElement.lang) {
   const name = `${key}.${pluralRules(language).select(Math.abs(n))}`
@@ -24,6 +24,6 @@ function pluralRules(language) {
   try {
     return new Intl.PluralRules(language || 'en')
   } catch {
-    return new Intl.PluralRules('en') // no language tag that the browser can read
+    return new Intl.PluralRules('en') // a language tag that the browser does not understand
   }
 }

@@ -1,14 +1,14 @@
 /**
- * The stream of events, which ends while nobody looks at the page: browsers allow few connections to one place.
+ * The stream of events, which is closed while the page is hidden, as browsers allow few connections to one host.
  *
  *   connect(page, { hello, page, news, lost })
  *
- * However long a page was away, the server tells how things stand when it is back.
+ * The server sends its whole state whenever a page connects.
  */
 
 const AGAIN = 1000 // ms
 
-export function connect(page, on) {
+export function connect(page, handlers) {
   let source = null
   let timer = null
   const close = () => {
@@ -20,10 +20,10 @@ export function connect(page, on) {
     if (source !== null || document.visibilityState === 'hidden') return
     source = new EventSource(`/.coursebuild/events?page=${encodeURIComponent(page)}`)
     for (const name of ['hello', 'page', 'news']) {
-      source.addEventListener(name, (event) => on[name](JSON.parse(event.data)))
+      source.addEventListener(name, (event) => handlers[name](JSON.parse(event.data)))
     }
     source.addEventListener('error', () => {
-      on.lost()
+      handlers.lost()
       close()
       timer = setTimeout(open, AGAIN)
     })

@@ -1,4 +1,4 @@
-/** Making elements: no markup in strings, no style attributes, so that the page's strict policy has nothing to forbid. */
+/** Makes elements without markup in strings or style attributes, as a strict content security policy demands. */
 
 export function h(tag, attributes = {}, ...children) {
   const element = document.createElement(tag)

@@ -1,4 +1,4 @@
-/** What of a new page's head is taken over: its title, its language, its style sheet. Its scripts cannot be. */
+/** Takes over a new page's title, language and style sheet. Its scripts cannot be taken over. */
 
 const scripts = (page) => [...page.querySelectorAll('head script[src]')].map((script) => script.getAttribute('src')).join('\n')
 const sheet = (page) => page.querySelector('head link[rel="stylesheet"]')
@@ -14,7 +14,7 @@ export function takeHead(next) {
   takeSheet(sheet(next)?.getAttribute('href'))
 }
 
-/** A new style sheet takes the place of the old one when it and its fonts are there, so that nothing flashes. */
+/** Replace the style sheet once the new one and its fonts are loaded, so that nothing flashes. */
 async function takeSheet(address) {
   const old = sheet(document)
   if (!address || !old || old.dataset.next === address) return

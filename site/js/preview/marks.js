@@ -1,8 +1,8 @@
 /**
- * How scripts did, in its place: beside each recorded output that is still checked, or that is another now, at each figure that is
- * another now, and at each bound number that does not hold.
+ * Marks in the page for the results of scripts: at each recorded output that is being checked or has changed, at each figure that
+ * has changed, and at each bound number that does not hold.
  *
- *   const marks = new Marks(accept)      accept(id) → Promise<text>, why not, or nothing
+ *   const marks = new Marks(accept)      accept(id) → Promise<text>: why not, or nothing
  *   marks.show(news)                     after each piece of news, and after each change of the page
  */
 
@@ -22,102 +22,102 @@ const STATES = {
 export class Marks {
   constructor(accept) {
     this.accept = accept
-    this.shown = new Map() // element → { text, parts }
+    this.marksByElement = new Map() // element → { text, parts }
   }
 
   show({ outputs, figures, numbers }) {
-    const wanted = new Map()
-    for (const told of outputs) {
-      const element = outputOf(told)
-      if (element && (told.state === 'drift' || told.state in STATES)) wanted.set(element, told)
+    const itemsByElement = new Map()
+    for (const output of outputs) {
+      const element = outputOf(output)
+      if (element && (output.state === 'drift' || output.state in STATES)) itemsByElement.set(element, output)
     }
-    for (const told of figures) {
-      const element = figureOf(told)
-      if (element) wanted.set(element, told)
+    for (const figure of figures) {
+      const element = figureOf(figure)
+      if (element) itemsByElement.set(element, figure)
     }
-    for (const told of numbers) {
-      const element = numberOf(told)
-      if (element) wanted.set(element, told)
+    for (const number of numbers) {
+      const element = numberOf(number)
+      if (element) itemsByElement.set(element, number)
     }
-    for (const [element, { parts }] of this.shown) {
-      if (wanted.has(element) && element.isConnected) continue
+    for (const [element, { parts }] of this.marksByElement) {
+      if (itemsByElement.has(element) && element.isConnected) continue
       clear(element, parts)
-      this.shown.delete(element)
+      this.marksByElement.delete(element)
     }
-    for (const [element, told] of wanted) this.mark(element, told)
+    for (const [element, item] of itemsByElement) this.mark(element, item)
   }
 
-  mark(element, told) {
-    const text = JSON.stringify(told)
-    const old = this.shown.get(element)
+  mark(element, item) {
+    const text = JSON.stringify(item)
+    const old = this.marksByElement.get(element)
     if (old?.text === text) return
     if (old) clear(element, old.parts)
-    this.shown.set(element, { text, parts: this.parts(element, told) })
+    this.marksByElement.set(element, { text, parts: this.makeParts(element, item) })
   }
 
-  parts(element, told) {
-    if ('rows' in told) return this.drift(element, told)
-    if ('drawn' in told) return told.drawn ? this.figure(element, told) : this.data(element, told)
-    return 'state' in told ? this.state(element, told) : this.number(element, told)
+  makeParts(element, item) {
+    if ('rows' in item) return this.markOutput(element, item)
+    if ('drawn' in item) return item.drawn ? this.markFigure(element, item) : this.markData(element, item)
+    return 'state' in item ? this.markState(element, item) : this.markNumber(element, item)
   }
 
-  state(element, { state }) {
+  markState(element, { state }) {
     const mark = h('p', { class: `preview-mark preview-${state === 'running' ? 'running' : 'failed'}`, role: 'status' }, STATES[state])
     element.classList.add('preview-known')
     element.append(mark)
     return [mark]
   }
 
-  drift(element, told) {
+  markOutput(element, run) {
     const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': 'Recorded output, and this run' })
     box.append(
       h('p', { class: 'preview-legend' }, 'The script prints something else now: ', sign('-'), ' recorded, ', sign('+'), ' this run.'),
-      diff(told.rows),
-      this.foot(told, 'Accept this output', 'It is run once more, to see whether it prints the same again.'),
+      diff(run.rows),
+      this.makeFoot(run, 'Accept this output', 'It is run once more, to see whether it prints the same again.'),
     )
     element.classList.add('preview-known', 'preview-drifted')
     element.append(box)
     return [box]
   }
 
-  figure(element, told) {
+  markFigure(element, figure) {
     const image = element.querySelector('img')
     const drawings = [
-      ['recorded', reloaded(image.src)],
-      ['this run', told.drawn],
+      ['recorded', bypassCache(image.src)],
+      ['this run', figure.drawn],
     ].map(([label, src]) => h('div', { class: 'preview-drawing' }, h('img', { src, alt: `${image.alt} (${label})` }), h('p', {}, label)))
     const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': 'Recorded figure, and this run' })
     box.append(
-      h('p', { class: 'preview-legend' }, `The script draws something else now: ${told.differs}.`),
+      h('p', { class: 'preview-legend' }, `The script draws something else now: ${figure.differs}.`),
       h('div', { class: 'preview-drawings' }, ...drawings),
-      this.foot(told, 'Accept this figure', ''),
+      this.makeFoot(figure, 'Accept this figure', ''),
     )
     element.classList.add('preview-drifted')
     element.prepend(box)
     return [box]
   }
 
-  data(element, told) {
+  markData(element, figure) {
     const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': 'Recorded data, and this run' })
-    box.append(h('p', { class: 'preview-legend' }, `The script writes other data now: ${told.differs}.`), this.foot(told, 'Accept these data', ''))
+    box.append(h('p', { class: 'preview-legend' }, `The script writes other data now: ${figure.differs}.`), this.makeFoot(figure, 'Accept these data', ''))
     element.append(box)
     return [box]
   }
 
-  number(element, told) {
+  markNumber(element, number) {
     const box = h('span', { class: 'preview-number', role: 'group', 'aria-label': 'A bound number that does not hold' })
-    const better = told.better ? [h('ins', { class: 'preview-better' }, told.better), ' '] : []
-    box.append(' ', ...better, h('span', { class: 'preview-why' }, told.label || told.message), ' ', this.foot(told, 'Accept', ''))
+    const better = number.better ? [h('ins', { class: 'preview-better' }, number.better), ' '] : []
+    box.append(' ', ...better, h('span', { class: 'preview-why' }, number.label || number.message), ' ', this.makeFoot(number, 'Accept', ''))
     element.classList.add('preview-wrong')
     element.after(box)
     return [box]
   }
 
-  /** The button that accepts, or why there is none. */
-  foot({ offer, refused }, label, waiting) {
+  /** The button that accepts a change, or the reason why there is none. */
+  makeFoot({ offer, refused }, label, note) {
     const foot = h('span', { class: 'preview-foot' })
     if (!offer) {
-      const text = refused ? `It cannot be accepted: ${refused}.` : waiting
+      const text = refused ? `It cannot be accepted: ${refused}.` : note
       if (text) foot.append(h('span', { class: 'preview-why' }, text))
       return foot
     }
@@ -126,9 +126,9 @@ export class Marks {
     button.addEventListener('click', async () => {
       button.disabled = true
       answer.textContent = 'Written.'
-      const why = await this.accept(offer)
-      if (!why) return
-      answer.textContent = `Nothing was written: ${why}.`
+      const refusal = await this.accept(offer)
+      if (!refusal) return
+      answer.textContent = `Nothing was written: ${refusal}.`
       button.disabled = false
     })
     foot.append(button, answer)
@@ -140,12 +140,12 @@ function sign(mark) {
   return h('span', { class: `preview-sign preview-${KINDS[mark]}` }, SIGNS[mark])
 }
 
-/** The lines of a recorded output and of what ran. A sign tells them apart, and for whoever hears the page an element. */
+/** The lines of a recorded output and of this run, distinguished by a sign and, for screen readers, by their element. */
 function diff(rows) {
   const list = h('pre', { class: 'preview-diff', tabindex: '0' })
   for (const [mark, pieces] of rows) {
     const line = h({ ' ': 'span', '-': 'del', '+': 'ins' }[mark], { class: 'preview-text' })
-    for (const [text, changed] of pieces) line.append(changed && mark !== ' ' ? h('mark', {}, text) : text)
+    for (const [text, isChanged] of pieces) line.append(isChanged && mark !== ' ' ? h('mark', {}, text) : text)
     list.append(h('span', { class: `preview-row preview-${KINDS[mark]}` }, h('span', { class: 'preview-sign' }, SIGNS[mark]), line), '\n')
   }
   return list
@@ -153,34 +153,34 @@ function diff(rows) {
 
 function clear(element, parts) {
   for (const part of parts) part.remove()
-  for (const image of element.querySelectorAll(':scope > img')) image.src = reloaded(image.src)
+  for (const image of element.querySelectorAll(':scope > img')) image.src = bypassCache(image.src)
   element.classList.remove('preview-known', 'preview-drifted', 'preview-wrong')
 }
 
-/** The recorded output of a script with this number among its outputs on the page. */
+/** The `nth` recorded output of a script on the page. */
 function outputOf({ script, nth }) {
-  const own = (figure) => figure.dataset.script === script
-  const figures = [...document.querySelectorAll('figure[data-script]')].filter(own)
+  const belongs = (figure) => figure.dataset.script === script
+  const figures = [...document.querySelectorAll('figure[data-script]')].filter(belongs)
   return figures.flatMap((figure) => [...figure.querySelectorAll('.output')])[nth] ?? null
 }
 
-/** The figure that shows a drawing with this name, or the caption of the one whose data have it. */
-function figureOf({ name, drawn }) {
-  const known = drawn ? name : name.replace(/csv$/, '')
+/** The figure whose drawing has this name, or the caption of the figure whose data have it. */
+function figureOf({ name, drawn: isDrawing }) {
+  const stem = isDrawing ? name : name.replace(/csv$/, '')
   const figures = [...document.querySelectorAll('figure[data-figure]')]
-  const figure = figures.find(({ dataset }) => (drawn ? dataset.figure === known : dataset.figure.startsWith(known)))
-  return (drawn ? figure : figure?.querySelector('figcaption')) ?? null
+  const figure = figures.find(({ dataset }) => (isDrawing ? dataset.figure === stem : dataset.figure.startsWith(stem)))
+  return (isDrawing ? figure : figure?.querySelector('figcaption')) ?? null
 }
 
-/** An address by which a browser asks for an image that it has already. */
-function reloaded(src) {
+/** An address that makes a browser load an image again. */
+function bypassCache(src) {
   const url = new URL(src)
   url.searchParams.set('at', Date.now())
   return url.href
 }
 
-/** The bound number with this place among those of the same text. The page shows minus signs where the lesson has hyphens. */
+/** The `nth` bound number with this text. The page shows minus signs where the lesson has hyphens. */
 function numberOf({ text, nth }) {
-  const plain = (shown) => shown.replaceAll('\u2212', '-')
-  return [...document.querySelectorAll('.prose .bound')].filter((bound) => plain(bound.textContent) === plain(text))[nth] ?? null
+  const plain = (label) => label.replaceAll('\u2212', '-')
+  return [...document.querySelectorAll('.prose .bound')].filter((element) => plain(element.textContent) === plain(text))[nth] ?? null
 }

@@ -1,8 +1,8 @@
 /**
- * What is wrong with the course, over the page: a small button in the corner says how things stand, and opens the list.
+ * The course's mistakes, over the page: a small button in the corner shows the state and opens the list.
  *
- * The list opens by itself when there is a mistake that was not there before, closes when the last one is mended, and stays away once
- * a reader has closed it, until there is another.
+ * The list opens by itself when there is a new mistake, closes when the last one is corrected, and once a reader has closed it
+ * stays closed until there is another.
  */
 
 import { h } from './elements.js'
@@ -11,7 +11,7 @@ const PATIENCE = 600 // ms
 
 const count = (number, noun) => `${number} ${noun}${number === 1 ? '' : 's'}`
 
-/** What the button says of the news. */
+/** The text of the button. */
 export function summary({ problems, busy, trouble }, lost, gone) {
   const errors = problems.filter(({ severity }) => severity === 'error').length
   const warnings = problems.length - errors
@@ -26,14 +26,14 @@ export function summary({ problems, busy, trouble }, lost, gone) {
 }
 
 export class Panel {
-  /** `openPlace` asks for a place to be opened in the editor; it promises why it was not, or nothing. */
+  /** `openPlace(place)` opens a place in the editor; it promises why it could not, or nothing. */
   constructor(openPlace) {
     this.openPlace = openPlace
     this.news = { problems: [], more: 0, busy: '', trouble: '' }
     this.lost = false
     this.gone = false
     this.open = false
-    this.told = new Set() // mistakes that a reader has seen
+    this.seenErrors = new Set() // mistakes that a reader has seen
     this.button = h('button', { type: 'button', class: 'preview-button', 'aria-expanded': 'false', click: () => this.toggle() })
     this.status = h('span', { class: 'unseen', role: 'status' })
     this.list = h('section', { class: 'preview-panel', 'aria-label': 'Problems', tabindex: '-1' })
@@ -46,7 +46,7 @@ export class Panel {
   }
 
   show(news) {
-    // What is done in a moment is not worth a word.
+    // Short work is not worth a message.
     clearTimeout(this.timer)
     if (news.busy && !this.news.busy) {
       this.timer = setTimeout(() => this.take(news), PATIENCE)
@@ -58,14 +58,14 @@ export class Panel {
   take(news) {
     this.news = news
     const errors = news.problems.filter(({ severity, inPlace }) => severity === 'error' && !inPlace)
-    const fresh = errors.filter(({ place, message }) => !this.told.has(`${place} ${message}`))
+    const fresh = errors.filter(({ place, message }) => !this.seenErrors.has(`${place} ${message}`))
     if (fresh.length > 0) this.open = true
     if (errors.length === 0 && !news.trouble) this.open = false
-    this.told = new Set(errors.map(({ place, message }) => `${place} ${message}`))
+    this.seenErrors = new Set(errors.map(({ place, message }) => `${place} ${message}`))
     this.draw()
   }
 
-  state({ lost = this.lost, gone = this.gone }) {
+  setState({ lost = this.lost, gone = this.gone }) {
     Object.assign(this, { lost, gone })
     this.draw()
   }
@@ -79,57 +79,57 @@ export class Panel {
 
   draw() {
     const text = summary(this.news, this.lost, this.gone)
-    const some = this.news.problems.length > 0 || this.news.trouble !== ''
-    const drawn = JSON.stringify([text, this.open, this.news, this.gone])
-    if (drawn === this.drawn) return
-    this.drawn = drawn
+    const hasProblems = this.news.problems.length > 0 || this.news.trouble !== ''
+    const key = JSON.stringify([text, this.open, this.news, this.gone])
+    if (key === this.drawnKey) return
+    this.drawnKey = key
     this.button.hidden = text === ''
     this.button.textContent = text
-    this.button.disabled = !some && !this.gone
+    this.button.disabled = !hasProblems && !this.gone
     this.button.classList.toggle('preview-bad', this.lost || this.gone || this.news.problems.some(({ severity }) => severity === 'error'))
     this.button.setAttribute('aria-expanded', String(this.open))
-    this.status.textContent = some || this.gone || this.lost ? text : ''
+    this.status.textContent = hasProblems || this.gone || this.lost ? text : ''
     this.list.hidden = !this.open
-    this.list.replaceChildren(...(this.open ? this.content() : []))
+    this.list.replaceChildren(...(this.open ? this.makeContent() : []))
   }
 
-  content() {
+  makeContent() {
     const { problems, more, trouble, kept } = this.news
     const close = h('button', { type: 'button', class: 'preview-close', click: () => this.toggle() }, 'Close')
     const parts = [h('div', { class: 'preview-head' }, h('p', { class: 'preview-title' }, kept ? 'The last good page is shown' : 'What is wrong with the course'), close)]
     if (trouble) parts.push(h('pre', { class: 'preview-trouble' }, trouble))
-    parts.push(h('ol', { class: 'preview-problems' }, ...problems.map((problem) => this.problem(problem))))
+    parts.push(h('ol', { class: 'preview-problems' }, ...problems.map((problem) => this.makeProblem(problem))))
     if (more) parts.push(h('p', {}, `and ${more} more, in the terminal`))
     return parts
   }
 
-  problem({ severity, rule, place, message, label, help, notes, line, start, end, blocks }) {
+  makeProblem({ severity, rule, place, message, label, help, notes, line, start, end, blocks }) {
     const item = h('li', { class: `preview-problem preview-${severity}` })
     const kind = blocks ? 'Blocks this page' : severity === 'error' ? 'Mistake' : 'Warning'
     item.append(
-      h('p', { class: 'preview-message' }, h('strong', {}, kind), ' ', ...coded(message)),
-      this.place(place, rule),
+      h('p', { class: 'preview-message' }, h('strong', {}, kind), ' ', ...formatCode(message)),
+      this.makePlace(place, rule),
     )
     if (line.trim()) {
-      const marked = h('mark', {}, line.slice(start, Math.max(end, start + 1)) || '\u00a0')
-      item.append(h('pre', { class: 'preview-source', tabindex: '0' }, line.slice(0, start), marked, line.slice(Math.max(end, start + 1))))
+      const excerpt = h('mark', {}, line.slice(start, Math.max(end, start + 1)) || '\u00a0')
+      item.append(h('pre', { class: 'preview-source', tabindex: '0' }, line.slice(0, start), excerpt, line.slice(Math.max(end, start + 1))))
     }
-    if (label) item.append(h('p', { class: 'preview-label' }, ...coded(label)))
+    if (label) item.append(h('p', { class: 'preview-label' }, ...formatCode(label)))
     for (const note of notes) item.append(h('pre', { class: 'preview-note' }, note))
-    if (help) item.append(h('p', { class: 'preview-help' }, ...coded(help)))
+    if (help) item.append(h('p', { class: 'preview-help' }, ...formatCode(help)))
     return item
   }
 
-  place(text, rule) {
+  makePlace(text, rule) {
     const answer = h('span', { class: 'preview-why', role: 'status' })
     const button = h('button', { type: 'button', title: 'Open in the editor' }, h('code', {}, text))
     button.addEventListener('click', async () => {
-      const why = await this.openPlace(text)
-      answer.replaceChildren(...(why ? coded(`It cannot be opened: ${why}.`) : []))
+      const refusal = await this.openPlace(text)
+      answer.replaceChildren(...(refusal ? formatCode(`It cannot be opened: ${refusal}.`) : []))
     })
     return h('p', { class: 'preview-place' }, button, ` ${rule} `, answer)
   }
 }
 
-/** What stands between backticks is code. */
-const coded = (text) => text.split(/`([^`]*)`/).map((part, index) => (index % 2 ? h('code', {}, part) : part))
+/** Show text between backticks as code. */
+const formatCode = (text) => text.split(/`([^`]*)`/).map((part, index) => (index % 2 ? h('code', {}, part) : part))

@@ -1,7 +1,7 @@
-/** Texts that differ in one stretch. */
+/** Compares texts. */
 
-/** The stretch of `before` to replace, and by what: `{start, count, text}`. No half of a character is left alone. */
-export function stretch(before, after) {
+/** The stretch of `before` to replace, and its replacement: `{start, count, text}`. Surrogate pairs are not split. */
+export function difference(before, after) {
   const shortest = Math.min(before.length, after.length)
   let start = 0
   while (start < shortest && before[start] === after[start]) start++
@@ -12,5 +12,5 @@ export function stretch(before, after) {
   return { start, count: before.length - end - start, text: after.slice(start, after.length - end) }
 }
 
-const isHigh = (text, at) => (text.charCodeAt(at) & 0xfc00) === 0xd800
-const isLow = (text, at) => (text.charCodeAt(at) & 0xfc00) === 0xdc00
+const isHigh = (text, index) => (text.charCodeAt(index) & 0xfc00) === 0xd800
+const isLow = (text, index) => (text.charCodeAt(index) & 0xfc00) === 0xdc00

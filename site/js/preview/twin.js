@@ -1,84 +1,84 @@
 /**
- * The page as the server made it, beside the page as it is.
+ * A copy of the page as the server made it, beside the living page.
  *
- *   const twin = new Twin(element)          as soon as the element was parsed, before any other script
+ *   const twin = new Twin(element)          as soon as the element is parsed, before any other script
  *   const { added, removed } = twin.update(next)
  *
- * What scripts made of the page since (buttons, running labs, open folds, answers) is no part of what the server made. An update
- * compares the server's old page with its new one, and changes in the living page only what differs between these two. So whatever the
- * author did not touch stays exactly as it is: focus, selection, what is open, what runs.
+ * What scripts have made of the page since (buttons, running labs, open folds, answers) is not in the copy. An update compares the
+ * server's old page with its new one, and changes in the living page only what differs between the two. So whatever the author did
+ * not touch stays exactly as it is: focus, selection, open folds, running labs.
  */
 
 import { align } from './align.js'
-import { stretch } from './text.js'
+import { difference } from './text.js'
 
-/** Elements that are one thing: where anything in them differs they are replaced. */
+/** Elements that are replaced as a whole if anything in them differs. */
 const WHOLE = new Set(['math', 'svg', 'video', 'audio', 'object', 'iframe', 'select', 'template'])
 
 export class Twin {
   constructor(live) {
-    this.of = new WeakMap()
+    this.liveNodes = new WeakMap()
     this.base = live.cloneNode(true)
     this.link(this.base, live)
   }
 
-  /** Note which living node each node of the server's page became. */
+  /** Map each node of the server's page to its living node. */
   link(base, live) {
-    this.of.set(base, live)
+    this.liveNodes.set(base, live)
     const children = live.childNodes
     for (let i = 0; i < base.childNodes.length; i++) this.link(base.childNodes[i], children[i])
   }
 
-  /** The same for a part of a new page that is no other than it was. */
+  /** Map an unchanged part of a new page to the living nodes of the old one. */
   inherit(base, next) {
-    this.of.set(next, this.of.get(base))
+    this.liveNodes.set(next, this.liveNodes.get(base))
     for (let i = 0; i < base.childNodes.length; i++) this.inherit(base.childNodes[i], next.childNodes[i])
   }
 
-  /** Make the page what the server makes of it now. */
+  /** Update the living page to the server's new one. */
   update(next) {
     this.added = []
     this.removed = []
-    this.element(this.base, next)
+    this.updateElement(this.base, next)
     this.base = next
     return { added: this.added, removed: this.removed }
   }
 
-  element(base, next) {
-    const live = this.of.get(base)
-    this.of.set(next, live)
-    attributes(base, next, live)
+  updateElement(base, next) {
+    const live = this.liveNodes.get(base)
+    this.liveNodes.set(next, live)
+    updateAttributes(base, next, live)
     const before = [...base.childNodes]
     const after = [...next.childNodes]
     let previous = null // the living node after which the next one stands
-    for (const [i, j] of align(before, after, same, alike)) {
+    for (const [i, j] of align(before, after, isSame, isAlike)) {
       if (j === null) this.remove(before[i])
       else if (i === null) previous = this.insert(after[j], live, previous, before)
       else {
-        this.pair(before[i], after[j])
-        const here = this.of.get(after[j])
-        if (here.parentNode === live) previous = here
+        this.updateNode(before[i], after[j])
+        const node = this.liveNodes.get(after[j])
+        if (node.parentNode === live) previous = node
       }
     }
   }
 
-  pair(base, next) {
-    if (same(base, next)) this.inherit(base, next)
-    else if (base.nodeType !== Node.ELEMENT_NODE) this.text(base, next)
-    else if (isWhole(base, next, this.of.get(base))) this.replace(base, next)
-    else this.element(base, next)
+  updateNode(base, next) {
+    if (isSame(base, next)) this.inherit(base, next)
+    else if (base.nodeType !== Node.ELEMENT_NODE) this.updateText(base, next)
+    else if (isWhole(base, next, this.liveNodes.get(base))) this.replace(base, next)
+    else this.updateElement(base, next)
   }
 
-  text(base, next) {
-    const live = this.of.get(base)
-    const { start, count, text } = stretch(base.data, next.data)
+  updateText(base, next) {
+    const live = this.liveNodes.get(base)
+    const { start, count, text } = difference(base.data, next.data)
     if (live.data === base.data) live.replaceData(start, count, text)
     else live.data = next.data
-    this.of.set(next, live)
+    this.liveNodes.set(next, live)
   }
 
   remove(base) {
-    const live = this.of.get(base)
+    const live = this.liveNodes.get(base)
     if (live.nodeType === Node.ELEMENT_NODE) this.removed.push(live)
     live.remove()
   }
@@ -88,8 +88,8 @@ export class Twin {
     this.link(next, live)
     if (previous !== null) previous.after(live)
     else {
-      const first = siblings.map((node) => this.of.get(node)).find((node) => node.parentNode === parent)
-      if (first) first.before(live)
+      const sibling = siblings.map((node) => this.liveNodes.get(node)).find((node) => node.parentNode === parent)
+      if (sibling) sibling.before(live)
       else parent.append(live)
     }
     if (live.nodeType === Node.ELEMENT_NODE) this.added.push(live)
@@ -97,7 +97,7 @@ export class Twin {
   }
 
   replace(base, next) {
-    const old = this.of.get(base)
+    const old = this.liveNodes.get(base)
     const live = document.importNode(next, true)
     const folds = old.querySelectorAll('details')
     live.querySelectorAll('details').forEach((fold, index) => (fold.open ||= folds[index]?.open ?? false))
@@ -108,30 +108,30 @@ export class Twin {
   }
 }
 
-function same(one, two) {
-  return one.isEqualNode(two) && (one.nodeName !== 'TEMPLATE' || one.innerHTML === two.innerHTML)
+function isSame(first, second) {
+  return first.isEqualNode(second) && (first.nodeName !== 'TEMPLATE' || first.innerHTML === second.innerHTML)
 }
 
-/** Whether one may become the other. */
-function alike(one, two) {
-  return one.nodeName === two.nodeName && key(one) === key(two)
+/** Whether one node may be changed into the other. */
+function isAlike(first, second) {
+  return first.nodeName === second.nodeName && key(first) === key(second)
 }
 
-/** What an element is known by, whatever is in it. */
+/** The identity of an element, whatever it contains. */
 function key(node) {
   if (node.nodeType !== Node.ELEMENT_NODE) return ''
   return node.id || node.dataset?.lab || node.dataset?.question || ''
 }
 
-/** Whether an element cannot become the other piece by piece. */
+/** Whether an element must be replaced, as it cannot be changed piece by piece. */
 function isWhole(base, next, live) {
   if (WHOLE.has(base.localName)) return true
   if ('lab' in base.dataset) return base.dataset.config !== next.dataset.config || base.dataset.script !== next.dataset.script
   return 'question' in base.dataset && live.querySelector('form, fieldset') !== null
 }
 
-/** Change the attributes that differ; of classes only those that came or went. */
-function attributes(base, next, live) {
+/** Change the attributes that differ, and of the classes only those that came or went. */
+function updateAttributes(base, next, live) {
   for (const { name } of [...base.attributes]) {
     if (name !== 'class' && !next.hasAttribute(name)) live.removeAttribute(name)
   }

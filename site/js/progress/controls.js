@@ -1,4 +1,4 @@
-/** Saving progress as a file, bringing it in, forgetting it. */
+/** The controls that export progress as a file, import it, and reset it. */
 
 import { download, h } from '../lab/page/dom.js'
 import { ImportError, importText } from './exchange.js'
@@ -12,7 +12,7 @@ export function addControls(document, words, progress) {
   addReset(control('reset'), key, words, progress)
 }
 
-const button = (text, onclick, more = {}) => h('button', { type: 'button', class: 'quiet', onclick, ...more }, text)
+const button = (text, onclick, properties = {}) => h('button', { type: 'button', class: 'quiet', onclick, ...properties }, text)
 const status = () => h('p', { class: 'told', role: 'status' })
 const fileName = (key) => `progress-${key}-${new Date().toISOString().slice(0, 10)}.json`
 
@@ -23,41 +23,41 @@ function save(key, progress) {
 }
 
 function addExport(place, key, words, progress) {
-  const told = status()
-  const act = () => (told.textContent = say(words, 'progress.live.saved', { name: save(key, progress) }))
-  place.append(button(words('progress.live.export'), act), told)
-  const aside = progress.aside()
-  if (aside === null) return
+  const message = status()
+  const act = () => (message.textContent = say(words, 'progress.live.saved', { name: save(key, progress) }))
+  place.append(button(words('progress.live.export'), act), message)
+  const damaged = progress.damagedText()
+  if (damaged === null) return
   const part = h('div', { class: 'aside-part' }, h('p', {}, words('progress.live.aside')))
   const drop = () => {
-    progress.dropAside()
+    progress.dropDamaged()
     part.remove()
     place.querySelector('button').focus()
   }
-  const keep = () => download(fileName(`${key}-damaged`), aside, 'text/plain')
+  const keep = () => download(fileName(`${key}-damaged`), damaged, 'text/plain')
   part.append(button(words('progress.live.aside_save'), keep), ' ', button(words('progress.live.aside_drop'), drop))
   place.append(part)
 }
 
 function addImport(place, words, progress) {
-  const told = status()
+  const message = status()
   const label = h('label', { class: 'file' }, h('span', {}, words('progress.live.import')), ' ')
   const input = h('input', { type: 'file', accept: '.json,application/json' })
   label.append(input)
   input.addEventListener('change', async () => {
     const [file] = input.files
     if (!file) return
-    told.replaceChildren()
+    message.replaceChildren()
     let text = null
     try {
       text = await file.text()
-      tellImported(told, importText(progress, text), text, words, progress)
+      tellImported(message, importText(progress, text), text, words, progress)
     } catch (error) {
-      told.replaceChildren(h('span', { class: 'wrong' }, errorText(error, text, words)))
+      message.replaceChildren(h('span', { class: 'wrong' }, errorText(error, text, words)))
     }
     input.value = '' // the same file may be chosen again
   })
-  place.append(label, told)
+  place.append(label, message)
 }
 
 function errorText(error, text, words) {
@@ -66,45 +66,45 @@ function errorText(error, text, words) {
   return say(words, `progress.live.error_${error.code}`, { detail: error.detail })
 }
 
-function tellImported(told, { answers, lessons, restorable }, text, words, progress) {
+function tellImported(message, { answers, lessons, restorable }, text, words, progress) {
   const amounts = { answers: say(words, 'progress.live.answers_n', { n: answers }), lessons: say(words, 'progress.live.lessons_n', { n: lessons }) }
-  told.textContent = answers || lessons ? say(words, 'progress.live.imported', amounts) : words('progress.live.imported_none')
+  message.textContent = answers || lessons ? say(words, 'progress.live.imported', amounts) : words('progress.live.imported_none')
   if (!restorable) return
   const restore = () => {
-    tellImported(told, importText(progress, text, { restore: true }), text, words, progress)
-    told.tabIndex = -1
-    told.focus()
+    tellImported(message, importText(progress, text, { restore: true }), text, words, progress)
+    message.tabIndex = -1
+    message.focus()
   }
-  told.append(' ', say(words, 'progress.live.restorable', { n: restorable }), ' ', button(words('progress.live.restore'), restore))
+  message.append(' ', say(words, 'progress.live.restorable', { n: restorable }), ' ', button(words('progress.live.restore'), restore))
 }
 
 function addReset(place, key, words, progress) {
-  const told = status()
+  const message = status()
   const open = button(words('progress.live.reset'), () => {
     const n = { answers: progress.all().length, lessons: progress.lessons().size }
-    what.textContent = say(words, 'progress.live.reset_what', {
+    summary.textContent = say(words, 'progress.live.reset_what', {
       answers: say(words, 'progress.live.answers_n', { n: n.answers }),
       lessons: say(words, 'progress.live.lessons_n', { n: n.lessons }),
     })
     dialog.showModal()
   })
-  const what = h('p')
+  const summary = h('p')
   const forget = () => {
-    const before = progress.exportText()
+    const backup = progress.exportText()
     progress.reset()
     dialog.close()
     const undo = () => {
-      importText(progress, before, { restore: true })
-      told.textContent = words('progress.live.undone')
+      importText(progress, backup, { restore: true })
+      message.textContent = words('progress.live.undone')
       open.focus()
     }
-    told.replaceChildren(words('progress.live.reset_done'), ' ', button(words('progress.live.undo'), undo))
+    message.replaceChildren(words('progress.live.reset_done'), ' ', button(words('progress.live.undo'), undo))
   }
   const dialog = h(
     'dialog',
     { class: 'ask', 'aria-labelledby': 'ask-title' },
     h('h2', { id: 'ask-title' }, words('progress.live.reset_ask')),
-    what,
+    summary,
     h(
       'p',
       { class: 'choices' },
@@ -115,5 +115,5 @@ function addReset(place, key, words, progress) {
       button(words('progress.live.reset_yes'), forget, { class: 'quiet firm' }),
     ),
   )
-  place.append(open, told, dialog)
+  place.append(open, message, dialog)
 }

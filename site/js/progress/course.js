@@ -1,5 +1,5 @@
 /**
- * What a reader has done of a course: its lessons and questions, as a page lists them, beside what is kept.
+ * What a reader has done of a course: matches the lessons and questions that a page lists with the stored progress.
  *
  * Entry points: `readQuizzes`, `overview`, `totals`, `markOf`, `nextUp`. All of it is pure.
  */
@@ -7,7 +7,7 @@
 import { answersByQuiz, matchQuestions } from './match.js'
 
 /**
- * The questions that a page says a lesson has: `ID:KEY,KEY ID:…`, ids percent-encoded.
+ * Parse the list of a lesson's questions in a page: `ID:KEY,KEY ID:…`, ids percent-encoded.
  * @param {string | undefined} text
  * @returns {{id: string, questions: {key: string, number: number}[]}[]}
  */
@@ -29,42 +29,42 @@ export function readQuizzes(text) {
  */
 
 /**
- * What is done of each lesson, and what is kept of lessons and questions that are no more.
+ * The state of each lesson, and the stored progress of lessons and questions that no longer exist.
  * @param {{id: string, quizzes: ReturnType<typeof readQuizzes>}[]} lessons
  * @param {{quiz: string, key: string, kind: string, number: number, right: boolean | null}[]} answers
- * @param {Map<string, {read: boolean}>} kept lessons
+ * @param {Map<string, {read: boolean}>} storedLessons
  * @returns {{lessons: Map<string, Done>, answers: object[], orphans: {answers: object[], lessons: string[]}}} `answers`: those whose
- *   question is there, each with the `page` that has it and the `question` as it is now
+ *   question exists, each with the `page` that has it and the present key of the `question`
  */
-export function overview(lessons, answers, kept) {
+export function overview(lessons, answers, storedLessons) {
   const byQuiz = answersByQuiz(answers)
-  const done = new Map()
-  const placed = []
+  const states = new Map()
+  const matchedAnswers = []
   const orphans = { answers: [], lessons: [] }
   for (const { id, quizzes } of lessons) {
-    const state = { read: kept.get(id)?.read ?? false, begun: kept.has(id), questions: 0, answered: 0, right: 0 }
+    const state = { read: storedLessons.get(id)?.read ?? false, begun: storedLessons.has(id), questions: 0, answered: 0, right: 0 }
     for (const { id: quiz, questions } of quizzes) {
-      const matched = matchQuestions(byQuiz.get(quiz) ?? [], questions)
+      const { matched, orphans: rest } = matchQuestions(byQuiz.get(quiz) ?? [], questions)
       byQuiz.delete(quiz)
-      orphans.answers.push(...matched.orphans)
+      orphans.answers.push(...rest)
       state.questions += questions.length
       for (const question of questions) {
-        const answer = matched.found.get(question.key)
+        const answer = matched.get(question.key)
         if (!answer) continue
-        placed.push({ ...answer, page: id, question: question.key })
+        matchedAnswers.push({ ...answer, page: id, question: question.key })
         state.answered += 1
         state.right += Number(answer.right === true)
       }
     }
     state.begun ||= state.answered > 0
-    done.set(id, state)
+    states.set(id, state)
   }
-  for (const left of byQuiz.values()) orphans.answers.push(...left)
-  for (const id of kept.keys()) if (!done.has(id)) orphans.lessons.push(id)
-  return { lessons: done, answers: placed, orphans }
+  for (const unmatched of byQuiz.values()) orphans.answers.push(...unmatched)
+  for (const id of storedLessons.keys()) if (!states.has(id)) orphans.lessons.push(id)
+  return { lessons: states, answers: matchedAnswers, orphans }
 }
 
-/** What is done of several lessons together. @param {Done[]} lessons */
+/** The sums over several lessons. @param {Done[]} lessons */
 export function totals(lessons) {
   const sum = { lessons: 0, read: 0, begun: 0, questions: 0, answered: 0, right: 0 }
   for (const { read, begun, questions, answered, right } of lessons) {
@@ -78,24 +78,24 @@ export function totals(lessons) {
   return sum
 }
 
-/** The mark of a lesson: `right` where all its questions are answered right, `read`, `begun`, or empty. @param {Done} done */
+/** The mark of a lesson: `right` if all its questions are answered right, `read`, `begun`, or empty. @param {Done} done */
 export function markOf({ read, begun, questions, right }) {
   if (questions > 0 && right === questions) return 'right'
   return read ? 'read' : begun ? 'begun' : ''
 }
 
 /**
- * Where to go on: in the lesson where the reader was last, or where that is read in the next that is not.
+ * Where to go on: in the lesson where the reader was last or, if that is read, in the next that is not.
  * @param {string[]} order ids of the lessons that can be read
  * @param {{id: string, section: string, title: string} | null} last
- * @param {Map<string, {read: boolean}>} kept
- * @returns {{id: string, section: string, title: string} | 'all' | null} `all`: every lesson is read; `null`: none is begun
+ * @param {Map<string, {read: boolean}>} storedLessons
+ * @returns {{id: string, section: string, title: string} | 'all' | null} `all`: every lesson is read; `null`: no lesson is begun
  */
-export function nextUp(order, last, kept) {
-  const isOpen = (id) => !kept.get(id)?.read
+export function nextUp(order, last, storedLessons) {
+  const isOpen = (id) => !storedLessons.get(id)?.read
   if (last !== null && order.includes(last.id) && isOpen(last.id)) return last
-  if (last === null && ![...kept.values()].some(({ read }) => read)) return null
-  const from = order.indexOf(last?.id) + 1
-  const id = [...order.slice(from), ...order.slice(0, from)].find(isOpen)
+  if (last === null && ![...storedLessons.values()].some(({ read }) => read)) return null
+  const start = order.indexOf(last?.id) + 1
+  const id = [...order.slice(start), ...order.slice(0, start)].find(isOpen)
   return id === undefined ? (order.length > 0 ? 'all' : null) : { id, section: '', title: '' }
 }

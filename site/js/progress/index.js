@@ -1,20 +1,20 @@
 /**
- * The reader's progress in the pages: the end of lessons, marks on maps, and the pages that are about it.
+ * The reader's progress in pages: at the end of lessons, on maps, and on the pages about it.
  *
- * Entry point: `showProgress(document, words, progress, improve)`. Everything that it shows is drawn again after each change, also one
- * that was made in another tab. What maps and the pages about the reader need comes in scripts of their own, which hand over what is to
- * be called: `document.dispatchEvent(new CustomEvent('coursebuild:reader', { detail: start }))`.
+ * Entry point: `showProgress(document, words, progress, improve)`. Everything is drawn again after each change, also one in another
+ * tab. Maps and the pages about progress have scripts of their own, which hand over their function:
+ * `document.dispatchEvent(new CustomEvent('coursebuild:reader', { detail: start }))`.
  */
 
 import { followLesson, showLesson } from './lesson.js'
 
-/** What the page's own script has handed over. */
+/** The function of the page's own script. */
 let start = null
 
 /**
  * @param {(key: string) => string} words
  * @param {ReturnType<import('./store.js').openProgress>} progress
- * @param {(part: Element) => void} improve what is done with new parts of the page
+ * @param {(part: Element) => void} improve called with new parts of the page
  * @returns {() => void} ends it
  */
 export function showProgress(document, words, progress, improve) {
@@ -36,11 +36,11 @@ export function showProgress(document, words, progress, improve) {
     document.addEventListener('coursebuild:reader', take, { once: true })
     ends.push(() => document.removeEventListener('coursebuild:reader', take))
   }
-  // A page that the browser has set aside hears of nothing.
-  const again = new AbortController()
-  addEventListener('pageshow', ({ persisted }) => persisted && progress.refresh(), { signal: again.signal })
+  // A page in the browser's back/forward cache misses storage events.
+  const abort = new AbortController()
+  addEventListener('pageshow', ({ persisted }) => persisted && progress.refresh(), { signal: abort.signal })
   return () => {
-    again.abort()
+    abort.abort()
     ends.forEach((end) => end())
   }
 }

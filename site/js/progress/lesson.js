@@ -1,4 +1,4 @@
-/** On the page of a lesson: notes how far it is read, and shows at its end whether it counts as read. */
+/** On a lesson's page: records how far it is read, and shows at its end whether it counts as read. */
 
 import { h } from '../lab/page/dom.js'
 import { currentHeading } from '../page/contents.js'
@@ -7,7 +7,7 @@ import { sign } from './signs.js'
 import { say } from './words.js'
 
 const SECOND = 1000
-const FIRST_NOTE = 5 // seconds
+const FIRST_NOTE = 5 // seconds before a place is recorded
 const SAVE_EVERY = 5 // seconds
 
 /** Follow the reader. @returns {() => void} ends it */
@@ -16,15 +16,15 @@ export function followLesson(document, id, progress) {
   if (!text) return () => {}
   const headings = [...text.querySelectorAll(':is(h2, h3)[id]')]
   const reading = new Reading(progress.lessons().get(id)?.place?.share ?? 0)
-  let noted = ''
-  let saved = 0
+  let lastPlace = ''
+  let lastSave = 0
   const save = () => {
-    const { at, title } = sectionOf(headings)
-    const place = { at, title, share: reading.share }
+    const { anchor, title } = sectionOf(headings)
+    const place = { anchor, title, share: reading.share }
     const now = JSON.stringify(place)
-    if (now === noted || reading.seconds < FIRST_NOTE) return
-    noted = now
-    saved = reading.seconds
+    if (now === lastPlace || reading.seconds < FIRST_NOTE) return
+    lastPlace = now
+    lastSave = reading.seconds
     progress.readLesson(id, place)
   }
   const look = () => {
@@ -32,23 +32,23 @@ export function followLesson(document, id, progress) {
     const { top, height } = text.getBoundingClientRect()
     reading.look(-top / height, (innerHeight - top) / height)
     if (reading.isRead && !progress.lessons().get(id)?.marked) progress.markLesson(id, true)
-    if (reading.seconds >= saved + SAVE_EVERY) save()
+    if (reading.seconds >= lastSave + SAVE_EVERY) save()
   }
   const timer = setInterval(look, SECOND)
-  const ended = new AbortController()
+  const abort = new AbortController()
   const hidden = () => document.visibilityState === 'hidden' && save()
-  document.addEventListener('visibilitychange', hidden, { signal: ended.signal })
-  addEventListener('pagehide', save, { signal: ended.signal })
+  document.addEventListener('visibilitychange', hidden, { signal: abort.signal })
+  addEventListener('pagehide', save, { signal: abort.signal })
   return () => {
     clearInterval(timer)
-    ended.abort()
+    abort.abort()
   }
 }
 
-/** The section that is being read: its anchor and title, empty above the first. */
+/** The current section: its anchor and title, empty above the first. */
 function sectionOf(headings) {
-  const heading = headings[currentHeading(headings.map((one) => one.getBoundingClientRect().top), innerHeight * 0.25)]
-  return heading ? { at: heading.id, title: headingText(heading) } : { at: '', title: '' }
+  const heading = headings[currentHeading(headings.map((element) => element.getBoundingClientRect().top), innerHeight * 0.25)]
+  return heading ? { anchor: heading.id, title: headingText(heading) } : { anchor: '', title: '' }
 }
 
 function headingText(heading) {
@@ -57,7 +57,7 @@ function headingText(heading) {
   return copy.textContent.replace(/\s+/g, ' ').trim()
 }
 
-/** Show at the end of a lesson whether it counts as read, with a button that says otherwise; called again after each change. */
+/** Show at the end of a lesson whether it counts as read, with a button to change that; called again after each change. */
 export function showLesson(place, id, words, progress) {
   const read = progress.lessons().get(id)?.read ?? false
   if (!place.firstChild) {
@@ -69,12 +69,12 @@ export function showLesson(place, id, words, progress) {
     )
   }
   const [state, button, trouble] = place.children
-  const shown = String(read)
-  if (state.dataset.read !== shown) {
-    state.dataset.read = shown
+  const key = String(read)
+  if (state.dataset.read !== key) {
+    state.dataset.read = key
     state.replaceChildren(...(read ? [sign('read'), words('progress.lesson.read')] : [words('progress.lesson.unread')]))
     button.textContent = words(read ? 'progress.lesson.mark_unread' : 'progress.lesson.mark_read')
   }
-  const wrong = progress.trouble()
-  trouble.textContent = wrong ? say(words, `progress.trouble.${wrong}`) : ''
+  const problem = progress.trouble()
+  trouble.textContent = problem ? say(words, `progress.trouble.${problem}`) : ''
 }

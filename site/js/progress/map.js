@@ -1,7 +1,7 @@
 /**
- * Marks on the course map and on the pages of levels, and where to go on.
+ * Marks lessons on the course map and on the pages of levels, and links to where to go on.
  *
- * Entry point: `showMap(document, { words, progress })`. It gives a function that ends it.
+ * Entry point: `showMap(document, { words, progress })`, which returns a function that ends it.
  */
 
 import { h } from '../lab/page/dom.js'
@@ -28,24 +28,24 @@ export function showMap(document, { words, progress }) {
 
 function drawMap(document, words, progress) {
   const lessons = readRows(document).filter(({ id }) => id)
-  const kept = progress.lessons()
-  const { lessons: done } = overview(lessons, progress.all(), kept)
-  for (const { id, row } of lessons) showMark(row.querySelector('[data-mark]'), done.get(id), words)
+  const storedLessons = progress.lessons()
+  const { lessons: states } = overview(lessons, progress.all(), storedLessons)
+  for (const { id, row } of lessons) showMark(row.querySelector('[data-mark]'), states.get(id), words)
   const open = lessons.filter(({ planned }) => !planned)
-  showSummary(document.querySelector('[data-progress="summary"]'), totals(open.map(({ id }) => done.get(id))), words)
-  showStart(document.querySelector('[data-progress="start"]'), open, nextUp(open.map(({ id }) => id), progress.last(), kept), words)
+  showSummary(document.querySelector('[data-progress="summary"]'), totals(open.map(({ id }) => states.get(id))), words)
+  showStart(document.querySelector('[data-progress="start"]'), open, nextUp(open.map(({ id }) => id), progress.last(), storedLessons), words)
 }
 
 /** The mark of a lesson: a sign, a word, and how many of its questions are right once one is answered. */
-export function showMark(place, done, words) {
+export function showMark(place, state, words) {
   if (!place) return
-  const mark = markOf(done)
+  const mark = markOf(state)
   if (!mark) return place.replaceChildren()
   const parts = [sign(mark), h('span', { class: 'mark-word' }, words(`progress.map.${mark}`))]
-  if (done.answered) {
+  if (state.answered) {
     parts.push(
-      h('span', { class: 'mark-count', 'aria-hidden': 'true' }, `${done.right}/${done.questions}`),
-      h('span', { class: 'unseen' }, `, ${say(words, 'progress.map.questions', { n: done.questions, right: done.right })}`),
+      h('span', { class: 'mark-count', 'aria-hidden': 'true' }, `${state.right}/${state.questions}`),
+      h('span', { class: 'unseen' }, `, ${say(words, 'progress.map.questions', { n: state.questions, right: state.right })}`),
     )
   }
   place.replaceChildren(...parts)
@@ -61,7 +61,7 @@ function showSummary(place, sum, words) {
   place.replaceChildren(...parts)
 }
 
-/** The button of the home page leads on to where the reader was. */
+/** Let the button of the home page lead to where the reader was. */
 function showStart(place, lessons, next, words) {
   if (!place) return
   const button = place.querySelector('a')

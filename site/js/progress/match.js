@@ -1,35 +1,35 @@
-/** Finding kept answers again in a quiz whose questions have changed. */
+/** Matches stored answers with the questions of a quiz that has changed. */
 
 /**
- * Find answers again whose question has another key than when they were given: by its number, where the kind is the same or unknown.
+ * Match answers with questions by key; an answer whose key no longer exists by number, if the kind is the same or unknown.
  * @template {{key: string, kind: string, number: number}} K
- * @param {K[]} kept answers of a quiz
- * @param {{key: string, kind?: string, number: number}[]} present questions that it has now
- * @returns {{found: Map<string, K>, orphans: K[]}} answers by the key that their question has now, and those without a question
+ * @param {K[]} answers of a quiz
+ * @param {{key: string, kind?: string, number: number}[]} present its questions
+ * @returns {{found: Map<string, K>, orphans: K[]}} answers by the present key of their question, and those without a question
  */
-export function matchQuestions(kept, present) {
-  const found = new Map()
+export function matchQuestions(answers, present) {
+  const matched = new Map()
   const keys = new Set(present.map(({ key }) => key))
-  const homeless = kept.filter((answer) => {
-    if (keys.has(answer.key)) found.set(answer.key, answer)
+  const unmatched = answers.filter((answer) => {
+    if (keys.has(answer.key)) matched.set(answer.key, answer)
     return !keys.has(answer.key)
   })
-  const orphans = homeless.filter((answer) => {
-    const fits = ({ key, kind, number }) => !found.has(key) && (kind ?? answer.kind) === answer.kind && number === answer.number
+  const orphans = unmatched.filter((answer) => {
+    const fits = ({ key, kind, number }) => !matched.has(key) && (kind ?? answer.kind) === answer.kind && number === answer.number
     const question = present.find(fits)
-    if (question) found.set(question.key, answer)
+    if (question) matched.set(question.key, answer)
     return !question
   })
-  return { found, orphans }
+  return { matched, orphans }
 }
 
 /** Answers by the id of their quiz. @template {{quiz: string}} K @param {K[]} answers @returns {Map<string, K[]>} */
 export function answersByQuiz(answers) {
-  const found = new Map()
+  const groups = new Map()
   for (const answer of answers) {
-    const same = found.get(answer.quiz)
-    if (same) same.push(answer)
-    else found.set(answer.quiz, [answer])
+    const group = groups.get(answer.quiz)
+    if (group) group.push(answer)
+    else groups.set(answer.quiz, [answer])
   }
-  return found
+  return groups
 }

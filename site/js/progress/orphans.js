@@ -1,27 +1,27 @@
-/** Answers and lessons that are kept though the course has them no more: shown, and forgotten where the reader wants it. */
+/** Shows stored answers and lessons that the course no longer has, with buttons to forget them. */
 
 import { h } from '../lab/page/dom.js'
 import { say } from './words.js'
 
 /** @param {{answers: object[], lessons: string[]}} orphans see `overview` */
 export function showOrphans(place, orphans, words, progress) {
-  const found = [
+  const items = [
     ...orphans.lessons.map((id) => ({ text: say(words, 'progress.live.orphan_lesson', { id }), forget: () => progress.forgetLesson(id) })),
     ...orphans.answers.map((answer) => ({ text: answerText(answer, words), forget: () => progress.forget(answer.quiz, answer.key) })),
   ]
-  const shown = JSON.stringify(found.map(({ text }) => text))
-  if (place.dataset.shown === shown) return
-  place.dataset.shown = shown
+  const key = JSON.stringify(items.map(({ text }) => text))
+  if (place.dataset.shown === key) return
+  place.dataset.shown = key
   const hadFocus = place.contains(document.activeElement)
-  place.hidden = found.length === 0
+  place.hidden = items.length === 0
   place.replaceChildren(
     h('h2', { tabIndex: -1 }, words('progress.live.orphans')),
     h('p', {}, words('progress.live.orphans_text')),
-    h('ul', {}, ...found.map(({ text, forget }) => h('li', {}, text, ' ', forgetButton(text, forget, words)))),
-    h('p', {}, h('button', { type: 'button', class: 'quiet', onclick: () => found.forEach(({ forget }) => forget()) }, words('progress.live.forget_all'))),
+    h('ul', {}, ...items.map(({ text, forget }) => h('li', {}, text, ' ', forgetButton(text, forget, words)))),
+    h('p', {}, h('button', { type: 'button', class: 'quiet', onclick: () => items.forEach(({ forget }) => forget()) }, words('progress.live.forget_all'))),
   )
-  // The button that was pressed is gone.
-  if (hadFocus) (found.length > 0 ? place.querySelector('h2') : document.querySelector('h1')).focus()
+  // The pressed button has gone.
+  if (hadFocus) (items.length > 0 ? place.querySelector('h2') : document.querySelector('h1')).focus()
 }
 
 function answerText({ quiz, number, lesson, right }, words) {

@@ -1,7 +1,7 @@
 /**
- * The page of the reader's progress: how far each level is, and the ways to save, bring in and forget what is kept.
+ * The page of the reader's progress: the state of each level, and the controls to export, import and reset progress.
  *
- * Entry point: `showPage(document, { words, progress })`. It gives a function that ends it.
+ * Entry point: `showPage(document, { words, progress })`, which returns a function that ends it.
  */
 
 import { h } from '../lab/page/dom.js'
@@ -16,15 +16,15 @@ export function showPage(document, { words, progress }) {
   const place = (name) => document.querySelector(`[data-progress="${name}"]`)
   addControls(document, words, progress)
   const draw = () => {
-    const named = lessons.filter(({ id }) => id)
-    const others = lessons.filter(({ id }) => !id).map((page, number) => ({ ...page, id: `page ${number}` }))
-    const { lessons: done, orphans } = overview([...named, ...others], progress.all(), progress.lessons())
-    for (const { id, row } of [...named, ...others]) showMark(row.querySelector('[data-mark]'), done.get(id), words)
-    const written = named.filter(({ planned }) => !planned)
-    showOverall(place('overall'), sumOf(written, others, done), words, progress.trouble())
+    const withId = lessons.filter(({ id }) => id)
+    const otherPages = lessons.filter(({ id }) => !id).map((page, number) => ({ ...page, id: `page ${number}` }))
+    const { lessons: states, orphans } = overview([...withId, ...otherPages], progress.all(), progress.lessons())
+    for (const { id, row } of [...withId, ...otherPages]) showMark(row.querySelector('[data-mark]'), states.get(id), words)
+    const available = withId.filter(({ planned }) => !planned)
+    showOverall(place('overall'), sumOf(available, otherPages, states), words, progress.trouble())
     for (const level of document.querySelectorAll('[data-level]')) {
-      const [inside, beside] = [written, others].map((rows) => rows.filter(({ row }) => level.contains(row)))
-      level.querySelector('[data-amounts]')?.replaceChildren(...amounts(sumOf(inside, beside, done), words))
+      const [levelLessons, levelPages] = [available, otherPages].map((rows) => rows.filter(({ row }) => level.contains(row)))
+      level.querySelector('[data-amounts]')?.replaceChildren(...amounts(sumOf(levelLessons, levelPages, states), words))
     }
     showOrphans(place('orphans'), orphans, words, progress)
   }
@@ -32,11 +32,11 @@ export function showPage(document, { words, progress }) {
   return progress.onChange(draw)
 }
 
-/** What is done of some lessons, with the questions of other pages. */
-function sumOf(lessons, others, done) {
-  const sum = totals(lessons.map(({ id }) => done.get(id)))
-  const more = totals(others.map(({ id }) => done.get(id)))
-  for (const name of ['questions', 'answered', 'right']) sum[name] += more[name]
+/** The sums over lessons, including the questions of other pages. */
+function sumOf(lessons, otherPages, states) {
+  const sum = totals(lessons.map(({ id }) => states.get(id)))
+  const extra = totals(otherPages.map(({ id }) => states.get(id)))
+  for (const name of ['questions', 'answered', 'right']) sum[name] += extra[name]
   return sum
 }
 
@@ -52,14 +52,14 @@ function showOverall(place, sum, words, trouble) {
 function amounts(sum, words) {
   const parts = []
   if (sum.lessons) {
-    const begun = sum.begun ? `, ${say(words, 'progress.live.begun', { n: sum.begun })}` : ''
-    parts.push(amount(say(words, 'progress.live.lessons', { n: sum.lessons, read: sum.read }) + begun, sum.read, sum.lessons))
+    const begunText = sum.begun ? `, ${say(words, 'progress.live.begun', { n: sum.begun })}` : ''
+    parts.push(amount(say(words, 'progress.live.lessons', { n: sum.lessons, read: sum.read }) + begunText, sum.read, sum.lessons))
   }
   if (sum.questions) parts.push(amount(say(words, 'progress.map.questions', { n: sum.questions, right: sum.right }), sum.right, sum.questions))
   return parts
 }
 
-/** The text says it all: the bar is for the eye. */
+/** A text and a bar; the bar is hidden from screen readers, as the text says the same. */
 function amount(text, value, max) {
   return h('p', { class: 'amount' }, h('progress', { value, max, 'aria-hidden': 'true' }), h('span', {}, text))
 }

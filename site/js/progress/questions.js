@@ -1,4 +1,4 @@
-/** Questions out of the pages of their lessons. */
+/** Fetches questions from the pages of their lessons. */
 
 import { h } from '../lab/page/dom.js'
 
@@ -7,21 +7,21 @@ export class QuestionPages {
   #pages = new Map()
 
   /**
-   * A question as this page can show it: alone in its quiz, with addresses that lead where they led in the lesson, and with a link to
-   * the lesson in the place of a simulation.
+   * A question that this page can show: alone in its quiz, with its addresses resolved, and with links to the lesson in place of
+   * simulations.
    * @param {string} address of the lesson's page
    * @param {string} lab the text of that link
-   * @returns {Promise<{section: HTMLElement, question: HTMLElement} | null>} `null` where the page has no such question
+   * @returns {Promise<{section: HTMLElement, question: HTMLElement} | null>} `null` if the page has no such question
    */
   async question(address, quiz, key, lab) {
     const page = await this.#page(address)
     const source = [...page.querySelectorAll('[data-quiz]')].find((section) => section.dataset.quiz === quiz)
-    const found = [...(source?.querySelectorAll('[data-question]') ?? [])].find((one) => one.dataset.question === key)
-    if (!found) return null
-    const question = document.importNode(found, true)
-    keepLeading(question, address)
-    for (const one of question.querySelectorAll('[data-lab]')) {
-      one.replaceWith(h('p', {}, h('a', { href: `${address}#${encodeURIComponent(question.id)}` }, lab)))
+    const original = [...(source?.querySelectorAll('[data-question]') ?? [])].find((candidate) => candidate.dataset.question === key)
+    if (!original) return null
+    const question = document.importNode(original, true)
+    resolveAddresses(question, address)
+    for (const element of question.querySelectorAll('[data-lab]')) {
+      element.replaceWith(h('p', {}, h('a', { href: `${address}#${encodeURIComponent(question.id)}` }, lab)))
     }
     const list = h('ol', { class: 'questions' }, question)
     return { section: h('section', { class: 'quiz', 'data-quiz': quiz }, list), question }
@@ -39,8 +39,8 @@ async function fetchPage(address) {
   return new DOMParser().parseFromString(await response.text(), 'text/html')
 }
 
-/** Addresses in a part of another page, as seen from there. */
-function keepLeading(part, address) {
+/** Resolve the addresses in a part of another page. */
+function resolveAddresses(part, address) {
   for (const name of ['href', 'src', 'data-config', 'data-script']) {
     for (const element of part.querySelectorAll(`[${name}]`)) {
       const value = element.getAttribute(name)

@@ -1,9 +1,9 @@
 /**
- * When a lesson counts as read: a judgement that the reader can correct.
+ * Estimates whether a lesson has been read; the reader can correct it.
  *
- * The text is taken in a hundred parts. A part is seen once it was in the window for two seconds. The lesson counts as read when its
- * end and four fifths of it are seen, after ten seconds at least: who follows a link to its end has not read it, nor who scrolls
- * through. Parts seen on an earlier visit count again.
+ * The text is divided into a hundred parts. A part is seen once it was in the window for two seconds. The lesson counts as read when
+ * its end and four fifths of it are seen, after at least ten seconds: following a link to its end, or scrolling through, is not
+ * reading. Parts seen on an earlier visit count.
  */
 
 const PARTS = 100
@@ -11,22 +11,22 @@ const LOOKS = 2
 const LEAST = 10
 const ENOUGH = 0.8
 
-/** How much of a text was in sight. */
+/** Measures how much of a text was in sight. */
 export class Reading {
   #looks = new Uint8Array(PARTS)
   #total = 0
 
-  /** @param {number} before the share that was seen on earlier visits, taken from the beginning */
-  constructor(before = 0) {
-    this.#looks.fill(LOOKS, 0, Math.floor(before * PARTS))
+  /** @param {number} earlierShare the share that was seen on earlier visits, assumed to be the beginning */
+  constructor(earlierShare = 0) {
+    this.#looks.fill(LOOKS, 0, Math.floor(earlierShare * PARTS))
   }
 
-  /** A second passes while the text is in the window from one share of its height to another. */
+  /** Count a second during which the window shows the text from one share of its height to another. */
   look(from, to) {
-    const [first, end] = [Math.max(0, Math.floor(from * PARTS)), Math.min(PARTS, Math.ceil(to * PARTS))]
-    if (!(first < end)) return
+    const [start, end] = [Math.max(0, Math.floor(from * PARTS)), Math.min(PARTS, Math.ceil(to * PARTS))]
+    if (!(start < end)) return
     this.#total += 1
-    for (let part = first; part < end; part++) this.#looks[part] = Math.min(LOOKS, this.#looks[part] + 1)
+    for (let part = start; part < end; part++) this.#looks[part] = Math.min(LOOKS, this.#looks[part] + 1)
   }
 
   /** The share that was seen. */
@@ -34,7 +34,7 @@ export class Reading {
     return this.#looks.reduce((sum, looks) => sum + Number(looks === LOOKS), 0) / PARTS
   }
 
-  /** So many seconds the text was in sight, on this visit. */
+  /** The seconds for which the text was in sight, on this visit. */
   get seconds() {
     return this.#total
   }

@@ -1,10 +1,10 @@
 /**
  * The page of the review: brings back questions that were missed, one at a time, when they are due.
  *
- * Entry point: `showReview(document, { words, progress, improve })`. It gives a function that ends it.
+ * Entry point: `showReview(document, { words, progress, improve })`, which returns a function that ends it.
  *
- * A question is taken out of its lesson’s page, which is fetched from the same site; it is answered here as it is there, but for what
- * was answered before, which is not shown. Pages from disk cannot be fetched: then there are links to the questions.
+ * A question is copied from its lesson’s page, which is fetched from the same site. It works as in the lesson, but does not show the
+ * earlier answer. Pages on disk cannot be fetched: then there are links to the questions.
  */
 
 import { h } from '../lab/page/dom.js'
@@ -16,7 +16,7 @@ import { agenda } from './schedule.js'
 import { say } from './words.js'
 
 export function showReview(document, { words, progress, improve = () => {} }) {
-  return new Review(document, words, progress, improve).begun()
+  return new Review(document, words, progress, improve).start()
 }
 
 class Review {
@@ -32,26 +32,26 @@ class Review {
     this.running = false
   }
 
-  begun() {
+  start() {
     this.#showAgenda()
     return this.progress.onChange(() => this.running || this.#showAgenda())
   }
 
-  #showAgenda(before = []) {
+  #showAgenda(intro = []) {
     const { answers, orphans } = overview(this.rows, this.progress.all(), this.progress.lessons())
     const { due, later } = agenda(answers, Date.now())
     const lost = agenda(orphans.answers, Date.now())
     const missed = due.length + later.length > 0
-    const parts = [...before, h('p', { class: 'due', role: 'status' }, this.#dueText(due.length, missed))]
+    const parts = [...intro, h('p', { class: 'due', role: 'status' }, this.#dueText(due.length, missed))]
     if (due.length && this.document.location.protocol === 'file:') {
       parts.push(h('p', {}, this.say('disk')), h('ul', {}, ...due.map((item) => h('li', {}, this.#link(item)))))
     } else if (due.length) parts.push(h('p', {}, this.#button(this.say('start'), () => this.#run(due), 'button')))
-    const coming = later.map(({ days, count }) => this.say('later', { n: count, days: this.say('days', { n: days }) }))
-    if (coming.length) parts.push(h('p', { class: 'later' }, coming.join(' ')))
-    const gone = lost.due.length + lost.later.reduce((sum, { count }) => sum + count, 0)
-    if (gone) parts.push(h('p', { class: 'later' }, this.say('orphans', { n: gone })))
-    const wrong = this.progress.trouble()
-    if (wrong) parts.push(h('p', { class: 'trouble' }, say(this.words, `progress.trouble.${wrong}`)))
+    const laterTexts = later.map(({ days, count }) => this.say('later', { n: count, days: this.say('days', { n: days }) }))
+    if (laterTexts.length) parts.push(h('p', { class: 'later' }, laterTexts.join(' ')))
+    const lostCount = lost.due.length + lost.later.reduce((sum, { count }) => sum + count, 0)
+    if (lostCount) parts.push(h('p', { class: 'later' }, this.say('orphans', { n: lostCount })))
+    const problem = this.progress.trouble()
+    if (problem) parts.push(h('p', { class: 'trouble' }, say(this.words, `progress.trouble.${problem}`)))
     this.place.replaceChildren(...parts)
   }
 
@@ -66,32 +66,32 @@ class Review {
     this.running = true
     this.right = 0
     this.answered = 0
-    this.#ask(due, 0)
+    this.#showQuestion(due, 0)
   }
 
-  async #ask(due, index) {
+  async #showQuestion(due, index) {
     if (index === due.length) return this.#finish()
     const item = due[index]
     const heading = h('h2', { tabIndex: -1, class: 'review-count' }, this.say('count', { number: index + 1, n: due.length }))
     const row = this.rows.find(({ id }) => id === item.page)
-    const from = h('p', { class: 'review-from' }, `${this.say('from')} `, this.#source(row), ' ')
-    from.append(h('span', { class: 'review-box' }, this.say('box', { number: item.box + 1 })))
+    const origin = h('p', { class: 'review-from' }, `${this.say('from')} `, this.#source(row), ' ')
+    origin.append(h('span', { class: 'review-box' }, this.say('box', { number: item.box + 1 })))
     const body = h('div', { class: 'review-question', 'aria-busy': 'true' }, h('p', {}, this.say('loading')))
     const next = this.#button(this.say('skip'), () => this.#leave(body, due, index + 1), 'quiet')
     const end = this.#button(this.say('end'), () => this.#leave(body, due, due.length), 'quiet')
-    this.place.replaceChildren(heading, from, body, h('p', { class: 'review-actions' }, next, ' ', end))
+    this.place.replaceChildren(heading, origin, body, h('p', { class: 'review-actions' }, next, ' ', end))
     heading.focus()
-    const shown = await this.#load(item, row)
+    const content = await this.#load(item, row)
     if (!body.isConnected) return
     body.removeAttribute('aria-busy')
-    body.replaceChildren(shown.part)
-    if (shown.question) this.#mount(shown, item, next)
+    body.replaceChildren(content.part)
+    if (content.question) this.#mount(content, item, next)
   }
 
   async #load(item, row) {
     try {
-      const found = await this.pages.question(row.link.href, item.quiz, item.question, this.say('lab'))
-      if (found) return { part: found.section, question: found.question }
+      const result = await this.pages.question(row.link.href, item.quiz, item.question, this.say('lab'))
+      if (result) return { part: result.section, question: result.question }
       return { part: h('p', {}, this.say('moved')) }
     } catch {
       return { part: h('p', {}, `${this.say('failed')} `, this.#link(item)) }
@@ -101,29 +101,29 @@ class Review {
   #mount({ part, question }, item, next) {
     const { progress } = this
     let last = null
-    let first = true
+    let isFirstVerdict = true
     if (item.key !== item.question) progress.rename(item.quiz, item.key, item.question)
-    const keep = {
+    const recorder = {
       put: (quiz, key, answer) => {
         const recall = last === null || last.tries !== answer.tries || last.right !== answer.right
         last = answer
         progress.put(quiz, key, { ...answer, lesson: item.lesson }, { recall })
         if (answer.right === null) return
-        if (first) {
+        if (isFirstVerdict) {
           this.answered += 1
           this.right += Number(answer.right)
         }
-        first = false
+        isFirstVerdict = false
         next.textContent = this.say('next')
       },
     }
-    mountQuestion(question, this.words, keep, { fresh: true })
+    mountQuestion(question, this.words, recorder, { fresh: true })
     this.improve(part)
   }
 
   #leave(body, due, index) {
     leaveQuizzes(body)
-    this.#ask(due, index)
+    this.#showQuestion(due, index)
   }
 
   #finish() {

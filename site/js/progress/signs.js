@@ -1,4 +1,4 @@
-/** Signs for what is read: each a shape of its own, beside a word. */
+/** Signs for progress: each a distinct shape, used beside a word. */
 
 import { pictogram } from '../lab/page/dom.js'
 
@@ -9,7 +9,7 @@ const SHAPES = {
   right: 'M.8 8.800l3.200 3.200 6.500-7.200M6.800 11.200l.8.8 7.600-8.200',
 }
 
-/** A small picture in the colour of the text around it. @param {'begun' | 'read' | 'right'} name */
+/** An icon in the colour of the text around it. @param {'begun' | 'read' | 'right'} name */
 export function sign(name) {
   const svg = pictogram(SHAPES[name])
   svg.setAttribute('class', `sign sign-${name}`)

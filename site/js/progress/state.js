@@ -1,14 +1,14 @@
 /**
- * What is known of a reader's way through a course, as a value that can be merged.
+ * A reader's progress through a course, as a value that can be merged.
  *
- * A state holds the answers to questions, the lessons read, and the time of the last reset. Every value in it has a tick, a whole
- * number that grows with each change: the time in ms where that is later than all ticks known, else the next number. So a clock that
- * goes backwards, or another device whose clock is wrong, puts nothing in the wrong order (L. Lamport, “Time, clocks, and the ordering
+ * A state holds the answers to questions, the lessons read, and the time of the last reset. Every value in it has a tick, an
+ * integer that grows with each change: the time in ms if that is later than all known ticks, else the next integer. So a clock that
+ * goes backwards, or another device whose clock is wrong, cannot reverse the order (L. Lamport, “Time, clocks, and the ordering
  * of events in a distributed system”, 1978, with the wall clock as in S. Kulkarni and others, “Logical physical clocks”, 2014).
  *
- * `merge` is commutative, associative and idempotent, whatever the states: of one value the later counts, of equally late ones the one
- * whose text comes last; recalls are a set of which the latest stay; what is not later than a reset, or than its own removal, is gone.
- * So it does not matter which of two tabs or devices learns of what first, or how often.
+ * `merge` is commutative, associative and idempotent: of two versions of a value the later wins, of equally late ones the one
+ * whose text sorts last; recalls are a set of which the latest stay; what is not later than a reset, or than its own removal, is
+ * dropped. So it does not matter in which order, or how often, tabs and devices exchange their states.
  *
  * In memory: `{ reset, answers: Map(quiz → Map(key → Entry)), lessons: Map(id → Entry) }` with
  * `Entry = { gone, values: Map(name → { tick, … }), recalls: [{ tick, right, at }] }`. An answer has the one value `answer`, a lesson
@@ -16,23 +16,23 @@
  */
 
 export const VERSION = 1
-/** The latest tick that is taken from elsewhere: so many changes remain that can be counted exactly. */
+/** The latest tick that is accepted from a file or another tab; above it there is room for more changes with exact integers. */
 export const LAST_TICK = 2 ** 52
-/** So many recalls of a question are kept, the latest. */
+/** The number of recalls of a question that are stored, the latest ones. */
 export const RECALLS = 16
 const DEPTH = 4
 
-/** Something in a state that is not as it should be; `where` names the place. */
+/** Something in a state is invalid; `path` says what. */
 export class StateError extends Error {
-  constructor(where) {
-    super(`not a value of this kind: ${where}`)
-    this.where = where
+  constructor(path) {
+    super(`not a value of this kind: ${path}`)
+    this.path = path
   }
 }
 
 export const NOTHING = Object.freeze({ gone: 0, values: new Map(), recalls: Object.freeze([]) })
 
-/** A state of which nothing is known. */
+/** A state without progress. */
 export function emptyState() {
   return { reset: 0, answers: new Map(), lessons: new Map() }
 }
@@ -55,55 +55,55 @@ function* entriesOf(state) {
 
 // --- merge
 
-/** What is known to either of two states. */
-export function merge(one, other) {
-  const reset = Math.max(one.reset, other.reset)
-  const quizzes = joined(one.answers, other.answers, (a, b) => {
-    const entries = joined(a, b, (x, y) => mergeEntries(x, y, reset))
+/** Merge two states. */
+export function merge(first, second) {
+  const reset = Math.max(first.reset, second.reset)
+  const quizzes = joinMaps(first.answers, second.answers, (a, b) => {
+    const entries = joinMaps(a, b, (x, y) => mergeEntries(x, y, reset))
     return entries.size ? entries : undefined
   })
-  return { reset, answers: quizzes, lessons: joined(one.lessons, other.lessons, (a, b) => mergeEntries(a, b, reset)) }
+  return { reset, answers: quizzes, lessons: joinMaps(first.lessons, second.lessons, (a, b) => mergeEntries(a, b, reset)) }
 }
 
-/** Two maps as one; what `merged` gives no value for is left out. It gets `undefined` where a map lacks the key. */
-function joined(one = new Map(), other = new Map(), merged) {
-  const all = new Map()
-  for (const [key, value] of one) all.set(key, merged(value, other.get(key)))
-  for (const [key, value] of other) if (!one.has(key)) all.set(key, merged(undefined, value))
-  for (const [key, value] of all) if (value === undefined) all.delete(key)
-  return all
+/** Merge two maps by `mergeValues`, which gets `undefined` if a map lacks the key, and returns it for a key to be left out. */
+function joinMaps(first = new Map(), second = new Map(), mergeValues) {
+  const union = new Map()
+  for (const [key, value] of first) union.set(key, mergeValues(value, second.get(key)))
+  for (const [key, value] of second) if (!first.has(key)) union.set(key, mergeValues(undefined, value))
+  for (const [key, value] of union) if (value === undefined) union.delete(key)
+  return union
 }
 
-/** One entry of two, as of a reset; `undefined` where nothing is left of it. */
-export function mergeEntries(one = NOTHING, other = NOTHING, reset = 0) {
-  const removed = Math.max(one.gone, other.gone)
-  const since = Math.max(removed, reset)
-  const gone = removed > reset ? removed : 0
-  if (other === NOTHING || one === NOTHING) {
-    const only = other === NOTHING ? one : other
-    if (gone === only.gone && allLater(only, since)) return isBare(only) ? undefined : only
+/** Merge two entries, given the time of a reset; `undefined` if nothing is left. */
+export function mergeEntries(first = NOTHING, second = NOTHING, reset = 0) {
+  const removedAt = Math.max(first.gone, second.gone)
+  const cutoff = Math.max(removedAt, reset)
+  const gone = removedAt > reset ? removedAt : 0
+  if (second === NOTHING || first === NOTHING) {
+    const only = second === NOTHING ? first : second
+    if (gone === only.gone && allLater(only, cutoff)) return isBare(only) ? undefined : only
   }
-  const values = joined(one.values, other.values, (a, b) => {
-    const value = a && b ? later(a, b) : a ?? b
-    return value.tick > since ? value : undefined
+  const values = joinMaps(first.values, second.values, (a, b) => {
+    const value = a && b ? laterOf(a, b) : a ?? b
+    return value.tick > cutoff ? value : undefined
   })
-  const recalls = latestRecalls([...one.recalls, ...other.recalls].filter(({ tick }) => tick > since))
+  const recalls = latestRecalls([...first.recalls, ...second.recalls].filter(({ tick }) => tick > cutoff))
   const entry = { gone, values, recalls }
   return isBare(entry) ? undefined : entry
 }
 
 const isBare = ({ gone, values, recalls }) => gone === 0 && values.size === 0 && recalls.length === 0
-const allLater = ({ values, recalls }, since) =>
-  [...values.values()].every(({ tick }) => tick > since) && recalls.every(({ tick }) => tick > since)
+const allLater = ({ values, recalls }, cutoff) =>
+  [...values.values()].every(({ tick }) => tick > cutoff) && recalls.every(({ tick }) => tick > cutoff)
 
-function later(one, other) {
-  if (one.tick !== other.tick) return one.tick > other.tick ? one : other
-  return canonical(one) >= canonical(other) ? one : other
+function laterOf(first, second) {
+  if (first.tick !== second.tick) return first.tick > second.tick ? first : second
+  return canonical(first) >= canonical(second) ? first : second
 }
 
 const recallOrder = (a, b) => a.tick - b.tick || a.right - b.right || a.at - b.at
 
-/** The latest of some recalls, each once, in order. */
+/** The latest recalls, in order and without duplicates. */
 export function latestRecalls(recalls) {
   const sorted = [...recalls].sort(recallOrder)
   return sorted.filter((recall, i) => i === 0 || recallOrder(sorted[i - 1], recall) !== 0).slice(-RECALLS)
@@ -121,7 +121,7 @@ export function canonical(value) {
 
 const texts = new WeakMap()
 
-/** The text of a map, kept while the map is in use: of a large state only what changed is written anew. */
+/** The text of a map, cached while the map is in use, so that of a large state only changes are written anew. */
 function mapText(map, textOf) {
   let text = texts.get(map)
   if (text === undefined) {
@@ -132,13 +132,13 @@ function mapText(map, textOf) {
   return text
 }
 
-/** The same as `canonical`, faster for what there is most of. */
+/** The same as `canonical`, but faster for answers, the most frequent values. */
 function valueText(name, value) {
   if (name !== 'answer') return canonical(value)
   const { at, given, hints, kind, lesson, number, right, tick, tries } = value
   const texts = [at, kind, lesson].map((text) => JSON.stringify(text))
-  const before = `{"at":${texts[0]},"given":${canonical(given)},"hints":${hints},"kind":${texts[1]},"lesson":${texts[2]}`
-  return `${before},"number":${number},"right":${right},"tick":${tick},"tries":${tries}}`
+  const start = `{"at":${texts[0]},"given":${canonical(given)},"hints":${hints},"kind":${texts[1]},"lesson":${texts[2]}`
+  return `${start},"number":${number},"right":${right},"tick":${tick},"tries":${tries}}`
 }
 
 function entryText(entry) {
@@ -163,16 +163,16 @@ export function encode(state, course) {
 }
 
 /**
- * A state from what JSON gave. Of an entry that is not as it should be, `bad(error)` is told, and it is left out; `bad` may throw.
- * @throws {StateError} where it is no state at all
+ * Decode a state from parsed JSON. An invalid entry is passed to `bad(error)`, which may throw, and left out.
+ * @throws {StateError} if it is no state at all
  */
 export function decode(data, bad) {
   if (!isObject(data) || !isObject(data.answers) || !isObject(data.lessons)) throw new StateError('the whole')
   const state = emptyState()
   state.reset = tickOf(data.reset, 'reset')
-  const add = (map, key, where, read, value) => {
+  const add = (map, key, path, read, value) => {
     try {
-      map.set(key, read(value, where))
+      map.set(key, read(value, path))
     } catch (error) {
       if (!(error instanceof StateError)) throw error
       bad(error)
@@ -189,8 +189,8 @@ export function decode(data, bad) {
   return merge(state, emptyState())
 }
 
-/** What a kept text says, as far as it can be read, and what is wrong with it: `newer`, `damaged` or `null`. */
-export function understood(text, course) {
+/** Parse a stored text as far as possible; `trouble` is `newer`, `damaged` or `null`. */
+export function parseState(text, course) {
   let whole = true
   try {
     const data = JSON.parse(text)
@@ -209,52 +209,52 @@ export function understood(text, course) {
 
 const isObject = (value) => value !== null && typeof value === 'object' && !Array.isArray(value)
 
-function tickOf(value, where) {
-  if (!Number.isSafeInteger(value) || value < 0 || value > LAST_TICK) throw new StateError(where)
+function tickOf(value, path) {
+  if (!Number.isSafeInteger(value) || value < 0 || value > LAST_TICK) throw new StateError(path)
   return value
 }
 
-function must(right, where) {
-  if (!right) throw new StateError(where)
+function check(isValid, path) {
+  if (!isValid) throw new StateError(path)
 }
 
-function readEntry(data, where, readers) {
-  must(isObject(data), where)
+function readEntry(data, path, readers) {
+  check(isObject(data), path)
   const values = new Map()
   let gone = 0
   let recalls = []
   for (const [name, value] of Object.entries(data)) {
-    if (name === 'gone') gone = tickOf(value, `${where}, gone`)
-    else if (name === 'recalls') recalls = readRecalls(value, `${where}, recalls`)
+    if (name === 'gone') gone = tickOf(value, `${path}, gone`)
+    else if (name === 'recalls') recalls = readRecalls(value, `${path}, recalls`)
     else {
-      must(Object.hasOwn(readers, name) && isObject(value), `${where}, ${name}`)
-      values.set(name, { tick: tickOf(value.tick, `${where}, ${name}`), ...readers[name](value, `${where}, ${name}`) })
+      check(Object.hasOwn(readers, name) && isObject(value), `${path}, ${name}`)
+      values.set(name, { tick: tickOf(value.tick, `${path}, ${name}`), ...readers[name](value, `${path}, ${name}`) })
     }
   }
   return { gone, values, recalls }
 }
 
-function readRecalls(data, where) {
-  must(Array.isArray(data), where)
+function readRecalls(data, path) {
+  check(Array.isArray(data), path)
   return latestRecalls(
     data.map((recall) => {
-      must(Array.isArray(recall) && recall.length === 3 && (recall[1] === 0 || recall[1] === 1), where)
-      return { tick: tickOf(recall[0], where), right: recall[1] === 1, at: tickOf(recall[2], where) }
+      check(Array.isArray(recall) && recall.length === 3 && (recall[1] === 0 || recall[1] === 1), path)
+      return { tick: tickOf(recall[0], path), right: recall[1] === 1, at: tickOf(recall[2], path) }
     }),
   )
 }
 
-const readAnswer = (data, where) => readEntry(data, where, { answer: answerOf })
-const readLesson = (data, where) => readEntry(data, where, { read: readOf, place: placeOf })
+const readAnswer = (data, path) => readEntry(data, path, { answer: answerOf })
+const readLesson = (data, path) => readEntry(data, path, { read: readOf, place: placeOf })
 
 const isCount = (value) => Number.isSafeInteger(value) && value >= 0
-/** Whether a value is a time as `toISOString` gives it, in years of four digits. */
+/** Whether a value is a time in the format of `toISOString`, with a year of four digits. */
 export const isTime = (value) => typeof value === 'string' && /^\d{4}-\d\d-\d\dT[\d:.]+Z$/.test(value) && Number.isFinite(Date.parse(value))
 
-/** An answer with its own fields and no others. @throws {StateError} */
-export function answerOf({ kind, given, right, tries, hints, number, lesson, at }, where = 'answer') {
-  must(typeof kind === 'string' && typeof lesson === 'string' && isGiven(given, DEPTH) && isTime(at), where)
-  must((right === null || typeof right === 'boolean') && isCount(tries) && isCount(hints) && isCount(number), where)
+/** Check an answer and return it without other fields. @throws {StateError} */
+export function answerOf({ kind, given, right, tries, hints, number, lesson, at }, path = 'answer') {
+  check(typeof kind === 'string' && typeof lesson === 'string' && isGiven(given, DEPTH) && isTime(at), path)
+  check((right === null || typeof right === 'boolean') && isCount(tries) && isCount(hints) && isCount(number), path)
   return { kind, given, right, tries, hints, number, lesson, at }
 }
 
@@ -265,15 +265,15 @@ function isGiven(value, depth) {
   return Object.values(value).every((part) => isGiven(part, depth - 1))
 }
 
-/** Whether a lesson is read. @throws {StateError} */
-export function readOf({ value, at }, where = 'read') {
-  must(typeof value === 'boolean' && isTime(at), where)
+/** Check the mark that a lesson is read, or not. @throws {StateError} */
+export function readOf({ value, at }, path = 'read') {
+  check(typeof value === 'boolean' && isTime(at), path)
   return { value, at }
 }
 
-/** How far a lesson is read: the anchor and the title of a section, and the share that was in sight. @throws {StateError} */
-export function placeOf({ section, title, share, at }, where = 'place') {
-  must(typeof section === 'string' && typeof title === 'string' && isTime(at), where)
-  must(typeof share === 'number' && share >= 0 && share <= 1, where)
+/** Check a place in a lesson: the anchor and the title of a section, and the share that was in sight. @throws {StateError} */
+export function placeOf({ section, title, share, at }, path = 'place') {
+  check(typeof section === 'string' && typeof title === 'string' && isTime(at), path)
+  check(typeof share === 'number' && share >= 0 && share <= 1, path)
   return { section, title, share, at }
 }

@@ -1,20 +1,20 @@
 /**
- * A reader's progress through a course, kept in the reader's browser and nowhere else.
+ * A reader's progress through a course, stored in the reader's browser and nowhere else.
  *
- * Entry point: `openProgress(course)`. All of a course is one text under `coursebuild.progress.COURSE`; see state.js for what is in it
- * and how two such texts are merged.
+ * Entry point: `openProgress(course)`. The progress in a course is one text under `coursebuild.progress.COURSE`; state.js describes it
+ * and merges two such texts.
  *
- * 1. Before each change the text is read again, and merged where another tab has written it since.
- * 2. The changed state is written. Two tabs that write at the very same moment can lose each other's text for that moment: each hears
- *    of the other's by the storage event, merges it, and writes what the other lacks.
- * 3. Where the storage is closed or full, or holds what only a newer version understands, changes hold for this page alone, and
- *    `trouble()` says so. A damaged text is put aside before anything is written; what can be read of it is taken over.
+ * 1. Before each change the text is read again, and merged if another tab has written it since.
+ * 2. The changed state is written. Two tabs that write at the same moment can overwrite each other's text for that moment: each gets
+ *    the other's by the storage event, merges it, and writes what the other lacks.
+ * 3. If the storage is blocked or full, or holds the text of a newer version, changes hold for this page only, and `trouble()` says
+ *    so. A damaged text is backed up before anything is written; its valid parts are taken over.
  */
 
-import { PREFIX } from './kept.js'
-import { counts } from './schedule.js'
+import { PREFIX } from './storage.js'
+import { changesSchedule } from './schedule.js'
 import { answerOf, canonical, emptyState, encode, isTime, latest, latestRecalls, merge, NOTHING } from './state.js'
-import { placeOf, readOf, understood } from './state.js'
+import { placeOf, readOf, parseState } from './state.js'
 
 export { matchQuestions } from './match.js'
 
@@ -26,14 +26,14 @@ const LAST_TIME = Date.UTC(9999, 11, 31)
  * @property {unknown} given what the learner entered: plain JSON values
  * @property {boolean | null} right `null`: not decided
  * @property {number} tries
- * @property {number} hints so many were opened
+ * @property {number} hints number of opened hints
  * @property {number} number of the question in its quiz, from 1
  * @property {string} lesson its id
  * @property {string} at when, ISO
  */
 
-/** The browser's storage; `null` where it is closed to the page. */
-function ownStorage() {
+/** The browser's storage; `null` if it is blocked. */
+function openStorage() {
   try {
     return globalThis.localStorage ?? null
   } catch {
@@ -44,9 +44,9 @@ function ownStorage() {
 /**
  * @param {string} course its key
  * @param {Storage | null} storage
- * @param {{now?: () => number, events?: EventTarget}} around the clock, ms, and where storage events arrive
+ * @param {{now?: () => number, events?: EventTarget}} services the clock, ms, and the target of storage events
  */
-export function openProgress(course, storage = ownStorage(), { now = Date.now, events = globalThis } = {}) {
+export function openProgress(course, storage = openStorage(), { now = Date.now, events = globalThis } = {}) {
   return new Progress(course, storage, now, events)
 }
 
@@ -57,28 +57,28 @@ class Progress {
   #now
   #state = emptyState()
   #clock = 0
-  /** The text that the state was last read from or written as; `null` where there was none. */
+  /** The text that was last read or written; `null` if there was none. */
   #text = null
   #trouble = null
-  /** Whether what is kept must not be written over. */
-  #held = false
+  /** Whether the stored text must not be overwritten. */
+  #isReadOnly = false
   #listeners = new Set()
-  #begun = false
+  #hasRead = false
 
   constructor(course, storage, now, events) {
     this.#course = course
     this.#name = `${PREFIX}${course}`
     this.#storage = storage
-    // A clock may be set to before 1970, or to years that no date can be of.
+    // A clock may be set to before 1970, or beyond the largest date.
     this.#now = () => Math.min(Math.max(Math.floor(now()), 0), LAST_TIME)
     events?.addEventListener?.('storage', (event) => {
-      if (this.#begun && (event.key === this.#name || event.key === null)) this.refresh()
+      if (this.#hasRead && (event.key === this.#name || event.key === null)) this.refresh()
     })
   }
 
-  /** The state; the storage is first read when somebody asks. */
-  get #known() {
-    if (!this.#begun) this.#read()
+  /** The state; the storage is read on first use. */
+  get #current() {
+    if (!this.#hasRead) this.#read()
     return this.#state
   }
 
@@ -86,13 +86,12 @@ class Progress {
 
   /** @returns {Answer | null} */
   get(quiz, key) {
-    const answer = this.#known.answers.get(quiz)?.get(key)?.values.get('answer')
+    const answer = this.#current.answers.get(quiz)?.get(key)?.values.get('answer')
     return answer ? plain(answer) : null
   }
 
   /**
-   * Note an answer. A verdict after another number of tries than before, or another verdict, is a recall for the review; `recall` says
-   * so where whoever calls knows better.
+   * Record an answer. A new verdict, or one after another number of tries, is a recall for the review, unless `recall` decides.
    * @param {Answer} answer
    */
   put(quiz, key, answer, { recall } = {}) {
@@ -100,78 +99,78 @@ class Progress {
     const value = answerOf({ ...answer, given: structuredClone(answer.given), at: isTime(answer.at) ? answer.at : new Date(now).toISOString() })
     this.#read()
     const entry = this.#state.answers.get(quiz)?.get(key) ?? NOTHING
-    const before = entry.values.get('answer')
-    if (before && !recall && canonical({ ...value, at: before.at }) === canonical(plain(before))) return
-    const told = recall ?? (before?.tries !== value.tries || before?.right !== value.right)
-    const made = { tick: this.#tick(now), right: value.right, at: now }
-    const kept = told && value.right !== null && counts(entry.recalls, made)
-    const values = new Map(entry.values).set('answer', { tick: made.tick, ...value })
-    const recalls = kept ? latestRecalls([...entry.recalls, made]) : entry.recalls
+    const previous = entry.values.get('answer')
+    if (previous && !recall && canonical({ ...value, at: previous.at }) === canonical(plain(previous))) return
+    const isRecall = recall ?? (previous?.tries !== value.tries || previous?.right !== value.right)
+    const newRecall = { tick: this.#tick(now), right: value.right, at: now }
+    const isKept = isRecall && value.right !== null && changesSchedule(entry.recalls, newRecall)
+    const values = new Map(entry.values).set('answer', { tick: newRecall.tick, ...value })
+    const recalls = isKept ? latestRecalls([...entry.recalls, newRecall]) : entry.recalls
     this.#setAnswer(quiz, key, { gone: entry.gone, values, recalls })
     this.#write()
   }
 
   /** All answers, each with its recalls. */
   all() {
-    const found = []
-    for (const [quiz, entries] of this.#known.answers) {
+    const answers = []
+    for (const [quiz, entries] of this.#current.answers) {
       for (const [key, { values, recalls }] of entries) {
         const answer = values.get('answer')
-        if (answer) found.push({ quiz, key, ...plain(answer), recalls })
+        if (answer) answers.push({ quiz, key, ...plain(answer), recalls })
       }
     }
-    return found
+    return answers
   }
 
-  /** Forget an answer, here and wherever this state is merged. */
+  /** Forget an answer, here and in every state that is merged with this one. */
   forget(quiz, key) {
     this.#read()
     this.#setAnswer(quiz, key, { ...NOTHING, gone: this.#tick() })
     this.#write()
   }
 
-  /** Let an answer go by another key: that of the same question, whose text has changed. One that is there already stays. */
-  rename(quiz, from, to) {
+  /** Move an answer to another key, as the text of its question has changed. An answer that is already there stays. */
+  rename(quiz, oldKey, newKey) {
     this.#read()
-    const old = this.#state.answers.get(quiz)?.get(from)
-    const have = this.#state.answers.get(quiz)?.get(to) ?? NOTHING
-    if (!old?.values.size || have.values.size || from === to) return
-    const anew = (value) => ({ ...value, tick: this.#tick() })
-    const values = new Map([...old.values].map(([name, value]) => [name, anew(value)]))
-    this.#setAnswer(quiz, to, { gone: have.gone, values, recalls: old.recalls.map(anew) })
-    this.#setAnswer(quiz, from, { ...NOTHING, gone: this.#tick() })
+    const old = this.#state.answers.get(quiz)?.get(oldKey)
+    const target = this.#state.answers.get(quiz)?.get(newKey) ?? NOTHING
+    if (!old?.values.size || target.values.size || oldKey === newKey) return
+    const withNewTick = (value) => ({ ...value, tick: this.#tick() })
+    const values = new Map([...old.values].map(([name, value]) => [name, withNewTick(value)]))
+    this.#setAnswer(quiz, newKey, { gone: target.gone, values, recalls: old.recalls.map(withNewTick) })
+    this.#setAnswer(quiz, oldKey, { ...NOTHING, gone: this.#tick() })
     this.#write()
   }
 
   // --- lessons
 
   /**
-   * Lessons by id. `marked`: somebody has said whether it is read; `at`: when it was last touched.
+   * Lessons by id. `marked`: it is recorded whether it is read; `at`: the time of the last change.
    * @returns {Map<string, {read: boolean, marked: boolean, place: {section: string, title: string, share: number, at: string} | null,
    *   at: string}>}
    */
   lessons() {
-    const found = new Map()
-    for (const [id, { values }] of this.#known.lessons) {
+    const lessons = new Map()
+    for (const [id, { values }] of this.#current.lessons) {
       const read = values.get('read')
       const place = values.get('place')
       const at = !read || (place && place.tick > read.tick) ? place?.at : read.at
-      if (at) found.set(id, { read: read?.value ?? false, marked: read !== undefined, place: place ? plain(place) : null, at })
+      if (at) lessons.set(id, { read: read?.value ?? false, marked: read !== undefined, place: place ? plain(place) : null, at })
     }
-    return found
+    return lessons
   }
 
   /**
-   * Note how far a lesson is read.
-   * @param {{at: string, title?: string, share: number}} place the anchor of a section (empty: the beginning), its title, and the share
-   *   of the lesson that has been in sight, 0 to 1
+   * Record how far a lesson is read.
+   * @param {{anchor: string, title?: string, share: number}} place the anchor of a section (empty: the beginning), its title, and the
+   *   share of the lesson that has been in sight, 0 to 1
    */
-  readLesson(id, { at, title = '', share }) {
+  readLesson(id, { anchor, title = '', share }) {
     const time = new Date(this.#now()).toISOString()
-    this.#setLesson(id, 'place', placeOf({ section: at, title: title.slice(0, 300), share, at: time }))
+    this.#setLesson(id, 'place', placeOf({ section: anchor, title: title.slice(0, 300), share, at: time }))
   }
 
-  /** Note that a lesson is read, or that it is not. */
+  /** Record whether a lesson is read. */
   markLesson(id, read) {
     this.#setLesson(id, 'read', readOf({ value: read, at: new Date(this.#now()).toISOString() }))
   }
@@ -185,36 +184,36 @@ class Progress {
 
   /** The lesson in which the reader was last, and where; `null` before the first. */
   last() {
-    let found = null
-    for (const [id, { values }] of this.#known.lessons) {
+    let newest = null
+    for (const [id, { values }] of this.#current.lessons) {
       const place = values.get('place')
-      if (place && (found === null || place.tick > found.tick || (place.tick === found.tick && id > found.id))) {
-        found = { id, ...place }
+      if (place && (newest === null || place.tick > newest.tick || (place.tick === newest.tick && id > newest.id))) {
+        newest = { id, ...place }
       }
     }
-    return found && { id: found.id, ...plain(found) }
+    return newest && { id: newest.id, ...plain(newest) }
   }
 
   // --- the whole
 
-  /** Call `fn({here})` after each change, made here or in another tab. @returns {() => void} ends it */
+  /** Call `fn({isLocal})` after each change, made by this page or in another tab. @returns {() => void} ends it */
   onChange(fn) {
-    if (!this.#begun) this.#read()
+    if (!this.#hasRead) this.#read()
     this.#listeners.add(fn)
     return () => this.#listeners.delete(fn)
   }
 
-  /** Read again what is kept: another tab may have changed it while this page could not hear of it. */
+  /** Read the storage again: another tab may have changed it while this page got no events. */
   refresh() {
-    const before = this.#known
+    const previous = this.#current
     this.#read()
-    if (this.#text !== null && before !== this.#state && encode(this.#state, this.#course) !== this.#text) this.#tryWrite()
-    if (before !== this.#state) this.#tell(false)
+    if (this.#text !== null && previous !== this.#state && encode(this.#state, this.#course) !== this.#text) this.#tryWrite()
+    if (previous !== this.#state) this.#tell(false)
   }
 
-  /** Why nothing is kept beyond this page, or what is wrong with what is: `closed`, `full`, `newer`, `damaged`; else `null`. */
+  /** Why progress is not stored, or that the stored text is damaged: `closed`, `full`, `newer`, `damaged`; else `null`. */
   trouble() {
-    if (!this.#begun) this.#read()
+    if (!this.#hasRead) this.#read()
     return this.#trouble
   }
 
@@ -228,15 +227,15 @@ class Progress {
   }
 
   /**
-   * Take another state, made of the one that is: `make(state, tick)`, where `tick` gives ticks. See exchange.js.
-   * @returns {boolean} `false` where there is no room for it: then nothing is changed
+   * Replace the state by `make(state, tick)`; `tick()` returns new ticks. See exchange.js.
+   * @returns {boolean} `false` if there is no room for it: then nothing is changed
    */
   replace(make) {
     this.#read()
-    const [state, known, trouble] = [this.#state, this.#text, this.#trouble]
-    this.#take(make(state, () => this.#tick()))
-    if (encode(this.#state, this.#course) !== known && !this.#tryWrite() && this.#trouble === 'full') {
-      this.#take(state)
+    const [state, text, trouble] = [this.#state, this.#text, this.#trouble]
+    this.#setState(make(state, () => this.#tick()))
+    if (encode(this.#state, this.#course) !== text && !this.#tryWrite() && this.#trouble === 'full') {
+      this.#setState(state)
       this.#trouble = trouble
       return false
     }
@@ -247,12 +246,12 @@ class Progress {
   /** Forget everything, here and in other tabs. */
   reset() {
     this.#read()
-    this.#take({ ...emptyState(), reset: this.#tick() })
+    this.#setState({ ...emptyState(), reset: this.#tick() })
     this.#write()
   }
 
-  /** What was put aside because it was damaged; `null` where there is none. */
-  aside() {
+  /** The backup of a damaged text, or `null`. */
+  damagedText() {
     try {
       return this.#storage?.getItem(`${this.#name}.damaged`) ?? null
     } catch {
@@ -260,11 +259,11 @@ class Progress {
     }
   }
 
-  dropAside() {
+  dropDamaged() {
     try {
       this.#storage?.removeItem(`${this.#name}.damaged`)
     } catch {
-      // The storage is closed: there is nothing to drop.
+      // The storage is blocked: there is nothing to drop.
     }
   }
 
@@ -275,7 +274,7 @@ class Progress {
     return this.#clock
   }
 
-  #take(state) {
+  #setState(state) {
     this.#state = state
     this.#clock = Math.max(this.#clock, latest(state))
   }
@@ -296,9 +295,9 @@ class Progress {
     this.#write()
   }
 
-  /** Take in what is kept, where it is another text than the one known. */
+  /** Read the stored text, and merge it if it has changed. */
   #read() {
-    this.#begun = true
+    this.#hasRead = true
     let text
     try {
       if (this.#storage === null) throw new Error('no storage')
@@ -309,24 +308,24 @@ class Progress {
     }
     if (this.#trouble === 'closed') this.#trouble = null
     if (text === this.#text) return
-    const known = this.#text
+    const previousText = this.#text
     this.#text = text
     if (text === null) {
-      // Somebody has emptied the browser's storage: what this page remembers must not come back.
-      if (known !== null) this.#take(emptyState())
-      this.#held = false
+      // The browser's storage was emptied: the state of this page must not come back.
+      if (previousText !== null) this.#setState(emptyState())
+      this.#isReadOnly = false
       this.#trouble = null
       return
     }
-    const { state, trouble } = understood(text, this.#course)
-    this.#held = trouble === 'newer' || (trouble === 'damaged' && !this.#putAside(text))
+    const { state, trouble } = parseState(text, this.#course)
+    this.#isReadOnly = trouble === 'newer' || (trouble === 'damaged' && !this.#backUpDamaged(text))
     this.#trouble = trouble
-    if (state) this.#take(merge(this.#state, state))
+    if (state) this.#setState(merge(this.#state, state))
   }
 
-  #putAside(text) {
+  #backUpDamaged(text) {
     try {
-      if (this.aside() !== text) this.#storage.setItem(`${this.#name}.damaged`, text)
+      if (this.damagedText() !== text) this.#storage.setItem(`${this.#name}.damaged`, text)
       return true
     } catch {
       return false
@@ -338,9 +337,9 @@ class Progress {
     this.#tell(true)
   }
 
-  /** @returns {boolean} whether the state is kept */
+  /** @returns {boolean} whether the state was stored */
   #tryWrite() {
-    if (this.#held || this.#trouble === 'closed') return false
+    if (this.#isReadOnly || this.#trouble === 'closed') return false
     const text = encode(this.#state, this.#course)
     try {
       this.#storage.setItem(this.#name, text)
@@ -353,8 +352,8 @@ class Progress {
     return true
   }
 
-  #tell(here) {
-    for (const fn of [...this.#listeners]) fn({ here })
+  #tell(isLocal) {
+    for (const fn of [...this.#listeners]) fn({ isLocal })
   }
 }
 

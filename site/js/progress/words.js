@@ -1,9 +1,9 @@
-/** Texts with values in them, and texts that depend on a number. */
+/** Fills interface texts with values, and chooses plural forms. */
 
 import { fill } from '../lab/page/words.js'
 import { form } from '../page/words.js'
 
-/** `say(words, 'progress.map.lessons', { n: 3 })`: where a text has forms, `n` chooses. */
+/** `say(words, 'progress.map.lessons', { n: 3 })`: `n` chooses the form of a text that has several. */
 export function say(words, key, values = {}) {
   const text = words(key)
   if (text !== key || !('n' in values)) return fill(text, values)

@@ -4,11 +4,11 @@
  *   mountQuizzes(part, words, progress)    called for what is new in the page
  *   leaveQuizzes(part)                     for what has gone from it
  *
- * Answers of questions whose text has changed have found their new keys before (progress/settle.js). After every change of an answer
+ * Answers of questions whose text has changed have found their new keys before (progress/rekey.js). After every change of an answer
  * the event `coursebuild:answered` bubbles from the question; its detail is `{ quiz, key, answer }`.
  */
 
-import { within } from '../page/within.js'
+import { selectAll } from '../page/select.js'
 import { canBeLive, Question } from './question.js'
 
 const live = new WeakMap() // element → what ends it
@@ -21,7 +21,7 @@ const drafts = new Map() // what was entered and not checked in questions that w
  * @param {{fresh?: boolean}} options `fresh`: answers of before are not shown, as in a review
  */
 export function mountQuizzes(part, words, progress = null, options = {}) {
-  for (const element of within(part, '.question[data-question]')) mountQuestion(element, words, progress, options)
+  for (const element of selectAll(part, '.question[data-question]')) mountQuestion(element, words, progress, options)
 }
 
 /** One question. @returns {Question | null} null where it cannot be answered in the page */
@@ -40,7 +40,7 @@ export function mountQuestion(element, words, progress = null, { fresh = false }
   const name = `${place.quiz}/${place.key}`
   if (!fresh && drafts.has(name)) question.showDraft(drafts.get(name))
   drafts.delete(name)
-  const deaf = fresh || !progress?.onChange ? () => {} : progress.onChange(({ here } = {}) => here || follow(question, place, progress))
+  const deaf = fresh || !progress?.onChange ? () => {} : progress.onChange(({ isLocal } = {}) => isLocal || follow(question, place, progress))
   live.set(element, () => {
     deaf()
     const draft = question.draft()
@@ -51,7 +51,7 @@ export function mountQuestion(element, words, progress = null, { fresh = false }
 
 /** End what was begun for questions that have gone from the page. */
 export function leaveQuizzes(part) {
-  for (const element of within(part, '.question[data-question]')) {
+  for (const element of selectAll(part, '.question[data-question]')) {
     live.get(element)?.()
     live.delete(element)
   }

@@ -1,17 +1,17 @@
-/** Finding the object by which a learning platform speaks SCORM 1.2 (Run-Time Environment, section 3.2.4). */
+/** Finds the API object of a learning platform (SCORM 1.2, Run-Time Environment, section 3.2.4). */
 
-const DEPTH = 50 // frames in frames; a chain that is longer is a circle, or not ours to search
+const DEPTH = 50 // the most nested frames that are searched
 
 /**
- * The platform's API: in a window above this one, else in the one that opened this one or above that; `null` where there is none.
- * A window of another host may be among them: it is passed over.
+ * The platform's API: in this window or a parent of it, else in the window that opened this one or a parent of that; else `null`.
+ * Windows of other hosts are passed over.
  * @param {Window} window
  */
 export function findApi(window) {
-  return above(window) ?? above(openerOf(window)) ?? openersOfTop(window)
+  return findAbove(window) ?? findAbove(openerOf(window)) ?? openersOfTop(window)
 }
 
-function above(window) {
+function findAbove(window) {
   for (let depth = 0; window && depth < DEPTH; depth++) {
     const api = apiOf(window)
     if (api) return api
@@ -22,7 +22,7 @@ function above(window) {
   return null
 }
 
-/** A platform may open a window with frames, of which this is one: the window at the top has the opener. */
+/** A platform may open a window of which this one is a frame: then the top window has the opener. */
 function openersOfTop(window) {
   let top = window
   for (let depth = 0; depth < DEPTH; depth++) {
@@ -30,7 +30,7 @@ function openersOfTop(window) {
     if (!parent || parent === top) break
     top = parent
   }
-  return top === window ? null : above(openerOf(top))
+  return top === window ? null : findAbove(openerOf(top))
 }
 
 function apiOf(window) {

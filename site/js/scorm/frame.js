@@ -1,29 +1,29 @@
-/** The lesson's pages in the frame: where questions and their answers are found in them. */
+/** Follows the lesson's pages in the frame: their questions, answers, and how far they are read. */
 
 import { Reading } from '../progress/reading.js'
 
 const SECOND = 1000
 
 /**
- * Follow what is shown in a frame.
+ * Follow the pages in a frame.
  * @param {HTMLIFrameElement} frame
  * @param {string} lesson its id
  * @param {{shows: Function, answered: Function, wasRead: Function, isAt: Function}} visit
- * @param {() => void} done called after each change
+ * @param {() => void} onChange called after each change
  */
-export function followFrame(frame, lesson, visit, done) {
+export function followFrame(frame, lesson, visit, onChange) {
   let timer = 0
   const begin = () => {
     clearInterval(timer)
     const { document } = frame.contentWindow
     document.addEventListener('coursebuild:answered', ({ detail: { quiz, key, answer } }) => {
       visit.answered(quiz, key, answer)
-      done()
+      onChange()
     })
     if (document.querySelector('main')?.dataset.lesson !== lesson) return
     visit.shows(questionsOf(document))
-    timer = followReading(frame.contentWindow, visit, done)
-    done()
+    timer = watchReading(frame.contentWindow, visit, onChange)
+    onChange()
   }
   frame.addEventListener('load', begin)
 }
@@ -34,13 +34,13 @@ export function questionsOf(document) {
     const { question: key, kind, answer } = element.dataset
     const quiz = element.closest('[data-quiz]')?.dataset.quiz ?? ''
     const parts = [...element.querySelectorAll('[data-key]')].map(({ dataset }) => dataset.key)
-    // Items stand as the learner has put them: their signs must not depend on that.
+    // Items stand in the learner's order, on which their signs must not depend.
     if (kind === 'order') parts.sort()
     return { quiz, key, kind, parts, answer: kind === 'open' ? null : answer ?? null }
   })
 }
 
-function followReading(window, visit, done) {
+function watchReading(window, visit, onChange) {
   const text = window.document.querySelector('.prose')
   if (!text) return 0
   const reading = new Reading()
@@ -49,11 +49,11 @@ function followReading(window, visit, done) {
     if (window.document.visibilityState !== 'visible') return
     const { top, height } = text.getBoundingClientRect()
     reading.look(-top / height, (window.innerHeight - top) / height)
-    const above = headings.filter((heading) => heading.getBoundingClientRect().top <= window.innerHeight / 4)
-    visit.isAt(above.at(-1)?.id ?? '')
+    const passed = headings.filter((heading) => heading.getBoundingClientRect().top <= window.innerHeight / 4)
+    visit.isAt(passed.at(-1)?.id ?? '')
     if (!reading.isRead) return
     visit.wasRead()
-    done()
+    onChange()
   }
   return setInterval(look, SECOND)
 }

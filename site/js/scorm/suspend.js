@@ -1,8 +1,8 @@
 /**
- * What a lesson leaves with the platform so that it goes on where it was left, on any machine: `cmi.suspend_data`, 4096 characters.
+ * The data that a lesson stores in the platform, so that it can be resumed on any machine: `cmi.suspend_data`, 4096 characters.
  *
- * JSON: `{"v": 1, "r": read, "q": {QUIZ: {KEY: [kind, right, tries, hints, number, at in s, given]}}}`. Where that is too long, what
- * was entered is left out, the longest first; then whole answers, the oldest first.
+ * JSON: `{"v": 1, "r": read, "q": {QUIZ: {KEY: [kind, right, tries, hints, number, at in s, given]}}}`. If that is too long, entered
+ * texts are left out, the longest first; then whole answers, the oldest first.
  */
 
 const LONGEST = 4096
@@ -15,25 +15,25 @@ const KINDS = ['mcq', 'several', 'predict', 'numeric', 'open', 'output', 'order'
  * @param {boolean} read
  * @returns {string}
  */
-export function packed(answers, read) {
-  const kept = [...answers].sort((a, b) => (a.at < b.at ? 1 : -1))
+export function pack(answers, read) {
+  const newestFirst = [...answers].sort((a, b) => (a.at < b.at ? 1 : -1))
   const size = ({ given }) => JSON.stringify(given).length
-  const entered = kept.filter(({ given }) => given !== null).sort((a, b) => size(b) - size(a))
-  const without = (count) => {
-    const bare = new Set(entered.slice(0, count))
-    const left = kept.slice(0, kept.length - Math.max(0, count - entered.length))
-    return written(left.map((answer) => (bare.has(answer) ? { ...answer, given: null } : answer)), read)
+  const withText = newestFirst.filter(({ given }) => given !== null).sort((a, b) => size(b) - size(a))
+  const shorten = (count) => {
+    const bare = new Set(withText.slice(0, count))
+    const remaining = newestFirst.slice(0, newestFirst.length - Math.max(0, count - withText.length))
+    return serialize(remaining.map((answer) => (bare.has(answer) ? { ...answer, given: null } : answer)), read)
   }
-  let [fewest, most] = [0, entered.length + kept.length]
-  while (fewest < most) {
-    const middle = Math.floor((fewest + most) / 2)
-    if (without(middle).length <= LONGEST) most = middle
+  let [fewest, enough] = [0, withText.length + newestFirst.length]
+  while (fewest < enough) {
+    const middle = Math.floor((fewest + enough) / 2)
+    if (shorten(middle).length <= LONGEST) enough = middle
     else fewest = middle + 1
   }
-  return without(fewest)
+  return shorten(fewest)
 }
 
-function written(answers, read) {
+function serialize(answers, read) {
   const q = Object.create(null) // a quiz can have any name
   for (const { quiz, key, kind, given, right, tries, hints, number, at } of answers) {
     const entry = [KINDS.indexOf(kind), right === null ? 2 : Number(right), tries, hints, number, Math.floor(Date.parse(at) / 1000)]
@@ -45,10 +45,10 @@ function written(answers, read) {
 }
 
 /**
- * What `packed` gave; what is damaged, or of another version, is nothing, and entries that cannot be are passed over.
+ * Read what `pack` wrote. A damaged text, or one of another version, is empty; invalid entries are skipped.
  * @returns {{answers: object[], read: boolean}}
  */
-export function unpacked(text) {
+export function unpack(text) {
   let data
   try {
     data = JSON.parse(text)
@@ -71,8 +71,8 @@ const isCount = (value) => Number.isInteger(value) && value >= 0
 function answerOf(quiz, key, entry) {
   if (!Array.isArray(entry)) return null
   const [kind, right, tries, hints, number, at, given = null] = entry
-  const known = KINDS[kind] !== undefined && [0, 1, 2].includes(right)
-  if (!known || ![tries, hints, number, at].every(isCount) || at > 8e9) return null
+  const isKnown = KINDS[kind] !== undefined && [0, 1, 2].includes(right)
+  if (!isKnown || ![tries, hints, number, at].every(isCount) || at > 8e9) return null
   const verdict = right === 2 ? null : right === 1
   return { quiz, key, kind: KINDS[kind], given, right: verdict, tries, hints, number, at: new Date(at * 1000).toISOString() }
 }

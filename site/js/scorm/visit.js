@@ -1,15 +1,15 @@
 /**
- * A lesson in a platform: what happens on its pages, told to the session.
+ * A visit to a lesson in a platform: passes what happens on its pages on to the session.
  *
- * Entry point: `Visit`. It knows nothing of frames: whoever shows the lesson tells it of answers, of reading, and of the end.
+ * Entry point: `Visit`. It does not depend on frames: its methods are called for answers, for reading, and at the end.
  *
- * 1. What the platform kept, and what this browser has kept of the same learner since, is known at the beginning.
- * 2. Another learner at the same machine gets nothing of it: the browser's progress is one learner's, and is emptied for the next.
- * 3. Each answer goes to the platform at once, with the points and the status that follow.
+ * 1. At the beginning it merges the platform's data and this browser's newer progress of the same learner.
+ * 2. Another learner at the same machine sees none of it: the browser's progress is emptied for the next learner.
+ * 3. Each answer goes to the platform at once, with the new points and status.
  */
 
 import { grade, nameOf } from './answers.js'
-import { packed, unpacked } from './suspend.js'
+import { pack, unpack } from './suspend.js'
 
 const LEARNER = 'coursebuild.learner.'
 
@@ -17,7 +17,7 @@ export class Visit {
   #session
   #lesson
   #answers = new Map()
-  /** `null`: the page is not there yet. */
+  /** `null` until the page is loaded. */
   #questions = null
   #read
 
@@ -30,40 +30,40 @@ export class Visit {
   constructor(session, { lesson, course }, progress, storage) {
     this.#session = session
     this.#lesson = lesson
-    if (isOther(session.learner, course, storage)) progress.reset()
-    const { answers, read } = unpacked(session.kept)
+    if (changesLearner(session.learner, course, storage)) progress.reset()
+    const { answers, read } = unpack(session.suspendData)
     this.#read = read
-    for (const answer of answers) this.#take(answer)
+    for (const answer of answers) this.#keepNewest(answer)
     for (const answer of progress.all()) {
-      if (answer.lesson === lesson) this.#take(answer)
+      if (answer.lesson === lesson) this.#keepNewest(answer)
     }
     for (const { quiz, key, ...answer } of this.#answers.values()) {
-      const there = progress.get(quiz, key)
-      if (answer.given !== null && (!there || there.at < answer.at)) progress.put(quiz, key, { ...answer, lesson })
+      const stored = progress.get(quiz, key)
+      if (answer.given !== null && (!stored || stored.at < answer.at)) progress.put(quiz, key, { ...answer, lesson })
     }
     if (read) progress.markLesson(lesson, true)
   }
 
-  /** The lesson's page is there, with these questions. */
+  /** The lesson's page is loaded, with these questions. */
   shows(questions) {
     this.#questions = questions
-    this.#tell()
+    this.#report()
   }
 
   /** A question was answered. */
   answered(quiz, key, answer) {
     if (answer.lesson !== this.#lesson) return
     this.#answers.set(nameOf(quiz, key), { quiz, key, ...answer })
-    const question = this.#questions?.find((one) => one.quiz === quiz && one.key === key)
+    const question = this.#questions?.find((candidate) => candidate.quiz === quiz && candidate.key === key)
     if (question) this.#session.answer(question, answer)
-    this.#tell()
+    this.#report()
   }
 
   /** The lesson was read. */
   wasRead() {
     if (this.#read) return
     this.#read = true
-    this.#tell()
+    this.#report()
   }
 
   /** The reader is in a section. */
@@ -73,38 +73,38 @@ export class Visit {
 
   /** The visit ends. */
   ends() {
-    this.#tell()
+    this.#report()
     this.#session.finish()
   }
 
-  #take(answer) {
+  #keepNewest(answer) {
     const name = nameOf(answer.quiz, answer.key)
-    const known = this.#answers.get(name)
-    if (!known || known.at < answer.at) this.#answers.set(name, answer)
+    const older = this.#answers.get(name)
+    if (!older || older.at < answer.at) this.#answers.set(name, answer)
   }
 
-  #tell() {
+  #report() {
     if (this.#questions === null) return
-    const of = ({ quiz, key }) => this.#answers.get(nameOf(quiz, key)) ?? null
-    const kept = packed([...this.#answers.values()], this.#read)
-    this.#session.progress(grade(this.#questions, of, this.#read), kept, this.location ?? this.#session.location)
+    const answerTo = ({ quiz, key }) => this.#answers.get(nameOf(quiz, key)) ?? null
+    const data = pack([...this.#answers.values()], this.#read)
+    this.#session.progress(grade(this.#questions, answerTo, this.#read), data, this.location ?? this.#session.location)
   }
 }
 
-/** Whether what this browser keeps is not this learner’s; from now on it is. */
-function isOther(learner, course, storage) {
+/** Whether this browser's progress belongs to another learner; from now on it belongs to this one. */
+function changesLearner(learner, course, storage) {
   const name = `${LEARNER}${course}`
   const mark = digest(learner)
   try {
     if (storage?.getItem(name) === mark) return false
     storage?.setItem(name, mark)
-    return true // or nobody whom a platform named
+    return true // also if it belongs to nobody that a platform has named
   } catch {
-    return true // nobody knows
+    return true // unknown
   }
 }
 
-/** Tells learners apart without keeping their names: FNV-1a, 32 bits (G. Fowler, L. Noll, K. Vo). */
+/** A digest that distinguishes learners without storing their names: FNV-1a, 32 bits (G. Fowler, L. Noll, K. Vo). */
 function digest(text) {
   let hash = 0x811c9dc5
   for (const byte of new TextEncoder().encode(text)) hash = Math.imul(hash ^ byte, 0x01000193) >>> 0

@@ -1,9 +1,9 @@
 /**
  * Real time, kept by whole timesteps.
  *
- * The clock owes the simulation the time that has passed, times the speed. `owed` says how many whole steps that is, `ran` what
- * was done of it. The timestep itself is never changed. What a slow model cannot do within `catchUp` seconds is let go, so
- * that a lab which was slow for a moment does not race afterwards, and `ratio` says how far behind it runs.
+ * The clock owes the simulation the time that has passed, times the speed. `stepsDue` says how many whole steps that is;
+ * `countSteps` subtracts those that were made. The timestep itself is never changed. At most `catchUp` seconds are made up for,
+ * so that a lab which was slow for a moment does not race afterwards; `ratio` says how far behind it runs.
  *
  * Pure: the caller brings the time, in seconds.
  */
@@ -19,13 +19,13 @@ export class Clock {
     this.stop()
   }
 
-  /** Forget the past: the next `owed` starts a new count. */
+  /** Forget the past: the next `stepsDue` starts a new count. */
   stop() {
     this.last = null
     this.debt = 0
     this.marks = []
-    this.done = 0
-    this.wanted = 0
+    this.simulated = 0
+    this.target = 0
   }
 
   /** Change how many simulated seconds go by in a real one. */
@@ -42,34 +42,34 @@ export class Clock {
    * @param {number} now s
    * @param {number} timestep s
    */
-  owed(now, timestep) {
-    if (!(timestep > 0)) return 1 // the step itself will tell what is wrong
+  stepsDue(now, timestep) {
+    if (!(timestep > 0)) return 1 // the step itself will report the mistake
     if (this.last !== null && now > this.last) {
       const due = (now - this.last) * this.speed
-      this.wanted += due
-      // One step may be longer than what is made up for: it must still come due.
+      this.target += due
+      // A step may be longer than `catchUp`; it must become due all the same.
       this.debt = Math.min(this.debt + due, Math.max(this.catchUp * this.speed, timestep))
     }
     this.last = now
     return Math.floor(this.debt / timestep + EPSILON)
   }
 
-  /** Take note of `steps` steps of `timestep` seconds; `now` as for `owed`. */
-  ran(steps, timestep, now) {
+  /** Record that `steps` steps of `timestep` seconds were made; `now` as for `stepsDue`. */
+  countSteps(steps, timestep, now) {
     this.debt = Math.max(0, this.debt - steps * timestep)
-    this.done += steps * timestep
-    // What is still owed is late by less than a frame and no sign of slowness.
-    this.marks.push({ now, met: this.done + this.debt, wanted: this.wanted })
+    this.simulated += steps * timestep
+    // The remaining debt is late by less than a frame, which is no sign of slowness.
+    this.marks.push({ now, reached: this.simulated + this.debt, target: this.target })
     while (this.marks.length > 2 && this.marks[1].now <= now - WINDOW) this.marks.shift()
   }
 
-  /** Simulated time over the time it should have simulated, in the last second: 1 is on time, 0.5 half as fast. */
+  /** Simulated time over the time that was due, in the last second: 1 is on time, 0.5 half as fast. */
   ratio() {
     if (this.marks.length < 2) return 1
     const first = this.marks[0]
     const last = this.marks[this.marks.length - 1]
-    const wanted = last.wanted - first.wanted
-    return wanted > 0 ? Math.min(1, (last.met - first.met) / wanted) : 1
+    const target = last.target - first.target
+    return target > 0 ? Math.min(1, (last.reached - first.reached) / target) : 1
   }
 
   /** Seconds of real time until the next step is due. */

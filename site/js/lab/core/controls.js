@@ -2,7 +2,8 @@
  * The controls of a lab: their values, and applying them.
  *
  * A parameter (`param`) is put into `ctx` before anything else runs, at the start and at every reset. A control with `init` is
- * applied after `setup`, each time. Every other one is applied once at the start, before `setup`, so that the page shows what is.
+ * applied after `setup`, each time. Every other one is applied once at the start, before `setup`, so that the model agrees with
+ * the values on the page.
  */
 
 import { call } from './piece.js'
@@ -22,21 +23,21 @@ export class Controls {
   }
 
   applyParams() {
-    this.each((control) => control.param != null)
+    this.applyWhere((control) => control.param != null)
   }
 
   applyOnce() {
-    this.each((control) => control.param == null && !control.init)
+    this.applyWhere((control) => control.param == null && !control.init)
   }
 
   applyInit() {
-    this.each((control) => control.param == null && control.init)
+    this.applyWhere((control) => control.param == null && control.init)
   }
 
-  /** Apply all controls of a kind that have a value. */
-  each(chosen = () => true) {
+  /** Apply the controls that `accepts` admits and that have a value. */
+  applyWhere(accepts = () => true) {
     this.data.forEach((control, i) => {
-      if (chosen(control)) this.apply(i)
+      if (accepts(control)) this.apply(i)
     })
   }
 
@@ -46,7 +47,7 @@ export class Controls {
     if (control.set && value !== null) call(['controls', i], () => control.set(this.env, value))
   }
 
-  /** Refuse what the page could not have sent; without a value it is the press of a button. */
+  /** Throw on what the page cannot have sent. No value means that a button was pressed. */
   check(i, value) {
     const control = this.data[i]
     const presses = value === undefined
@@ -74,7 +75,7 @@ export class Controls {
   }
 }
 
-/** The value with which a control starts; `null`: it has none until it is used. */
+/** The value with which a control starts; `null`: none until it is used. */
 function initialValue(control) {
   if (control.type === 'button') return null
   if (control.type === 'select') return control.value ?? control.options[0][1]

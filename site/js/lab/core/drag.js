@@ -16,9 +16,9 @@ export class Drag {
     this.model = handles.model
     this.data = handles.data
     this.scene = scene
-    this.handle = handles.own(new engine.mj.MjvPerturb())
+    this.handle = handles.adopt(new engine.mj.MjvPerturb())
     this.body = -1
-    this.saved = new Float64Array(6)
+    this.authorForce = new Float64Array(6)
   }
 
   get active() {
@@ -68,15 +68,15 @@ export class Drag {
     if (!this.active || this.mocap >= 0) return
     const { engine, model, data } = this
     const force = data.xfrc_applied.subarray(6 * this.body, 6 * this.body + 6)
-    this.saved.set(force)
+    this.authorForce.set(force)
     engine.mj.mjv_applyPerturbForce(model, data, this.handle)
-    for (let i = 0; i < 6; i++) force[i] += this.saved[i]
+    for (let i = 0; i < 6; i++) force[i] += this.authorForce[i]
   }
 
   /** Take it away again, after the step. */
   pop() {
     if (!this.active || this.mocap >= 0) return
-    this.data.xfrc_applied.set(this.saved, 6 * this.body)
+    this.data.xfrc_applied.set(this.authorForce, 6 * this.body)
   }
 }
 

@@ -22,7 +22,7 @@ export class EngineError extends Error {
 /**
  * Start the engine.
  *
- * It is compiled beforehand, for the glue goes on waiting for a module that does not come.
+ * The module is compiled beforehand: if its own compilation failed, the glue would wait forever.
  *
  * @param {(module: object) => Promise<object>} loadMujoco the default export of @mujoco/mujoco
  * @param {WebAssembly.Module} module mujoco.wasm
@@ -34,11 +34,11 @@ export async function createEngine(loadMujoco, module, log = () => {}) {
     const mj = await loadMujoco({
       print: log,
       printErr: log,
-      instantiateWasm(imports, done) {
-        const started = readableBooleans(imports.env)
+      instantiateWasm(imports, finish) {
+        const onInstance = registerBooleanViews(imports.env)
         const instance = new WebAssembly.Instance(module, imports)
-        started(instance)
-        done(instance, module)
+        onInstance(instance)
+        finish(instance, module)
       },
     })
     return new Engine(mj)
@@ -49,18 +49,18 @@ export async function createEngine(loadMujoco, module, log = () => {}) {
 
 /**
  * Arrays of booleans (`data.eq_active`, `model.light_active`, …) have a type that the bindings forget to register, so that
- * reading one throws. It is registered here, as bytes, when it is first met.
+ * reading one throws. The type is registered here, as bytes, on the first such read.
  *
  * @param {object} env the functions that the engine imports; one is replaced
  * @returns {(instance: WebAssembly.Instance) => void} to be called with the instance
  */
-function readableBooleans(env) {
+function registerBooleanViews(env) {
   const take = env._emval_take_value
   let memory = null
-  let known = false
+  let isRegistered = false
   const UNSIGNED_BYTES = 1
   env._emval_take_value = (type, argument) => {
-    if (known) return take(type, argument)
+    if (isRegistered) return take(type, argument)
     try {
       return take(type, argument)
     } catch (error) {
@@ -68,7 +68,7 @@ function readableBooleans(env) {
       const name = new Uint32Array(memory.buffer)[(type >> 2) + 1]
       if (textAt(memory, name) !== 'N10emscripten11memory_viewIbEE') throw error
       env._embind_register_memory_view(type, UNSIGNED_BYTES, name)
-      known = true
+      isRegistered = true
       return take(type, argument)
     }
   }
@@ -99,14 +99,14 @@ export class Engine {
   }
 }
 
-/** A model, its data, and a second data for looking at (see `lab.js`). */
+/** A model, its data, and a second data that is only looked at (see `lab.js`). */
 export class Handles {
   constructor(mj, model) {
     this.model = typeof model === 'string' ? compileModel(mj, model) : readModel(mj, model)
-    this.owned = [this.model]
+    this.objects = [this.model]
     try {
-      this.data = this.own(new mj.MjData(this.model))
-      this.shown = this.own(new mj.MjData(this.model))
+      this.data = this.adopt(new mj.MjData(this.model))
+      this.displayData = this.adopt(new mj.MjData(this.model))
     } catch (error) {
       this.dispose()
       throw new EngineError(`the model has no room: ${error.message}`)
@@ -114,14 +114,14 @@ export class Handles {
   }
 
   /** Take over a C++ object: it is deleted with the model. */
-  own(object) {
-    this.owned.push(object)
+  adopt(object) {
+    this.objects.push(object)
     return object
   }
 
   /** Delete everything, last made first; a second call does nothing. */
   dispose() {
-    for (const object of this.owned.splice(0).reverse()) object.delete()
+    for (const object of this.objects.splice(0).reverse()) object.delete()
   }
 }
 
@@ -146,27 +146,27 @@ function readModel(mj, bytes) {
   return model
 }
 
-/** How much of what a page has to draw it draws without becoming slow. */
+/** The largest model that a page draws without becoming slow. */
 const MOST = { ngeom: 2000, nsite: 2000, nlight: 100, nmeshface: 200_000, nhfielddata: 500_000, ntexdata: 64 << 20 }
 
-/** Compile MJCF that a reader may have written. It lies in no folder: a file that it names is not found. */
+/** Compile MJCF that a reader may have written, and refuse a model that is too large to draw. Files that it names are not found. */
 function compileModel(mj, text) {
-  const model = compiled(mj, text)
-  const beyond = Object.keys(MOST).find((name) => model[name] > MOST[name])
-  if (beyond === undefined) return model
-  const has = model[beyond]
+  const model = compileXml(mj, text)
+  const field = Object.keys(MOST).find((name) => model[name] > MOST[name])
+  if (field === undefined) return model
+  const size = model[field]
   model.delete()
-  throw new EngineError(`${beyond} is ${has}, and a page shows models up to ${MOST[beyond]}`)
+  throw new EngineError(`${field} is ${size}, and a page shows models up to ${MOST[field]}`)
 }
 
-function compiled(mj, text) {
+function compileXml(mj, text) {
   try {
     return mj.MjModel.from_xml_string(text)
   } catch (error) {
     const message = String(error.message).trim()
-    const told = message.replace(/^MuJoCo Error: (Loading error: )?/, '')
-    // What is thrown by C++ itself, for lack of memory, has only the name of what it wanted to make.
-    const reason = told === message ? `the engine has no room for this model (${message})` : told
+    const detail = message.replace(/^MuJoCo Error: (Loading error: )?/, '')
+    // An exception of C++ itself, for lack of memory, holds only the name of a type.
+    const reason = detail === message ? `the engine has no room for this model (${message})` : detail
     throw new EngineError(reason, error instanceof WebAssembly.RuntimeError)
   }
 }

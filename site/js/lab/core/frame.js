@@ -35,12 +35,12 @@ const DEFAULT_COLOUR = [0.5, 0.5, 0.5, 1] // MuJoCo's default colour: a geom tha
 
 /** The overlays that a lab can offer, and what they switch on in MuJoCo's visualizer. */
 export const OVERLAYS = ['frames', 'contacts', 'forces', 'com', 'inertia', 'joints', 'momentum', 'angularMomentum', 'axis']
-const OWN = OVERLAYS.slice(-3) // which are not MuJoCo's
+const OWN_OVERLAYS = OVERLAYS.slice(-3) // drawn by arrows.js, not by MuJoCo
 
 export class Pictures {
   /**
    * @param {import('./engine.js').Engine} engine
-   * @param {import('./engine.js').Handles} handles `shown` is what is drawn
+   * @param {import('./engine.js').Handles} handles their `displayData` is drawn
    * @param {object} config the lab's data
    * @param {import('./sampler.js').Sampler} sampler keeps the trail
    */
@@ -49,37 +49,37 @@ export class Pictures {
     this.engine = engine
     this.handles = handles
     this.model = handles.model
-    this.data = handles.shown
+    this.data = handles.displayData
     this.config = config
     this.sampler = sampler
-    this.scene = handles.own(new mj.MjvScene(this.model, MOST_DECORATIONS))
-    this.option = handles.own(new mj.MjvOption())
-    this.camera = handles.own(new mj.MjvCamera())
-    this.still = handles.own(new mj.MjvPerturb())
-    // What is computed from the distance of the camera (a drag, slack tendons) must find one.
+    this.scene = handles.adopt(new mj.MjvScene(this.model, MOST_DECORATIONS))
+    this.option = handles.adopt(new mj.MjvOption())
+    this.camera = handles.adopt(new mj.MjvCamera())
+    this.still = handles.adopt(new mj.MjvPerturb())
+    // The visualizer scales a drag and slack tendons by the distance of the camera, so there must be one.
     mj.mjv_defaultFreeCamera(this.model, this.camera)
     mj.mjv_updateCamera(this.model, this.data, this.camera, this.scene)
     this.geoms = new SceneGeoms(this.scene, this.data)
-    this.layout = layoutOf(this.model, sampler.capacity)
+    this.layout = layOut(this.model, sampler.capacity)
     const { map } = this.model.vis
     const perNewton = config.forceScale ?? config.arrows?.forces
-    // MuJoCo divides by the mean mass, and half of what comes out is drawn.
+    // MuJoCo divides by the mean mass, and draws half of the length.
     if (perNewton) map.force = 2 * this.model.stat.meanmass * perNewton
     // Geoms, sites, skins and flexes are drawn from the model; the visualizer adds the rest.
     for (const group of ['geomgroup', 'sitegroup', 'skingroup', 'flexgroup']) this.option[group].fill(0)
     this.option.flags[engine.k.vis.PERTFORCE] = 1
-    this.own = new Set()
+    this.ownOverlays = new Set()
     for (const name of OVERLAYS) this.setOverlay(name, config.overlays.includes(name))
   }
 
   /** Switch an overlay on or off. */
-  setOverlay(name, on) {
+  setOverlay(name, isOn) {
     const { vis, frame } = this.engine.k
     const flags = { contacts: vis.CONTACTPOINT, forces: vis.CONTACTFORCE, com: vis.COM, inertia: vis.INERTIA, joints: vis.JOINT }
-    if (name === 'forces' && on) this.paintForces()
-    if (name === 'frames') this.option.frame = on ? frame.BODY : frame.NONE
-    else if (OWN.includes(name)) this.own[on ? 'add' : 'delete'](name)
-    else if (name in flags) this.option.flags[flags[name]] = on ? 1 : 0
+    if (name === 'forces' && isOn) this.paintForces()
+    if (name === 'frames') this.option.frame = isOn ? frame.BODY : frame.NONE
+    else if (OWN_OVERLAYS.includes(name)) this.ownOverlays[isOn ? 'add' : 'delete'](name)
+    else if (name in flags) this.option.flags[flags[name]] = isOn ? 1 : 0
     else throw new RangeError(`there is no overlay "${name}"`)
   }
 
@@ -89,15 +89,15 @@ export class Pictures {
     if (PALE.every((x, i) => Math.abs(x - contactforce[i]) < 1e-6)) contactforce.set(FORCE)
   }
 
-  /** What does not move. */
+  /** The description of what does not move (see `scene.js`). */
   describe() {
     return describeScene(this.engine, this.handles, this.config, this.camera, this.layout)
   }
 
   /**
-   * Write a frame of the data as it is.
+   * Write a frame of the present data.
    *
-   * @param {ArrayBuffer | null | undefined} buffer is used when it is large enough, else a new one is made
+   * @param {ArrayBuffer | null | undefined} buffer used if it is large enough; else a new one is made
    * @param {import('./drag.js').Drag} drag
    * @returns {Float32Array} of exactly the floats in use
    */
@@ -106,10 +106,10 @@ export class Pictures {
     const perturb = drag.active ? drag.handle : this.still
     engine.mj.mjv_updateScene(model, data, this.option, perturb, this.camera, engine.k.category.ALL, this.scene)
     const decorations = this.geoms.update()
-    const most = layout.trail + 3 * this.sampler.capacity + DECORATION * decorations
+    const atLeast = layout.trail + 3 * this.sampler.capacity + DECORATION * decorations
     const arrows = this.arrows()
-    const needed = 4 * (most + DECORATION * arrows.length)
-    const target = new Float32Array(buffer && buffer.byteLength >= needed ? buffer : new ArrayBuffer(needed + 40 * DECORATION))
+    const bytes = 4 * (atLeast + DECORATION * arrows.length)
+    const target = new Float32Array(buffer && buffer.byteLength >= bytes ? buffer : new ArrayBuffer(bytes + 40 * DECORATION))
     this.writePoses(target)
     this.writeVertices(target)
     const points = this.sampler.writeTrail(target, layout.trail)
@@ -123,8 +123,8 @@ export class Pictures {
   }
 
   arrows() {
-    const { engine, model, data, own, config } = this
-    return own.size > 0 && config.arrows ? arrowRows(momenta(engine, model, data), own, config.arrows) : []
+    const { engine, model, data, ownOverlays, config } = this
+    return ownOverlays.size > 0 && config.arrows ? arrowRows(momenta(engine, model, data), ownOverlays, config.arrows) : []
   }
 
   writePoses(target) {
@@ -133,15 +133,15 @@ export class Pictures {
     writeGeoms(target, layout.sites, model, 'site', data.site_xpos, data.site_xmat)
     const { light_xpos, light_xdir, cam_xpos, cam_xmat } = data
     const { light_active, cam_fovy } = model
-    for (let i = 0, at = layout.lights; i < model.nlight; i++, at += LIGHT) {
-      target.set(light_xpos.subarray(3 * i, 3 * i + 3), at)
-      target.set(light_xdir.subarray(3 * i, 3 * i + 3), at + 3)
-      target[at + 6] = light_active[i]
+    for (let i = 0, offset = layout.lights; i < model.nlight; i++, offset += LIGHT) {
+      target.set(light_xpos.subarray(3 * i, 3 * i + 3), offset)
+      target.set(light_xdir.subarray(3 * i, 3 * i + 3), offset + 3)
+      target[offset + 6] = light_active[i]
     }
-    for (let i = 0, at = layout.cameras; i < model.ncam; i++, at += CAMERA) {
-      target.set(cam_xpos.subarray(3 * i, 3 * i + 3), at)
-      target.set(cam_xmat.subarray(9 * i, 9 * i + 9), at + 3)
-      target[at + 12] = cam_fovy[i]
+    for (let i = 0, offset = layout.cameras; i < model.ncam; i++, offset += CAMERA) {
+      target.set(cam_xpos.subarray(3 * i, 3 * i + 3), offset)
+      target.set(cam_xmat.subarray(9 * i, 9 * i + 9), offset + 3)
+      target[offset + 12] = cam_fovy[i]
     }
   }
 
@@ -151,10 +151,10 @@ export class Pictures {
     if (model.nskinvert === 0) return
     engine.mj.mjv_updateSkin(model, data, scene)
     const { skinvert, skinnormal } = scene
-    for (let i = 0, at = layout.skin; i < 3 * model.nskinvert; i += 3, at += 6) {
+    for (let i = 0, offset = layout.skin; i < 3 * model.nskinvert; i += 3, offset += 6) {
       for (let j = 0; j < 3; j++) {
-        target[at + j] = skinvert[i + j]
-        target[at + 3 + j] = skinnormal[i + j]
+        target[offset + j] = skinvert[i + j]
+        target[offset + 3 + j] = skinnormal[i + j]
       }
     }
   }
@@ -163,13 +163,13 @@ export class Pictures {
     const { ints, floats } = this.geoms
     const { CYLINDER } = this.engine.k.geom
     const { contactforce } = this.model.vis.rgba
-    for (let i = 0, at = start; i < count; i++, at += DECORATION) {
-      const from = this.geoms.at(i)
-      for (let j = 0; j < 4; j++) target[at + j] = ints[from + j]
-      target.set(floats.subarray(from + 10, from + 30), at + 4) // size, position, matrix, colour, emission
-      if (ints[from] === ARROW && contactforce.every((x, j) => target[at + 19 + j] === x)) target[at + 1] = IN_FRONT
-      // The axes of MuJoCo's frames, long cylinders, are so thick that they cover what they stand in.
-      if (ints[from] === CYLINDER && target[at + 6] > target[at + 4]) target.fill(AXIS * target[at + 4], at + 4, at + 6)
+    for (let i = 0, offset = start; i < count; i++, offset += DECORATION) {
+      const source = this.geoms.offset(i)
+      for (let j = 0; j < 4; j++) target[offset + j] = ints[source + j]
+      target.set(floats.subarray(source + 10, source + 30), offset + 4) // size, position, matrix, colour, emission
+      if (ints[source] === ARROW && contactforce.every((x, j) => target[offset + 19 + j] === x)) target[offset + 1] = IN_FRONT
+      // The axes of MuJoCo's frames, long cylinders, are so thick that they would cover the body.
+      if (ints[source] === CYLINDER && target[offset + 6] > target[offset + 4]) target.fill(AXIS * target[offset + 4], offset + 4, offset + 6)
     }
   }
 }
@@ -177,18 +177,18 @@ export class Pictures {
 /** One row for each geom or site (`kind`); the colour is resolved as MuJoCo does. */
 function writeGeoms(target, start, model, kind, positions, matrices) {
   const [sizes, colours, materials] = ['size', 'rgba', 'matid'].map((name) => model[`${kind}_${name}`])
-  const ofMaterials = model.mat_rgba
-  for (let i = 0, at = start; i < materials.length; i++, at += GEOM) {
-    target.set(positions.subarray(3 * i, 3 * i + 3), at)
-    target.set(matrices.subarray(9 * i, 9 * i + 9), at + 3)
-    target.set(sizes.subarray(3 * i, 3 * i + 3), at + 12)
-    const own = materials[i] < 0 || DEFAULT_COLOUR.some((x, j) => colours[4 * i + j] !== x)
-    const [colour, from] = own ? [colours, 4 * i] : [ofMaterials, 4 * materials[i]]
-    target.set(colour.subarray(from, from + 4), at + 15)
+  const materialColours = model.mat_rgba
+  for (let i = 0, offset = start; i < materials.length; i++, offset += GEOM) {
+    target.set(positions.subarray(3 * i, 3 * i + 3), offset)
+    target.set(matrices.subarray(9 * i, 9 * i + 9), offset + 3)
+    target.set(sizes.subarray(3 * i, 3 * i + 3), offset + 12)
+    const hasOwnColour = materials[i] < 0 || DEFAULT_COLOUR.some((x, j) => colours[4 * i + j] !== x)
+    const [colour, source] = hasOwnColour ? [colours, 4 * i] : [materialColours, 4 * materials[i]]
+    target.set(colour.subarray(source, source + 4), offset + 15)
   }
 }
 
-function layoutOf(model, trail) {
+function layOut(model, trail) {
   const geoms = HEADER
   const sites = geoms + GEOM * model.ngeom
   const lights = sites + GEOM * model.nsite

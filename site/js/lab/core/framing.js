@@ -1,21 +1,21 @@
 /**
- * The camera that shows all of a motion, as a photographer would: from its direction, as near as the motion allows, with a margin.
+ * The camera that shows all of a motion, as a photographer would: from a given direction, as near as the motion allows, with a margin.
  *
  *   const framing = new Framing(lab, camera)        its azimuth, elevation and fovy
- *   framing.begin(); framing.see(lab); …            a run, and each moment of it
+ *   framing.begin(); framing.observe(lab); …        a run, and each moment of it
  *   framing.fit() → { distance, target } | null     null: nothing moves
  *
  * Runs in which something flies off are left out: those that would take the camera much farther away than the first run does.
  *
  * A camera sees a point if the point lies on the inner side of the picture's four edges, each of which is a plane through the
- * camera. So all that has to be known of a moment is how far what moves reaches in the directions of their normals. Coordinates
- * are those of the camera: to the right, up, and into the picture.
+ * camera. So of each moment only the `reach` is kept: how far the moving parts extend along the normals of these planes.
+ * Coordinates are those of the camera: to the right, up, and into the picture.
  */
 
 const ASPECT = 1.6 // width of a view over its height
-const MARGIN = 0.9 // of the view is the motion's
-const AROUND = 0.3 // of the motion's size: so far around it, what stands still belongs to the picture
-const FARTHEST = 5 // distances of the first run's camera
+const MARGIN = 0.9 // part of the view that the motion may fill
+const SURROUNDINGS = 0.3 // in sizes of the motion: what stands still and is nearer than this belongs in the picture
+const FARTHEST = 5 // in distances of the first run's camera
 const GAP = 0.04 // of the motion's size: between it and the floor
 const LEVEL = 0.999
 const SHOWN_GROUPS = 3
@@ -44,50 +44,50 @@ export class Framing {
     const [x, y] = this.slopes.map((slope) => MARGIN * slope)
     this.normals = [...AXES, [1, 0, -x], [-1, 0, -x], [0, 1, -y], [0, -1, -y]]
     this.directions = [...this.normals.map(this.world), [0, 0, -1]] // and down
-    const shown = Array.from(model.geom_type, (_, i) => i).filter((i) => isShown(model, i))
+    const visible = Array.from(model.geom_type, (_, i) => i).filter((i) => isShown(model, i))
     const moves = (i) => model.body_weldid[model.geom_bodyid[i]] !== 0 || model.body_mocapid[model.geom_bodyid[i]] >= 0
-    this.moving = shown.filter(moves)
-    this.still = shown.filter((i) => !moves(i) && model.geom_type[i] > this.kinds.HFIELD)
+    this.movingGeoms = visible.filter(moves)
+    this.stillGeoms = visible.filter((i) => !moves(i) && model.geom_type[i] > this.kinds.HFIELD)
     const { gravity } = model.opt
     this.falls = gravity[2] < 0 && Math.hypot(gravity[0], gravity[1]) < -gravity[2]
-    const planes = shown.filter((i) => model.geom_type[i] === this.kinds.PLANE)
+    const planes = visible.filter((i) => model.geom_type[i] === this.kinds.PLANE)
     this.tilted = planes.some((i) => data.geom_xmat[9 * i + 8] < LEVEL)
     this.planes = planes.map((i) => data.geom_xpos[3 * i + 2])
     this.runs = []
-    this.around = []
+    this.stillReaches = []
   }
 
-  /** A run begins. */
+  /** Begin a run. */
   begin() {
     this.runs.push([])
   }
 
-  /** What was seen of the first run. */
-  get first() {
+  /** The moments of the first run. */
+  get firstRun() {
     return this.runs[0]
   }
 
   /** The moments that a camera is to show. */
   get moments() {
-    const near = this.distanceOf(this.first) * FARTHEST
-    return this.runs.flatMap((run) => (this.distanceOf([...this.first, ...run]) <= near ? run : []))
+    const farthest = this.distanceOf(this.firstRun) * FARTHEST
+    return this.runs.flatMap((run) => (this.distanceOf([...this.firstRun, ...run]) <= farthest ? run : []))
   }
 
   distanceOf(moments) {
     return moments.length > 0 ? this.place(moments).distance : 0
   }
 
-  /** Take in where everything is: what moves, what tendons are fixed to, the site that leaves a trail. */
-  see(lab) {
+  /** Record a moment: the reach of what moves, of the points that tendons touch, and of the site that leaves a trail. */
+  observe(lab) {
     const { model, sampler } = lab
     const { data } = lab.sync()
     const points = [...rows(data.flexvert_xpos, 0, model.nflexvert), ...rows(data.site_xpos, sampler.site, sampler.site < 0 ? 0 : 1)]
     for (let i = 0; i < model.ntendon; i++) points.push(...rows(data.wrap_xpos, data.ten_wrapadr[i], data.ten_wrapnum[i]))
     const reach = this.directions.map((d) =>
-      Math.max(...this.moving.map((i) => this.support(model, data, i, d)), ...points.map((p) => dot(p, d))),
+      Math.max(...this.movingGeoms.map((i) => this.support(model, data, i, d)), ...points.map((p) => dot(p, d))),
     )
     if (reach.every(Number.isFinite)) this.runs.at(-1).push(reach)
-    this.around = this.still.map((i) => this.directions.map((d) => this.support(model, data, i, d)))
+    this.stillReaches = this.stillGeoms.map((i) => this.directions.map((d) => this.support(model, data, i, d)))
   }
 
   /** How far a geom reaches in a direction. */
@@ -119,11 +119,11 @@ export class Framing {
     return moments.length > 0 ? this.place(moments) : null
   }
 
-  /** The camera that sees all of some moments, and what stands still close to them. */
+  /** The camera that sees all of these moments, and what stands still close to them. */
   place(moments) {
     const reach = furthest(moments)
-    const room = reach.slice(0, EDGES).map((x) => x + AROUND * sizeOf(reach))
-    for (const still of this.around) {
+    const room = reach.slice(0, EDGES).map((x) => x + SURROUNDINGS * sizeOf(reach))
+    for (const still of this.stillReaches) {
       const clipped = room.map((x, i) => Math.min(x, still[i]))
       if ([0, 2, 4].some((i) => clipped[i] < -clipped[i + 1])) continue
       this.normals.forEach((normal, i) => {
@@ -138,22 +138,22 @@ export class Framing {
     return { distance: middle - depth, target: this.world([(right - left) / 2, (top - bottom) / 2, middle]) }
   }
 
-  /** The height of the floor: that of a level plane of the model, else under everything; null where nothing falls, or on a slope. */
+  /** The height of the floor: that of the model's level plane, else below everything; null if nothing falls or the plane is tilted. */
   floor() {
     const { moments } = this
     if (!this.falls || this.tilted || moments.length === 0) return null
     if (this.planes.length > 0) return Math.max(...this.planes)
     const reach = furthest(moments)
     const size = sizeOf(reach)
-    const feet = this.around.map((still) => still.at(-1)).filter((down) => down < reach.at(-1) + 2 * size)
+    const feet = this.stillReaches.map((still) => still.at(-1)).filter((depth) => depth < reach.at(-1) + 2 * size)
     return -Math.max(reach.at(-1) + GAP * size, ...feet)
   }
 
-  /** The part of a camera's picture that the rectangle around what moves fills, in the mean of the first run. */
+  /** The part of a camera's picture that the rectangle around what moves fills, averaged over the first run. */
   fill({ distance, target }) {
     const [x, y, z] = this.directions.filter((_, i) => i < EDGES && i % 2 === 0).map((d) => dot(target, d))
     const part = (low, high, middle, half) => Math.max(0, Math.min(high - middle, half) - Math.max(low - middle, -half)) / (2 * half)
-    const shares = this.first.map(([right, left, top, bottom, back, front]) => {
+    const shares = this.firstRun.map(([right, left, top, bottom, back, front]) => {
       const depth = Math.max(1e-9, (back - front) / 2 - z + distance)
       const [w, h] = this.slopes.map((slope) => slope * depth)
       return part(-left, right, x, w) * part(-bottom, top, y, h)
@@ -165,12 +165,12 @@ export class Framing {
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 const furthest = (moments) => moments[0].map((_, i) => Math.max(...moments.map((moment) => moment[i])))
 const sizeOf = (reach) => Math.max(...[0, 2, 4].map((i) => reach[i] + reach[i + 1]))
-const rows = (array, first, count) => Array.from({ length: count }, (_, i) => array.subarray(3 * (first + i), 3 * (first + i) + 3))
+const rows = (array, start, count) => Array.from({ length: count }, (_, i) => array.subarray(3 * (start + i), 3 * (start + i) + 3))
 
 /** Whether a geom is drawn, by its group and its colour. */
 function isShown(model, i) {
   const material = model.geom_matid[i]
-  const own = model.geom_rgba[4 * i + 3]
-  const alpha = material >= 0 && own === 1 ? model.mat_rgba[4 * material + 3] : own
+  const alphaOfGeom = model.geom_rgba[4 * i + 3]
+  const alpha = material >= 0 && alphaOfGeom === 1 ? model.mat_rgba[4 * material + 3] : alphaOfGeom
   return model.geom_group[i] < SHOWN_GROUPS && alpha > 0
 }

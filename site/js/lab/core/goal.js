@@ -1,4 +1,4 @@
-/** The goal of a lab: a condition that has to stay true for a while. It is looked at where samples are taken. */
+/** The goal of a lab: a condition that has to stay true for a while. It is evaluated whenever a sample is taken. */
 
 import { call, condition } from './piece.js'
 
@@ -13,15 +13,15 @@ export class Goal {
     this.clear()
   }
 
-  /** A new run begins. */
+  /** Begin a new run. */
   clear() {
-    this.since = null // when it last became true
-    this.held = 0 // s
-    this.longest = 0
-    this.reached = null // at which time
+    this.since = null // the time at which it last became true
+    this.held = 0 // s, for which it has been true
+    this.longest = 0 // s, the maximum of `held`
+    this.reached = null // the time at which it had been true for long enough
   }
 
-  /** Look at data whose derived quantities are current. */
+  /** Evaluate it on data whose derived quantities are current. */
   look(env) {
     const { time } = env.data
     const holds = call(ENTRY, () => condition(ENTRY, this.run(env)))

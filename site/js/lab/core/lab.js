@@ -4,8 +4,8 @@
  *   const lab = new Lab(engine, source, config, code)
  *   lab.start(); lab.step(100); lab.readouts(); lab.dispose()
  *
- * There are two MjData. `data` is the simulation. `shown` is brought up to date from it with mj_forward whenever something is
- * looked at: readouts, traces, claims and pictures see it. So what they show belongs to one moment (after mj_step, positions are
+ * There are two MjData. `data` is the simulation. `displayData` is copied from it and completed with mj_forward whenever something
+ * is looked at: readouts, traces, claims and pictures read it. So all of them show the same moment (after mj_step, positions are
  * new and everything derived from them is old), and looking, however often, changes no bit of the motion.
  */
 
@@ -29,14 +29,14 @@ export class Lab {
    * @param {Uint8Array | string} source the model, an MJB file or MJCF
    * @param {object} config the lab's data (coursebuild/features/lab/compile.py)
    * @param {object} code the lab's functions (ditto)
-   * @param {{play?: () => void, pause?: () => void}} [host] what `sim.play()` and `sim.pause()` do besides
+   * @param {{play?: () => void, pause?: () => void}} [host] called by `sim.play()` and `sim.pause()`
    */
   constructor(engine, source, config, code, host = {}) {
     this.engine = engine
     this.config = config
     this.code = code
     this.host = host
-    this.recorder = null // of each step, for the trial
+    this.recorder = null // records each step for the trial
     this.handles = engine.load(source)
     try {
       this.build()
@@ -48,31 +48,31 @@ export class Lab {
 
   build() {
     const { engine, config, code, handles } = this
-    const { model, data, shown } = handles
-    Watch.keep(engine, model)
+    const { model, data, displayData } = handles
+    Watch.disableAutoreset(engine, model)
     this.model = model
     this.data = data
     this.option = model.opt // every access through the model would make a new object
     this.paused = !config.autoplay
     this.key = keyframe(engine, model, config.key)
     this.ctx = {}
-    this.scratch = { force: handles.own(new engine.mj.DoubleBuffer(6)) }
+    this.scratch = { force: handles.adopt(new engine.mj.DoubleBuffer(6)) }
     this.watch = new Watch(engine, model, data)
     this.sampler = new Sampler(config, code, siteOf(engine, model, config.trail))
     this.pictures = new Pictures(engine, handles, config, this.sampler)
     this.drag = new Drag(engine, handles, this.pictures.scene)
     this.physics = new State(engine, handles)
     this.env = environment(this, data, true)
-    this.view = environment(this, shown, false)
+    this.view = environment(this, displayData, false)
     this.controls = new Controls(config.controls, code.controls, this.env)
     this.warnings = []
-    this.queue = [] // what is left of a log that is replayed
+    this.queue = [] // the remaining events of a log that is being replayed
     this.forget()
   }
 
-  // --- life
+  // --- start and reset
 
-  /** Begin: every control at its value, then as after a reset. Controls without `init` are applied here only. */
+  /** Start with every control at its initial value. Controls without `init` are applied here and not at a reset. */
   start() {
     this.controls.restart()
     this.controls.applyParams()
@@ -105,7 +105,7 @@ export class Lab {
     this.settle()
   }
 
-  /** A new run begins at the present state. */
+  /** Begin a new run at the present state. */
   forget() {
     this.steps = 0
     this.diverged = null
@@ -115,7 +115,7 @@ export class Lab {
     this.dirty = true
   }
 
-  /** After lab code: what is derived becomes current, and what went wrong is noticed. */
+  /** After lab code has run: update what is derived, and notice warnings and divergence. */
   settle() {
     const { engine, model, data } = this
     if (data.time < this.sampler.last) this.forget() // the code has put the time back, which begins a new run
@@ -123,7 +123,7 @@ export class Lab {
     this.dirty = true
     this.diverged = null
     const time = data.time
-    for (const finding of this.watch.raised(time)) this.note(finding)
+    for (const finding of this.watch.takeNew(time)) this.note(finding)
     this.diverged ??= this.watch.badState('qpos', time) ?? this.watch.badState('qvel', time)
     if (this.steps === 0 && this.sampler.active) {
       this.sampler.clear()
@@ -168,7 +168,7 @@ export class Lab {
     })
   }
 
-  /** Do what a reader does, and log it; where a new run begins with it, it is the first event of that. */
+  /** Do what a reader asks for, and log it. If that begins a new run, it is the first event of the new log. */
   act(event, action) {
     const { log } = this
     const values = [...this.values]
@@ -181,13 +181,13 @@ export class Lab {
     else this.log = null
   }
 
-  // --- the log: what was done in a run since its reset; `null` where the controls alone do not tell the motion
+  // --- the log: what was done in a run since its reset; `null` if the controls alone do not determine the motion
 
   /**
-   * Begin a run in which all is done again that a log says, each before the first step at its time or later.
+   * Begin a run that repeats the events of a log, each before the first step at its time or later.
    *
-   * @param {{values: unknown[], events: [number, number, unknown?][], end?: number}} log the values of the controls at its reset; then
-   *   a time, the number of a control and, but for a button, a value; it stops at `end` (s)
+   * @param {{values: unknown[], events: [number, number, unknown?][], end?: number}} log the values of the controls at the reset;
+   *   of each event the time, the number of a control and, except for a button, a value; the replay stops at `end` (s)
    */
   replay({ values, events, end = Infinity }) {
     for (const [, i, value] of events) this.controls.check(i, value)
@@ -196,7 +196,7 @@ export class Lab {
     this.log.replayed = true
   }
 
-  /** Do what the log says is due; `stopAt` at its end. */
+  /** Do the events of the log that are due; returns 'stopAt' at its end. */
   follow() {
     const { queue } = this
     while (queue.length > 0 && this.data.time >= queue[0][0] - TOLERANCE) {
@@ -210,7 +210,7 @@ export class Lab {
     return null
   }
 
-  /** How far the goal is; it counts where the reader has used the controls alone. */
+  /** The state of the goal; `counts`: the reader has used nothing but the controls. */
   get goal() {
     const { goal } = this.sampler
     return goal && { held: goal.held, reached: goal.reached, counts: this.log !== null && !this.log.replayed }
@@ -226,8 +226,8 @@ export class Lab {
   // --- running
 
   /**
-   * Make at most `n` steps. It ends early when the lab diverges (`diverged` says how), when its time reaches `stopAt`, and
-   * when its code calls `sim.pause()`.
+   * Make at most `n` steps; fewer if the lab diverges (`diverged` says how), its time reaches `stopAt`, or its code calls
+   * `sim.pause()`.
    *
    * @returns {{steps: number, stopped: null | 'diverged' | 'stopAt' | 'code'}}
    */
@@ -235,22 +235,22 @@ export class Lab {
     if (this.stepping) throw new Error('sim.step() within a step is not possible')
     this.interrupted = false
     let steps = 0
-    let stopped = this.diverged === null ? null : 'diverged'
-    while (stopped === null && steps < n) {
-      stopped = this.follow()
-      if (stopped !== null) break
+    let reason = this.diverged === null ? null : 'diverged'
+    while (reason === null && steps < n) {
+      reason = this.follow()
+      if (reason !== null) break
       this.stepping = true
       try {
-        stopped = this.one()
+        reason = this.stepOnce()
       } finally {
         this.stepping = false
       }
       steps += 1
     }
-    return { steps, stopped }
+    return { steps, stopped: reason }
   }
 
-  one() {
+  stepOnce() {
     const { engine, model, data, drag, recorder } = this
     recorder?.begin()
     if (this.code.controller) call(['controller'], () => this.code.controller(this.env))
@@ -275,7 +275,7 @@ export class Lab {
     return this.interrupted ? 'code' : null
   }
 
-  /** Bring `shown` up to date, and return what looking code sees. */
+  /** Bring `displayData` up to date; returns the environment of code that only looks. */
   sync() {
     if (this.dirty) {
       this.physics.copy(this.view.data)
@@ -344,17 +344,17 @@ export class Lab {
 
   // --- sharing
 
-  /** All that the motion depends on, given model and code: can be cloned and sent. */
+  /** All that the motion depends on, given model and code; plain values that can be sent to another thread. */
   state() {
     return { values: [...this.values], steps: this.steps, time: this.data.time, physics: this.physics.read(), log: this.log }
   }
 
-  /** Go to a state: its controls, a reset, and then its physics where it holds any. */
+  /** Go to a state: set its controls, reset, and then set its physics if it holds any. */
   restore({ values, steps = 0, physics = null }) {
     values.forEach((value, i) => {
       if (value !== null) this.controls.take(i, value)
     })
-    this.controls.each()
+    this.controls.applyWhere()
     this.reset()
     if (physics === null) return
     this.physics.write(physics)

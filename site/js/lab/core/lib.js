@@ -2,7 +2,7 @@
  * What lab code finds under `lib`: quantities that take more than an index, computed by MuJoCo.
  *
  * Nothing here changes the motion. `energy`, `momentum` and `angmom` need results that MuJoCo leaves in the data only on
- * demand; the data are as before afterwards, so that a readout never changes what another one shows. Vectors are copies, in
+ * demand; afterwards the data are as before, so that no readout changes another. Vectors are copies, in
  * SI units and the world frame.
  */
 
@@ -21,26 +21,26 @@ export function createLib(engine, model, data, scratch, random) {
   const { mj, k } = engine
   const ids = new Map()
 
-  const id = (type, what, name) => {
+  const id = (type, kind, name) => {
     if (typeof name === 'number') return name
     const key = `${type} ${name}`
-    let found = ids.get(key)
-    if (found === undefined) {
-      found = mj.mj_name2id(model, type, String(name))
-      if (found < 0) throw new Error(`the model has no ${what} "${name}"`)
-      ids.set(key, found)
+    let index = ids.get(key)
+    if (index === undefined) {
+      index = mj.mj_name2id(model, type, String(name))
+      if (index < 0) throw new Error(`the model has no ${kind} "${name}"`)
+      ids.set(key, index)
     }
-    return found
+    return index
   }
-  const row = (array, index, what) => {
-    if (!(index >= 0 && 3 * index < array.length)) throw new Error(`the model has no ${what} number ${index}`)
+  const row = (array, index, kind) => {
+    if (!(index >= 0 && 3 * index < array.length)) throw new Error(`the model has no ${kind} number ${index}`)
     return array.slice(3 * index, 3 * index + 3)
   }
 
   return Object.freeze({
     /** J: {kinetic, potential, total}; potential: gravity and springs. */
     energy() {
-      return undisturbed(data, ['energy'], ['flg_energypos', 'flg_energyvel'], () => {
+      return withRestored(data, ['energy'], ['flg_energypos', 'flg_energyvel'], () => {
         mj.mj_energyPos(model, data)
         mj.mj_energyVel(model, data)
         const [potential, kinetic] = data.energy
@@ -67,12 +67,12 @@ export function createLib(engine, model, data, scratch, random) {
     qpos(name) {
       const joint = id(k.obj.JOINT, 'joint', name)
       if (!(joint >= 0 && joint < model.njnt)) throw new Error(`the model has no joint number ${joint}`)
-      const at = model.jnt_qposadr[joint]
+      const start = model.jnt_qposadr[joint]
       const size = { [k.joint.FREE]: 7, [k.joint.BALL]: 4 }[model.jnt_type[joint]] ?? 1
-      return size === 1 ? data.qpos[at] : data.qpos.slice(at, at + size)
+      return size === 1 ? data.qpos[start] : data.qpos.slice(start, start + size)
     },
 
-    /** N: the normal forces of all contacts, or of those of one geom, added up. */
+    /** N: the sum of the normal forces of all contacts, or of those of one geom. */
     normalForce(geom) {
       const only = geom === undefined ? -1 : id(k.obj.GEOM, 'geom', geom)
       let sum = 0
@@ -94,20 +94,20 @@ export function createLib(engine, model, data, scratch, random) {
   })
 
   function subtree(read) {
-    return undisturbed(data, ['subtree_linvel', 'subtree_angmom'], ['flg_subtreevel'], () => {
+    return withRestored(data, ['subtree_linvel', 'subtree_angmom'], ['flg_subtreevel'], () => {
       mj.mj_subtreeVel(model, data)
       return read()
     })
   }
 }
 
-/** Call `compute`, and put back what it did to these arrays and flags of the data. */
-function undisturbed(data, arrays, flags, compute) {
-  const before = arrays.map((name) => data[name].slice())
-  const set = flags.map((name) => data[name])
+/** Call `compute`, then restore these arrays and flags of the data. */
+function withRestored(data, arrays, flags, compute) {
+  const arrayValues = arrays.map((name) => data[name].slice())
+  const flagValues = flags.map((name) => data[name])
   const result = compute()
-  arrays.forEach((name, i) => data[name].set(before[i]))
-  flags.forEach((name, i) => (data[name] = set[i]))
+  arrays.forEach((name, i) => data[name].set(arrayValues[i]))
+  flags.forEach((name, i) => (data[name] = flagValues[i]))
   return result
 }
 
@@ -130,7 +130,7 @@ export function eachContact(data, visit) {
 }
 
 /**
- * The contacts as plain objects, what `sim.contacts()` gives: `geoms` are two ids (-1: not a geom, but part of a flex) and
+ * The contacts as plain objects, as `sim.contacts()` returns them: `geoms` are two ids (-1: not a geom, but part of a flex) and
  * `names` their names; `pos` (m) and `normal` (unit, from the first to the second) are in the world; `dist` is negative in
  * penetration (m); `force` is [normal, friction, friction, torsion, rolling, rolling] in the frame of the contact (N, N m).
  */

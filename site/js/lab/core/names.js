@@ -1,4 +1,4 @@
-/** What a lab's data names in its model. */
+/** Finds what a lab's data name in its model. */
 
 /** The number of a keyframe, by name or number; -1 for none. */
 export function keyframe(engine, model, key) {
@@ -18,7 +18,7 @@ export function siteOf(engine, model, name) {
   return site
 }
 
-/** The name of an object; empty where it has none, for which the bindings give whatever text lies at the null address. */
+/** The name of an object, or ''. For an object without a name the bindings return whatever text lies at the null address. */
 export function nameOf(engine, model, type, i) {
   const name = engine.mj.mj_id2name(model, type, i) ?? ''
   return engine.mj.mj_name2id(model, type, name) === i ? name : ''

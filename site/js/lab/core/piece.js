@@ -1,5 +1,5 @@
 /**
- * Calling the pieces of a lab's code, so that whatever goes wrong is known by its entry in the lesson.
+ * Calls the pieces of a lab's code, so that a failure is reported with its entry in the lesson.
  */
 
 /**
@@ -15,7 +15,7 @@ export class LabError extends Error {
   }
 }
 
-/** The entry whose code runs now, and the entry that is being tried; they outlive an engine that was stopped from outside. */
+/** The entry whose code runs now, and the entry that is being tried; still known after the engine was stopped from outside. */
 export const current = { entry: null, trying: null }
 
 /** Call `code` for `entry`; what it throws becomes a LabError. */
@@ -33,24 +33,24 @@ export function call(entry, code) {
   }
 }
 
-/** A value for a person: a number or a text, or `null` where there is none. */
+/** Check a value for a readout: a number or a text, or `null` for none. */
 export function readable(entry, value) {
   if (typeof value === 'number' || typeof value === 'string' || value === null) return value
   throw new LabError('type', entry, `gives ${describe(value)}, not a number or a text`)
 }
 
-/** A value for a plot: a number, or `null` for a gap. */
+/** Check a value for a plot: a number, or `null` for a gap. */
 export function plottable(entry, value) {
   return value === null ? value : numeric(entry, value)
 }
 
-/** A value for a claim: a number, which may be NaN. */
+/** Check a value for a claim: a number, which may be NaN. */
 export function numeric(entry, value) {
   if (typeof value === 'number') return value
   throw new LabError('type', entry, `gives ${describe(value)}, not a number`)
 }
 
-/** A value for a goal. */
+/** Check a value for a goal: true or false. */
 export function condition(entry, value) {
   if (typeof value === 'boolean') return value
   throw new LabError('type', entry, `gives ${describe(value)}, not true or false`)

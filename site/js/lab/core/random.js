@@ -1,6 +1,6 @@
 /**
- * A seeded generator, so that a lab with chance in it does the same each time: xoshiro128** of Blackman and Vigna, its state
- * filled from the seed by splitmix32. It is 32-bit integer arithmetic, hence the same in every engine.
+ * A seeded generator, so that a lab that draws random numbers does the same each time: xoshiro128** of Blackman and Vigna, its
+ * state filled from the seed by splitmix32. It is 32-bit integer arithmetic, hence the same in every engine.
  */
 
 const rotl = (x, k) => (x << k) | (x >>> (32 - k))

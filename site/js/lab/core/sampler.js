@@ -1,5 +1,5 @@
 /**
- * What a lab records while it runs: the traces of its plots, the trail of a site, and how long its goal is held.
+ * Records a lab while it runs: the traces of its plots, the trail of a site, and how long its goal has held.
  *
  * Samples lie on a grid of steps counted from the reset, never on the clock, so that the same run gives the same samples in
  * the page and in the build, at any speed.
@@ -32,7 +32,7 @@ export class Sampler {
     this.clear()
   }
 
-  /** A new run begins: what was recorded belongs to the one before. */
+  /** Begin a new run: drop the samples of the previous one. */
   clear() {
     this.epoch += 1
     this.times = []
@@ -59,31 +59,31 @@ export class Sampler {
       this.times.push(env.data.time)
     }
     if (this.site >= 0) {
-      const at = 3 * (this.points++ % TRAIL)
-      const from = 3 * this.site
-      this.trail.set(env.data.site_xpos.subarray(from, from + 3), at)
+      const offset = 3 * (this.points++ % TRAIL)
+      const source = 3 * this.site
+      this.trail.set(env.data.site_xpos.subarray(source, source + 3), offset)
     }
     this.goal?.look(env)
     this.last = env.data.time
   }
 
   /**
-   * What was recorded since the last call. `values` holds, for each of the times, one value for each trace of all plots in turn;
-   * a new `epoch` says that the samples before it are of an earlier run.
+   * The samples since the last call. `values` holds, for each of the times, one value for each trace of all plots in turn;
+   * a new `epoch` says that earlier samples belong to an earlier run.
    */
   take() {
-    const taken = { epoch: this.epoch, times: Float64Array.from(this.times), values: Float64Array.from(this.values) }
+    const samples = { epoch: this.epoch, times: Float64Array.from(this.times), values: Float64Array.from(this.values) }
     this.times = []
     this.values = []
-    return taken
+    return samples
   }
 
-  /** The number of points of the trail, and the points from the oldest to the newest, written into `target` at `at`. */
-  writeTrail(target, at) {
+  /** Write the points of the trail, from the oldest to the newest, into `target` from `start` on; returns their number. */
+  writeTrail(target, start) {
     const count = Math.min(this.points, TRAIL)
     const oldest = this.points > TRAIL ? 3 * (this.points % TRAIL) : 0
-    target.set(this.trail.subarray(oldest, 3 * count), at)
-    target.set(this.trail.subarray(0, oldest), at + 3 * count - oldest)
+    target.set(this.trail.subarray(oldest, 3 * count), start)
+    target.set(this.trail.subarray(0, oldest), start + 3 * count - oldest)
     return count
   }
 

@@ -1,8 +1,8 @@
 /**
- * What of a model's appearance does not move: plain values and copies of arrays, ready to be sent to another thread.
+ * The constant part of a model's appearance: plain values and copies of arrays, ready to be sent to another thread.
  *
- * The page builds its meshes, textures and lights from it once; where they are, and what colour and size they have, is in every
- * frame (see `frame.js`). Ids are MuJoCo's; -1 means none. Angles are in degrees, lengths in metres.
+ * The page builds its meshes, textures and lights from it once; their places, colours and sizes come with every frame
+ * (see `frame.js`). Ids are MuJoCo's; -1 means none. Angles are in degrees, lengths in metres.
  */
 
 import { nameOf } from './names.js'
@@ -18,12 +18,12 @@ const ROLE_RGB = 1
  * @param {object} camera an MjvCamera to work with
  * @param {object} layout of the frames
  */
-export function describeScene(engine, { model, shown: data }, config, camera, layout) {
+export function describeScene(engine, { model, displayData: data }, config, camera, layout) {
   const { mj, k } = engine
   const name = (type, i) => nameOf(engine, model, type, i)
-  const each = (count, make) => Array.from({ length: count }, (_, i) => make(i))
+  const list = (count, make) => Array.from({ length: count }, (_, i) => make(i))
   const { stat, vis } = model
-  const { extent = stat.extent } = config // of the model that the camera and the floor were found for
+  const { extent = stat.extent } = config // of the model for which camera and floor were computed
   const fits = stat.extent < 1.5 * extent && extent < 1.5 * stat.extent
   return {
     layout: { ...layout },
@@ -33,12 +33,12 @@ export function describeScene(engine, { model, shown: data }, config, camera, la
     center: Array.from(stat.center),
     extent: stat.extent,
     visual: visual(vis),
-    bodies: each(model.nbody, (i) => ({
+    bodies: list(model.nbody, (i) => ({
       name: name(k.obj.BODY, i),
       parent: model.body_parentid[i],
       movable: model.body_weldid[i] !== 0 || model.body_mocapid[i] >= 0,
     })),
-    geoms: each(model.ngeom, (i) => ({
+    geoms: list(model.ngeom, (i) => ({
       name: name(k.obj.GEOM, i),
       type: model.geom_type[i],
       body: model.geom_bodyid[i],
@@ -46,40 +46,40 @@ export function describeScene(engine, { model, shown: data }, config, camera, la
       material: model.geom_matid[i],
       data: model.geom_dataid[i],
     })),
-    sites: each(model.nsite, (i) => ({
+    sites: list(model.nsite, (i) => ({
       name: name(k.obj.SITE, i),
       type: model.site_type[i],
       body: model.site_bodyid[i],
       group: model.site_group[i],
       material: model.site_matid[i],
     })),
-    joints: each(model.njnt, (i) => ({ name: name(k.obj.JOINT, i), type: model.jnt_type[i], body: model.jnt_bodyid[i] })),
-    springs: each(model.njnt, (i) => spring(k, model, i)).filter((found) => found !== null),
-    pins: each(model.njnt, (i) => pin(k, model, data, i)).filter((found) => found !== null),
-    materials: each(model.nmat, (i) => material(model, i, name(k.obj.MATERIAL, i))),
-    textures: each(model.ntex, (i) => texture(model, i, name(k.obj.TEXTURE, i))),
-    meshes: each(model.nmesh, (i) => mesh(model, i, name(k.obj.MESH, i))),
-    hfields: each(model.nhfield, (i) => hfield(model, i, name(k.obj.HFIELD, i))),
-    lights: each(model.nlight, (i) => light(model, i, name(k.obj.LIGHT, i))),
-    cameras: each(model.ncam, (i) => ({ name: name(k.obj.CAMERA, i), projection: model.cam_projection[i] })),
-    flexes: each(model.nflex, (i) => flex(model, i, name(k.obj.FLEX, i))),
-    skins: each(model.nskin, (i) => skin(model, i, name(k.obj.SKIN, i))),
+    joints: list(model.njnt, (i) => ({ name: name(k.obj.JOINT, i), type: model.jnt_type[i], body: model.jnt_bodyid[i] })),
+    springs: list(model.njnt, (i) => spring(k, model, i)).filter((shape) => shape !== null),
+    pins: list(model.njnt, (i) => pin(k, model, data, i)).filter((shape) => shape !== null),
+    materials: list(model.nmat, (i) => material(model, i, name(k.obj.MATERIAL, i))),
+    textures: list(model.ntex, (i) => texture(model, i, name(k.obj.TEXTURE, i))),
+    meshes: list(model.nmesh, (i) => mesh(model, i, name(k.obj.MESH, i))),
+    hfields: list(model.nhfield, (i) => hfield(model, i, name(k.obj.HFIELD, i))),
+    lights: list(model.nlight, (i) => light(model, i, name(k.obj.LIGHT, i))),
+    cameras: list(model.ncam, (i) => ({ name: name(k.obj.CAMERA, i), projection: model.cam_projection[i] })),
+    flexes: list(model.nflex, (i) => flex(model, i, name(k.obj.FLEX, i))),
+    skins: list(model.nskin, (i) => skin(model, i, name(k.obj.SKIN, i))),
   }
 }
 
 const part = (array, start, count) => array.slice(start, start + count)
 const row = (array, i, n) => Array.from(array.subarray(n * i, n * i + n))
 
-/** A slide joint that is a spring, between the geoms that it holds apart; of a body in the world, the nearest that stands still. */
+/** The spring to draw for a slide joint with stiffness: from the first geom of the parent that is no plane or height field to that of its body. */
 function spring(k, model, i) {
   const body = model.jnt_bodyid[i]
   if (model.jnt_type[i] !== k.joint.SLIDE || !(model.jnt_stiffness[i] > 0) || model.body_geomnum[body] === 0) return null
-  const to = model.body_geomadr[body]
+  const geom = model.body_geomadr[body]
   const parent = model.body_parentid[body]
-  const first = model.body_geomadr[parent]
-  const holders = Array.from({ length: model.body_geomnum[parent] }, (_, j) => first + j)
-  const from = holders.find((geom) => model.geom_type[geom] > k.geom.HFIELD)
-  return from === undefined ? null : { from, to, radius: 0.4 * Math.min(model.geom_rbound[from], model.geom_rbound[to]) }
+  const firstGeom = model.body_geomadr[parent]
+  const holders = Array.from({ length: model.body_geomnum[parent] }, (_, j) => firstGeom + j)
+  const holder = holders.find((g) => model.geom_type[g] > k.geom.HFIELD)
+  return holder === undefined ? null : { from: holder, to: geom, radius: 0.4 * Math.min(model.geom_rbound[holder], model.geom_rbound[geom]) }
 }
 
 /** A hinge that is fixed to the world. */
@@ -88,14 +88,14 @@ function pin(k, model, data, i) {
   return { position: row(data.xanchor, i, 3), axis: row(data.xaxis, i, 3) }
 }
 
-/** MuJoCo's free camera for the model, with what the lab says instead. */
-function freeCamera(mj, model, wanted, camera) {
+/** MuJoCo's free camera for the model, with the lab's settings in place of its defaults. */
+function freeCamera(mj, model, settings, camera) {
   mj.mjv_defaultFreeCamera(model, camera)
   return {
-    azimuth: wanted?.azimuth ?? camera.azimuth,
-    elevation: wanted?.elevation ?? camera.elevation,
-    distance: wanted?.distance ?? camera.distance,
-    target: wanted?.target ?? Array.from(camera.lookat),
+    azimuth: settings?.azimuth ?? camera.azimuth,
+    elevation: settings?.elevation ?? camera.elevation,
+    distance: settings?.distance ?? camera.distance,
+    target: settings?.target ?? Array.from(camera.lookat),
     orthographic: camera.orthographic !== 0,
     fovy: model.vis.global.fovy,
   }
@@ -208,11 +208,11 @@ function flex(model, i, name) {
 
 function skin(model, i, name) {
   const count = model.skin_vertnum[i]
-  const at = model.skin_texcoordadr[i]
+  const start = model.skin_texcoordadr[i]
   return {
     name,
     faces: part(model.skin_face, 3 * model.skin_faceadr[i], 3 * model.skin_facenum[i]),
-    texcoords: at >= 0 ? part(model.skin_texcoord, 2 * at, 2 * count) : null,
+    texcoords: start >= 0 ? part(model.skin_texcoord, 2 * start, 2 * count) : null,
     start: model.skin_vertadr[i],
     count,
     group: model.skin_group[i],

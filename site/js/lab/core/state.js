@@ -8,7 +8,7 @@ export class State {
     this.data = handles.data
     this.signature = engine.k.state.INTEGRATION
     this.size = this.mj.mj_stateSize(this.model, this.signature)
-    this.buffer = handles.own(new this.mj.DoubleBuffer(Math.max(1, this.size)))
+    this.buffer = handles.adopt(new this.mj.DoubleBuffer(Math.max(1, this.size)))
   }
 
   /** A copy of it. */

@@ -1,11 +1,11 @@
 /**
- * C structures of the engine, read where they lie in its memory.
+ * C structures of the engine, read directly from its memory.
  *
- * The bindings only copy the warning counters and the geoms of a scene, object by object, which would cost more than a step.
- * Both are plain structures whose layout belongs to the engine's version. Each reader compares what it finds with what the
- * bindings say before it is used, and refuses to work on a difference.
+ * The bindings can only copy the warning counters and the geoms of a scene, object by object, which would cost more than a step.
+ * Both are plain structures whose layout belongs to the engine's version. Before it is used, each reader compares its values with
+ * those of the bindings, and throws on a difference.
  *
- * The engine's memory may grow, which detaches every array on it: views are made anew when they have become empty.
+ * The engine's memory may grow, which detaches every array on it: a view that has become empty is made anew.
  */
 
 import { EngineError } from './engine.js'
@@ -15,7 +15,7 @@ const WRONG = 'the engine lays out its memory in another way than this version o
 /** The memory of the engine, found through any array of a model. */
 const memory = (data) => data.xpos.buffer
 
-/** How often each of MuJoCo's warnings was raised since the last reset of the data. */
+/** Counts how often each of MuJoCo's warnings was raised since the last reset of the data. */
 export class WarningCounters {
   /** @param {object} data MjData, which must outlive the counters */
   constructor(data) {
@@ -24,24 +24,24 @@ export class WarningCounters {
     const vector = data.warning
     this.count = vector.size()
     const words = new Int32Array(memory(data))
-    const first = words[vector.$$.ptr >> 2] >> 2
-    this.address = words[first]
+    const start = words[vector.$$.ptr >> 2] >> 2
+    this.address = words[start]
     for (let i = 0; i < this.count; i++) {
-      if (words[first + 2 * i] !== this.address + 8 * i) throw new EngineError(WRONG, true)
+      if (words[start + 2 * i] !== this.address + 8 * i) throw new EngineError(WRONG, true)
     }
     this.view = new Int32Array(0)
-    this.prove(vector)
+    this.verify(vector)
   }
 
-  prove(vector) {
+  verify(vector) {
     for (let i = 0; i < this.count; i++) {
       const before = this.number(i)
       this.words()[2 * i + 1] = 1000 + i
       const copy = vector.get(i)
-      const right = copy.number === 1000 + i
+      const agrees = copy.number === 1000 + i
       copy.delete()
       this.words()[2 * i + 1] = before
-      if (!right) throw new EngineError(WRONG, true)
+      if (!agrees) throw new EngineError(WRONG, true)
     }
   }
 
@@ -55,7 +55,7 @@ export class WarningCounters {
     return this.words()[2 * i + 1]
   }
 
-  /** What the last warning `i` was about: an index into the array in question. */
+  /** The index that the last warning `i` refers to, in the array that it is about. */
   info(i) {
     return this.words()[2 * i]
   }
@@ -81,11 +81,11 @@ export class SceneGeoms {
     const words = new Int32Array(memory(data))
     const wrapper = scene.$$.ptr >> 2
     const candidates = [words[wrapper], words[wrapper + 1], words[wrapper + 2]]
-    this.address = candidates.find((at) => at > 0 && at % 4 === 0 && words[at >> 2] === scene.maxgeom)
+    this.address = candidates.find((address) => address > 0 && address % 4 === 0 && words[address >> 2] === scene.maxgeom)
     if (this.address === undefined) throw new EngineError(WRONG, true)
     this.ints = new Int32Array(0)
     this.floats = new Float32Array(0)
-    this.proven = false
+    this.isVerified = false
   }
 
   /** Read again after mjv_updateScene; returns the number of geoms. */
@@ -98,29 +98,29 @@ export class SceneGeoms {
       this.floats = new Float32Array(buffer, geoms, GEOM_WORDS * this.scene.maxgeom)
     }
     const count = this.header[1]
-    if (!this.proven && count > 0) this.prove(count)
+    if (!this.isVerified && count > 0) this.verify(count)
     return count
   }
 
-  prove(count) {
+  verify(count) {
     const vector = this.scene.geoms
-    let right = vector.size() === count
-    for (let i = 0; right && i < count; i++) {
+    let agrees = vector.size() === count
+    for (let i = 0; agrees && i < count; i++) {
       const copy = vector.get(i)
-      const at = i * GEOM_WORDS
+      const offset = i * GEOM_WORDS
       const { type, objid, size, pos, mat, rgba } = copy
       const fields = [[0, type], [3, objid], [12, size[2]], [13, pos[0]], [24, mat[8]], [28, rgba[3]]]
-      // A state that has blown up gives numbers that are none.
-      right = fields.every(([j, x]) => Object.is(x, j < 4 ? this.ints[at + j] : this.floats[at + j]))
+      // `Object.is`, as a diverged state gives NaN.
+      agrees = fields.every(([j, x]) => Object.is(x, j < 4 ? this.ints[offset + j] : this.floats[offset + j]))
       copy.delete()
     }
     vector.delete()
-    if (!right) throw new EngineError(WRONG, true)
-    this.proven = true
+    if (!agrees) throw new EngineError(WRONG, true)
+    this.isVerified = true
   }
 
   /** The first word of geom `i`. */
-  at(i) {
+  offset(i) {
     return i * GEOM_WORDS
   }
 }

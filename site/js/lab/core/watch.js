@@ -2,8 +2,8 @@
  * Watching for divergence.
  *
  * MuJoCo answers a bad state (a value that is not finite, or beyond 1e10) with a reset and a counter. The lab switches the
- * reset off, and looks after each step: at the counters, at the time, and at the state itself, which MuJoCo would only
- * check at the next step. Where the author has switched the reset on again, the counter still tells.
+ * reset off, and checks after each step: the counters, the time, and the state itself, which MuJoCo would only
+ * check at the next step. If the author has switched the reset on again, the counter still shows it.
  */
 
 import { WarningCounters } from './structs.js'
@@ -19,7 +19,7 @@ export class Watch {
     this.model = model
     this.data = data
     this.counters = new WarningCounters(data)
-    this.seen = new Int32Array(this.counters.count)
+    this.counts = new Int32Array(this.counters.count)
     this.total = 0
     this.arrays = {}
     const { warning } = engine.k
@@ -28,26 +28,26 @@ export class Watch {
   }
 
   /** Switch off MuJoCo's own reset of a diverged state. */
-  static keep(engine, model) {
+  static disableAutoreset(engine, model) {
     model.opt.disableflags |= engine.k.disable.AUTORESET
   }
 
-  /** Start afresh: after a reset, or after lab code that may have repaired the state. */
+  /** Start anew: after a reset, or after lab code that may have repaired the state. */
   restart() {
-    for (let i = 0; i < this.seen.length; i++) this.seen[i] = this.counters.number(i)
+    for (let i = 0; i < this.counts.length; i++) this.counts[i] = this.counters.number(i)
     this.total = this.counters.total()
   }
 
   /**
-   * Look after a step that began at time `before`.
+   * Check the state after a step that began at time `before`.
    *
    * @returns {{diverged: Finding | null, warnings: Finding[]} | null} null when all is well
    */
   look(before) {
     const { data } = this
     const time = data.time
-    if (this.counters.total() === this.total && time > before && this.good('qpos') && this.good('qvel')) return null
-    const warnings = this.raised(time)
+    if (this.counters.total() === this.total && time > before && this.isBounded('qpos') && this.isBounded('qvel')) return null
+    const warnings = this.takeNew(time)
     const fatal = warnings.find((finding) => finding.fatal)
     return {
       diverged: fatal ?? this.badTime(before, time) ?? this.badState('qpos', time) ?? this.badState('qvel', time),
@@ -55,19 +55,19 @@ export class Watch {
     }
   }
 
-  /** The warnings raised since last time. */
-  raised(time) {
-    const found = []
-    for (let i = 0; i < this.seen.length; i++) {
+  /** The warnings raised since the last call. */
+  takeNew(time) {
+    const findings = []
+    for (let i = 0; i < this.counts.length; i++) {
       const number = this.counters.number(i)
-      if (number > this.seen[i]) {
+      if (number > this.counts[i]) {
         const message = sentence(this.engine.mj.mju_warningText(i, this.counters.info(i)))
-        found.push({ time, kind: this.names[i], message, fatal: this.fatal.has(i) })
+        findings.push({ time, kind: this.names[i], message, fatal: this.fatal.has(i) })
       }
-      this.seen[i] = number
+      this.counts[i] = number
     }
     this.total = this.counters.total()
-    return found
+    return findings
   }
 
   badTime(before, time) {
@@ -76,12 +76,12 @@ export class Watch {
   }
 
   badState(name, time) {
-    if (this.good(name)) return null
+    if (this.isBounded(name)) return null
     const index = this.array(name).findIndex((x) => !(Math.abs(x) < LARGEST))
     return { time, kind: `bad${name}`, message: `${name}[${index}] is ${this.array(name)[index]}`, fatal: true }
   }
 
-  good(name) {
+  isBounded(name) {
     const array = this.array(name)
     for (let i = 0; i < array.length; i++) if (!(Math.abs(array[i]) < LARGEST)) return false
     return true

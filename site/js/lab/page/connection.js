@@ -1,14 +1,15 @@
 /**
- * The page's one worker, and the line of each lab to it. docs/explanation/how-labs-run.md has the protocol.
+ * The worker that the page's labs share, and each lab's line to it. docs/explanation/how-labs-run.md has the protocol.
  *
  *   const line = connection(workerUrl).open(id, receive)
  *   line.send({ type: 'play' }); line.close()
  *
- * A lab with a `#` in the address of its worker has one of its own, which ends with the lab, and when it is silent for too long.
+ * A lab with a `#` in the address of its worker has a dedicated worker, which ends with the lab, or when it does not answer for too
+ * long.
  */
 
-const BEAT = 5000 // ms between two questions to a worker of one lab
-const MISSED = 3 // that it may leave without an answer
+const BEAT = 5000 // ms between two pings to a dedicated worker
+const MISSED = 3 // pings that it may leave without an answer
 
 const connections = new Map()
 
@@ -25,7 +26,7 @@ export class Connection {
     this.start = start
     this.worker = null
     this.lines = new Map()
-    this.own = url.includes('#')
+    this.isDedicated = url.includes('#')
   }
 
   /**
@@ -42,13 +43,13 @@ export class Connection {
       send: (message, transfer = []) => this.worker?.postMessage({ ...message, lab: id }, transfer),
       close: () => {
         if (!this.lines.delete(id)) return
-        if (this.own) this.end()
+        if (this.isDedicated) this.end()
         else this.worker?.postMessage({ type: 'dispose', lab: id })
       },
     }
   }
 
-  /** Have the engine fetched and started before a lab asks for it. */
+  /** Fetch and start the engine before a lab needs it. */
   warm(wasm) {
     if (this.worker === null) this.begin()
     this.worker.postMessage({ type: 'warm', wasm })
@@ -57,7 +58,7 @@ export class Connection {
   begin() {
     this.worker = this.start(this.url)
     this.silence = 0
-    if (this.own) this.beat = setInterval(() => this.ask(), BEAT)
+    if (this.isDedicated) this.beat = setInterval(() => this.ask(), BEAT)
     this.worker.onmessage = ({ data }) => {
       this.silence = 0
       this.lines.get(data.lab)?.(data)
@@ -67,7 +68,7 @@ export class Connection {
     this.worker.onmessageerror = () => this.fail('a message of the worker cannot be read')
   }
 
-  /** See whether the worker still answers. */
+  /** Check that the worker still answers. */
   ask() {
     if (this.silence === MISSED) this.fail('it takes too long, or too much memory')
     this.silence += 1
@@ -80,11 +81,11 @@ export class Connection {
     this.worker = null
   }
 
-  // The engine's memory is gone with the worker: every lab has to be told, and the next one starts a new worker.
-  fail(message, told = null) {
+  // The engine's memory is lost with the worker: every lab gets an error, and the next one starts a new worker.
+  fail(message, notifiedId = null) {
     this.end()
     for (const [id, receive] of [...this.lines]) {
-      if (id === told) continue
+      if (id === notifiedId) continue
       receive({ type: 'error', message, entry: [], kind: 'worker', fatal: true })
     }
   }

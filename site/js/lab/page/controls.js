@@ -18,14 +18,14 @@ export function buildControls(controls, actions) {
     return button(control, () => actions.press(i))
   })
   const buttons = parts.filter((_, i) => controls[i].type === 'button').map(({ element }) => element)
-  const others = parts.filter((_, i) => controls[i].type !== 'button').map(({ element }) => element)
+  const settings = parts.filter((_, i) => controls[i].type !== 'button').map(({ element }) => element)
   const element = parts.length === 0 ? null : h('div', { class: 'lab-controls' })
   if (buttons.length > 0) element.append(h('div', { class: 'lab-buttons' }, ...buttons))
-  if (others.length > 0) element.append(h('div', { class: 'lab-settings' }, ...others))
+  if (settings.length > 0) element.append(h('div', { class: 'lab-settings' }, ...settings))
   return {
     element,
     show: (values) => parts.forEach((part, i) => part.show?.(values[i])),
-    setEnabled: (on) => parts.forEach(({ field }) => (field.disabled = !on)),
+    setEnabled: (isEnabled) => parts.forEach(({ field }) => (field.disabled = !isEnabled)),
   }
 }
 
@@ -38,29 +38,29 @@ function slider({ label, unit, min, max, step, digits }, set) {
   const id = freshId('slider')
   const places = digits ?? digitsOfStep(step)
   const text = (value) => `${formatNumber(value, places).trim()}${unit ? `\u00a0${unit}` : ''}`
-  const shown = h('output', { class: 'lab-value', for: id })
+  const output = h('output', { class: 'lab-value', for: id })
   const field = h('input', { type: 'range', id })
   Object.assign(field, { min: String(min), max: String(max), step: String(step ?? (max - min) / STEPS) })
-  // The widest value keeps its room, so that nothing moves while the slider does.
-  shown.style.minWidth = `${Math.max(text(min).length, text(max).length)}ch`
+  // Reserve the width of the widest value, so that nothing moves while the slider does.
+  output.style.minWidth = `${Math.max(text(min).length, text(max).length)}ch`
   let value = null
   let queued = false
   const show = (now) => {
     value = now
     field.value = String(now ?? min)
-    shown.textContent = now === null || now === undefined ? '–' : text(now)
-    field.setAttribute('aria-valuetext', shown.textContent)
+    output.textContent = now === null || now === undefined ? '–' : text(now)
+    field.setAttribute('aria-valuetext', output.textContent)
   }
   field.addEventListener('input', () => {
     show(Number(field.value))
     if (queued) return
-    queued = true // at most one message for each picture
+    queued = true // at most one message per refresh of the screen
     requestAnimationFrame(() => {
       queued = false
       set(value)
     })
   })
-  const element = h('div', { class: 'lab-slider' }, h('label', { for: id }, label), shown, field)
+  const element = h('div', { class: 'lab-slider' }, h('label', { for: id }, label), output, field)
   return { element, field, show: (now) => queued || show(now) }
 }
 
@@ -73,35 +73,35 @@ function list({ label, unit, options }, set) {
   return { element, field, show }
 }
 
-/** Buttons for the arrows that the motion has, by their usual letters, and boxes to tick for the other overlays. */
+/** Buttons for the arrows that the motion has, labelled with their usual symbols, and checkboxes for the other overlays. */
 export function buildOverlays({ toggles, overlays, arrows }, words, toggle) {
-  const offered = Object.keys(SIGNS).filter((name) => arrows?.[name])
-  const rest = toggles.filter((name) => !offered.includes(name))
+  const available = Object.keys(SIGNS).filter((name) => arrows?.[name])
+  const rest = toggles.filter((name) => !available.includes(name))
   const ticks = rest.map((name) => {
     const box = h('input', { type: 'checkbox', checked: overlays.includes(name) })
     box.addEventListener('change', () => toggle(name, box.checked))
     return h('label', { class: 'lab-check' }, box, ` ${words(`overlay.${name}`)}`)
   })
-  const buttons = offered.map((name) => arrowButton(name, words, overlays, toggle))
+  const buttons = available.map((name) => arrowButton(name, words, overlays, toggle))
   const group = (kind, parts) =>
     parts.length > 0 ? h('div', { class: kind, role: 'group', 'aria-label': words('lab.overlays') }, ...parts) : null
   return { arrows: group('lab-arrows', buttons), boxes: group('lab-overlays', ticks) }
 }
 
 function arrowButton(name, words, overlays, toggle) {
-  let on = overlays.includes(name)
+  let isOn = overlays.includes(name)
   const text = words(`overlay.${name}`)
-  const properties = { type: 'button', class: `lab-icon lab-arrow lab-${name}`, title: text, 'aria-label': text, 'aria-pressed': on }
+  const properties = { type: 'button', class: `lab-icon lab-arrow lab-${name}`, title: text, 'aria-label': text, 'aria-pressed': isOn }
   const button = h('button', properties, h('i', {}, SIGNS[name]))
   button.addEventListener('click', () => {
-    on = !on
-    button.setAttribute('aria-pressed', on)
-    toggle(name, on)
+    isOn = !isOn
+    button.setAttribute('aria-pressed', isOn)
+    toggle(name, isOn)
   })
   return button
 }
 
-/** The readouts: labels, and values that keep the room they once had. */
+/** The readouts: labels, and values whose space grows but never shrinks. */
 export function buildReadouts(readouts, format) {
   if (readouts.length === 0) return { element: null, show: () => {} }
   const rows = readouts.map(({ label }) => ({ label, value: h('dd', {}, '–'), room: 0, text: '–' }))

@@ -73,7 +73,7 @@ export async function mountCustom(element, config, base, words) {
   }
 }
 
-/** What a custom lab is given, and what must be taken back from it at the end. */
+/** Makes the `api` of a custom lab, and disposes at the end of what it has created. */
 class Kit {
   constructor(element, body, config, base, words) {
     Object.assign(this, { element, body, config, base, words })
@@ -81,12 +81,12 @@ class Kit {
     this.simulations = []
     this.disposals = []
     this.watchers = new Set()
-    this.seen = false
+    this.isVisible = false
     this.disposals.push(
-      watchSight(body, (seen) => {
-        this.seen = seen
-        this.simulations.forEach((simulation) => simulation.setVisible(seen))
-        this.watchers.forEach((watcher) => watcher(seen))
+      watchSight(body, (visible) => {
+        this.isVisible = visible
+        this.simulations.forEach((simulation) => simulation.setVisible(visible))
+        this.watchers.forEach((watcher) => watcher(visible))
       }),
     )
   }
@@ -99,8 +99,8 @@ class Kit {
       formatNumber: formatReadout,
       formatLabel,
       formatTime,
-      createSimulation: (options) => this.simulation(options),
-      createPlot: (config) => this.plot(config),
+      createSimulation: (options) => this.createSimulation(options),
+      createPlot: (config) => this.createPlot(config),
       createControls: (controls, actions) =>
         buildControls(
           controls.map((control) => ({ ...PLAIN_CONTROL, ...control })),
@@ -116,7 +116,7 @@ class Kit {
       notice: (text, kind = 'note') => (text === null ? notices.clear() : notices.show(text, kind)),
       onVisible: (watcher) => {
         this.watchers.add(watcher)
-        watcher(this.seen)
+        watcher(this.isVisible)
         return () => this.watchers.delete(watcher)
       },
       prefersStillness,
@@ -124,12 +124,12 @@ class Kit {
   }
 
   /**
-   * Another simulation in the page's worker.
+   * Create a simulation in the page's worker.
    *
    * @param {object} [options] fields of a simlab (`controls`, `plots`, …), and `on` (see simulation.js), `picture` (false: none),
    *   `height` (px), `label` of the picture, `mjb` and `module` (addresses relative to the lab's JSON)
    */
-  simulation(options = {}) {
+  createSimulation(options = {}) {
     const { on = {}, picture = true, height = HEIGHT, label = this.config.title, ...fields } = options
     const { words, notices, config } = this
     const number = this.simulations.length + 1
@@ -159,20 +159,20 @@ class Kit {
       this.disposals.push(() => hands.dispose())
     }
     simulation.element = view === null ? null : h('div', { class: 'lab-screen' }, view.element)
-    simulation.setVisible(this.seen)
+    simulation.setVisible(this.isVisible)
     this.simulations.push(simulation)
     return simulation
   }
 
-  plot(config) {
+  createPlot(config) {
     const plot = new Plot({ ...PLAIN_PLOT, ...config }, this.words)
     this.disposals.push(() => plot.dispose())
     return plot
   }
 
-  /** After `mount`: the lines that tell something stand last. */
+  /** After `mount`: append the notices, so that they stand last. */
   finish() {
-    this.body.append(this.notices.shown, this.notices.spoken)
+    this.body.append(this.notices.message, this.notices.announcement)
   }
 
   dispose() {

@@ -1,10 +1,10 @@
-/** Making elements: no markup in strings, no style attributes, so that a page's strict policy has nothing to forbid. */
+/** Makes elements without markup in strings or style attributes, as a strict content security policy demands. */
 
 const SVG = 'http://www.w3.org/2000/svg'
 
 /**
- * An element. Properties that start with `on` are listeners, `class` and whatever has a dash are attributes, the rest are
- * properties of the element.
+ * Make an element. Properties that start with `on` become listeners; `class`, `role`, `for` and names with a dash become attributes;
+ * the rest become properties of the element.
  *
  * @param {string} tag
  * @param {object} [properties] undefined and null are left out
@@ -22,7 +22,7 @@ export function h(tag, properties = {}, ...children) {
   return element
 }
 
-/** Shapes of the buttons, in a square of 16. */
+/** Icons of the buttons: SVG paths in a square of 16. */
 const ICONS = {
   play: 'M4 2.5v11l9-5.5z',
   pause: 'M3.5 2.5h3v11h-3zM9.5 2.5h3v11h-3z',
@@ -31,19 +31,19 @@ const ICONS = {
   full: 'M2 2h4.5v1.6H3.6v2.9H2zM9.500 2H14v4.500h-1.600V3.600H9.500zM2 9.500h1.600v2.900h2.900V14H2zM12.400 9.500H14V14H9.500v-1.600h2.900z',
 }
 
-/** A small picture in the colour of the text; what it means is said by the button that holds it. */
+/** An icon in the colour of the text. The button around it has the label. */
 export function icon(name) {
   return pictogram(ICONS[name])
 }
 
-/** A picture of one path, in a square of 16, that nobody reads out. */
+/** A picture of one path, in a square of 16, hidden from screen readers. */
 export function pictogram(path) {
   const svg = outline(path)
   svg.setAttribute('viewBox', '0 0 16 16')
   return svg
 }
 
-/** A path by itself. */
+/** An SVG of one path, without a size. */
 export function outline(d) {
   const svg = document.createElementNS(SVG, 'svg')
   svg.setAttribute('aria-hidden', 'true')
@@ -55,13 +55,13 @@ export function outline(d) {
 
 let count = 0
 
-/** A new id, for what refers to an element. */
+/** A new id, for a reference to an element. */
 export function freshId(prefix) {
   count += 1
   return `_${prefix}-${count}`
 }
 
-/** Hand a text to the reader as a file. */
+/** Let the reader download a text as a file. */
 export function download(name, text, type = 'text/plain') {
   const address = URL.createObjectURL(new Blob([text], { type: `${type};charset=utf-8` }))
   const link = h('a', { href: address, download: name })

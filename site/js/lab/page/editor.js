@@ -1,5 +1,5 @@
 /**
- * A text that the reader edits, with numbers of its lines and what is wrong in one of them.
+ * A text field with line numbers and an error message that refers to one of its lines.
  *
  *   const editor = new Editor(text, words, { run, input })
  *   editor.fail("Schema violation: unrecognized attribute: 'foo'\nElement 'geom', line 3")
@@ -14,8 +14,8 @@ export class Editor {
   /** @param {{run: () => void, input: () => void}} on Ctrl or Cmd with Enter, and every change of the text */
   constructor(text, words, on) {
     this.words = words
-    const [id, wrong] = [freshId('model'), freshId('wrong')]
-    this.error = h('p', { class: 'lab-message lab-is-wrong', id: wrong, role: 'alert', hidden: true })
+    const [id, errorId] = [freshId('model'), freshId('wrong')]
+    this.error = h('p', { class: 'lab-message lab-is-wrong', id: errorId, role: 'alert', hidden: true })
     this.numbers = h('div', { class: 'lab-numbers', 'aria-hidden': 'true' })
     this.field = h('textarea', {
       id,
@@ -28,14 +28,14 @@ export class Editor {
       autocapitalize: 'off',
       autocomplete: 'off',
       dir: 'ltr',
-      'aria-describedby': wrong,
+      'aria-describedby': errorId,
       'aria-keyshortcuts': 'Control+Enter Meta+Enter',
     })
-    let request = 0 // a text of many lines may come as an event for each
+    let request = 0 // pasting many lines may fire an event for each of them
     this.field.addEventListener('input', () => {
       cancelAnimationFrame(request)
       request = requestAnimationFrame(() => {
-        this.number()
+        this.numberLines()
         on.input()
       })
     })
@@ -52,7 +52,7 @@ export class Editor {
       h('div', { class: 'lab-source', dir: 'ltr' }, this.numbers, this.field),
       this.error,
     )
-    this.number()
+    this.numberLines()
   }
 
   get text() {
@@ -64,15 +64,15 @@ export class Editor {
     this.clear()
   }
 
-  /** Tell what is wrong, and mark the line that it is about. */
+  /** Show an error, and mark the line that it refers to. */
   fail(message) {
     const { line, text } = readError(message)
-    const known = line >= 1 && line <= this.lines.length
+    const hasLine = line >= 1 && line <= this.lines.length
     this.error.replaceChildren(text)
     this.error.hidden = false
     this.field.setAttribute('aria-invalid', 'true')
-    this.number(known ? line : null)
-    if (!known) return
+    this.numberLines(hasLine ? line : null)
+    if (!hasLine) return
     const go = h('button', { type: 'button', class: 'lab-text', onclick: () => this.goTo(line) })
     go.textContent = this.words('lab.live.line', { line })
     this.error.prepend(go, ' ')
@@ -83,18 +83,18 @@ export class Editor {
     this.error.hidden = true
     this.error.replaceChildren()
     this.field.removeAttribute('aria-invalid')
-    this.number()
+    this.numberLines()
   }
 
   get lines() {
     return this.text.split('\n')
   }
 
-  /** Number the lines; one of them may be wrong, until that is cleared. */
-  number(wrong = this.error.hidden ? null : this.wrong) {
-    this.wrong = wrong
+  /** Draw the line numbers, with a mark at the line of the error, if any. */
+  numberLines(errorLine = this.error.hidden ? null : this.errorLine) {
+    this.errorLine = errorLine
     const count = this.lines.length
-    const parts = wrong === null ? [range(1, count)] : [range(1, wrong - 1), h('mark', {}, String(wrong)), range(wrong + 1, count)]
+    const parts = errorLine === null ? [range(1, count)] : [range(1, errorLine - 1), h('mark', {}, String(errorLine)), range(errorLine + 1, count)]
     this.numbers.replaceChildren(...parts)
     this.numbers.scrollTop = this.field.scrollTop
   }
@@ -116,15 +116,15 @@ function range(first, last) {
   return Array.from({ length: Math.max(0, last - first + 1) }, (_, i) => first + i).join('\n')
 }
 
-/** What MuJoCo says of a model, and the line that it says it of: 0 where it names none. */
+/** The text of MuJoCo's error about a model, and the line that it names, or 0. */
 export function readError(message) {
-  const found = /, line (\d+)\s*$|Line number=(\d+)/.exec(message)
+  const lineMatch = /, line (\d+)\s*$|Line number=(\d+)/.exec(message)
   const text = message
     .trim()
     .replace(/^(?:(?:XML )?Error: )+/, '')
-    .replace(/^XML parse error \d+:\s*Error=(?:XML_)?(?:ERROR_)?(\w+) .*?(?:XMLElement name=(\S+))?$/s, (_, what, name) => {
-      const words = what.replaceAll('_', ' ').toLowerCase()
+    .replace(/^XML parse error \d+:\s*Error=(?:XML_)?(?:ERROR_)?(\w+) .*?(?:XMLElement name=(\S+))?$/s, (_, code, name) => {
+      const words = code.replaceAll('_', ' ').toLowerCase()
       return `XML: ${words}${name ? `\nElement '${name}'` : ''}`
     })
-  return { line: found ? Number(found[1] ?? found[2]) : 0, text }
+  return { line: lineMatch ? Number(lineMatch[1] ?? lineMatch[2]) : 0, text }
 }

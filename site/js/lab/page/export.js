@@ -1,5 +1,5 @@
 /**
- * "Export as Python": the script that the build wrote, with the controls as they are now.
+ * "Export as Python": the script that the build wrote, with the present values of the controls.
  *
  * The config's `exportPython` is `{name, text}`; `{{control:N}}` in the text stands for the value of control N, a number or a
  * string, which Python writes as JSON does.

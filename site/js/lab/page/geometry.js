@@ -1,11 +1,12 @@
 /**
  * The shapes of MuJoCo's geoms as three.js geometries.
  *
- * A shape is a list of parts; each has a geometry of unit size, shared by all labs, and says how it is scaled and shifted along
- * its z axis for a geom's size. So a size may change from frame to frame without a new geometry.
+ * A shape is a list of parts. Each part has a geometry of unit size, shared by all labs, and a function that scales it and shifts it
+ * along its z axis for a geom's size. So a size may change from frame to frame without a new geometry.
  *
  * Texture coordinates are those of MuJoCo's renderer, for a texture that is spread over the shape once: over each face of a box, around
- * and from top to bottom of round shapes, with the first row of the texture on top. `direction` is what a cube texture is looked up by.
+ * and from top to bottom of round shapes, with the first row of the texture on top. `direction` is the attribute by which a cube
+ * texture is looked up.
  */
 
 import {
@@ -27,13 +28,16 @@ export const GEOM = Object.freeze({
 
 const ROUND = 40 // segments around
 const QUARTER = 10 // segments from a pole to the equator
-const ROPE = 12 // segments around a line that has a radius, of which a rope has many
+const ROPE = 12 // segments around a piece of a rope; fewer, as there are many pieces
 const HEAD_WIDTH = 1.75 // of an arrow, in widths of its shaft
 const HEAD_LENGTH = 3 // in radii of its shaft
 
 const cache = new Map()
 
-/** `wrap(x, y, z, nx, ny, nz)` gives texture coordinates where three.js has others; `lift` moves the directions along z. */
+/**
+ * A geometry of unit size, made once. `wrap(x, y, z, nx, ny, nz)` returns texture coordinates that replace those of three.js, or
+ * null; `lift` moves the directions along z.
+ */
 function unit(name, make, wrap = null, lift = 0) {
   if (!cache.has(name)) cache.set(name, textured(make(), wrap, lift))
   return cache.get(name)
@@ -44,11 +48,11 @@ function textured(geometry, wrap, lift) {
   if (uv === undefined) return geometry // lines
   const direction = new Float32Array(3 * position.count)
   for (let i = 0; i < position.count; i++) {
-    const at = [position.getX(i), position.getY(i), position.getZ(i)]
-    direction.set([at[0], at[1], at[2] + lift], 3 * i)
-    const own = wrap === null ? null : wrap(...at, normal.getX(i), normal.getY(i), normal.getZ(i))
-    if (own === null) uv.setY(i, 1 - uv.getY(i))
-    else uv.setXY(i, ...own)
+    const point = [position.getX(i), position.getY(i), position.getZ(i)]
+    direction.set([point[0], point[1], point[2] + lift], 3 * i)
+    const coordinates = wrap === null ? null : wrap(...point, normal.getX(i), normal.getY(i), normal.getZ(i))
+    if (coordinates === null) uv.setY(i, 1 - uv.getY(i))
+    else uv.setXY(i, ...coordinates)
   }
   geometry.setAttribute('direction', new BufferAttribute(direction, 3))
   return geometry
@@ -56,7 +60,7 @@ function textured(geometry, wrap, lift) {
 
 // three.js has its axes along y; textures of its spheres begin half a turn, those of its cylinders a quarter from MuJoCo's.
 const standing = (geometry, turn) => geometry.rotateX(Math.PI / 2).rotateZ(turn)
-const sphere = (from, angle, rings) => standing(new SphereGeometry(1, ROUND, rings, 0, 2 * Math.PI, from, angle), Math.PI)
+const sphere = (start, angle, rings) => standing(new SphereGeometry(1, ROUND, rings, 0, 2 * Math.PI, start, angle), Math.PI)
 const barrel = (open) => standing(new CylinderGeometry(1, 1, 2, ROUND, 1, open), Math.PI / 2)
 
 const onFace = (x, y, z, nx, ny, nz) => [(1 + (Math.abs(nx) > 0.5 ? y : x)) / 2, (1 - (Math.abs(nz) > 0.5 ? y : z)) / 2]
@@ -70,13 +74,13 @@ const tube = () => unit('tube', () => barrel(true))
 const dome = () => unit('dome', () => sphere(0, Math.PI / 2, QUARTER), null, 1)
 const bowl = () => unit('bowl', () => sphere(Math.PI / 2, Math.PI / 2, QUARTER), null, -1)
 const plane = () => unit('plane', () => new PlaneGeometry(2, 2), fromAbove)
-const turned = () => unit('plane from below', () => inverted(new PlaneGeometry(2, 2)), fromAbove)
+const planeFromBelow = () => unit('plane from below', () => inverted(new PlaneGeometry(2, 2)), fromAbove)
 const cone = () => unit('cone', () => standing(new ConeGeometry(1, 1, ROUND), 0).translate(0, 0, 0.5))
 const edges = () => unit('edges', () => new EdgesGeometry(new BoxGeometry(2, 2, 2)))
 const line = () =>
   unit('line', () => new BufferGeometry().setAttribute('position', new BufferAttribute(new Float32Array([0, 0, 0, 0, 0, 1]), 3)))
 
-/** The same surface, seen from its other side: its normals stay where they are. */
+/** Flip the faces of a surface so that it is seen from its other side, with the same normals. */
 function inverted(geometry) {
   const { array } = geometry.index
   for (let i = 0; i < array.length; i += 3) [array[i], array[i + 1]] = [array[i + 1], array[i]]
@@ -84,7 +88,7 @@ function inverted(geometry) {
 }
 
 /** A plane's geometry for an eye above or below it. */
-export const planeSeen = (below) => (below ? turned() : plane())
+export const planeGeometry = (isBelow) => (isBelow ? planeFromBelow() : plane())
 
 /** Pieces of a rope, of length 2 along z or radius 1. */
 export const ropePieces = () => ({
@@ -101,29 +105,29 @@ const set = (out, x, y, z, shift = 0) => {
   out[3] = shift
 }
 
-const scaled = (geometry) => [part(geometry, (s, out) => set(out, s[0], s[1], s[2]))]
+const scaledParts = (geometry) => [part(geometry, (s, out) => set(out, s[0], s[1], s[2]))]
 
-/** Radius and half-length: the visualizer's geoms have the length third, the model's second. */
-const round = (pieces, at) => pieces.map(([geometry, kind]) =>
+/** The parts of a shape with radius and half-length; the length is `size[lengthIndex]`: third in the visualizer, second in the model. */
+const roundParts = (pieces, lengthIndex) => pieces.map(([geometry, kind]) =>
   part(geometry, (s, out) => {
     const r = s[0]
-    const half = s[at]
+    const half = s[lengthIndex]
     if (kind === 'side') set(out, r, r, half)
     else set(out, r, r, r, kind === 'top' ? half : -half)
   }),
 ) // prettier-ignore
 
-/** From its place an arrow reaches half of its third size; a double one does so on both sides. */
-const arrow = (width, both) => {
+/** An arrow is half as long as its third size; a double one reaches so far to both sides. */
+const arrow = (width, isDouble) => {
   const reach = (s) => s[2] / 2
   const head = (s) => Math.min(HEAD_LENGTH * s[0], reach(s) / 2)
   const shaft = part(cylinder(), (s, out) => {
     const length = reach(s) - head(s)
-    set(out, s[0], s[1], both ? length : length / 2, both ? 0 : length / 2)
+    set(out, s[0], s[1], isDouble ? length : length / 2, isDouble ? 0 : length / 2)
   })
   const tip = (sign) =>
     part(cone(), (s, out) => set(out, width * s[0], sign * width * s[1], sign * head(s), sign * (reach(s) - head(s))))
-  return both ? [shaft, tip(1), tip(-1)] : [shaft, tip(1)]
+  return isDouble ? [shaft, tip(1), tip(-1)] : [shaft, tip(1)]
 }
 
 /**
@@ -131,27 +135,27 @@ const arrow = (width, both) => {
  *
  * @param {number} type mjtGeom
  * @param {boolean} model whether sizes are the model's (radius, half-length) or the visualizer's (radius, radius, half-length)
- * @param {import('three').BufferGeometry | null} [given] of a mesh or height field
+ * @param {import('three').BufferGeometry | null} [geometry] of a mesh or height field
  */
-export function shape(type, model, given = null) {
+export function shape(type, model, geometry = null) {
   const half = model ? 1 : 2
   switch (type) {
     case GEOM.SPHERE:
       return [part(ball(), (s, out) => set(out, s[0], s[0], s[0]))]
     case GEOM.ELLIPSOID:
-      return scaled(ball())
+      return scaledParts(ball())
     case GEOM.BOX:
-      return scaled(box())
+      return scaledParts(box())
     case GEOM.CYLINDER:
-      return round([[cylinder(), 'side']], half)
+      return roundParts([[cylinder(), 'side']], half)
     case GEOM.CAPSULE:
-      return round([[tube(), 'side'], [dome(), 'top'], [bowl(), 'bottom']], half) // prettier-ignore
+      return roundParts([[tube(), 'side'], [dome(), 'top'], [bowl(), 'bottom']], half) // prettier-ignore
     case GEOM.PLANE:
       return [part(plane(), (s, out) => set(out, s[0], s[1], 1))]
     case GEOM.MESH:
     case GEOM.SDF:
     case GEOM.HFIELD:
-      return given === null ? [] : [part(given, (_, out) => set(out, 1, 1, 1))]
+      return geometry === null ? [] : [part(geometry, (_, out) => set(out, 1, 1, 1))]
     case GEOM.ARROW:
       return arrow(HEAD_WIDTH, false)
     case GEOM.ARROW1:
@@ -168,8 +172,8 @@ export function shape(type, model, given = null) {
 }
 
 /**
- * A mesh of the model. Each corner has its own texture coordinate, as the file had it, and its own normal: that of the vertex, or where
- * it is far from that of the face, the face's, as MuJoCo's renderer does it.
+ * A mesh of the model. Each corner has its own texture coordinate, as in the file, and its own normal: that of the vertex, or that of
+ * the face if the two differ much, as in MuJoCo's renderer.
  */
 export function meshGeometry(mesh) {
   const { vertices, normals, faces, faceNormals, texcoords, faceTexcoords } = mesh
@@ -198,15 +202,15 @@ export function meshGeometry(mesh) {
     .setAttribute('uv', new BufferAttribute(uv, 2))
 }
 
-const SMOOTH = 0.8 // cosine
+const SMOOTH = 0.8 // cosine of the largest angle between the normals of vertex and face
 
-function sharpen(position, normal, at) {
-  const side = (k) => [0, 1, 2].map((j) => position[at + 3 * k + j] - position[at + j])
+function sharpen(position, normal, offset) {
+  const side = (k) => [0, 1, 2].map((j) => position[offset + 3 * k + j] - position[offset + j])
   const [a, b] = [side(1), side(2)]
   const face = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
   const length = Math.hypot(...face)
   if (length === 0) return
-  for (let corner = at; corner < at + 9; corner += 3) {
+  for (let corner = offset; corner < offset + 9; corner += 3) {
     const cosine = face.reduce((sum, x, j) => sum + x * normal[corner + j], 0) / length
     if (cosine < SMOOTH) for (let j = 0; j < 3; j++) normal[corner + j] = face[j] / length
   }
@@ -238,11 +242,11 @@ export function hfieldGeometry({ rows, columns, size, data }) {
     const pairs = points.map(([column, row]) => [vertex(column, row, height(column, row)), vertex(column, row, -base)])
     for (let i = 0; i + 1 < pairs.length; i++) quad(pairs[i][1], pairs[i + 1][1], pairs[i + 1][0], pairs[i][0])
   }
-  const along = (n, make) => Array.from({ length: n }, (_, i) => make(i))
-  wall(along(columns, (i) => [i, 0]))
-  wall(along(rows, (i) => [columns - 1, i]))
-  wall(along(columns, (i) => [columns - 1 - i, rows - 1]))
-  wall(along(rows, (i) => [0, rows - 1 - i]))
+  const list = (n, make) => Array.from({ length: n }, (_, i) => make(i))
+  wall(list(columns, (i) => [i, 0]))
+  wall(list(rows, (i) => [columns - 1, i]))
+  wall(list(columns, (i) => [columns - 1 - i, rows - 1]))
+  wall(list(rows, (i) => [0, rows - 1 - i]))
   quad(vertex(0, 0, -base), vertex(0, rows - 1, -base), vertex(columns - 1, rows - 1, -base), vertex(columns - 1, 0, -base))
   const geometry = new BufferGeometry()
     .setAttribute('position', new BufferAttribute(new Float32Array(position), 3))

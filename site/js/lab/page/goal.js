@@ -1,4 +1,4 @@
-/** A lab's goal in the page: what is asked, how long it is held, and whether this reader has reached it. */
+/** A lab's goal in the page: its text, for how long it has held, and whether this reader has reached it. */
 
 import { sign } from '../../progress/signs.js'
 import { h } from './dom.js'
@@ -9,12 +9,12 @@ export class GoalView {
    * @param {HTMLElement} still the goal in the lab's static form
    * @param {{hold: number}} goal of the lab's JSON
    * @param {(key: string, values?: object) => string} words
-   * @param {{progress: object | null, say: (text: string) => void, show: () => void}} around `progress`: see progress/store.js
+   * @param {{progress: object | null, say: (text: string) => void, show: () => void}} services `progress`: see progress/store.js
    */
   constructor(still, { hold }, words, { progress, say, show }) {
     Object.assign(this, { hold, words, progress, say })
     this.key = still.dataset.goal
-    this.now = { held: 0, reached: null, counts: true }
+    this.status = { held: 0, reached: null, counts: true }
     this.bar = h('progress', { max: hold, value: 0, 'aria-hidden': 'true', hidden: hold === 0 })
     this.text = h('span', {})
     const button = h('button', { type: 'button', class: 'lab-text', onclick: show }, words('lab.live.goal_show'))
@@ -24,36 +24,36 @@ export class GoalView {
     this.draw()
   }
 
-  get kept() {
+  get isStored() {
     return this.progress?.get(this.key, this.key)?.right === true
   }
 
-  /** @param {{held: number, reached: number | null, counts: boolean}} now of a frame */
-  show(now) {
-    const before = this.now
-    this.now = now
-    if (now.reached !== before.reached && now.reached !== null && now.counts) this.note(now.reached)
+  /** @param {{held: number, reached: number | null, counts: boolean}} status of a frame */
+  show(status) {
+    const previous = this.status
+    this.status = status
+    if (status.reached !== previous.reached && status.reached !== null && status.counts) this.note(status.reached)
     this.draw()
   }
 
   note(time) {
     this.say(this.words('lab.live.goal_reached', { t: formatTime(time) }))
-    if (this.kept) return
+    if (this.isStored) return
     const lesson = document.querySelector('main')?.dataset.lesson ?? ''
     this.progress?.put(this.key, this.key, { kind: 'goal', given: time, right: true, tries: 1, hints: 0, number: 1, lesson })
   }
 
   draw() {
-    const { words, hold, now } = this
-    const { held, reached, counts } = now
+    const { words, hold, status } = this
+    const { held, reached, counts } = status
     let text = hold > 0 ? words('lab.live.goal_held', { t: formatTime(held), hold }) : ''
     if (reached !== null) text = words('lab.live.goal_reached', { t: formatTime(reached) })
-    else if (this.kept) text = `${words('lab.live.goal_kept')} ${text}`
-    if (!counts && !this.kept) text += ` ${words('lab.live.goal_other')}`
+    else if (this.isStored) text = `${words('lab.live.goal_kept')} ${text}`
+    if (!counts && !this.isStored) text += ` ${words('lab.live.goal_other')}`
     this.bar.value = reached === null ? held : hold
-    if (text === this.shown) return
-    this.shown = text
-    this.text.replaceChildren(...(this.kept ? [sign('read')] : []), text)
+    if (text === this.shownText) return
+    this.shownText = text
+    this.text.replaceChildren(...(this.isStored ? [sign('read')] : []), text)
   }
 
   dispose() {

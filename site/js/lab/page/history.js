@@ -1,8 +1,8 @@
 /**
- * What a plot shows: samples in typed arrays, of the last so many seconds or of all of the run.
+ * The samples of a plot in typed arrays: of a window of some seconds, or of the whole run.
  *
- * With a window, what has left it is dropped. Without one, every second sample is dropped when there are more than a plot can
- * show. No DOM.
+ * With a window, samples that have left it are dropped. Without one, every second sample is dropped whenever there are more than a
+ * plot can show. No DOM.
  */
 
 const MOST = 4000 // samples of a plot that shows all of its run
@@ -19,7 +19,7 @@ export class History {
     this.start = 0
     this.end = 0
     this.stride = 1
-    this.skipped = 0
+    this.counter = 0
     this.gaps = false
   }
 
@@ -32,13 +32,13 @@ export class History {
     return this.end > this.start ? this.columns[0][this.end - 1] : 0
   }
 
-  /** Add a sample: its time, and the values from `at` on. */
-  push(time, values, at) {
-    if (this.skipped++ % this.stride !== 0) return
-    if (this.end === this.columns[0].length) this.room()
+  /** Add a sample: its time, and the values from `offset` on. */
+  push(time, values, offset) {
+    if (this.counter++ % this.stride !== 0) return
+    if (this.end === this.columns[0].length) this.makeRoom()
     this.columns[0][this.end] = time
     for (let i = 1; i < this.columns.length; i++) {
-      const value = (this.columns[i][this.end] = values[at + i - 1])
+      const value = (this.columns[i][this.end] = values[offset + i - 1])
       if (!Number.isFinite(value)) this.gaps = true
     }
     this.end += 1
@@ -48,7 +48,7 @@ export class History {
     } else if (this.length > MOST) this.thin()
   }
 
-  room() {
+  makeRoom() {
     if (this.start > this.end / 2) {
       for (const column of this.columns) column.copyWithin(0, this.start, this.end)
       this.end -= this.start
@@ -68,10 +68,10 @@ export class History {
     this.start = 0
     this.end = count
     this.stride *= 2
-    this.skipped = 1
+    this.counter = 1
   }
 
-  /** The samples as uPlot takes them: times, then one array for each trace, with `null` for what interrupts its line. */
+  /** The samples for uPlot: times, then one array for each trace, with `null` where its line is interrupted. */
   data() {
     const columns = this.columns.map((column) => column.subarray(this.start, this.end))
     return this.gaps ? columns.map((column) => Array.from(column, (x) => (Number.isFinite(x) ? x : null))) : columns

@@ -4,7 +4,7 @@
  *   const instrument = new Instrument(element, config, base, words, progress)
  *
  * `element` is the lab's place in the page, `config` its JSON, `base` the address of that JSON, to which its addresses are relative;
- * `progress` is where a reached goal is kept (progress/store.js), or null.
+ * `progress` stores a reached goal (progress/store.js), or is null.
  */
 
 import { buildControls, buildOverlays, buildReadouts } from './controls.js'
@@ -22,9 +22,9 @@ import { prefersStillness } from './support.js'
 import { buildTransport } from './transport.js'
 import { View } from './view.js'
 
-const TEXT_EVERY = 90 // ms: faster than this no eye reads a number
+const TEXT_EVERY = 90 // ms; nobody reads numbers faster
 const PLOT_EVERY = 30
-const SETTLED = 400 // ms after which a paused lab's last picture is there
+const SETTLE_TIME = 400 // ms, after which the last picture of a paused lab has arrived
 const HEIGHT = 300 // CSS pixels, of a view that is 480 wide
 const HELP = ['keys_mouse', 'keys_touch', 'keys_camera', 'keys_run']
 
@@ -33,10 +33,10 @@ export class Instrument {
     Object.assign(this, { element, config, words, progress })
     this.values = this.initial = config.controls.map(({ value }) => value ?? null)
     this.textAt = this.plotAt = -Infinity
-    this.rest = 0 // timer of what is to be said of a pause
-    this.pressed = false
-    this.begun = false // whether it has moved, or the reader has begun to step
-    this.wanted = null // what is done when the lab is there
+    this.sayTimer = 0 // of the announcement of a pause
+    this.playRequested = false
+    this.hasStarted = false // whether it has played, or the reader has stepped
+    this.pendingAction = null // to be done when the lab is ready
     this.build()
     this.simulation = new Simulation({
       config: { ...config, autoplay: Boolean(config.autoplay) && !prefersStillness() },
@@ -44,7 +44,7 @@ export class Instrument {
       view: this.view,
       on: this.listeners(),
     })
-    this.unwatch = watchSight(this.body, (seen) => this.simulation.setVisible(seen))
+    this.unwatch = watchSight(this.body, (isVisible) => this.simulation.setVisible(isVisible))
   }
 
   build() {
@@ -70,10 +70,10 @@ export class Instrument {
       full: document.fullscreenEnabled ? () => this.toggleFull() : null,
     })
     this.controls = buildControls(config.controls, {
-      set: (index, value) => this.simulation.set(index, value, !this.begun),
+      set: (index, value) => this.simulation.set(index, value, !this.hasStarted),
       press: (index) => this.simulation.press(index, config.controls[index].play),
     })
-    const { arrows, boxes } = buildOverlays(config, words, (name, on) => this.simulation.overlay(name, on))
+    const { arrows, boxes } = buildOverlays(config, words, (name, isOn) => this.simulation.overlay(name, isOn))
     if (arrows !== null) this.transport.speed.after(arrows)
     this.readouts = buildReadouts(config.readouts, formatReadout)
     this.plots = config.plots.map((plot) => new Plot(plot, words))
@@ -92,11 +92,11 @@ export class Instrument {
       h('div', { class: 'lab-screen' }, this.view.element, this.transport.full),
       this.transport.element,
       this.motion,
-      this.notices.shown,
+      this.notices.message,
       this.goal?.element ?? null,
       ...this.plots.map((plot) => plot.element),
-      h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element, this.foot()),
-      this.notices.spoken,
+      h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element, this.makeFoot()),
+      this.notices.announcement,
     )
     this.controls.show(this.values)
     this.transport.setTime(0)
@@ -107,7 +107,7 @@ export class Instrument {
   }
 
   /** Link, export and help under the instrument. */
-  foot() {
+  makeFoot() {
     const { words, config } = this
     const act = (key, run) => h('button', { type: 'button', class: 'lab-text', onclick: run }, words(`lab.live.${key}`))
     const help = h('details', { class: 'lab-help' }, h('summary', {}, words('lab.live.help')))
@@ -115,14 +115,14 @@ export class Instrument {
     return h(
       'div',
       { class: 'lab-foot' },
-      act(...this.sharing()),
+      act(...this.shareAction()),
       config.exportPython ? act('export', () => this.export()) : null,
-      document.querySelector('script[data-state]') && !config.kind ? this.logging() : null,
+      document.querySelector('script[data-state]') && !config.kind ? this.makeLogButton() : null,
       help,
     )
   }
 
-  // --- what the simulation does
+  // --- events of the simulation
 
   listeners() {
     const { words, notices, config } = this
@@ -138,7 +138,7 @@ export class Instrument {
       diverged: ({ time, message }) => notices.show(words('lab.live.diverged', { t: formatTime(time), message }), 'wrong'),
       warning: ({ time, message }) => notices.show(words('lab.live.warning', { t: formatTime(time), message }), 'warning'),
       error: (error) => notices.failure(error, config),
-      saved: (state) => this.saved(state),
+      saved: (state) => this.onSaved(state),
       noPicture: () =>
         this.view.element.replaceChildren(h('p', { class: 'lab-message lab-is-wrong' }, words('lab.live.no_webgl'))),
     }
@@ -146,28 +146,28 @@ export class Instrument {
 
   opened(values) {
     this.update(values)
-    const { wanted, pressed } = this
-    this.wanted = null
-    this.pressed = false
-    wanted?.()
+    const { pendingAction, playRequested: pressed } = this
+    this.pendingAction = null
+    this.playRequested = false
+    pendingAction?.()
     if (pressed) this.simulation.play()
   }
 
   changed(state, reason) {
     this.state = state
     this.element.dataset.state = state
-    this.textAt = this.plotAt = -Infinity // numbers at rest are those of the last picture
+    this.textAt = this.plotAt = -Infinity // so that the next refresh shows the numbers of the last picture
     this.transport.setPlaying(state === 'playing')
     this.transport.setEnabled(state === 'paused' || state === 'playing')
     this.controls.setEnabled(state !== 'ended')
     if (state === 'playing') {
-      this.begun = true
+      this.hasStarted = true
       this.notices.clear()
       this.notices.say(this.words('lab.live.said_playing'))
     }
-    clearTimeout(this.rest)
+    clearTimeout(this.sayTimer)
     const key = { user: 'said_paused', code: 'said_paused', stopAt: 'said_stopped' }[reason]
-    if (key) this.rest = setTimeout(() => this.sayTime(key), SETTLED)
+    if (key) this.sayTimer = setTimeout(() => this.sayTime(key), SETTLE_TIME)
   }
 
   sayTime(key) {
@@ -184,7 +184,7 @@ export class Instrument {
     }
   }
 
-  /** Numbers and plots follow the picture, though not as often. */
+  /** Update numbers and plots, less often than the picture. */
   refresh({ time, readouts, realtime, goal }, now) {
     const resting = this.state !== 'playing'
     if (resting || now - this.textAt >= TEXT_EVERY) {
@@ -205,13 +205,13 @@ export class Instrument {
     this.controls.show(values)
   }
 
-  // --- what a reader does
+  // --- actions of the reader
 
   togglePlay() {
     if (this.state === 'playing') this.simulation.pause()
     else if (this.state === 'loading') {
-      this.pressed = !this.pressed
-      this.transport.setPlaying(this.pressed)
+      this.playRequested = !this.playRequested
+      this.transport.setPlaying(this.playRequested)
     } else {
       this.notices.clear()
       this.simulation.play()
@@ -219,13 +219,13 @@ export class Instrument {
   }
 
   step() {
-    this.begun = true
+    this.hasStarted = true
     this.simulation.step()
   }
 
   reset() {
     this.simulation.reset()
-    clearTimeout(this.rest)
+    clearTimeout(this.sayTimer)
     this.notices.say(this.words('lab.live.said_reset'))
   }
 
@@ -234,7 +234,7 @@ export class Instrument {
     else this.element.requestFullscreen().catch(() => {})
   }
 
-  /** Go to a state of a link, now or when the lab is there; the motion that led to it is offered. */
+  /** Go to the state of a link, now or when the lab is ready, and offer a button that replays the motion that led to it. */
   restore(state) {
     const { log } = state
     const replay = () => this.simulation.replay(log)
@@ -244,11 +244,11 @@ export class Instrument {
     this.whenReady(() => this.simulation.restore(state))
   }
 
-  /** From the first state of the controls, press the buttons and set the controls that are listed by their labels, and start. */
+  /** Reset the controls, then press the buttons and set the controls that `steps` lists by their labels, and play. */
   run(steps) {
     this.whenReady(() => {
       const { simulation, config } = this
-      const control = (label) => config.controls.findIndex((one) => one.label === label)
+      const control = (label) => config.controls.findIndex((item) => item.label === label)
       simulation.restore({ values: config.controls.map(({ value }) => value ?? null) })
       if (steps.length === 0) simulation.play()
       for (const step of steps) {
@@ -259,27 +259,27 @@ export class Instrument {
   }
 
   whenReady(act) {
-    if (this.state === 'loading') this.wanted = act
+    if (this.state === 'loading') this.pendingAction = act
     else act()
   }
 
-  /** What the button for a link says, and does. */
-  sharing() {
+  /** The label (a key) and the action of the button for a link. */
+  shareAction() {
     return ['link', () => this.save((state) => this.share(state))]
   }
 
-  /** Ask for the state; `saved` is called with it. */
-  save(saved) {
-    this.saved = saved
+  /** Ask for the state; `callback` is called with it. */
+  save(callback) {
+    this.onSaved = callback
     this.simulation.save()
   }
 
-  /** In the preview: a button for what the author has done, as the `log` of a goal. */
-  logging() {
+  /** For the preview: a button that copies what the author has done, as the `log` of a goal. */
+  makeLogButton() {
     const copy = ({ log }) => {
       const text = log ? writeLog(log, this.config.controls) : ''
-      const told = text ? navigator.clipboard.writeText(text) : Promise.reject(new Error('no log of a pulled body, or of a link'))
-      told.then(
+      const copying = text ? navigator.clipboard.writeText(text) : Promise.reject(new Error('no log of a pulled body, or of a link'))
+      copying.then(
         () => this.notices.show('The log is copied.', 'note'),
         (error) => this.notices.show(text || error.message, 'warning'),
       )
@@ -294,7 +294,7 @@ export class Instrument {
     else this.notices.show(`${this.words(key)} ${this.words(`lab.live.link_${only}`)}`, 'warning')
   }
 
-  /** Put a link into the address bar and, where that is allowed, the clipboard; gives the key of the text that says so. */
+  /** Put a link into the address bar and, if allowed, the clipboard; returns the key of the message. */
   async copy(link) {
     const address = new URL(window.location.href)
     address.hash = link
@@ -312,7 +312,7 @@ export class Instrument {
 
   dispose() {
     this.unwatch()
-    clearTimeout(this.rest)
+    clearTimeout(this.sayTimer)
     this.hands.dispose()
     this.goal?.dispose()
     this.plots.forEach((plot) => plot.dispose())

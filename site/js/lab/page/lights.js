@@ -1,8 +1,8 @@
 /**
  * The lights of a lab.
  *
- * A model with lights of its own has those and MuJoCo's headlight, as in MuJoCo. One without is lit as the recorded picture is,
- * from the camera and from above: by the headlight alone it would be too dark to see anything.
+ * A model with lights has those and MuJoCo's headlight, as in MuJoCo. A model without is lit like the recorded picture, from the
+ * camera and from above, as the headlight alone would leave it too dark.
  */
 
 import { AmbientLight, DirectionalLight, PointLight, SpotLight } from 'three'
@@ -10,20 +10,20 @@ import { AmbientLight, DirectionalLight, PointLight, SpotLight } from 'three'
 const FULL = Math.PI // see materials.js
 const AMBIENT = 0.35
 const FROM_CAMERA = 0.25
-const FROM_ABOVE = 0.6 // most of it, so that no two sides of a box look alike
+const FROM_ABOVE = 0.6 // the largest part, so that no two sides of a box look alike
 export const ABOVE = [0.25, -0.35, 0.9]
 const LIGHT = 7 // floats in a frame
 const SPOT = 0 // mjtLightType
 const DIRECTIONAL = 1
 const SHADOW_TEXELS = 1024
-const SHADOW_PASSES = 8 // a picture is drawn so often for shadows at most
-const ALL_AROUND = 6 // of them for a light that shines everywhere
+const SHADOW_PASSES = 8 // the most passes for shadows in one picture
+const ALL_AROUND = 6 // passes for a point light
 
 /** The light from all sides, as red, green and blue. */
 export function ambientOf({ lights, visual: { headlight } }) {
   if (lights.length === 0) return [AMBIENT, AMBIENT, AMBIENT]
-  const all = headlight.active ? [...lights, headlight] : lights
-  return [0, 1, 2].map((i) => all.reduce((sum, light) => sum + light.ambient[i], 0))
+  const sources = headlight.active ? [...lights, headlight] : lights
+  return [0, 1, 2].map((i) => sources.reduce((sum, light) => sum + light.ambient[i], 0))
 }
 
 export class Lights {
@@ -37,31 +37,31 @@ export class Lights {
     this.ambient = new AmbientLight(0xffffff, FULL)
     this.ambient.color.setRGB(...ambientOf(description))
     this.head = new DirectionalLight(0xffffff, FULL * FROM_CAMERA)
-    this.lights = description.lights.map((light) => this.make(light))
+    this.lights = description.lights.map((light) => this.makeLight(light))
     this.add(this.head)
     scene.add(this.ambient)
-    if (this.lights.length === 0) this.studio()
-    else this.own(description)
+    if (this.lights.length === 0) this.addTopLight()
+    else this.setHeadlight(description)
   }
 
-  studio() {
-    const above = new DirectionalLight(0xffffff, FULL * FROM_ABOVE)
-    above.position
+  addTopLight() {
+    const topLight = new DirectionalLight(0xffffff, FULL * FROM_ABOVE)
+    topLight.position
       .set(...ABOVE)
       .multiplyScalar(4 * this.extent)
       .add({ x: this.center[0], y: this.center[1], z: this.center[2] })
-    above.target.position.set(...this.center)
-    this.add(above)
-    above.target.updateMatrixWorld()
+    topLight.target.position.set(...this.center)
+    this.add(topLight)
+    topLight.target.updateMatrixWorld()
   }
 
-  own({ visual: { headlight } }) {
+  setHeadlight({ visual: { headlight } }) {
     this.head.visible = headlight.active
     this.head.color.setRGB(...headlight.diffuse)
     this.head.intensity = FULL
   }
 
-  make(info) {
+  makeLight(info) {
     const light =
       info.type === DIRECTIONAL
         ? new DirectionalLight()
@@ -70,14 +70,14 @@ export class Lights {
           : new PointLight(0xffffff, 1, 0, 0)
     light.color.setRGB(...info.diffuse)
     light.intensity = FULL
-    if (info.castshadow) this.shadow(light)
+    if (info.castshadow) this.addShadow(light)
     this.add(light)
     return light
   }
 
-  // MuJoCo gives a spot light of any width one shadow map, and a point light no light at all; here both shine, and throw shadows, to
-  // all sides. The first lights have shadows, as many as there are passes for: each pass draws the whole model.
-  shadow(light) {
+  // MuJoCo gives a spot light of any width one shadow map, and a point light no light at all; here a wide spot light and a point light
+  // shine and cast shadows in all directions. Only the first lights cast shadows, as each pass draws the whole model.
+  addShadow(light) {
     const passes = light.isPointLight ? ALL_AROUND : 1
     if (this.shadows + passes > SHADOW_PASSES) return
     this.shadows += passes
@@ -98,14 +98,14 @@ export class Lights {
     if (light.target) this.scene.add(light.target)
   }
 
-  /** Where the lights are, from a frame, and the headlight at the camera. */
+  /** Move the lights to their places in a frame, and the headlight to the camera. */
   update(frame, eye, forward) {
     this.head.position.set(...eye)
     this.head.target.position.set(eye[0] + forward[0], eye[1] + forward[1], eye[2] + forward[2])
     this.lights.forEach((light, i) => {
-      const at = this.start + LIGHT * i
-      const [px, py, pz, dx, dy, dz, on] = frame.subarray(at, at + LIGHT)
-      light.visible = on !== 0
+      const offset = this.start + LIGHT * i
+      const [px, py, pz, dx, dy, dz, isOn] = frame.subarray(offset, offset + LIGHT)
+      light.visible = isOn !== 0
       light.position.set(px, py, pz)
       if (light.isDirectionalLight) light.position.set(...this.center.map((x, j) => x - 4 * this.extent * [dx, dy, dz][j]))
       const { x, y, z } = light.position

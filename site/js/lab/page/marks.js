@@ -1,11 +1,11 @@
 /**
- * What a text about a model speaks of and the model does not show: springs as coils, the pins of hinges, the path of a site. Drawn
- * from the frames, as all else; which springs and pins there are the scene says (`core/scene.js`).
+ * Marks that the model itself does not have: coils for springs, pins for hinges, the path of a site. The scene lists the springs and
+ * pins (`core/scene.js`); their places come from the frames.
  */
 
 import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Line, LineBasicMaterial, Mesh, Sphere, Vector3 } from 'three'
 import { cylinder } from './geometry.js'
-import { Ropes, stretch } from './surfaces.js'
+import { Ropes, writeTubeMatrix } from './surfaces.js'
 
 const EVERYWHERE = new Sphere(new Vector3(), Infinity)
 const TURNS = 9
@@ -17,14 +17,14 @@ const IRON = [0.4, 0.41, 0.44, 1]
 const PIN = 0.011 // radius of a pin, for a camera at a distance of 1
 const ROW = 19 // floats of a geom in a frame
 
-/** A spring between the middles of two geoms. */
+/** A spring between the centres of two geoms. */
 export class Coil {
   constructor(parent, materials, { from, to, radius }, layout) {
     this.ends = [from, to].map((geom) => layout.geoms + ROW * geom)
     this.radius = radius
     const count = TURNS * ROUND + 1
     const elements = Array.from({ length: 2 * (count - 1) }, (_, i) => (i + 1) >> 1)
-    const material = materials.make(-1)
+    const material = materials.makeMaterial(-1)
     materials.paint(material, ...STEEL)
     this.ropes = new Ropes(material, { count, elements, radius: WIRE * radius })
     this.points = new Float32Array(3 * count)
@@ -35,10 +35,10 @@ export class Coil {
   }
 
   update(frame) {
-    const [a, b] = this.ends.map((at) => frame.subarray(at, at + 3))
-    // A tube of radius 1 from one end to the other has the axes of the coil.
+    const [a, b] = this.ends.map((offset) => frame.subarray(offset, offset + 3))
+    // The matrix of a tube from one end to the other holds the axes of the coil.
     const tube = new Float32Array(16)
-    stretch(tube, 0, [...a, ...b], 0, 3, this.radius)
+    writeTubeMatrix(tube, 0, [...a, ...b], 0, 3, this.radius)
     const last = this.points.length / 3 - 1
     for (let i = 0; i <= last; i++) {
       const t = i / last
@@ -58,14 +58,14 @@ export class Coil {
 /** The pin of a hinge that is fixed to the world. */
 export class Pin {
   constructor(parent, materials, { position, axis }, distance) {
-    const material = materials.make(-1)
+    const material = materials.makeMaterial(-1)
     materials.paint(material, ...IRON)
     this.mesh = new Mesh(cylinder(), material)
     this.mesh.matrixAutoUpdate = false
     const half = axis.map((x) => 2.2 * PIN * distance * x)
     const ends = [...position.map((x, i) => x - half[i]), ...position.map((x, i) => x + half[i])]
     const matrix = new Float32Array(16)
-    stretch(matrix, 0, ends, 0, 3, PIN * distance)
+    writeTubeMatrix(matrix, 0, ends, 0, 3, PIN * distance)
     this.mesh.matrix.fromArray(matrix)
     parent.add(this.mesh)
   }
@@ -78,7 +78,7 @@ export class Pin {
 /** The path of a site, which fades with its age. */
 export class Trail {
   constructor(parent, layout) {
-    this.at = layout.trail
+    this.offset = layout.trail
     this.geometry = new BufferGeometry()
     const dynamic = (width) => new BufferAttribute(new Float32Array(width * layout.longestTrail), width).setUsage(DynamicDrawUsage)
     this.position = dynamic(3)
@@ -97,7 +97,7 @@ export class Trail {
   }
 
   update(frame, count) {
-    this.position.array.set(frame.subarray(this.at, this.at + 3 * count))
+    this.position.array.set(frame.subarray(this.offset, this.offset + 3 * count))
     this.position.needsUpdate = true
     this.geometry.setDrawRange(0, count)
     if (count === this.count) return

@@ -1,12 +1,12 @@
 /**
  * MuJoCo's materials and textures for three.js.
  *
- * MuJoCo lights as OpenGL's fixed pipeline does, with colours as they are written; three.js with light intensities, in which a
- * surface of colour c returns c/π. Lights are therefore π times as strong here, and specular colours divided by what
- * three.js's highlight has more than OpenGL's.
+ * MuJoCo lights like OpenGL's fixed pipeline, with colours as they are written; three.js with light intensities, of which a
+ * surface of colour c returns c/π. Therefore lights are π times as strong here, and specular colours are divided by the ratio of
+ * three.js's highlight to OpenGL's.
  *
- * `metallic` and `roughness`, which MuJoCo's own renderer knows but does not draw, are unset below 0. Where one of them is set, they take
- * the place of `specular` and `shininess` (see `finishOf`).
+ * `metallic` and `roughness`, which MuJoCo's own renderer ignores, are unset if negative. If one of them is set, they replace
+ * `specular` and `shininess` (see `finishOf`).
  */
 
 import {
@@ -19,8 +19,8 @@ const SPECULAR = 0.5 // of a geom without a material
 const SHININESS = 0.5
 const WITHOUT_LIGHTS = 0.5 // see lights.js
 const FINE = 4 // anisotropy
-const DIELECTRIC = 0.04 // what a surface that is no metal reflects of light from straight ahead
-const ROOM = 0.5 // of a metal's light is that of the room that it mirrors, lit as a matte surface is
+const DIELECTRIC = 0.04 // reflectance of a non-metal at normal incidence
+const ROOM = 0.5 // part of a metal's light that comes from an imagined room, lit like a matte surface
 const SHARPEST = 1024 // exponent of a highlight
 const TEXTURE_CUBE = 1
 const TEXTURE_SKY = 2
@@ -30,8 +30,8 @@ export class Materials {
   constructor(scene) {
     this.scene = scene
     this.textures = new Map()
-    this.made = []
-    this.gloss = gloss(scene)
+    this.resources = []
+    this.gloss = glossOf(scene)
     this.ambient = ambientOf(scene)
   }
 
@@ -40,14 +40,14 @@ export class Materials {
    *
    * @param {number} id of the material, or -1
    */
-  make(id, { doubleSided = false } = {}) {
+  makeMaterial(id, { doubleSided = false } = {}) {
     const info = this.scene.materials[id]
     const { shininess, specular, metallic } = finishOf(info, this.gloss)
     const material = new MeshPhongMaterial({ shininess })
     material.specular.setScalar(specular)
     Object.assign(material.userData, { emission: info?.emission ?? 0, metallic, specular })
     if (doubleSided) material.side = DoubleSide
-    this.made.push(material)
+    this.resources.push(material)
     return material
   }
 
@@ -61,17 +61,17 @@ export class Materials {
     material.color.setRGB(r, g, b).multiplyScalar(matte)
     material.emissive.setRGB(r, g, b).multiplyScalar(emission)
     if (metallic > 0) {
-      // A metal has no colour but in what it mirrors: lights, what comes from all sides, and a room that is not there. Without the
-      // last it would be black wherever no light is mirrored.
+      // A metal has colour only in its reflections: of lights, of the ambient light, and of an imagined room, without which it
+      // would be black wherever it reflects no light.
       const mirrored = (colour, i) => specular * (1 - metallic) + metallic * colour[i]
-      const all = [r, g, b]
-      material.specular.setRGB(mirrored(all, 0), mirrored(all, 1), mirrored(all, 2))
-      material.emissive.setRGB(...all.map((x, i) => x * (emission + (1 - matte) * this.ambient[i])))
+      const rgb = [r, g, b]
+      material.specular.setRGB(mirrored(rgb, 0), mirrored(rgb, 1), mirrored(rgb, 2))
+      material.emissive.setRGB(...rgb.map((x, i) => x * (emission + (1 - matte) * this.ambient[i])))
     }
-    const through = a < 1
-    if (material.transparent !== through) {
-      material.transparent = through
-      material.depthWrite = !through
+    const isTransparent = a < 1
+    if (material.transparent !== isTransparent) {
+      material.transparent = isTransparent
+      material.depthWrite = !isTransparent
       material.needsUpdate = true
     }
     material.opacity = a
@@ -81,10 +81,10 @@ export class Materials {
    * Give a material its texture.
    *
    * @param {boolean} wrapped whether the geometry has texture coordinates of a file
-   * @returns {((size: ArrayLike<number>, x?: number, y?: number, endless?: boolean) => void) | null} what to call when the size, which
-   *   is the visualizer's, has changed; x and y are where in its plane (m) an endless plane has its middle
+   * @returns {((size: ArrayLike<number>, x?: number, y?: number, endless?: boolean) => void) | null} to be called when the size (as the
+   *   visualizer has it) has changed; x and y are the centre of an endless plane in its own coordinates (m)
    */
-  dress(material, id, wrapped) {
+  applyTexture(material, id, wrapped) {
     const info = this.scene.materials[id]
     const texture = info === undefined ? undefined : this.scene.textures[info.texture]
     if (texture === undefined || texture.type === TEXTURE_SKY) return null
@@ -92,15 +92,15 @@ export class Materials {
     const map = this.flat(info.texture).clone()
     map.needsUpdate = true
     material.map = map
-    // OpenGL's textures colour all of the light, and so what a surface sends out by itself.
+    // OpenGL's textures colour all light, also what a surface emits.
     if (info.emission > 0 || info.metallic > 0) material.emissiveMap = map
-    this.made.push(map)
+    this.resources.push(map)
     const [u, v] = info.texrepeat
     if (wrapped) {
       map.repeat.set(u, v)
       return null
     }
-    // A uniform texture is repeated for every metre of two, another as often on each face. That of an endless plane is uniform.
+    // A uniform texture repeats per two metres, another the same number of times on each face. That of an endless plane is uniform.
     return (size, x = 0, y = 0, endless = false) => {
       const uniform = info.texuniform || endless
       map.repeat.set(uniform ? u * size[0] : u, uniform ? v * size[1] : v)
@@ -122,8 +122,8 @@ export class Materials {
       const texture = this.scene.textures[id]
       const { width, height } = texture
       const faces = Array.from({ length: 6 }, (_, i) => {
-        const from = height === 6 * width ? i * width : 0
-        return new DataTexture(rgba(texture, from, width), width, width, RGBAFormat)
+        const startRow = height === 6 * width ? i * width : 0
+        return new DataTexture(rgba(texture, startRow, width), width, width, RGBAFormat)
       })
       faces.forEach((face) => (face.needsUpdate = true))
       this.textures.set(id, finish(new CubeTexture(faces)))
@@ -138,14 +138,14 @@ export class Materials {
   }
 
   dispose() {
-    for (const thing of [...this.made, ...this.textures.values()]) thing.dispose()
+    for (const thing of [...this.resources, ...this.textures.values()]) thing.dispose()
   }
 }
 
 /**
- * How a material of MuJoCo takes light: exponent and strength of three.js's highlight, and how much it is of metal.
+ * The finish of a material of MuJoCo for three.js: exponent and strength of the highlight, and the part that is metal.
  *
- * A surface that is rough on a small scale, with slopes of spread `roughness`², has about the highlight of the exponent 2/roughness⁴ - 2.
+ * A microfacet surface, whose slopes have the spread `roughness`², has about the highlight of the exponent 2/roughness⁴ - 2.
  *
  * @param {object | undefined} info @param {number} gloss how much weaker highlights are because of their lights
  */
@@ -161,11 +161,11 @@ export function finishOf(info, gloss) {
   }
 }
 
-/** Highlights have the light's specular colour in MuJoCo, its only colour in three.js: how much weaker they are. */
-function gloss({ lights, visual: { headlight } }) {
+/** The strength of highlights: in MuJoCo they have the light's specular colour, in three.js its only colour, which here is the diffuse one. */
+function glossOf({ lights, visual: { headlight } }) {
   if (lights.length === 0) return WITHOUT_LIGHTS
-  const all = headlight.active ? [...lights, headlight] : lights
-  const sum = (name) => all.reduce((total, light) => total + light[name][0] + light[name][1] + light[name][2], 0)
+  const sources = headlight.active ? [...lights, headlight] : lights
+  const sum = (name) => sources.reduce((total, light) => total + light[name][0] + light[name][1] + light[name][2], 0)
   return sum('diffuse') > 0 ? Math.min(2, sum('specular') / sum('diffuse')) : 0
 }
 
@@ -184,17 +184,17 @@ function finish(texture) {
 function rgba({ width, channels, data }, firstRow, rows) {
   const count = width * rows
   const target = new Uint8Array(4 * count)
-  for (let i = 0, from = firstRow * width * channels; i < count; i++, from += channels) {
+  for (let i = 0, offset = firstRow * width * channels; i < count; i++, offset += channels) {
     const grey = channels < 3
-    target[4 * i] = data[from]
-    target[4 * i + 1] = data[from + (grey ? 0 : 1)]
-    target[4 * i + 2] = data[from + (grey ? 0 : 2)]
-    target[4 * i + 3] = channels === 4 ? data[from + 3] : 255
+    target[4 * i] = data[offset]
+    target[4 * i + 1] = data[offset + (grey ? 0 : 1)]
+    target[4 * i + 2] = data[offset + (grey ? 0 : 2)]
+    target[4 * i + 3] = channels === 4 ? data[offset + 3] : 255
   }
   return target
 }
 
-/** A cube texture is looked up by the direction from the geom's centre, in its own axes: of the unit shape, or if `uniform` of the geom. */
+/** Let a material look up a cube texture by the direction from the geom's centre, in the unit shape or, if `uniform`, in the geom's size. */
 function wrapCube(material, texture, uniform) {
   const size = { value: [1, 1, 1] }
   material.onBeforeCompile = (shader) => {

@@ -1,11 +1,11 @@
 /**
- * What a shiny floor shows: the one reflection of a picture.
+ * The reflection in a shiny floor; a picture has one at most.
  *
- * As in MuJoCo's renderer, the first geom with `reflectance` that is a plane or a box, and not seen through, reflects: a plane on its
- * upper side, a box on the face towards its +z. What it shows is added to its own colour, times `reflectance`; the sky is not in it.
+ * As in MuJoCo's renderer, the first opaque plane or box with `reflectance` reflects: a plane on its upper side, a box on the face
+ * towards its +z. The reflection is added to its own colour, times `reflectance`; it does not show the sky.
  *
- * The scene is drawn a second time from the eye's mirror image, into a texture that the surface looks up by where it is on the
- * screen. A scene without such a geom has no `Mirror`, and pays nothing.
+ * The scene is drawn a second time from the eye's mirror image, into a texture that the surface looks up by its place on the
+ * screen. A scene without such a geom has no `Mirror`.
  */
 
 import { Matrix4, PerspectiveCamera, Vector2, Vector3, Vector4, WebGLRenderTarget } from 'three'
@@ -23,29 +23,29 @@ export class Mirror {
     this.screen = { value: new Vector2() }
     this.surfaces = surfaces.map(({ solid, reflectance }) => {
       const strength = { value: 0 }
-      polish(solid.material, { labMirror: this.picture, labScreen: this.screen, labReflectance: strength })
+      addReflection(solid.material, { labMirror: this.picture, labScreen: this.screen, labReflectance: strength })
       return { solid, reflectance, strength }
     })
   }
 
-  /** Draw the reflection that the next picture through `lens` needs; gives whether there is one. */
+  /** Draw the reflection for the next picture through `lens`; returns whether there is one. */
   draw({ renderer, software, sharpness }, scene, lens, width, height) {
     this.picture.value = null
     for (const { strength } of this.surfaces) strength.value = 0
-    const chosen = this.surfaces.find(({ solid }) => solid.shown && !solid.material.transparent)
-    const plane = chosen === undefined ? null : upperFace(chosen.solid)
+    const surface = this.surfaces.find(({ solid }) => solid.isVisible && !solid.material.transparent)
+    const plane = surface === undefined ? null : upperFace(surface.solid)
     if (plane === null || !reflect(lens, plane, this.lens)) return false
     this.resize(sharpness * (software ? SOFT : 1), width, height)
-    this.render(renderer, scene, chosen.solid.material)
+    this.render(renderer, scene, surface.solid.material)
     this.picture.value = this.target.texture
     this.screen.value.set(1 / (width * sharpness), 1 / (height * sharpness))
-    chosen.strength.value = chosen.reflectance
+    surface.strength.value = surface.reflectance
     return true
   }
 
   resize(scale, width, height) {
     const [w, h] = [width, height].map((x) => Math.max(1, Math.round(scale * x)))
-    // Without antialiasing of its own: resolving it lost the shadow maps of point lights, which the picture needs next.
+    // Without antialiasing: resolving it would lose the shadow maps of point lights, which the picture still needs.
     this.target ??= new WebGLRenderTarget(w, h)
     this.target.setSize(w, h)
   }
@@ -67,7 +67,7 @@ export class Mirror {
   }
 }
 
-/** The surface that reflects, as a point of it and its normal; null where it has no size. */
+/** The reflecting surface, as a point on it and its normal; null if it has no size. */
 function upperFace({ type, meshes: [mesh] }) {
   const e = mesh.matrix.elements
   const normal = new Vector3(e[8], e[9], e[10])
@@ -77,9 +77,9 @@ function upperFace({ type, meshes: [mesh] }) {
 }
 
 /**
- * Set `mirrored` to a camera that sees what a plane shows to `lens`, with left and right exchanged.
+ * Set `mirrored` to a camera that sees what a plane reflects to `lens`, with left and right exchanged.
  *
- * What is behind the plane is cut off by its near plane, which is laid into the mirror.
+ * Its near plane is laid into the mirror, which cuts off what is behind it.
  *
  * @returns {boolean} false where the eye is behind the plane
  */
@@ -94,17 +94,17 @@ export function reflect(lens, { point, normal }, mirrored) {
     -2 * x * z, -2 * y * z, 1 - 2 * z * z, 2 * offset * z,
     0, 0, 0, 1,
   ) // prettier-ignore
-  // Exchanging left and right makes a rotation of it again, so that front faces stay front faces.
+  // Exchanging left and right makes it a rotation again, so that front faces stay front faces.
   mirrored.matrix.multiplyMatrices(householder, lens.matrixWorld).scale(new Vector3(-1, 1, 1))
   mirrored.updateMatrixWorld(true)
   mirrored.projectionMatrix.copy(lens.projectionMatrix)
   mirrored.projectionMatrixInverse.copy(lens.projectionMatrixInverse)
-  cut(mirrored, normal, point)
+  clipFrustum(mirrored, normal, point)
   return true
 }
 
-/** Lay the near plane of a camera into a plane, and its far plane so that the corner of the frustum that is farthest off stays. */
-function cut(camera, normal, point) {
+/** Lay the near plane of a camera into a plane, and its far plane through the farthest corner of the frustum. */
+function clipFrustum(camera, normal, point) {
   const inverse = camera.matrixWorldInverse
   const n = normal.clone().transformDirection(inverse)
   const plane = new Vector4(n.x, n.y, n.z, -n.dot(point.clone().applyMatrix4(inverse)))
@@ -119,8 +119,8 @@ function cut(camera, normal, point) {
   camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert()
 }
 
-/** Let a material add what a mirror shows, where its normal is its geom's z axis. */
-function polish(material, uniforms) {
+/** Let a material add the reflection where its normal is the geom's z axis. */
+function addReflection(material, uniforms) {
   const { onBeforeCompile } = material
   const name = `${material.userData.shader ?? ''} lab-mirror`
   material.onBeforeCompile = (shader, renderer) => {

@@ -1,4 +1,4 @@
-/** What a lab tells: a line that everybody sees, and one that only screen readers do. */
+/** A lab's notices: a visible line, and one for screen readers only. */
 
 import { h } from './dom.js'
 
@@ -8,40 +8,40 @@ export class Notices {
   /** @param {(key: string, values?: object) => string} words */
   constructor(words) {
     this.words = words
-    this.shown = h('p', { class: 'lab-message', role: 'alert', hidden: true })
-    this.spoken = h('p', { class: 'lab-announce unseen', role: 'status' })
+    this.message = h('p', { class: 'lab-message', role: 'alert', hidden: true })
+    this.announcement = h('p', { class: 'lab-announce unseen', role: 'status' })
     this.timer = 0
   }
 
-  /** Tell a screen reader. */
+  /** Announce a text to screen readers. */
   say(text) {
-    this.spoken.textContent = text
+    this.announcement.textContent = text
   }
 
   /** @param {'wrong' | 'warning' | 'note'} kind a note goes away by itself */
   show(text, kind) {
     clearTimeout(this.timer)
-    this.shown.textContent = text
-    this.shown.className = `lab-message lab-is-${kind}`
-    this.shown.hidden = false
+    this.message.textContent = text
+    this.message.className = `lab-message lab-is-${kind}`
+    this.message.hidden = false
     if (kind === 'note') this.timer = setTimeout(() => this.clear(), SHORT)
   }
 
   clear() {
     clearTimeout(this.timer)
-    this.shown.hidden = true
-    this.shown.textContent = ''
+    this.message.hidden = true
+    this.message.textContent = ''
   }
 
   /** An error of the worker, with the place in the lab's JSON. */
   failure({ message, entry }, config) {
     const { words } = this
-    const where = entry.length > 0 ? placeOf(entry, config) : ''
-    this.show(where ? words('lab.live.failed_in', { where, message }) : words('lab.live.failed', { message }), 'wrong')
+    const place = entry.length > 0 ? placeOf(entry, config) : ''
+    this.show(place ? words('lab.live.failed_in', { where: place, message }) : words('lab.live.failed', { message }), 'wrong')
   }
 }
 
-/** An entry of the lab's JSON as its author finds it, with its label: `controls[2].run ("push")`. */
+/** An entry of the lab's JSON as its author writes it, with its label: `controls[2].run ("push")`. */
 export function placeOf(entry, config) {
   let value = config
   let label = ''

@@ -1,4 +1,4 @@
-/** Numbers as a reader sees them: a real minus sign, fixed digits, no width that changes with the sign. */
+/** Formats numbers for readers: with a real minus sign, fixed digits, and a width that does not depend on the sign. */
 
 const FIGURE_SPACE = '\u2007'
 const MINUS = '\u2212'
@@ -6,7 +6,7 @@ const MINUS = '\u2212'
 /**
  * A readout's value.
  *
- * @param {number | string | null} value NaN and `null`: there is none
+ * @param {number | string | null} value NaN and `null`: none
  * @param {number | null} digits after the point; null: six significant figures
  */
 export function formatReadout(value, digits) {
@@ -24,32 +24,32 @@ export function formatNumber(value, digits) {
   if (digits === null || digits === undefined)
     text = size === 0 || (size >= 1e-4 && size < 1e7) ? plain(size) : scientific(size, 4)
   else text = size < 1e9 ? size.toFixed(digits) : scientific(size, Math.max(2, digits))
-  // What is rounded to zero has no sign.
+  // A number that is rounded to zero has no sign.
   const sign = value < 0 && /[1-9]/.test(text) ? MINUS : FIGURE_SPACE
   return sign + text
 }
 
 /** A number without padding, for a label: `−0.5`. */
 export function formatLabel(value) {
-  return (value < 0 ? MINUS : '') + trimmed(Math.abs(value))
+  return (value < 0 ? MINUS : '') + shortest(Math.abs(value))
 }
 
-/** Digits after the point that tell all steps of a slider apart. */
+/** The digits after the point that are needed to tell the values of a slider apart. */
 export function digitsOfStep(step) {
   if (!(step > 0)) return 2
   for (let digits = 0; digits < 10; digits++) {
-    const scaled = step * 10 ** digits
-    if (Math.abs(scaled - Math.round(scaled)) < 1e-6 * scaled) return digits
+    const multiple = step * 10 ** digits
+    if (Math.abs(multiple - Math.round(multiple)) < 1e-6 * multiple) return digits
   }
   return 10
 }
 
-/** Simulated time: milliseconds below ten seconds' worth of steps are of no use to the eye. */
+/** Simulated time, in hundredths of a second. */
 export function formatTime(seconds) {
   return `${seconds < 0 ? MINUS : ''}${Math.abs(seconds).toFixed(2)}`
 }
 
-/** `0.4` for 0.412, `0.03` for 0.0312: enough to see how slow. */
+/** `0.4` for 0.412, `0.03` for 0.0312. */
 export function formatRatio(ratio) {
   return ratio >= 0.1 ? ratio.toFixed(1) : ratio.toPrecision(1)
 }
@@ -58,7 +58,7 @@ function plain(size) {
   return String(Number(size.toPrecision(6)))
 }
 
-function trimmed(size) {
+function shortest(size) {
   if (size === 0 || (size >= 1e-4 && size < 1e7)) return String(Number(size.toPrecision(10)))
   const [mantissa, exponent] = size.toExponential(3).split('e')
   const power = `10${superscript(Number(exponent))}`
@@ -70,10 +70,10 @@ function scientific(size, digits) {
   return `${mantissa}·10${superscript(Number(exponent))}`
 }
 
-const RAISED = '⁰¹²³⁴⁵⁶⁷⁸⁹'
+const SUPERSCRIPTS = '⁰¹²³⁴⁵⁶⁷⁸⁹'
 
-/** An exponent in small raised figures. */
+/** An exponent in superscript digits. */
 export function superscript(exponent) {
-  const digits = [...String(Math.abs(exponent))].map((digit) => RAISED[digit]).join('')
+  const digits = [...String(Math.abs(exponent))].map((digit) => SUPERSCRIPTS[digit]).join('')
   return exponent < 0 ? `⁻${digits}` : digits
 }

@@ -1,8 +1,8 @@
-/** The page's colours for canvases, which know no style sheet, and when they change. */
+/** The page's colours for canvases, to which style sheets do not apply, and a watcher of their changes. */
 
 const TRACES = 6
 
-/** Resolve a CSS colour in an element's place to red, green, blue in [0, 255] and text. */
+/** Resolve a CSS colour, as it applies inside an element, to `rgb(…)`. */
 export function resolve(element, colour) {
   const probe = document.createElement('span')
   probe.hidden = true
@@ -30,17 +30,17 @@ export function channels(text) {
 }
 
 /**
- * Call `changed` when the page goes from light to dark or back, or moves to a screen of another pixel density.
+ * Call `callback` when the page changes between light and dark.
  *
  * @returns {() => void} stops it
  */
-export function watchTheme(changed) {
+export function watchTheme(callback) {
   const media = window.matchMedia('(prefers-color-scheme: dark)')
-  const observer = new MutationObserver(changed)
+  const observer = new MutationObserver(callback)
   observer.observe(document.documentElement, { attributes: true, attributeFilter: ['data-theme'] })
-  media.addEventListener('change', changed)
+  media.addEventListener('change', callback)
   return () => {
     observer.disconnect()
-    media.removeEventListener('change', changed)
+    media.removeEventListener('change', callback)
   }
 }

@@ -1,6 +1,6 @@
 /**
- * Plots of traces against time, drawn by uPlot: axes with labels, a label at the end of each line instead of a legend, a colour and a
- * dash for each, and lines for reference values.
+ * Plots of traces against time, drawn by uPlot: axes with labels, a colour and a dash for each line, a label at its end instead of a
+ * legend, and lines for reference values.
  */
 
 import uPlot from 'uplot'
@@ -49,7 +49,7 @@ export class Plot {
     this.dirty = true
   }
 
-  /** Draw what is new. */
+  /** Draw new samples. */
   draw() {
     if (!this.dirty || this.chart === null) return
     this.dirty = false
@@ -89,11 +89,11 @@ export class Plot {
     })
     return {
       ...size,
-      padding: [config.ylabel ? LINE + GAP : FONT, this.room(font), 0, 0],
+      padding: [config.ylabel ? LINE + GAP : FONT, this.labelRoom(font), 0, 0],
       legend: { show: false },
       cursor: { show: false },
       scales: {
-        x: { time: false, range: () => this.spanX() },
+        x: { time: false, range: () => this.timeRange() },
         y: {
           distr: config.log ? LOGARITHMIC : LINEAR,
           range: (_, min, max) => (config.log ? decades(config, min, max) : spanOf(config, min, max)),
@@ -113,13 +113,13 @@ export class Plot {
         })),
       ],
       hooks: {
-        drawAxes: [(chart) => this.title(chart, font), (chart) => this.references(chart, font)],
-        draw: [(chart) => this.labels(chart, font)],
+        drawAxes: [(chart) => this.drawTitle(chart, font), (chart) => this.drawReferences(chart, font)],
+        draw: [(chart) => this.drawLabels(chart, font)],
       },
     }
   }
 
-  spanX() {
+  timeRange() {
     const { window } = this.config
     const { last } = this.history
     if (window !== null) return last <= window ? [0, window] : [last - window, last]
@@ -127,18 +127,18 @@ export class Plot {
   }
 
   /** Width of the labels at the ends of the lines. */
-  room(font) {
+  labelRoom(font) {
     const { traces } = this.config
     return traces.length === 0
       ? GAP
       : Math.min(140, Math.ceil(Math.max(...traces.map(({ label }) => widthOf(label, font))) + 2 * GAP))
   }
 
-  /** What the y axis stands for, above it: along the axis a long name would be cut. */
-  title({ ctx }, font) {
+  /** Draw the label of the y axis above it, as along the axis a long one would be cut. */
+  drawTitle({ ctx }, font) {
     const ratio = uPlot.pxRatio
     ctx.save()
-    ctx.font = scaled(font, ratio)
+    ctx.font = scaleFont(font, ratio)
     ctx.fillStyle = this.colours.text
     ctx.textAlign = 'left'
     ctx.textBaseline = 'top'
@@ -146,31 +146,31 @@ export class Plot {
     ctx.restore()
   }
 
-  references({ ctx, bbox, valToPos }, font) {
+  drawReferences({ ctx, bbox, valToPos }, font) {
     const ratio = uPlot.pxRatio
     for (const { y, label } of this.config.refLines) {
-      const at = Math.round(valToPos(y, 'y', true))
-      if (at < bbox.top || at > bbox.top + bbox.height) continue
+      const pixel = Math.round(valToPos(y, 'y', true))
+      if (pixel < bbox.top || pixel > bbox.top + bbox.height) continue
       ctx.save()
       ctx.strokeStyle = this.colours.text
       ctx.lineWidth = ratio
       ctx.setLineDash([2 * ratio, 3 * ratio])
       ctx.beginPath()
-      ctx.moveTo(bbox.left, at)
-      ctx.lineTo(bbox.left + bbox.width, at)
+      ctx.moveTo(bbox.left, pixel)
+      ctx.lineTo(bbox.left + bbox.width, pixel)
       ctx.stroke()
       if (label) {
-        ctx.font = scaled(font, ratio)
+        ctx.font = scaleFont(font, ratio)
         ctx.fillStyle = this.colours.text
         ctx.textAlign = 'left'
         ctx.textBaseline = 'bottom'
-        ctx.fillText(label, bbox.left + GAP * ratio, at - 2 * ratio)
+        ctx.fillText(label, bbox.left + GAP * ratio, pixel - 2 * ratio)
       }
       ctx.restore()
     }
   }
 
-  labels(chart, font) {
+  drawLabels(chart, font) {
     const { ctx, bbox, valToPos } = chart
     const { traces } = this.config
     const data = chart.data
@@ -182,7 +182,7 @@ export class Plot {
     const places = spread(ends, (FONT + 2) * ratio, bbox.top, bbox.top + bbox.height)
     const x = Math.min(bbox.left + bbox.width, end < 0 ? bbox.left : valToPos(data[0][end], 'x', true))
     ctx.save()
-    ctx.font = scaled(font, ratio)
+    ctx.font = scaleFont(font, ratio)
     ctx.textAlign = 'left'
     ctx.textBaseline = 'middle'
     traces.forEach(({ label }, i) => {
@@ -208,14 +208,14 @@ function dashOf({ dash }, index, count) {
   return count > 1 ? DASHES[index % DASHES.length] : []
 }
 
-/** Whole decades around the data; a log axis has no room for zero. */
+/** The range of a logarithmic axis: whole decades around the data. */
 function decades({ ymin, ymax }, low, high) {
-  const from = ymin ?? 10 ** Math.floor(Math.log10(low > 0 ? low : 1e-3))
-  const to = ymax ?? 10 ** Math.ceil(Math.log10(high > 0 ? high : 1))
-  return [from, to > from ? to : 10 * from]
+  const lower = ymin ?? 10 ** Math.floor(Math.log10(low > 0 ? low : 1e-3))
+  const upper = ymax ?? 10 ** Math.ceil(Math.log10(high > 0 ? high : 1))
+  return [lower, upper > lower ? upper : 10 * lower]
 }
 
-/** Ticks at powers of ten, not more than can be read. */
+/** Ticks of a logarithmic axis: at powers of ten, not more than can be read. */
 const POWERS = {
   splits: (_, __, min, max) => {
     const first = Math.ceil(Math.log10(min) - 1e-9)
@@ -227,14 +227,14 @@ const POWERS = {
   values: (_, ticks) => ticks.map((tick) => `10${superscript(Math.round(Math.log10(tick)))}`),
 }
 
-const scaled = (font, ratio) => font.replace(/^[\d.]+/, String(FONT * ratio))
+const scaleFont = (font, ratio) => font.replace(/^[\d.]+/, String(FONT * ratio))
 
-let measuring = null
+let measureContext = null
 
 function widthOf(text, font) {
-  measuring ??= document.createElement('canvas').getContext('2d')
-  measuring.font = font
-  return measuring.measureText(text).width
+  measureContext ??= document.createElement('canvas').getContext('2d')
+  measureContext.font = font
+  return measureContext.measureText(text).width
 }
 
 function sizeOf(values, font) {

@@ -1,9 +1,9 @@
-/** A scale: a bar in the corner of a view, as long as a round length is at what the camera looks at. */
+/** A scale bar in the corner of a view: a round length at the distance of the camera's target. */
 
 import { h, outline } from './dom.js'
 import { roundLength } from './studio.js'
 
-const MOST = 0.2 // of the width of the view
+const MOST = 0.2 // of the view's width, for the bar
 const MARGIN = 10 // CSS pixels
 const TICK = 5
 
@@ -16,7 +16,7 @@ export class ScaleBar {
     this.element = h('p', { class: 'lab-scale', role: 'img' }, this.svg, this.length)
   }
 
-  /** Fit a view of so many CSS pixels, in which a metre has `metre` of them. */
+  /** Fit the bar to a view of `width` by `height` CSS pixels, of which a metre has `metre`. */
   show(width, height, metre) {
     const length = roundLength((MOST * width) / metre)
     const path = `M${MARGIN} ${height - MARGIN - TICK}v${TICK}h${(length * metre).toFixed(1)}v${-TICK}`

@@ -2,25 +2,26 @@
  * A state of a lab, and the motion that led to it, in the fragment of a link: `#lab=ID&z=TEXT`.
  *
  * TEXT is base64url of a deflated content: JSON on one line (`v` the values of the controls, `n` the steps since the reset, `t` the
- * time in s; `l` the log: the values of the controls at the reset, and what was done since), and after the line's end the whole physics
- * as 64-bit floats, to the last bit. Where all this is too long for a link, the log is left out, then the physics. A browser that cannot deflate writes `s=TEXT`, the content as it is; in
- * older links that has the physics in the JSON, as base64 (`p`). A model that the reader has written is in the JSON, as `x`.
+ * time in s; `l` the log: the values of the controls at the reset, and the events since), and after the end of the line the whole
+ * physics as 64-bit floats. If all this is too long for a link, the log is left out, then the physics. A browser that cannot deflate
+ * writes `s=TEXT`, with the content as it is; in older links that has the physics in the JSON, as base64 (`p`). A model that the
+ * reader has written is in the JSON, as `x`.
  */
 
-/** Letters of a link's text: what all browsers keep in an address, and most programs that pass it on. */
+/** The most characters of a link: all browsers keep so many in an address, and most programs that pass it on. */
 export const LONGEST = 16_000
 
-/** Characters of a model. */
+/** The most characters of a model. */
 export const LONGEST_MODEL = 100_000
 
 const MOST_EVENTS = 10_000 // of a log
-const LARGEST = 8 << 20 // bytes that a link may unfold to
+const LARGEST = 8 << 20 // bytes that a link may inflate to
 const LINE_END = 10
 
 /**
  * @param {string} id
  * @param {{values: unknown[], steps: number, time: number, physics: Float64Array, text?: string, log?: object | null}} state
- * @returns {Promise<{link: string, only: 'state' | 'controls' | null}>} `only`: what it holds where not all fitted
+ * @returns {Promise<{link: string, only: 'state' | 'controls' | null}>} `only`: what it holds if not all fitted
  */
 export async function writeLink(id, { values, steps, time, physics, text, log = null }) {
   const state = { v: values, n: steps, t: time, x: text }
@@ -36,15 +37,15 @@ export async function writeLink(id, { values, steps, time, physics, text, log = 
 function content(head, physics) {
   const line = new TextEncoder().encode(`${JSON.stringify(head)}\n`)
   const floats = new Uint8Array(Float64Array.from(physics).buffer)
-  const all = new Uint8Array(line.length + floats.length)
-  all.set(line)
-  all.set(floats, line.length)
-  return all
+  const bytes = new Uint8Array(line.length + floats.length)
+  bytes.set(line)
+  bytes.set(floats, line.length)
+  return bytes
 }
 
 async function field(bytes) {
   return typeof CompressionStream === 'function'
-    ? `z=${toBase64(await through(bytes, new CompressionStream('deflate-raw')))}`
+    ? `z=${toBase64(await pipe(bytes, new CompressionStream('deflate-raw')))}`
     : `s=${toBase64(bytes)}`
 }
 
@@ -61,7 +62,7 @@ export async function readLink(fragment) {
   const id = fields.get('lab')
   try {
     const [deflated, plain] = [fields.get('z'), fields.get('s')]
-    if (deflated) return { id, state: parse(await through(fromBase64(deflated), new DecompressionStream('deflate-raw'))) }
+    if (deflated) return { id, state: parse(await pipe(fromBase64(deflated), new DecompressionStream('deflate-raw'))) }
     return { id, state: plain ? parse(fromBase64(plain)) : null }
   } catch {
     return { id, state: null }
@@ -79,26 +80,26 @@ function parse(bytes) {
   return typeof x === 'string' && x.length <= LONGEST_MODEL ? { ...state, text: x } : state
 }
 
-/** A log as the JSON that an author gives a goal: one line for each thing that was done. */
+/** A log as the JSON that an author gives a goal: one line for each event. */
 export function writeLog({ values, events }, controls) {
-  const changed = values.flatMap((value, i) => (value === (controls[i].value ?? null) ? [] : [[0, i, value]]))
-  const entries = [...changed, ...events].map(([t, i, value]) => {
+  const initialEntries = values.flatMap((value, i) => (value === (controls[i].value ?? null) ? [] : [[0, i, value]]))
+  const entries = [...initialEntries, ...events].map(([t, i, value]) => {
     const { label } = controls[i]
     return JSON.stringify({ t, do: value === undefined ? label : { [label]: value } })
   })
   return `"log": [${entries.join(',\n  ')}]`
 }
 
-/** Whether a value has the form of a log; that its controls are there and take its values is for the lab to say. */
+/** Whether a value has the form of a log; whether its controls exist and accept its values is checked by the lab. */
 function isLog(value) {
   if (!Array.isArray(value) || !value.slice(0, 2).every(Array.isArray) || value.length !== 2) return false
-  const isValue = (one) => typeof one === 'string' || Number.isFinite(one)
+  const isValue = (item) => typeof item === 'string' || Number.isFinite(item)
   const isEvent = ([time, control, ...rest]) => time >= 0 && Number.isFinite(time) && Number.isInteger(control) && rest.length <= 1 && rest.every(isValue)
-  return value[1].length <= MOST_EVENTS && value[0].every((one) => one === null || isValue(one)) && value[1].every((event) => Array.isArray(event) && isEvent(event))
+  return value[1].length <= MOST_EVENTS && value[0].every((item) => item === null || isValue(item)) && value[1].every((event) => Array.isArray(event) && isEvent(event))
 }
 
-/** Bytes through a stream that deflates or inflates them. */
-async function through(bytes, stream) {
+/** Deflate or inflate bytes by a stream. */
+async function pipe(bytes, stream) {
   const chunks = []
   let size = 0
   const reader = new Blob([bytes]).stream().pipeThrough(stream).getReader()

@@ -1,15 +1,15 @@
-/** Whether an element can be seen: in the window, and the window's tab in front. */
+/** Watches whether an element is visible: in the window, and the window's tab in front. */
 
 /**
- * Call `changed(true or false)` when that changes, and once at first.
+ * Call `callback(true or false)` when that changes, and once at first.
  *
  * @returns {() => void} stops it
  */
-export function watchSight(element, changed) {
-  let seen = false
-  const tell = () => changed(seen && !document.hidden)
+export function watchSight(element, callback) {
+  let isIntersecting = false
+  const tell = () => callback(isIntersecting && !document.hidden)
   const observer = new IntersectionObserver((entries) => {
-    seen = entries[entries.length - 1].isIntersecting
+    isIntersecting = entries[entries.length - 1].isIntersecting
     tell()
   })
   observer.observe(element)

@@ -1,21 +1,21 @@
 /**
- * One simulation of the worker, as the page holds it: its line, its picture, and what it is doing.
+ * One simulation of the worker, as seen by the page: its line, its picture, and its state.
  *
  *   const simulation = new Simulation({ config, base, view, on })
  *   simulation.play(); simulation.set(0, 3); simulation.dispose()
  *
- * `on` has functions for what happens; all may be absent:
+ * `on` holds listeners, all optional:
  *
  *   state(state, reason)   'loading', 'paused', 'playing', 'ended' (it will not run again)
  *   ready({scene, values, time, version})
- *   samples({epoch, times, values}, fresh)   `fresh`: a new run began, samples before these are of another
+ *   samples({epoch, times, values}, fresh)   `fresh`: a new run began, earlier samples belong to another
  *   refresh(frame, now)    once for each picture at most: {time, readouts, realtime, contacts, goal}
  *   controls(values)       lab code may have changed them
  *   diverged({time, kind, message}), warning({time, kind, message}), error({message, entry, kind, fatal}), saved(state)
  *   noPicture()            the browser has no WebGL
  *
- * Every frame is answered at the next refresh of the screen, which makes the worker send one for each. The answer is the buffer of
- * the frame before: the newest one stays here, to be drawn again when the camera moves.
+ * Every frame is answered at the next refresh of the screen, so that the worker sends one for each. The answer is the buffer of
+ * the previous frame: the newest stays here, to be drawn again when the camera moves.
  */
 
 import { connection } from './connection.js'
@@ -32,7 +32,7 @@ export class Simulation {
     Object.assign(this, { config, view, on })
     this.address = (path) => new URL(path, base).href
     this.visible = false
-    this.chosen = new Map() // what outlives the engine: speed and overlays
+    this.settings = new Map() // messages to repeat after a restart: speed and overlays
     this.tick = (now) => this.refresh(now)
     this.request = 0
     this.connect()
@@ -40,11 +40,11 @@ export class Simulation {
 
   connect() {
     const { config, address } = this
-    this.spent = [] // one for each frame that was not answered yet; null: a new buffer has to be made
+    this.spentBuffers = [] // one for each frame not yet answered; null: the worker has to make a new one
     this.latest = null
     this.epoch = null
     this.diverged = false
-    this.change('loading')
+    this.setState('loading')
     this.line = connection(address(config.worker)).open(config.id, (message) => MESSAGES[message.type]?.(this, message))
     const addresses = { module: address(config.module), mjb: address(config.mjb), wasm: address(config.wasm) }
     this.send({ type: 'load', config, ...addresses })
@@ -55,17 +55,17 @@ export class Simulation {
     this.line.send(message, transfer)
   }
 
-  change(state, reason = null) {
+  setState(state, reason = null) {
     this.state = state
     this.view?.setMoving(state === 'playing' && this.visible)
     this.on.state?.(state, reason)
     this.schedule()
   }
 
-  // --- what can be done with it
+  // --- actions
 
   play() {
-    if (this.state === 'ended') this.again()
+    if (this.state === 'ended') this.restart()
     else if (this.diverged) this.reset()
     this.send({ type: 'play' })
   }
@@ -88,16 +88,16 @@ export class Simulation {
   }
 
   choose(key, message) {
-    this.chosen.set(key, message)
+    this.settings.set(key, message)
     this.send(message)
   }
 
-  /** Set a control to a value; `play`: and go on from there. */
+  /** Set a control to a value; `play`: and run. */
   set(index, value, play = false) {
     this.send({ type: 'control', index, value, play })
   }
 
-  /** Press a button; `play`: and go on from there, unless its code pauses. */
+  /** Press a button; `play`: and run, unless its code pauses. */
   press(index, play = false) {
     this.send({ type: 'press', index, play })
   }
@@ -120,12 +120,12 @@ export class Simulation {
     this.send({ type: 'restore', state })
   }
 
-  /** Play what a log says, from its reset. */
+  /** Replay a log from its reset. */
   replay(log) {
     this.send({ type: 'replay', log })
   }
 
-  /** What is out of sight makes no steps. */
+  /** Set whether the lab is in sight; out of sight it makes no steps. */
   setVisible(on) {
     if (on === this.visible) return
     this.visible = on
@@ -133,19 +133,19 @@ export class Simulation {
     this.view?.setMoving(this.state === 'playing' && on)
   }
 
-  /** Begin with another model, MJCF. */
+  /** Start again with another model, MJCF. */
   load(xml) {
     this.config = { ...this.config, xml }
-    this.again()
+    this.restart()
   }
 
-  /** From the beginning: with a new engine, where the lab has one of its own or the engine has ended. */
-  again() {
+  /** Start again, with a new engine if the worker is dedicated or has ended. */
+  restart() {
     this.line.close()
     cancelAnimationFrame(this.request)
     this.request = 0
     this.connect()
-    for (const message of this.chosen.values()) this.send(message)
+    for (const message of this.settings.values()) this.send(message)
   }
 
   dispose() {
@@ -155,9 +155,9 @@ export class Simulation {
     this.view?.dispose()
   }
 
-  // --- what comes back
+  // --- messages of the worker
 
-  opened(message) {
+  onReady(message) {
     try {
       this.view?.open(message.scene)
     } catch {
@@ -166,13 +166,13 @@ export class Simulation {
       this.on.noPicture?.()
     }
     this.on.ready?.(message)
-    if (this.state === 'loading') this.change('paused')
+    if (this.state === 'loading') this.setState('paused')
   }
 
-  took(frame) {
+  onFrame(frame) {
     const { buffer, samples } = frame
-    const before = this.view === null ? { buffer } : this.view.setFrame(new Float32Array(buffer))
-    this.spent.push(before?.buffer ?? null)
+    const previous = this.view === null ? { buffer } : this.view.setFrame(new Float32Array(buffer))
+    this.spentBuffers.push(previous?.buffer ?? null)
     this.latest = frame
     const fresh = samples.epoch !== this.epoch
     this.epoch = samples.epoch
@@ -186,18 +186,18 @@ export class Simulation {
 
   refresh(now) {
     this.request = 0
-    for (const buffer of this.spent.splice(0)) this.send({ type: 'frame', buffer }, buffer === null ? [] : [buffer])
+    for (const buffer of this.spentBuffers.splice(0)) this.send({ type: 'frame', buffer }, buffer === null ? [] : [buffer])
     this.on.refresh?.(this.latest, now)
   }
 }
 
-/** What each message of the worker does. */
+/** The handlers of the worker's messages. */
 const MESSAGES = {
-  ready: (simulation, message) => simulation.opened(message),
-  frame: (simulation, message) => simulation.took(message),
-  playing: (simulation) => simulation.state === 'playing' || simulation.change('playing'),
-  // Out of sight it only waits: nobody has paused it.
-  paused: (simulation, { reason }) => reason === 'offscreen' || simulation.change('paused', reason),
+  ready: (simulation, message) => simulation.onReady(message),
+  frame: (simulation, message) => simulation.onFrame(message),
+  playing: (simulation) => simulation.state === 'playing' || simulation.setState('playing'),
+  // Out of sight it only waits, which is no pause.
+  paused: (simulation, { reason }) => reason === 'offscreen' || simulation.setState('paused', reason),
   controls(simulation, { values }) {
     simulation.diverged = false
     simulation.on.controls?.(values)
@@ -209,7 +209,7 @@ const MESSAGES = {
   warning: (simulation, message) => simulation.on.warning?.(message),
   error(simulation, message) {
     simulation.on.error?.(message)
-    if (message.kind === 'load' || message.fatal) simulation.change('ended')
+    if (message.kind === 'load' || message.fatal) simulation.setState('ended')
   },
   state: (simulation, { state }) => simulation.on.saved?.(state),
 }

@@ -1,5 +1,5 @@
 /**
- * The page's one WebGL context, and who may draw with it when.
+ * The page's only WebGL context, and the view that holds its canvas.
  *
  * A browser gives a page few contexts, and a reader's machine may draw without a graphics processor. So all labs draw with one
  * renderer. Its canvas stands in the view that moves: nothing is copied and nobody waits for the drawing, which goes on in the
@@ -12,7 +12,7 @@
 import { ColorManagement, LinearSRGBColorSpace, PCFShadowMap, WebGLRenderer } from 'three'
 
 const SHARPEST = 3 // device pixels per CSS pixel
-const STILL = 2 // at least, for a picture at rest without a graphics processor
+const STILL = 2 // device pixels per CSS pixel, at least, of a picture at rest without a graphics processor
 const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i
 
 // MuJoCo computes with colours as they are written: no conversion to light intensities and back.
@@ -22,14 +22,14 @@ export class Stage {
   constructor() {
     this.renderer = null
     this.views = new Set()
-    this.moving = new Set()
+    this.movingViews = new Set()
     this.dirty = new Set()
     this.holder = null
     this.request = 0
     this.tick = (now) => this.paint(now)
   }
 
-  /** Start WebGL; throws where there is none. */
+  /** Start WebGL; throws if there is none. */
   start() {
     if (this.renderer !== null) return
     const canvas = document.createElement('canvas')
@@ -43,11 +43,11 @@ export class Stage {
     canvas.addEventListener('webglcontextrestored', () => this.views.forEach((view) => this.invalidate(view)))
   }
 
-  /** Device pixels per CSS pixel. Without a graphics processor what moves is coarse, and at rest drawn fine. */
+  /** Device pixels per CSS pixel. Without a graphics processor moving pictures are coarse, and pictures at rest fine. */
   get sharpness() {
     const real = globalThis.devicePixelRatio || 1
     if (!this.software) return Math.min(SHARPEST, real)
-    return this.moving.size > 0 ? 1 : Math.max(STILL, real)
+    return this.movingViews.size > 0 ? 1 : Math.max(STILL, real)
   }
 
   add(view) {
@@ -56,42 +56,42 @@ export class Stage {
   }
 
   remove(view) {
-    if (this.holder === view) this.give(null)
-    for (const set of [this.views, this.moving, this.dirty]) set.delete(view)
-    this.choose()
+    if (this.holder === view) this.giveCanvas(null)
+    for (const set of [this.views, this.movingViews, this.dirty]) set.delete(view)
+    this.chooseHolder()
     if (this.views.size === 0 && this.renderer !== null) this.renderer.renderLists.dispose()
   }
 
-  /** Say that a view moves, or has come to rest. */
-  setMoving(view, moving) {
-    if (moving) this.moving.add(view)
-    else if (this.moving.delete(view)) this.invalidate(view) // which shows it finer
-    this.choose()
+  /** Set whether a view moves. */
+  setMoving(view, isMoving) {
+    if (isMoving) this.movingViews.add(view)
+    else if (this.movingViews.delete(view)) this.invalidate(view) // to draw it finer
+    this.chooseHolder()
   }
 
-  /** The picture of a view is out of date. */
+  /** Plan to draw the picture of a view again. */
   invalidate(view) {
     this.dirty.add(view)
     if (this.request === 0) this.request = requestAnimationFrame(this.tick)
   }
 
-  // The canvas goes to the one view that moves, and stays with the last one that did.
-  choose() {
-    const next = this.moving.size === 0 ? this.holder : this.moving.size === 1 ? [...this.moving][0] : null
-    if (next !== this.holder) this.give(next)
+  // The canvas goes to the only view that moves, and stays with the last one that did.
+  chooseHolder() {
+    const next = this.movingViews.size === 0 ? this.holder : this.movingViews.size === 1 ? [...this.movingViews][0] : null
+    if (next !== this.holder) this.giveCanvas(next)
   }
 
-  give(view) {
-    const before = this.holder
+  giveCanvas(view) {
+    const previous = this.holder
     this.holder = view
     const canvas = this.renderer.domElement
-    if (before !== null && this.views.has(before)) {
-      this.draw(before)
-      before.keep(canvas)
+    if (previous !== null && this.views.has(previous)) {
+      this.draw(previous)
+      previous.copyCanvas(canvas)
     }
     if (view === null) canvas.remove()
     else {
-      view.hold(canvas)
+      view.takeCanvas(canvas)
       this.draw(view)
     }
   }
@@ -103,7 +103,7 @@ export class Stage {
     for (const view of views) {
       if (!view.prepare(now)) continue
       this.draw(view)
-      if (this.holder !== view) view.keep(this.renderer.domElement)
+      if (this.holder !== view) view.copyCanvas(this.renderer.domElement)
     }
   }
 
@@ -116,7 +116,7 @@ export class Stage {
       renderer.setPixelRatio(this.ratio)
       renderer.setSize(width, height, false)
     }
-    // What a mirror shows comes first, and makes the shadow maps, too.
+    // A reflection is drawn first, which also makes the shadow maps.
     renderer.shadowMap.autoUpdate = true
     renderer.shadowMap.autoUpdate = !view.reflect(this)
     renderer.render(view.scene, view.lens)

@@ -1,22 +1,21 @@
 /**
- * What a model stands on while it is shown: a floor with a grid, the shadow on it, and lines around bodies. It is drawn beside the
- * model, belongs to none of it, and is worth no work where nothing is drawn.
+ * The surroundings of a model in its picture, which are no part of it: a floor with a grid, the shadow on it, and lines around bodies.
  *
- * The grid fades with the distance, so that nobody takes it for a thing. The shadow is the model laid flat on the floor, once for
- * each of several points of a light that is not small: where these shadows part, its edge is soft.
+ * The grid fades with the distance, so that nobody takes it for an object. The shadow is the model projected onto the floor, once for
+ * each of several points of an extended light, so that its edge is soft.
  */
 
 import { BackSide, DoubleSide, Group, Mesh, MeshBasicMaterial, NotEqualStencilFunc, PlaneGeometry, ReplaceStencilOp, ShaderMaterial, Vector2 } from 'three'
 import { ABOVE } from './lights.js'
 
-export const BESIDE = 1 // the layer of what is drawn beside the model: no mirror shows it
-const CELLS = 10 // of the grid in the height of the picture, about
+export const STUDIO_LAYER = 1 // the layer of these objects: no mirror shows it
+const CELLS = 10 // of the grid, about, in the height of the picture
 const GREY = 0.5 // of lines, on light and on dark paper
-const SHADOW = 0.32 // of the light, in the middle of a shadow
-const POINTS = 10 // of the light
-const MOST = 360 // meshes that are laid on the floor
+const SHADOW = 0.32 // part of the light that is left in the middle of a shadow
+const POINTS = 10 // of the light, at most
+const MOST = 360 // meshes that are projected onto the floor
 const WIDTH = 0.08 // radius of the light, for a distance of 1
-const GOLDEN = Math.PI * (3 - Math.sqrt(5)) // points at such angles lie evenly on a disc
+const GOLDEN = Math.PI * (3 - Math.sqrt(5)) // multiples of this angle spread points evenly over a disc
 const EDGE = 1.1 // CSS pixels
 
 export class Floor {
@@ -33,7 +32,7 @@ export class Floor {
     this.grid.renderOrder = -2
     this.far = 2.2 * distance
     this.lift = 0.0005 * distance // above a plane of the model at the same height
-    this.grid.layers.set(BESIDE)
+    this.grid.layers.set(STUDIO_LAYER)
     scene.add(this.grid)
     this.bodies = bodies
     const points = Math.max(1, Math.min(POINTS, Math.floor(MOST / Math.max(1, bodies.length))))
@@ -41,7 +40,7 @@ export class Floor {
     for (const { group } of this.layers) scene.add(group)
   }
 
-  /** The shadow that one point of the light throws. */
+  /** The shadow cast by one point of the light. */
   layer(i, count) {
     const [angle, radius] = [GOLDEN * i, WIDTH * Math.sqrt((i + 0.5) / count)]
     const [x, y] = [ABOVE[0] + radius * Math.cos(angle), ABOVE[1] + radius * Math.sin(angle)].map((a) => a / ABOVE[2])
@@ -58,14 +57,14 @@ export class Floor {
       mesh.matrixAutoUpdate = mesh.frustumCulled = false
       mesh.matrix = body.matrix
       mesh.renderOrder = -1
-      mesh.layers.set(BESIDE)
+      mesh.layers.set(STUDIO_LAYER)
       group.add(mesh)
       return mesh
     })
     return { group, meshes, material }
   }
 
-  /** Follow the bodies, and what the camera looks at. */
+  /** Follow the bodies, and the camera's target. */
   update([x, y]) {
     const { far, grid } = this
     grid.matrix.set(far, 0, 0, x, 0, far, 0, y, 0, 0, far, this.height + this.lift / 2, 0, 0, 0, 1)
@@ -83,7 +82,7 @@ export class Floor {
   }
 }
 
-/** The length 1, 2 or 5 times a power of ten that is next below. */
+/** The largest length of 1, 2 or 5 times a power of ten that is not longer. */
 export function roundLength(length) {
   const power = 10 ** Math.floor(Math.log10(length))
   return power * [5, 2, 1].find((n) => n * power <= length)
@@ -122,10 +121,10 @@ function gridMaterial(cell, far) {
   })
 }
 
-/** A line around what a mesh shows, against a ground of like colour: its back, a little larger, behind it. */
+/** Outlines of meshes, against a ground of like colour: the back of each mesh, a little larger, is drawn behind it. */
 export class Edges {
   constructor() {
-    this.all = []
+    this.edges = []
     this.screen = { value: new Vector2(1, 1) }
     this.material = new ShaderMaterial({
       uniforms: { screen: this.screen },
@@ -142,20 +141,20 @@ export class Edges {
     })
   }
 
-  /** Draw one around a mesh, wherever it goes, unless one can see through it. */
+  /** Outline a mesh, as long as its material is opaque. */
   add(mesh, material) {
     const edge = new Mesh(mesh.geometry, this.material)
     edge.matrixAutoUpdate = false
     edge.frustumCulled = mesh.frustumCulled
-    edge.layers.set(BESIDE)
+    edge.layers.set(STUDIO_LAYER)
     mesh.add(edge)
-    this.all.push({ edge, material })
+    this.edges.push({ edge, material })
   }
 
-  /** Before a picture of so many CSS pixels. */
+  /** Prepare for a picture of `width` by `height` CSS pixels. */
   update(width, height) {
     this.screen.value.set(width, height)
-    for (const { edge, material } of this.all) edge.visible = !material.transparent
+    for (const { edge, material } of this.edges) edge.visible = !material.transparent
   }
 
   dispose() {

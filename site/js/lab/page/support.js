@@ -1,15 +1,15 @@
-/** What a browser must have for a lab, and what to say where it has not. */
+/** Checks what a browser has. */
 
 /**
- * What is missing for a lab to run at all. Missing WebGL is noticed when the picture begins, an old browser's worker when it starts.
+ * The feature that the browser lacks to run labs. A lack of WebGL or of workers with modules is noticed only when they start.
  *
- * @returns {string | null} the key of the word that says it
+ * @returns {string | null} the key of the message
  */
-export function missing() {
+export function missingFeature() {
   if (typeof WebAssembly !== 'object') return 'lab.live.no_wasm'
   if (typeof Worker !== 'function') return 'lab.live.no_worker'
   return null
 }
 
-/** Whether the reader has asked for nothing to move by itself. */
+/** Whether the reader wants nothing to move by itself. */
 export const prefersStillness = () => window.matchMedia('(prefers-reduced-motion: reduce)').matches

@@ -1,4 +1,4 @@
-/** What bends: skins and flexes, whose points come with every frame. */
+/** Deformable surfaces: skins and flexes, whose points come with every frame. */
 
 import {
   BufferAttribute, BufferGeometry, DynamicDrawUsage, InstancedMesh, Mesh, Sphere, Vector3,
@@ -13,7 +13,7 @@ const dynamic = (array, width) => new BufferAttribute(array, width).setUsage(Dyn
 /** A skin: points and normals of its vertices are in the frame. */
 export class Skin {
   constructor(parent, materials, info, layout) {
-    this.at = layout.skin + 6 * info.start
+    this.offset = layout.skin + 6 * info.start
     this.count = info.count
     this.rgba = info.rgba
     this.geometry = new BufferGeometry()
@@ -23,8 +23,8 @@ export class Skin {
     if (info.texcoords !== null) this.geometry.setAttribute('uv', new BufferAttribute(Float32Array.from(info.texcoords), 2))
     this.geometry.setIndex(Array.from(info.faces))
     this.geometry.boundingSphere = EVERYWHERE
-    const material = materials.make(info.material, { doubleSided: true })
-    if (info.texcoords !== null) materials.dress(material, info.material, true)
+    const material = materials.makeMaterial(info.material, { doubleSided: true })
+    if (info.texcoords !== null) materials.applyTexture(material, info.material, true)
     materials.paint(material, ...colourOf(info, materials))
     this.mesh = new Mesh(this.geometry, material)
     this.mesh.visible = info.group < SHOWN_GROUPS
@@ -33,9 +33,9 @@ export class Skin {
   }
 
   update(frame) {
-    for (let i = 0, from = this.at; i < this.count; i++, from += 6) {
-      this.position.array.set(frame.subarray(from, from + 3), 3 * i)
-      this.normal.array.set(frame.subarray(from + 3, from + 6), 3 * i)
+    for (let i = 0, offset = this.offset; i < this.count; i++, offset += 6) {
+      this.position.array.set(frame.subarray(offset, offset + 3), 3 * i)
+      this.normal.array.set(frame.subarray(offset + 3, offset + 6), 3 * i)
     }
     this.position.needsUpdate = this.normal.needsUpdate = true
   }
@@ -49,9 +49,9 @@ export class Skin {
 /** A flex: a surface whose normals follow from its points, or the ropes of one of dimension 1. */
 export class Flex {
   constructor(parent, materials, info, layout) {
-    this.at = layout.flex + 3 * info.start
+    this.offset = layout.flex + 3 * info.start
     this.count = info.count
-    const material = materials.make(info.material, { doubleSided: info.dim > 1 })
+    const material = materials.makeMaterial(info.material, { doubleSided: info.dim > 1 })
     material.flatShading = info.dim > 1 && info.flat
     materials.paint(material, ...colourOf(info, materials))
     this.part = info.dim === 1 ? new Ropes(material, info) : new Cloth(material, info)
@@ -64,7 +64,7 @@ export class Flex {
   }
 
   update(frame) {
-    this.part.update(frame.subarray(this.at, this.at + 3 * this.count))
+    this.part.update(frame.subarray(this.offset, this.offset + 3 * this.count))
   }
 
   dispose() {
@@ -109,10 +109,10 @@ export class Ropes {
   update(points) {
     const { elements, radius } = this
     const tubes = this.tubes.instanceMatrix
-    for (let i = 0; 2 * i < elements.length; i++) stretch(tubes.array, 16 * i, points, 3 * elements[2 * i], 3 * elements[2 * i + 1], radius)
+    for (let i = 0; 2 * i < elements.length; i++) writeTubeMatrix(tubes.array, 16 * i, points, 3 * elements[2 * i], 3 * elements[2 * i + 1], radius)
     const knots = this.knots.instanceMatrix
-    for (let i = 0, from = 0; i < knots.count; i++, from += 3) {
-      knots.array.set([radius, 0, 0, 0, 0, radius, 0, 0, 0, 0, radius, 0, points[from], points[from + 1], points[from + 2], 1], 16 * i)
+    for (let i = 0, offset = 0; i < knots.count; i++, offset += 3) {
+      knots.array.set([radius, 0, 0, 0, 0, radius, 0, 0, 0, 0, radius, 0, points[offset], points[offset + 1], points[offset + 2], 1], 16 * i)
     }
     tubes.needsUpdate = knots.needsUpdate = true
   }
@@ -125,21 +125,21 @@ export class Ropes {
 /**
  * Write the matrix that lays a tube (along z, from -1 to 1, of radius 1) from one point to another.
  *
- * @param {Float32Array} out by columns @param {number} at where it begins there @param {number} a @param {number} b where the points begin
+ * @param {Float32Array} out by columns @param {number} offset where it begins there @param {number} a @param {number} b where the points begin
  */
-export function stretch(out, at, points, a, b, radius) {
+export function writeTubeMatrix(out, offset, points, a, b, radius) {
   const half = [0, 1, 2].map((i) => (points[b + i] - points[a + i]) / 2)
   const length = Math.hypot(...half)
   const z = length > 0 ? half.map((x) => x / length) : [0, 0, 1]
-  // Any axis will do that is not along the tube.
+  // Any axis that is not along the tube will do.
   const s = Math.abs(z[2]) < 0.9 ? [-z[1], z[0], 0] : [0, -z[2], z[1]]
   const n = radius / Math.hypot(...s)
   const x = s.map((value) => n * value)
   const y = [0, 1, 2].map((i) => z[(i + 1) % 3] * x[(i + 2) % 3] - z[(i + 2) % 3] * x[(i + 1) % 3])
-  out.set([...x, 0, ...y, 0, ...half, 0, ...[0, 1, 2].map((i) => (points[a + i] + points[b + i]) / 2), 1], at)
+  out.set([...x, 0, ...y, 0, ...half, 0, ...[0, 1, 2].map((i) => (points[a + i] + points[b + i]) / 2), 1], offset)
 }
 
-/** A colour left at MuJoCo's default is that of the material. */
+/** The colour of a skin or flex; one left at MuJoCo's default is that of the material. */
 function colourOf({ rgba, material }, { scene }) {
   const unset = rgba.every((x, i) => x === [0.5, 0.5, 0.5, 1][i])
   return unset && material >= 0 ? scene.materials[material].rgba : rgba

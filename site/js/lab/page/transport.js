@@ -39,11 +39,11 @@ export function buildTransport(words, actions) {
     element,
     full,
     speed,
-    setPlaying(now) {
-      if (now === playing) return
-      playing = now
-      label.textContent = words(now ? 'lab.live.pause' : 'lab.live.play')
-      sign.replaceChildren(icon(now ? 'pause' : 'play'))
+    setPlaying(isPlaying) {
+      if (isPlaying === playing) return
+      playing = isPlaying
+      label.textContent = words(isPlaying ? 'lab.live.pause' : 'lab.live.play')
+      sign.replaceChildren(icon(isPlaying ? 'pause' : 'play'))
     },
     setTime(seconds) {
       const text = `${formatTime(seconds)} s`
@@ -53,8 +53,8 @@ export function buildTransport(words, actions) {
       const text = ratio < ON_TIME ? words('lab.live.ratio', { ratio: formatRatio(ratio) }) : ''
       if (late.textContent !== text) late.textContent = text
     },
-    setEnabled(on) {
-      for (const button of [step, reset, speed]) button.disabled = !on
+    setEnabled(isEnabled) {
+      for (const button of [step, reset, speed]) button.disabled = !isEnabled
     },
   }
 }

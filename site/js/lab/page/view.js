@@ -1,7 +1,7 @@
 /**
- * The picture of a lab: a place in the page, a camera, and the world that is seen.
+ * The picture of a lab: an element of the page, a camera, and the world that it sees.
  *
- * The place holds a 2-D canvas with the last picture, and while the view moves the stage's canvas above it (see `stage.js`).
+ * The element holds a 2-D canvas with the last picture and, while the view moves, the stage's canvas above it (see `stage.js`).
  */
 
 import { PerspectiveCamera } from 'three'
@@ -10,14 +10,14 @@ import { h } from './dom.js'
 import { channels, resolve, watchTheme } from './palette.js'
 import { ScaleBar } from './scale.js'
 import { stage } from './stage.js'
-import { BESIDE } from './studio.js'
+import { STUDIO_LAYER } from './studio.js'
 import { World, aim } from './world.js'
 
 export class View {
   /**
    * @param {object} options
    * @param {number} options.height CSS pixels, where it is 480 wide
-   * @param {string} options.label what the picture shows, for who cannot see it
+   * @param {string} options.label describes the picture for those who cannot see it
    * @param {string} options.name of the view, and how keys move it
    * @param {(key: string, values?: object) => string} options.words
    * @param {HTMLImageElement | null} [options.poster] a picture that is shown until there is a live one
@@ -32,7 +32,7 @@ export class View {
     this.element.style.setProperty('--height', height)
     this.lens = new PerspectiveCamera()
     this.lens.matrixAutoUpdate = false
-    this.lens.layers.enable(BESIDE)
+    this.lens.layers.enable(STUDIO_LAYER)
     this.world = null
     this.camera = null
     this.frame = null
@@ -54,7 +54,7 @@ export class View {
     this.invalidate()
   }
 
-  /** Begin with a model. Throws where WebGL is missing. */
+  /** Show a model. Throws if there is no WebGL. */
   open(description) {
     stage.add(this)
     this.world?.dispose()
@@ -65,13 +65,13 @@ export class View {
     this.colour()
   }
 
-  /** Take the page's colours for what has none of its own. */
+  /** Apply the page's colours. */
   colour() {
     this.world?.trail?.paint(channels(resolve(this.element, 'var(--trace-2)')))
     this.invalidate()
   }
 
-  /** Show a frame from the next drawing on; returns the frame that it takes the place of, which is spent. */
+  /** Show a frame from the next drawing on; returns the previous frame, which is no longer used. */
   setFrame(frame) {
     const spent = this.frame
     this.frame = frame
@@ -79,13 +79,13 @@ export class View {
     return spent
   }
 
-  /** The picture has to be drawn again. */
+  /** Plan to draw the picture again. */
   invalidate() {
     if (this.world !== null) stage.invalidate(this)
   }
 
-  setMoving(moving) {
-    if (this.world !== null) stage.setMoving(this, moving)
+  setMoving(isMoving) {
+    if (this.world !== null) stage.setMoving(this, isMoving)
   }
 
   // --- called by the stage
@@ -98,26 +98,26 @@ export class View {
     this.world.edges.update(this.width, this.height)
     this.poster?.remove()
     this.element.append(this.scale.element)
-    const high = 2 * this.camera.distance * Math.tan((this.lens.fov * Math.PI) / 360)
-    this.scale.show(this.width, this.height, this.height / high)
+    const viewHeight = 2 * this.camera.distance * Math.tan((this.lens.fov * Math.PI) / 360)
+    this.scale.show(this.width, this.height, this.height / viewHeight)
     return true
   }
 
-  /** Draw the reflection that the picture needs; gives whether there is one. */
+  /** Draw the reflection for the picture; returns whether there is one. */
   reflect(stage) {
     return this.world.mirror?.draw(stage, this.scene, this.lens, this.width, this.height) ?? false
   }
 
   /** Take the stage's canvas. */
-  hold(canvas) {
+  takeCanvas(canvas) {
     canvas.setAttribute('role', 'img')
     canvas.setAttribute('aria-label', this.label)
     this.still.hidden = true
     this.element.append(canvas)
   }
 
-  /** Keep what is on the stage's canvas. */
-  keep(canvas) {
+  /** Copy the picture on the stage's canvas. */
+  copyCanvas(canvas) {
     const { still } = this
     if (still.width !== canvas.width || still.height !== canvas.height) {
       still.width = canvas.width

@@ -1,7 +1,8 @@
 /**
- * A lab of the kind `mjcf`: an instrument, and the text of its model, which the reader edits and runs.
+ * A lab of the kind `mjcf`: an instrument with the text of its model, which the reader edits and runs.
  *
- * The text is compiled in a worker of the lab's own, a new one each time: a model that never compiles, or takes all memory, ends with it.
+ * The text is compiled in a dedicated worker, a new one each time, so that a model that never compiles, or takes all memory, can be
+ * stopped.
  */
 
 import { h } from './dom.js'
@@ -13,28 +14,28 @@ export class Workbench extends Instrument {
   build() {
     super.build()
     const { words, config } = this
-    this.other = config.xml // what the second button puts in the place of the text
-    this.editor = new Editor(config.xml, words, { run: () => this.run(), input: () => this.rename() })
-    this.back = h('button', { type: 'button', class: 'lab-button', onclick: () => this.exchange() })
+    this.otherText = config.xml // the reader's text, while the lesson's is in the editor
+    this.editor = new Editor(config.xml, words, { run: () => this.run(), input: () => this.labelBackButton() })
+    this.backButton = h('button', { type: 'button', class: 'lab-button', onclick: () => this.exchange() })
     const run = h('button', { type: 'button', class: 'lab-button', onclick: () => this.run() }, words('lab.live.compile'))
     const keys = h('span', {}, words('lab.live.keys_compile'))
-    this.editor.element.append(h('div', { class: 'lab-buttons' }, run, this.back, keys))
-    this.rename()
+    this.editor.element.append(h('div', { class: 'lab-buttons' }, run, this.backButton, keys))
+    this.labelBackButton()
     this.body.prepend(this.editor.element)
   }
 
   listeners() {
-    const on = super.listeners()
+    const inherited = super.listeners()
     return {
-      ...on,
+      ...inherited,
       ready: (message) => {
         this.editor.clear()
-        on.ready(message)
+        inherited.ready(message)
       },
       error: (error) => {
-        this.pressed = false
+        this.playRequested = false
         if (error.kind === 'load') this.editor.fail(error.message)
-        else on.error(error)
+        else inherited.error(error)
       },
     }
   }
@@ -43,27 +44,27 @@ export class Workbench extends Instrument {
   run(play = true) {
     this.notices.clear()
     this.editor.clear()
-    this.pressed = play
+    this.playRequested = play
     this.simulation.load(this.editor.text)
   }
 
-  /** Put the lesson's model in the place of the reader's, or that back. */
+  /** Exchange the reader's text for the lesson's model, or back. */
   exchange() {
     const { editor, config } = this
-    const now = editor.text
-    editor.text = now === config.xml ? this.other : config.xml
-    if (now !== config.xml) this.other = now
-    this.rename()
+    const text = editor.text
+    editor.text = text === config.xml ? this.otherText : config.xml
+    if (text !== config.xml) this.otherText = text
+    this.labelBackButton()
     this.run()
   }
 
-  rename() {
-    const { editor, config, other, words } = this
-    const back = editor.text !== config.xml || other === config.xml
-    this.back.textContent = words(back ? 'lab.live.lesson_model' : 'lab.live.my_model')
+  labelBackButton() {
+    const { editor, config, otherText, words } = this
+    const showsLesson = editor.text !== config.xml || otherText === config.xml
+    this.backButton.textContent = words(showsLesson ? 'lab.live.lesson_model' : 'lab.live.my_model')
   }
 
-  sharing() {
+  shareAction() {
     return ['link_model', () => this.shareModel()]
   }
 
@@ -75,11 +76,11 @@ export class Workbench extends Instrument {
     else notices.show(words('lab.live.link_long'), 'warning')
   }
 
-  /** Show a model of a link. */
+  /** Show the model of a link. */
   restore({ text }) {
     if (text === undefined) return
     this.editor.text = text
-    this.rename()
+    this.labelBackButton()
     this.run(false)
   }
 }

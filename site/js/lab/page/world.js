@@ -1,7 +1,6 @@
 /**
- * All that one lab shows, as a three.js scene: made once from the description of the model, moved by every frame.
- *
- * `site/js/lab/core/scene.js` and `frame.js` say what the two hold.
+ * A lab's picture as a three.js scene: made once from the description of the model (`core/scene.js`), moved by every frame
+ * (`core/frame.js`).
  */
 
 import { CubeTexture, Matrix4, Raycaster, Scene, Vector2 } from 'three'
@@ -14,7 +13,7 @@ import { Solid } from './solid.js'
 import { Edges, Floor } from './studio.js'
 import { Flex, Skin } from './surfaces.js'
 
-const SHOWN_GROUPS = 3 // MuJoCo's viewer shows groups 0, 1 and 2 at first
+const SHOWN_GROUPS = 3 // groups 0, 1 and 2, as in MuJoCo's viewer
 const ROW = 19 // floats of a geom or site in a frame
 const SIZE = 12
 const COLOUR = 15
@@ -23,7 +22,7 @@ const IN_FRONT = -2 // see `arrows.js` of the core
 const USUAL = 1.6 // width of a view over its height
 
 export class World {
-  /** @param {object} description what the worker's `ready` holds as `scene` */
+  /** @param {object} description the `scene` of the worker's message `ready` */
   constructor(description) {
     this.description = description
     this.scene = new Scene()
@@ -40,14 +39,14 @@ export class World {
     this.trail = description.layout.longestTrail > 0 ? new Trail(this.scene, description.layout) : null
     this.decorations = new Map()
     this.edges = new Edges()
-    this.floor = this.stand()
-    this.mirror = this.polished()
+    this.floor = this.makeFloor()
+    this.mirror = this.makeMirror()
     this.setSky()
     this.raycaster = new Raycaster()
   }
 
-  /** What a model without lights of its own stands on, if anything falls in it. */
-  stand() {
+  /** Outline all bodies; returns the floor of a model that has none and no lights, or null. */
+  makeFloor() {
     const solids = this.geoms.filter((solid) => solid !== null && !solid.plane)
     const bodies = solids.flatMap(({ meshes }) => meshes)
     for (const { meshes, material } of solids) for (const mesh of meshes) this.edges.add(mesh, material)
@@ -69,8 +68,8 @@ export class World {
     return new Solid(this.scene, this.materials, { type, material, geometry, wrapped, extent: this.description.extent })
   }
 
-  /** What can be mirrored in, or null where the model has nothing that mirrors. */
-  polished() {
+  /** The mirror, or null if nothing in the model reflects. */
+  makeMirror() {
     const { geoms, materials } = this.description
     const surfaces = geoms.flatMap(({ type, material }, i) => {
       const reflectance = materials[material]?.reflectance ?? 0
@@ -94,7 +93,7 @@ export class World {
     return this.hfields[id]
   }
 
-  /** Move everything to where a frame says it is. */
+  /** Move everything to its place in a frame. */
   update(frame, camera) {
     const { layout } = this.description
     const sight = { eye: camera.position(), target: camera.target }
@@ -111,32 +110,32 @@ export class World {
   }
 
   place(solids, frame, start, sight) {
-    for (let i = 0, at = start; i < solids.length; i++, at += ROW) solids[i]?.update(frame, at, at + SIZE, at + COLOUR, sight)
+    for (let i = 0, offset = start; i < solids.length; i++, offset += ROW) solids[i]?.update(frame, offset, offset + SIZE, offset + COLOUR, sight)
   }
 
-  // Decorations come and go: those of a type are used again, and what is left over is hidden.
+  // Decorations come and go: those of the same type are reused, and the rest are hidden.
   decorate(frame, start, count, sight) {
-    const used = new Map()
-    for (let i = 0, at = start; i < count; i++, at += DECORATION) {
-      const type = frame[at]
-      const data = frame[at + 1]
+    const counts = new Map()
+    for (let i = 0, offset = start; i < count; i++, offset += DECORATION) {
+      const type = frame[offset]
+      const data = frame[offset + 1]
       const key = type === GEOM.MESH ? `mesh ${data >> 1}` : data === IN_FRONT ? `${type} in front` : type
       if (!this.decorations.has(key)) this.decorations.set(key, [])
       const pool = this.decorations.get(key)
-      const next = used.get(key) ?? 0
+      const next = counts.get(key) ?? 0
       if (next === pool.length) pool.push(this.decoration(type, data))
-      used.set(key, next + 1)
+      counts.set(key, next + 1)
       const solid = pool[next]
-      solid.update(frame, at + 7, at + 4, at + 19, sight, frame[at + 23])
+      solid.update(frame, offset + 7, offset + 4, offset + 19, sight, frame[offset + 23])
     }
-    for (const [key, pool] of this.decorations) for (let i = used.get(key) ?? 0; i < pool.length; i++) pool[i].show(false)
+    for (const [key, pool] of this.decorations) for (let i = counts.get(key) ?? 0; i < pool.length; i++) pool[i].show(false)
   }
 
   decoration(type, data) {
     const geometry = type === GEOM.MESH ? this.mesh(data >> 1) : null
     const solid = new Solid(this.scene, this.materials, { type, geometry, model: false, extent: this.description.extent })
     for (const mesh of solid.meshes) mesh.castShadow = mesh.receiveShadow = false
-    // A box of inertia may lie in the faces of a geom: what is added is seen before what it is added to.
+    // A box of inertia may coincide with the faces of a geom: draw the decoration in front.
     Object.assign(solid.material, { polygonOffset: true, polygonOffsetFactor: -0.1, polygonOffsetUnits: -4 })
     if (data === IN_FRONT) {
       solid.material.depthTest = false
@@ -156,8 +155,8 @@ export class World {
     let best = null
     this.geoms.forEach((solid, i) => {
       const { body } = this.description.geoms[i]
-      // What is seen through a plane from below is meant, and not the plane.
-      if (solid === null || solid.below) return
+      // A plane seen from below is transparent: the body behind it is meant.
+      if (solid === null || solid.isBelow) return
       for (const hit of this.raycaster.intersectObjects(
         solid.meshes.filter((mesh) => mesh.visible),
         false,
@@ -180,7 +179,7 @@ export class World {
   }
 }
 
-/** Set a three.js camera to a free camera: near and far in extents of the model, as MuJoCo has them. */
+/** Set a three.js camera to a free camera, with MuJoCo's near and far planes, which are in extents of the model. */
 export function aim(lens, camera, { extent, visual }, width, height) {
   const { right, up, forward } = camera.axes()
   const p = camera.position()
@@ -193,7 +192,7 @@ export function aim(lens, camera, { extent, visual }, width, height) {
     ), // prettier-ignore
   )
   lens.aspect = width / Math.max(1, height)
-  // A view that is narrower than 16 : 10 shows all of its width.
+  // A view narrower than 16 : 10 shows the same width as one of that shape.
   const half = Math.tan((camera.fovy * Math.PI) / 360) * Math.max(1, USUAL / lens.aspect)
   lens.fov = (Math.atan(half) * 360) / Math.PI
   lens.near = Math.min(visual.znear * extent, 0.2 * camera.distance)

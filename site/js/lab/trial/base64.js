@@ -30,10 +30,10 @@ export function fromBase64(text) {
   const digits = text.replace(/=+$/, '')
   const bytes = new Uint8Array(Math.floor((digits.length * 3) / 4))
   let word = 0
-  let at = 0
+  let length = 0
   for (let i = 0; i < digits.length; i++) {
     word = (word << 6) | LETTERS.indexOf(digits[i])
-    if (i % 4 > 0) bytes[at++] = (word >> (6 - 2 * (i % 4))) & 255
+    if (i % 4 > 0) bytes[length++] = (word >> (6 - 2 * (i % 4))) & 255
   }
   return bytes
 }

@@ -1,5 +1,5 @@
 /**
- * What a lab's code names, looked up: names that there are none of, and how long arrays are.
+ * Looks up the names in a lab's code: which of them do not exist, and how long the arrays are.
  *
  *   lookUp(engine, bytes, [['data', 'qpos'], ['lib', 'enrgy']]) → [{length: 1}, {at: 1, names: ['energy', …]}]
  *
@@ -16,21 +16,21 @@ export function lookUp(engine, bytes, paths) {
   const { model, data } = handles
   try {
     const env = environment({ engine, model, ctx: {}, scratch: {} }, data, true)
-    return paths.map((path) => found(env, path))
+    return paths.map((path) => resolve(env, path))
   } finally {
     handles.dispose()
   }
 }
 
-function found(env, path) {
+function resolve(env, path) {
   const [root] = path
   if (!(root in env || root in globalThis)) return { at: 0, names: [...Object.keys(env), ...GLOBALS] }
-  if (!(root in env) && root !== 'Math') return {} // what is done to others is a matter of what labs share
+  if (!(root in env) && root !== 'Math') return {} // changes to other globals are found by guard.js
   let owner = env[root] ?? Math
-  for (let at = 1; at < path.length; at++) {
+  for (let depth = 1; depth < path.length; depth++) {
     if (owner === null || !['object', 'function'].includes(typeof owner)) return {}
-    if (!(path[at] in owner)) return { at, names: namesOf(owner) }
-    owner = owner[path[at]]
+    if (!(path[depth] in owner)) return { at: depth, names: namesOf(owner) }
+    owner = owner[path[depth]]
   }
   return ArrayBuffer.isView(owner) ? { length: owner.length } : {}
 }

@@ -1,9 +1,9 @@
 /**
- * What native MuJoCo needs to repeat a run of a lab, and what it has to arrive at.
+ * Records what native MuJoCo needs to repeat a run of a lab, and the states that it has to arrive at.
  *
- * Recorded are the model as the lab changed it, the state at the start, and every number of the state that the lab's controller
- * wrote, with the step before which it wrote it. Of each step there is a CRC-32 of the positions, velocities and activations,
- * and of every `stride`-th the numbers themselves.
+ * These are the model with the lab's changes, the state at the start, and every number of the state that the lab's controller
+ * wrote, with the number of the step that followed. Of each step there is a CRC-32 of the positions, velocities and activations,
+ * and of every `stride`-th step the numbers themselves.
  */
 
 import { packed } from './base64.js'
@@ -14,15 +14,15 @@ const MOST_WRITES = 1_000_000
 export class ParityRecorder {
   /**
    * @param {import('../core/lab.js').Lab} lab
-   * @param {Uint8Array} sent the model that it was made of
-   * @param {number} steps how many there will be at most
+   * @param {Uint8Array} sent the model that the lab was made from
+   * @param {number} steps the most that will be recorded
    */
   constructor(lab, sent, steps) {
     this.lab = lab
-    this.before = null
+    this.stateBefore = null
     this.mjb = saveModel(lab)
     this.autoreset = (lab.option.disableflags & lab.engine.k.disable.AUTORESET) === 0
-    this.asSent = equalBytes(this.mjb, sent) || equalBytes(savedWithReset(lab), sent)
+    this.asSent = equalBytes(this.mjb, sent) || equalBytes(saveWithReset(lab), sent)
     this.start = lab.physics.read()
     this.width = lab.model.nq + lab.model.nv + lab.model.na
     this.stride = Math.max(1, Math.ceil((steps * this.width) / MOST_NUMBERS))
@@ -34,20 +34,20 @@ export class ParityRecorder {
 
   /** Before the controller. */
   begin() {
-    if (this.lab.code.controller) this.before = this.lab.physics.read()
+    if (this.lab.code.controller) this.stateBefore = this.lab.physics.read()
   }
 
   /** Between the controller and the step. */
   controlled() {
-    if (this.before === null || !this.complete) return
+    if (this.stateBefore === null || !this.complete) return
     const { writes } = this
-    const after = this.lab.physics.read()
-    const [old, now] = [bits(this.before), bits(after)]
-    for (let i = 0; i < after.length; i++) {
+    const state = this.lab.physics.read()
+    const [old, now] = [bits(this.stateBefore), bits(state)]
+    for (let i = 0; i < state.length; i++) {
       if (old[2 * i] === now[2 * i] && old[2 * i + 1] === now[2 * i + 1]) continue
       writes.steps.push(this.sums.length)
       writes.indices.push(i)
-      writes.values.push(after[i])
+      writes.values.push(state[i])
     }
     if (writes.steps.length > MOST_WRITES) this.complete = false
   }
@@ -59,7 +59,7 @@ export class ParityRecorder {
     if (this.sums.length % this.stride === 0) this.rows.push(...qpos, ...qvel, ...act)
   }
 
-  /** What was recorded. `mjb` is null where the lab has changed nothing of the model but whether it resets itself: `autoreset`. */
+  /** The record. `mjb` is null if the lab has changed nothing of the model except `autoreset`, whether MuJoCo resets a diverged state. */
   result() {
     const { writes } = this
     return packed({
@@ -95,14 +95,14 @@ export function saveModel({ engine, model }) {
   }
 }
 
-/** The same with MuJoCo's own reset of a diverged state, which every lab switches off, on. */
-function savedWithReset(lab) {
+/** The model as an MJB file with MuJoCo's autoreset switched on, which every lab switches off. */
+function saveWithReset(lab) {
   const { option } = lab
   const flags = option.disableflags
   option.disableflags = flags & ~lab.engine.k.disable.AUTORESET
-  const saved = saveModel(lab)
+  const bytes = saveModel(lab)
   option.disableflags = flags
-  return saved
+  return bytes
 }
 
 const bits = (view) => new Int32Array(view.buffer, view.byteOffset, 2 * view.length)

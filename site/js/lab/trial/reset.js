@@ -1,28 +1,28 @@
-/** Whether a reset leads a lab back to where it started, and what keeps it from that. */
+/** Checks whether a reset leads a lab back to its start, and if not, finds the code that prevents it. */
 
 import { LabError, call } from '../core/piece.js'
 
-/** Parts of the state whose names in MjData are not theirs here. */
+/** Names in MjData of the parts of the state that have another name in mjtState. */
 const FIELDS = { warmstart: 'qacc_warmstart', plugin: 'plugin_state' }
 
 /**
  * Reset a lab and compare.
  *
- * The solver's warm start may differ: it holds what was computed before, to the solver's tolerance.
+ * The solver's warm start may differ: it is the last solution, which is exact only to the solver's tolerance.
  *
  * @param {import('../core/lab.js').Lab} lab
- * @param {Float64Array} before its state at the start
- * @returns {{what: string, entry: (string | number)[]} | null} the first number that differs, and the entry that would have to set it
+ * @param {Float64Array} start its state at the start
+ * @returns {{what: string, entry: (string | number)[]} | null} the first number that differs, and the entry that should have set it
  */
-export function resetDiffers(lab, before) {
+export function resetDiffers(lab, start) {
   lab.reset()
-  const after = lab.physics.read()
+  const state = lab.physics.read()
   const parts = partsOf(lab)
-  const first = after.findIndex((x, i) => !Object.is(x, before[i]) && partAt(parts, i).name !== FIELDS.warmstart)
-  if (first < 0) return null
-  const { name, start, size } = partAt(parts, first)
-  const what = name === 'time' && size === 1 ? name : `${name}[${first - start}]`
-  return { what, entry: culprit(lab, first, before[first]) }
+  const index = state.findIndex((x, i) => !Object.is(x, start[i]) && partAt(parts, i).name !== FIELDS.warmstart)
+  if (index < 0) return null
+  const { name, start: partStart, size } = partAt(parts, index)
+  const number = name === 'time' && size === 1 ? name : `${name}[${index - partStart}]`
+  return { what: number, entry: findCulprit(lab, index, start[index]) }
 }
 
 /** The parts of the state, in their order. */
@@ -41,17 +41,17 @@ function partsOf({ engine, model, physics }) {
 
 const partAt = (parts, i) => parts.find(({ start, size }) => i < start + size)
 
-/** The entry that sets number `i` at the start and not after a reset, or else the one that sets it after each. */
-function culprit(lab, i, wanted) {
+/** The entry that sets number `i` at the start but not after a reset, or else the entry that sets it after each reset. */
+function findCulprit(lab, i, initial) {
   const { config, controls, code } = lab
   const number = () => lab.physics.read()[i]
   const writes = (action) => {
     const old = number()
-    return quietly(action) && !Object.is(number(), old)
+    return succeeds(action) && !Object.is(number(), old)
   }
   const setters = config.controls.map((control, j) => ({ ...control, j })).filter(({ j, param }) => code.controls[j].set && param == null)
   for (const { j, init } of setters) {
-    if (!init && writes(() => controls.apply(j)) && Object.is(number(), wanted)) return ['controls', j]
+    if (!init && writes(() => controls.apply(j)) && Object.is(number(), initial)) return ['controls', j]
   }
   lab.toKeyframe()
   if (code.setup && writes(() => call(['setup'], () => code.setup(lab.env)))) return ['setup']
@@ -59,7 +59,7 @@ function culprit(lab, i, wanted) {
   return last ? ['controls', last.j] : []
 }
 
-function quietly(action) {
+function succeeds(action) {
   try {
     action()
     return true

@@ -1,7 +1,7 @@
 /**
- * What the engine's glue expects of its surroundings and a bare V8 does not have. Import it first.
+ * The globals that the engine's glue expects and a bare V8 does not have. Import it first.
  *
- * The glue runs in windows and workers: it is told that this is a worker. It draws random bytes for its file system only; they
+ * The glue runs in windows and workers; here it believes to be in a worker. It draws random bytes only for its file system; they
  * are zero here, so that nothing depends on chance.
  */
 

@@ -1,10 +1,10 @@
 /**
- * A lab's trial: it is taken through everything that a reader can do with it, and what fails is told with its entry.
+ * A lab's trial: everything that a reader can do with the lab is tried, and each failure is reported with its entry.
  *
  *   runTrial(engine, request, bytes, now) → reply          (both plain values, see docs/explanation/how-labs-run.md)
  *
- * 1. The main run: from the start, stepping as Play does. It gives the lab's static form and the material for parity.
- * 2. Every control at its ends and at its value, every option, every button, each from a fresh start and with some steps after.
+ * 1. The main run: from the start, stepping as Play does. It provides the lab's static form and the record for parity.
+ * 2. Every control at its ends and at its value, every option, every button, each from a fresh start and followed by some steps.
  * 3. Every claim (`expect`), from a fresh start; claims after the same steps share a run.
  * 4. The goal: its log has to reach it, and doing nothing must not.
  *
@@ -31,15 +31,15 @@ const PACE = 2000 // steps, at most
 const SLICE = 64 // steps at a time
 const CHECKS = 100 // looks at the readouts during the main run
 
-/** What ended the engine has been told; it cannot be trusted with the rest. */
+/** Ends the trial: the failure has been reported, and the engine cannot be trusted any more. */
 class Ended extends Error {}
 
-/** When the trial began, and when it last got on; they outlive a trial that was stopped from outside. */
-const progress = { began: 0, last: 0 }
+/** When the trial began, and when it last made progress; still known after the trial was stopped from outside. */
+const progress = { start: 0, last: 0 }
 
-/** The entry that keeps a trial from its end: its code has run for a twentieth of the time, so that it may never return. */
-export function stuck(now) {
-  return now - progress.last > (now - progress.began) / 20 ? current.entry : null
+/** The entry whose code may never return: it has run for more than a twentieth of the trial's time; else null. */
+export function stuckEntry(now) {
+  return now - progress.last > (now - progress.start) / 20 ? current.entry : null
 }
 
 /** @param {import('./guard.js').Guard | null} guard of what labs share */
@@ -56,20 +56,20 @@ class Trial {
     this.config = config
     this.bytes = bytes
     this.now = now
-    progress.began = progress.last = now()
+    progress.start = progress.last = now()
     this.seconds = seconds
     this.parity = parity
-    this.tried = []
+    this.attempts = []
     this.failures = []
-    this.told = new Set()
+    this.reportedKeys = new Set()
     this.code = null
     this.text = code
-    // What is not finite comes of a mistake, unless the lab's own code writes it.
-    this.meant = (value) => new RegExp(`\\b${Math.abs(value)}\\b`).test(code)
+    // A value that is not finite is a mistake, unless the lab's code contains it literally.
+    this.isIntended = (value) => new RegExp(`\\b${Math.abs(value)}\\b`).test(code)
     this.steps = 0
     this.took = 0
     this.framing = null
-    this.scales = new ArrowScales()
+    this.arrowScales = new ArrowScales()
   }
 
   run() {
@@ -77,8 +77,8 @@ class Trial {
     try {
       this.code = call([], () => new Function(`"use strict"; return ${this.text}`)())
       reply.main = this.attempt([], 'start', (lab) => this.mainRun(lab))
-      for (const { entry, what, act } of this.acts()) {
-        this.attempt(entry, what, (lab) => {
+      for (const { entry, what: title, act } of this.controlActs()) {
+        this.attempt(entry, title, (lab) => {
           act(lab)
           this.probe(lab)
         })
@@ -91,10 +91,10 @@ class Trial {
       if (!(error instanceof Ended)) this.fail([], 'engine', String(error.message ?? error), null)
     }
     const stepsPerSecond = this.took > 0 ? Math.round(this.steps / this.took) : null
-    return { ...reply, tried: this.tried, failures: this.failures, stepsPerSecond }
+    return { ...reply, tried: this.attempts, failures: this.failures, stepsPerSecond }
   }
 
-  /** How fast a lab runs of which nothing but the recorded run was tried: once more, without recording. */
+  /** Measure the speed of a lab of which only the recorded run was tried: run it once more, without recording. */
   pace({ steps }) {
     const lab = new Lab(this.engine, this.bytes, this.config, this.code)
     try {
@@ -105,7 +105,7 @@ class Trial {
     }
   }
 
-  /** Let the camera show all that has moved, where the lab does not say otherwise. */
+  /** Place the camera so that it shows all of the motion, unless the lab places it. */
   frame(main) {
     const { camera } = main.scene
     const fitting = camera.orthographic ? null : this.framing.fit()
@@ -114,7 +114,7 @@ class Trial {
     main.scene.floor = this.framing.floor()
     main.fill = this.framing.fill(camera)
     main.mostFill = this.framing.fill(fitting)
-    main.arrows = this.scales.fit(2 * camera.distance * Math.tan((camera.fovy * Math.PI) / 360))
+    main.arrows = this.arrowScales.fit(2 * camera.distance * Math.tan((camera.fovy * Math.PI) / 360))
     if (this.config.overlays.some((name) => name in main.arrows)) main.pictures[0] = packed(this.start(main.arrows))
   }
 
@@ -131,9 +131,9 @@ class Trial {
 
   // --- one attempt
 
-  /** Do something with a fresh lab; what goes wrong is noted under its own entry. */
-  attempt(entry, what, action) {
-    this.during = { entry, what }
+  /** Do something with a fresh lab, and note its failures under their own entries. */
+  attempt(entry, title, action) {
+    this.during = { entry, what: title }
     current.trying = entry
     progress.last = this.now()
     let lab = null
@@ -141,65 +141,65 @@ class Trial {
     try {
       lab = new Lab(this.engine, this.bytes, this.config, this.code)
       lab.start()
-      this.state(lab)
+      this.checkState(lab)
       this.framing?.begin()
       result = action(lab)
-      this.shared(action)
+      this.checkShared(action)
     } catch (error) {
       if (error instanceof Ended) throw error
-      this.shared(action) // which may be why
-      this.failed(error, lab?.time ?? null)
+      this.checkShared(action) // which may be the cause
+      this.noteError(error, lab?.time ?? null)
     } finally {
       lab?.dispose()
     }
-    this.tried.push({ entry, what })
+    this.attempts.push({ entry, what: title })
     return result
   }
 
-  failed(error, at) {
-    if (error instanceof LabError) this.fail(error.entry, error.kind, error.message, at)
-    else this.fail(this.during.entry, error instanceof EngineError ? 'engine' : 'throws', error.message, at)
+  noteError(error, time) {
+    if (error instanceof LabError) this.fail(error.entry, error.kind, error.message, time)
+    else this.fail(this.during.entry, error instanceof EngineError ? 'engine' : 'throws', error.message, time)
     if (error.kind === 'engine' || error.fatal || error instanceof WebAssembly.RuntimeError) throw new Ended()
   }
 
-  fail(entry, kind, message, at, key = JSON.stringify([entry, kind, message])) {
-    if (this.told.has(key)) return
-    this.told.add(key)
-    this.failures.push({ entry, kind, message, at, during: this.during ?? null })
+  fail(entry, kind, message, time, key = JSON.stringify([entry, kind, message])) {
+    if (this.reportedKeys.has(key)) return
+    this.reportedKeys.add(key)
+    this.failures.push({ entry, kind, message, at: time, during: this.during ?? null })
   }
 
-  /** See whether the lab has changed what is not its own; then what is tried next would tell nothing. */
-  shared(action) {
+  /** Check whether the lab has changed what labs share; then the trial ends, as further attempts would prove nothing. */
+  checkShared(action) {
     const names = this.guard?.changes() ?? []
     if (names.length === 0) return
     this.guard.repair()
-    this.failures = this.failures.filter(({ during }) => during !== this.during) // which come of it
-    this.fail(this.guilty(action), 'shared', names.map((name) => `\`${name}\``).join(', '), null)
+    this.failures = this.failures.filter(({ during }) => during !== this.during) // consequences of it
+    this.fail(this.findGuilty(action), 'shared', names.map((name) => `\`${name}\``).join(', '), null)
     throw new Ended()
   }
 
-  /** The entry whose code does it, if it does it again. */
-  guilty(action) {
-    const { code, failures, told, during } = this
+  /** The entry whose code changes what labs share, if it does so again. */
+  findGuilty(action) {
+    const { code, failures, reportedKeys, during } = this
     const watched = watchedCode(code, this.guard)
-    Object.assign(this, { code: watched.code, failures: [], told: new Set() })
+    Object.assign(this, { code: watched.code, failures: [], reportedKeys: new Set() })
     let lab = null
     try {
       lab = new Lab(this.engine, this.bytes, this.config, this.code)
       lab.start()
       action(lab)
     } catch {
-      // It ends there.
+      // The watched code throws as soon as it is known.
     } finally {
       this.guard.repair()
       lab?.dispose()
-      Object.assign(this, { code, failures, told, during })
+      Object.assign(this, { code, failures, reportedKeys, during })
     }
     return watched.entry() ?? during.entry
   }
 
-  /** Note what the lab itself says: divergence, warnings. */
-  state(lab) {
+  /** Note divergence and warnings of the lab. */
+  checkState(lab) {
     const { entry } = this.during
     for (const { kind, message, time } of lab.takeWarnings()) {
       this.fail(entry, 'warning', `${kind}: ${message}`, time, JSON.stringify([entry, kind])) // the first of its kind
@@ -207,63 +207,63 @@ class Trial {
     if (lab.diverged !== null) this.fail(entry, 'diverged', lab.diverged.message, lab.diverged.time)
   }
 
-  /** Note bodies that steps have brought deep into each other, once for each act. */
-  deep(lab) {
+  /** Note bodies that steps have brought deep into each other, once for each attempt. */
+  checkDepth(lab) {
     if (lab.steps === 0 || lab.diverged !== null) return
-    const found = deepContact(this.engine, lab.model, lab.data)
-    if (found === null) return
+    const contact = deepContact(this.engine, lab.model, lab.data)
+    if (contact === null) return
     const { entry } = this.during
-    const message = `${found.names.join(' and ')} by ${Number(found.depth.toPrecision(2))} m`
+    const message = `${contact.names.join(' and ')} by ${Number(contact.depth.toPrecision(2))} m`
     this.fail(entry, 'deep', message, lab.time, JSON.stringify([entry, 'deep']))
   }
 
-  /** Evaluate all that is shown; a wrong value does not keep the rest from being tried. */
-  look(lab) {
+  /** Evaluate all readouts and traces, also after one has failed. */
+  checkValues(lab) {
     const env = lab.sync()
-    this.code.readouts.forEach((run, i) => this.value(['readouts', i, 'expr'], run, env, readable, this.meant))
+    this.code.readouts.forEach((run, i) => this.value(['readouts', i, 'expr'], run, env, readable, this.isIntended))
     this.code.plots.forEach((traces, i) =>
-      traces.forEach((run, j) => this.value(['plots', i, 'traces', j, 'expr'], run, env, plottable, this.meant)),
+      traces.forEach((run, j) => this.value(['plots', i, 'traces', j, 'expr'], run, env, plottable, this.isIntended)),
     )
   }
 
-  /** Evaluate an expression; `check` takes its entry and value, and gives the value or throws; `meant`: may be NaN or infinite. */
-  value(entry, run, env, check, meant = () => false) {
+  /** Evaluate an expression. `check(entry, value)` returns the value or throws; `isIntended(value)`: it may be NaN or infinite. */
+  value(entry, run, env, check, isIntended = () => false) {
     try {
       const value = call(entry, () => check(entry, run(env)))
-      if (typeof value !== 'number' || Number.isFinite(value) || meant(value)) return value
+      if (typeof value !== 'number' || Number.isFinite(value) || isIntended(value)) return value
       this.fail(entry, 'nan', `is ${value}`, env.data.time)
     } catch (error) {
-      this.failed(error, env.data.time)
+      this.noteError(error, env.data.time)
     }
     return null
   }
 
-  /** Step until simulated time `t`, or for `most` steps; returns why it ended early. */
-  advance(lab, t, most = Infinity, stops = []) {
-    let left = most
-    const begun = lab.time
+  /** Step until simulated time `t`, at most `maxSteps`; returns why it ended early, else null. */
+  advance(lab, t, maxSteps = Infinity, stops = []) {
+    let left = maxSteps
+    const startTime = lab.time
     while (left > 0) {
       const timestep = lab.option.timestep
       const due = Math.round((t - lab.time) / timestep)
       if (!(due > 0)) return null
-      const started = (progress.last = this.now())
-      const { steps, stopped } = lab.step(Math.min(due, left, SLICE))
-      this.measure(lab, steps, this.now() - started)
-      if (lab.diverged === null) this.see(lab)
+      const sliceStart = (progress.last = this.now())
+      const { steps, stopped: reason } = lab.step(Math.min(due, left, SLICE))
+      this.measure(lab, steps, this.now() - sliceStart)
+      if (lab.diverged === null) this.observe(lab)
       left -= steps
-      this.state(lab)
-      if (stopped === 'diverged' || stops.includes(stopped)) return stopped
-      if (steps === 0) throw new Error(`no step can be made at t = ${begun}`)
+      this.checkState(lab)
+      if (reason === 'diverged' || stops.includes(reason)) return reason
+      if (steps === 0) throw new Error(`no step can be made at t = ${startTime}`)
     }
     return 'steps'
   }
 
-  see(lab) {
-    this.framing.see(lab)
-    this.scales.see(lab)
+  observe(lab) {
+    this.framing.observe(lab)
+    this.arrowScales.observe(lab)
   }
 
-  /** Recording costs time of its own, so those steps do not count. */
+  /** Count steps and their time, unless they are recorded, which costs time of its own. */
   measure(lab, steps, ms) {
     if (lab.recorder !== null) return
     this.steps += steps
@@ -271,11 +271,11 @@ class Trial {
   }
 
   probe(lab) {
-    this.state(lab)
-    this.look(lab)
+    this.checkState(lab)
+    this.checkValues(lab)
     this.advance(lab, lab.time + PROBE.seconds, PROBE.steps)
-    this.deep(lab)
-    if (lab.diverged === null) this.look(lab)
+    this.checkDepth(lab)
+    if (lab.diverged === null) this.checkValues(lab)
   }
 
   // --- the main run
@@ -283,26 +283,26 @@ class Trial {
   mainRun(lab) {
     const { stopAt } = this.config
     const timestep = lab.option.timestep
-    const wanted = this.seconds ?? stopAt ?? SECONDS
-    const most = this.seconds === null ? STEPS : Infinity
-    const due = Math.min(most, Math.ceil(wanted / timestep))
+    const seconds = this.seconds ?? stopAt ?? SECONDS
+    const maxSteps = this.seconds === null ? STEPS : Infinity
+    const due = Math.min(maxSteps, Math.ceil(seconds / timestep))
     this.framing = new Framing(lab, lab.scene().camera)
     this.framing.begin()
-    this.see(lab)
-    this.look(lab)
+    this.observe(lab)
+    this.checkValues(lab)
     const start = picture(lab)
     const atStart = lab.state().physics
     if (this.parity) lab.recorder = new ParityRecorder(lab, this.bytes, due)
-    const end = lab.time + wanted
-    let stopped = null
-    for (let i = 1; i <= CHECKS && lab.diverged === null && stopped === null; i++) {
+    const end = lab.time + seconds
+    let reason = null
+    for (let i = 1; i <= CHECKS && lab.diverged === null && reason === null; i++) {
       const t = lab.time + (end - lab.time) / (CHECKS + 1 - i)
-      const result = this.advance(lab, t, Math.ceil(most / CHECKS), ['stopAt', 'code'])
-      if (result === 'stopAt' || result === 'code') stopped = result
-      this.deep(lab)
-      if (lab.diverged === null) this.look(lab)
+      const result = this.advance(lab, t, Math.ceil(maxSteps / CHECKS), ['stopAt', 'code'])
+      if (result === 'stopAt' || result === 'code') reason = result
+      this.checkDepth(lab)
+      if (lab.diverged === null) this.checkValues(lab)
     }
-    if (stopAt !== null && stopped !== 'stopAt' && lab.diverged === null && lab.time >= stopAt) {
+    if (stopAt !== null && reason !== 'stopAt' && lab.diverged === null && lab.time >= stopAt) {
       this.fail(['stopAt'], 'stopAt', `the lab does not stop at ${stopAt} s`, lab.time)
     }
     const parity = lab.recorder?.result() ?? null
@@ -313,7 +313,7 @@ class Trial {
     return {
       seconds: lab.time,
       steps: lab.steps,
-      stopped,
+      stopped: reason,
       diverged: lab.diverged !== null,
       timestep,
       scene: packed(withSmallTextures(lab.scene())),
@@ -329,7 +329,7 @@ class Trial {
 
   // --- controls and claims
 
-  *acts() {
+  *controlActs() {
     for (const [i, control] of this.config.controls.entries()) {
       const entry = ['controls', i]
       if (control.type === 'button') {
@@ -341,8 +341,8 @@ class Trial {
       } else {
         for (const [name, value] of [['minimum', control.min], ['maximum', control.max], ['value', control.value]]) {
           if (value === null) continue
-          const what = `"${control.label}" at its ${name} ${value}`
-          yield { entry, what, act: (lab) => lab.setControl(i, value) }
+          const title = `"${control.label}" at its ${name} ${value}`
+          yield { entry, what: title, act: (lab) => lab.setControl(i, value) }
         }
       }
     }
@@ -356,7 +356,7 @@ class Trial {
     })
     for (const claims of groups.values()) {
       claims.sort((a, b) => a.t - b.t)
-      this.attempt(['expect', claims[0].i], this.describe(claims[0].after), (lab) => this.prove(lab, claims))
+      this.attempt(['expect', claims[0].i], this.describe(claims[0].after), (lab) => this.checkClaims(lab, claims))
     }
   }
 
@@ -364,19 +364,19 @@ class Trial {
     const { goal, stopAt } = this.config
     if (!goal) return
     const { hold, log } = goal
-    const wanted = this.seconds ?? stopAt ?? SECONDS
-    const reached = this.attempt(['goal', 'log'], 'the log of the goal', (lab) => {
+    const seconds = this.seconds ?? stopAt ?? SECONDS
+    const reachedAt = this.attempt(['goal', 'log'], 'the log of the goal', (lab) => {
       lab.replay({ values: [...lab.values], events: log })
-      const found = this.pursue(lab, (log.at(-1)?.[0] ?? 0) + hold + wanted)
-      const held = hold > 0 ? `it is held for ${rounded(found.longest)} s at the most, not ${hold} s` : 'its condition is never true'
-      if (found.reached === null) this.fail(['goal', 'log'], 'goal', `by ${rounded(lab.time)} s: ${held}`, lab.time)
-      return found.reached
+      const outcome = this.pursue(lab, (log.at(-1)?.[0] ?? 0) + hold + seconds)
+      const shortfall = hold > 0 ? `it is held for ${rounded(outcome.longest)} s at the most, not ${hold} s` : 'its condition is never true'
+      if (outcome.reached === null) this.fail(['goal', 'log'], 'goal', `by ${rounded(lab.time)} s: ${shortfall}`, lab.time)
+      return outcome.reached
     })
     this.attempt(['goal', 'expr'], 'the goal with nothing done', (lab) => {
-      const found = this.pursue(lab, log.length > 0 ? Math.max(wanted, reached ?? 0) : lab.time)
-      if (found.reached === null) return
-      const when = lab.steps === 0 ? 'at the start' : `with nothing done, at ${rounded(found.reached)} s`
-      this.fail(['goal', 'expr'], 'goal', when, found.reached)
+      const outcome = this.pursue(lab, log.length > 0 ? Math.max(seconds, reachedAt ?? 0) : lab.time)
+      if (outcome.reached === null) return
+      const occasion = lab.steps === 0 ? 'at the start' : `with nothing done, at ${rounded(outcome.reached)} s`
+      this.fail(['goal', 'expr'], 'goal', occasion, outcome.reached)
     })
   }
 
@@ -399,14 +399,14 @@ class Trial {
     return `claims ${only ? 'with' : 'after'} ${steps.join(', then ')}`
   }
 
-  prove(lab, claims) {
+  checkClaims(lab, claims) {
     this.act(lab, claims[0].after)
     for (const { i, t, min, max, diverges } of claims) {
       const entry = ['expect', i, 'expr']
       this.during.entry = current.trying = ['expect', i]
       if (lab.diverged === null) this.advance(lab, t)
-      else this.state(lab)
-      this.deep(lab)
+      else this.checkState(lab)
+      this.checkDepth(lab)
       if (diverges && lab.diverged === null) this.fail(['expect', i], 'expect', `the simulation has not diverged at ${t} s`, lab.time)
       if (lab.diverged !== null && !claims.some((claim) => claim.diverges)) return
       if (diverges || lab.diverged !== null) continue

@@ -1,10 +1,10 @@
-/** A lab's code that is looked after piece by piece. */
+/** A lab's code, checked by a guard after each piece. */
 
-/** Ends a run once it is known what was looked for. */
+/** Ends a run once the guilty piece is known. */
 class Found extends Error {}
 
 /**
- * The same code, which ends with an exception after the piece that changes what a guard looks after.
+ * Wrap a lab's code so that it throws after the piece that changes what the guard protects.
  *
  * @param {object} code
  * @param {import('./guard.js').Guard} guard
@@ -33,7 +33,7 @@ export function watchedCode(code, guard) {
     }
   }
   const list = (name) => code[name].map((run, i) => watch([name, i, 'expr'], run))
-  const watched = {
+  const wrappers = {
     setup: watch(['setup'], code.setup),
     controller: watch(['controller'], code.controller),
     controls: code.controls.map(({ set, run }, i) => ({ set: watch(['controls', i], set), run: watch(['controls', i, 'run'], run) })),
@@ -42,5 +42,5 @@ export function watchedCode(code, guard) {
     expect: list('expect'),
     goal: watch(['goal', 'expr'], code.goal),
   }
-  return { code: watched, entry: () => guilty }
+  return { code: wrappers, entry: () => guilty }
 }

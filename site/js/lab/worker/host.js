@@ -1,46 +1,46 @@
 /**
- * The labs of a page in one worker: one engine, its time shared out among those that run.
+ * The labs of a page in one worker: they share one engine, and its time is divided among those that run.
  *
- * Pure of the worker's surroundings, which are handed in: so the tests run it as it is.
+ * The worker's functions are handed in, so that the tests can run this module outside a worker.
  */
 
 import { EngineError, createEngine } from '../core/engine.js'
 import { Session } from './session.js'
 
 const BUDGET = 12 // ms of stepping before messages are looked at
-const LONGEST = 8 // ms between two looks at what is due
+const LONGEST = 8 // ms between two ticks
 
 export class Host {
   /**
-   * @param {object} around
-   * @param {(message: object, transfer: ArrayBuffer[]) => void} around.post
-   * @param {() => number} around.now ms
-   * @param {(action: () => void, ms: number) => unknown} around.later
-   * @param {(url: string) => Promise<Uint8Array>} around.fetchBytes
-   * @param {(url: string) => Promise<object>} around.importModule
-   * @param {(url: string) => Promise<WebAssembly.Module>} around.compile
-   * @param {(module: object) => Promise<object>} around.loadMujoco
+   * @param {object} services
+   * @param {(message: object, transfer: ArrayBuffer[]) => void} services.post
+   * @param {() => number} services.now ms
+   * @param {(action: () => void, ms: number) => unknown} services.later
+   * @param {(url: string) => Promise<Uint8Array>} services.fetchBytes
+   * @param {(url: string) => Promise<object>} services.importModule
+   * @param {(url: string) => Promise<WebAssembly.Module>} services.compile
+   * @param {(module: object) => Promise<object>} services.loadMujoco
    */
-  constructor(around) {
-    this.around = around
+  constructor(services) {
+    this.services = services
     this.sessions = new Map()
-    this.waiting = new Map()
+    this.queues = new Map()
     this.engine = null
     this.due = Infinity
   }
 
   /** Handle a message of the page. */
   receive(message) {
-    if (message.type === 'warm') return void this.start(message.wasm).catch(() => {}) // a lab that needs it will tell
+    if (message.type === 'warm') return void this.start(message.wasm).catch(() => {}) // a lab that needs it will report the failure
     if (message.type === 'load') return void this.load(message)
     const id = message.lab
-    if (message.type === 'ping') return void this.around.post({ type: 'pong', lab: id }, [])
+    if (message.type === 'ping') return void this.services.post({ type: 'pong', lab: id }, [])
     if (message.type === 'dispose') {
       this.sessions.get(id)?.close()
       this.sessions.delete(id)
-      this.waiting.delete(id)
-    } else if (this.waiting.has(id)) {
-      this.waiting.get(id).push(message)
+      this.queues.delete(id)
+    } else if (this.queues.has(id)) {
+      this.queues.get(id).push(message)
     } else if (this.sessions.has(id)) {
       const session = this.sessions.get(id)
       session.receive(message)
@@ -52,7 +52,7 @@ export class Host {
   /** Start the engine, once. */
   start(wasm) {
     if (this.engine === null) {
-      const { loadMujoco, compile } = this.around
+      const { loadMujoco, compile } = this.services
       this.engine = compile(wasm).then((module) => createEngine(loadMujoco, module))
       this.engine.catch(() => (this.engine = null)) // the network may be back for the next lab
     }
@@ -60,37 +60,37 @@ export class Host {
   }
 
   async load({ lab: id, config, module, mjb, wasm }) {
-    const { post, now, fetchBytes, importModule } = this.around
+    const { post, now, fetchBytes, importModule } = this.services
     this.sessions.get(id)?.close()
     const queue = []
-    this.waiting.set(id, queue)
+    this.queues.set(id, queue)
     try {
       const model = config.xml ?? fetchBytes(mjb)
       const [engine, source, code] = await Promise.all([this.start(wasm), model, importModule(module)])
-      if (this.waiting.get(id) !== queue) return // disposed of, or loaded again
+      if (this.queues.get(id) !== queue) return // disposed of, or loaded again
       const session = new Session(id, post, now)
       this.sessions.set(id, session)
       session.open(engine, source, config, code)
-      this.waiting.delete(id)
+      this.queues.delete(id)
       queue.forEach((message) => session.receive(message))
       session.show()
       this.wake()
     } catch (error) {
-      if (this.waiting.get(id) === queue) this.waiting.delete(id)
+      if (this.queues.get(id) === queue) this.queues.delete(id)
       const fatal = error instanceof EngineError && error.fatal
       post({ type: 'error', lab: id, message: `the lab does not load: ${error.message}`, entry: [], kind: 'load', fatal }, [])
     }
   }
 
-  /** See to it that running labs are looked after soon. */
+  /** Plan a tick if a lab runs and none is planned. */
   wake() {
     const busy = [...this.sessions.values()].some((session) => session.busy)
     if (busy && this.due === Infinity) this.plan(0)
   }
 
   plan(ms) {
-    this.due = this.around.now() + ms
-    this.around.later(() => this.tick(), ms)
+    this.due = this.services.now() + ms
+    this.services.later(() => this.tick(), ms)
   }
 
   tick() {

@@ -1,8 +1,8 @@
 /**
- * Doing something later, in a worker.
+ * A `setTimeout` without its shortest delay, for a worker.
  *
- * A timer that a timer has set waits for 4 ms at least, whatever it is asked for: a lab that cannot keep up would lose a
- * quarter of its time. What has not to wait comes as a message instead, behind the messages that are there already.
+ * A timer that was set by a timer waits for at least 4 ms: a lab that cannot keep up would lose a quarter of its time. An action
+ * that need not wait is posted as a message instead, behind the messages that are already queued.
  *
  * @param {MessageChannel} [channel]
  * @returns {(action: () => void, ms: number) => void}

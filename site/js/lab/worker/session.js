@@ -1,15 +1,15 @@
 /**
  * One lab of a page, as the worker runs it: messages in, frames out. docs/explanation/how-labs-run.md has the protocol.
  *
- * Frames are sent only while the page gives their buffers back, so that a page which cannot follow slows nothing but itself. What
- * lab code throws pauses the lab and is told with its entry.
+ * Frames are sent only while the page gives their buffers back, so that a page which cannot follow slows nothing but itself. An
+ * exception of lab code pauses the lab and is reported with its entry.
  */
 
 import { Clock } from '../core/clock.js'
 import { Lab } from '../core/lab.js'
 
 const CHUNK = 2 // ms of stepping between two looks at the clock
-const LEAST = 4 // ms between two frames of a lab that runs
+const LEAST = 4 // ms between two frames of a running lab
 
 export class Session {
   /**
@@ -24,14 +24,14 @@ export class Session {
     this.clock = new Clock()
     this.visible = true
     this.playing = false
-    this.buffers = [null] // one frame is under way at a time: then there is one for each refresh of the page
+    this.buffers = [null] // a single one: the next frame is sent when the page has returned it, so at most once per refresh
     this.stale = true
     this.sent = -Infinity
     this.chunk = 1
     this.lab = null
   }
 
-  /** Begin with what was fetched. */
+  /** Start the lab from the fetched model, data and code. */
   open(engine, source, config, code) {
     this.guard(() => {
       const host = { play: () => this.play(), pause: () => this.stop('code') }
@@ -43,7 +43,7 @@ export class Session {
     const { values, time } = this.lab
     this.post('ready', { version: engine.version, scene, values: values ?? [], time }, arrayBuffers(scene))
     this.report()
-    if (config.autoplay && !this.lab.diverged && !this.failed) this.play()
+    if (config.autoplay && !this.lab.diverged && !this.hasFailed) this.play()
   }
 
   close() {
@@ -52,7 +52,7 @@ export class Session {
     this.lab = null
   }
 
-  /** Whether time has to be spent on it. */
+  /** Whether the lab needs time. */
   get busy() {
     return this.playing && this.visible && this.lab !== null
   }
@@ -82,35 +82,35 @@ export class Session {
     this.post('paused', { reason })
   }
 
-  /** Do what a reader asks for; with `play` it goes on from there, unless lab code has paused it. */
+  /** Do what a reader asks for; with `play` the lab then runs, unless its code has paused it. */
   act(action, play) {
     this.lab.interrupted = false
     action(this.lab)
-    this.changed()
+    this.afterChange()
     if (play && !this.lab.interrupted) this.play()
   }
 
-  /** After lab code has run: the values of the controls, and what became of the state. */
-  changed() {
+  /** After lab code has run: send the values of the controls, warnings and divergence. */
+  afterChange() {
     this.stale = true
     this.post('controls', { values: this.lab.values })
     this.report()
   }
 
-  /** Tell what MuJoCo has warned of. */
+  /** Send MuJoCo's warnings, and a divergence once. */
   report() {
     for (const { time, kind, message } of this.lab.takeWarnings()) this.post('warning', { time, kind, message })
     const { diverged } = this.lab
     if (diverged === null) {
-      this.toldDivergence = null
-    } else if (diverged !== this.toldDivergence) {
-      this.toldDivergence = diverged
+      this.reportedDivergence = null
+    } else if (diverged !== this.reportedDivergence) {
+      this.reportedDivergence = diverged
       this.post('diverged', { time: diverged.time, kind: diverged.kind, message: diverged.message })
       this.stop('diverged')
     }
   }
 
-  /** Run something that may fail; a failure is told, and pauses the lab. */
+  /** Run something that may fail; a failure is sent to the page, and pauses the lab. */
   guard(action) {
     try {
       action()
@@ -118,7 +118,7 @@ export class Session {
     } catch (error) {
       const { entry = [], kind = 'refused' } = error
       const fatal = kind === 'engine' || error.fatal === true || error instanceof WebAssembly.RuntimeError
-      this.failed = kind !== 'refused'
+      this.hasFailed = kind !== 'refused'
       this.post('error', { message: error.message ?? String(error), entry, kind, fatal })
       if (kind !== 'refused' || fatal) this.stop('error')
       return false
@@ -127,36 +127,36 @@ export class Session {
 
   // --- running
 
-  /** Step what is due, for at most `budget` ms; returns the milliseconds until there is more to do. */
+  /** Make the steps that are due, for at most `budget` ms; returns the milliseconds until there is more to do. */
   run(budget) {
     if (!this.busy) return Infinity
-    const begun = this.now()
+    const startTime = this.now()
     const timestep = this.lab.option.timestep
-    let owed = this.clock.owed(begun / 1000, timestep)
+    let due = this.clock.stepsDue(startTime / 1000, timestep)
     let steps = 0
     this.guard(() => {
-      while (owed > 0 && this.playing && this.now() - begun < budget) {
-        const started = this.now()
-        const made = this.advance(Math.min(owed, this.chunk))
-        steps += made.steps
-        owed -= made.steps
-        this.adapt(this.now() - started, made.steps)
-        if (made.stopped !== null) this.ended(made.stopped)
+      while (due > 0 && this.playing && this.now() - startTime < budget) {
+        const sliceStart = this.now()
+        const result = this.advance(Math.min(due, this.chunk))
+        steps += result.steps
+        due -= result.steps
+        this.adapt(this.now() - sliceStart, result.steps)
+        if (result.stopped !== null) this.stopAtEnd(result.stopped)
       }
       if (steps > 0) this.report()
     })
-    this.clock.ran(steps, timestep, begun / 1000)
+    this.clock.countSteps(steps, timestep, startTime / 1000)
     if (steps > 0) this.stale = true
     if (!this.playing) return Infinity
-    return owed > 0 ? 0 : Math.max(1, 1000 * this.clock.wait(timestep))
+    return due > 0 ? 0 : Math.max(1, 1000 * this.clock.wait(timestep))
   }
 
-  /** Step, and tell what a log that is replayed has done meanwhile. */
+  /** Step, and send the changes if a replayed log has acted meanwhile. */
   advance(steps) {
     const { length } = this.lab.queue
-    const made = this.lab.step(steps)
-    if (this.lab.queue.length !== length) this.changed()
-    return made
+    const result = this.lab.step(steps)
+    if (this.lab.queue.length !== length) this.afterChange()
+    return result
   }
 
   /** Choose how many steps to make between two looks at the clock. */
@@ -166,11 +166,11 @@ export class Session {
     else if (took > CHUNK) this.chunk = Math.max(1, this.chunk >> 1)
   }
 
-  ended(reason) {
+  stopAtEnd(reason) {
     if (reason === 'stopAt') this.stop('stopAt')
   }
 
-  /** Send a frame if there is something new to see and a buffer to put it in. */
+  /** Send a frame if something has changed and there is a buffer for it. */
   show() {
     if (!this.stale || !this.visible || this.lab === null || this.buffers.length === 0) return
     const now = this.now()
@@ -198,15 +198,15 @@ const HANDLERS = {
   pause: (session) => session.stop('user'),
   step(session, { n }) {
     session.stop('user')
-    const { stopped } = session.advance(n ?? 1)
+    const { stopped: reason } = session.advance(n ?? 1)
     session.stale = true
     session.report()
-    if (stopped === 'stopAt') session.post('paused', { reason: 'stopAt' })
+    if (reason === 'stopAt') session.post('paused', { reason: 'stopAt' })
   },
   reset(session) {
     session.lab.reset()
     session.clock.stop()
-    session.changed()
+    session.afterChange()
   },
   speed: (session, { factor }) => session.clock.setSpeed(factor),
   control: (session, { index, value, play }) => session.act((lab) => lab.setControl(index, value), play),
@@ -229,19 +229,19 @@ const HANDLERS = {
   restore(session, { state }) {
     session.lab.restore(state)
     session.clock.stop()
-    session.changed()
+    session.afterChange()
   },
   replay(session, { log }) {
     session.lab.replay(log)
     session.clock.stop()
-    session.changed()
+    session.afterChange()
     session.play()
   },
 }
 
-/** The buffers of all arrays inside a value, each once. */
-export function arrayBuffers(value, found = new Set()) {
-  if (ArrayBuffer.isView(value)) found.add(value.buffer)
-  else if (value !== null && typeof value === 'object') Object.values(value).forEach((item) => arrayBuffers(item, found))
-  return [...found]
+/** The buffers of all arrays inside a value, without duplicates. */
+export function arrayBuffers(value, buffers = new Set()) {
+  if (ArrayBuffer.isView(value)) buffers.add(value.buffer)
+  else if (value !== null && typeof value === 'object') Object.values(value).forEach((item) => arrayBuffers(item, buffers))
+  return [...buffers]
 }

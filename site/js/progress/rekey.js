@@ -1,9 +1,9 @@
-/** Answers to questions whose text has changed since: their new keys are taken over where the page shows them. */
+/** Moves answers to the new keys of questions whose text has changed. */
 
 import { answersByQuiz, matchQuestions } from './match.js'
 
-/** Let the answers of the quizzes of a page go by the keys that their questions have now. Before quizzes come alive. */
-export function settleAnswers(document, progress) {
+/** Move the answers of the page's quizzes to the present keys of their questions; called before quizzes are mounted. */
+export function rekeyAnswers(document, progress) {
   const quizzes = [...document.querySelectorAll('[data-quiz]')]
   if (quizzes.length === 0) return
   const byQuiz = answersByQuiz(progress.all())
@@ -14,7 +14,7 @@ export function settleAnswers(document, progress) {
       kind,
       number: Number(number),
     }))
-    const { found } = matchQuestions(byQuiz.get(quiz) ?? [], present)
-    for (const [key, answer] of found) if (answer.key !== key) progress.rename(quiz, answer.key, key)
+    const { matched } = matchQuestions(byQuiz.get(quiz) ?? [], present)
+    for (const [key, answer] of matched) if (answer.key !== key) progress.rename(quiz, answer.key, key)
   }
 }
