@@ -1,10 +1,10 @@
 /**
- * The search and the command palette: loaded by the page's script when it is first asked for, as a plain script, since
- * modules cannot be loaded from a disk. What it offers is the global `coursebuildSearch`:
+ * The search and the command palette: loaded by the page's script on first use, as a classic script, since modules cannot
+ * be loaded from disk. Its interface is the global `coursebuildSearch`:
  *
  *   open(context)    opens the dialog
- *   mount(context)   brings the page of the search to life
- *   take             what the files of the index call
+ *   mount(context)   mounts the search page
+ *   take             called by the files of the index
  */
 
 import { loadFile, take } from './search/data.js'
@@ -14,8 +14,8 @@ import { mountPage } from './search/page.js'
 
 let engine = null
 
-/** The engine, made once; after a failure anew, past what the browser has kept of the list of pages. */
-function ready(context) {
+/** The engine, made once; after a failure it is made again, bypassing the browser's cache of the list of pages. */
+function getEngine(context) {
   engine ??= start(context, '').catch((error) => {
     engine = null
     throw error
@@ -23,32 +23,32 @@ function ready(context) {
   return engine
 }
 
-function start({ root }, again) {
-  return openSearch((path) => loadFile(root + path + (path.endsWith('search/index.js') ? again : '')))
+function start({ root }, suffix) {
+  return openSearch((path) => loadFile(root + path + (path.endsWith('search/index.js') ? suffix : '')))
 }
 
-/** A query; where files have gone because the site is newer than the list of pages, once more with a new list. */
-async function find(context, query, most) {
-  const search = await ready(context)
+/** Search; if files are missing because the site is newer than the list of pages, search again with a new list. */
+async function find(context, query, limit) {
+  const search = await getEngine(context)
   try {
-    const found = await search.find(query, most)
-    if (found.complete) return found
+    const result = await search.find(query, limit)
+    if (result.complete) return result
   } catch {
-    // See below: the list is loaded anew.
+    // The list is loaded anew below.
   }
   engine = start(context, `?${Date.now()}`)
   engine.catch(() => (engine = null))
-  return (await engine).find(query, most)
+  return (await engine).find(query, limit)
 }
 
-const using = (context) => ({
+const withSearch = (context) => ({
   ...context,
-  listing: async () => (await ready(context)).listing,
-  find: (query, most) => find(context, query, most),
+  listing: async () => (await getEngine(context)).listing,
+  find: (query, limit) => find(context, query, limit),
 })
 
 globalThis.coursebuildSearch = {
   take,
-  open: (context) => openDialog(using(context)),
-  mount: (context) => mountPage(using(context)),
+  open: (context) => openDialog(withSearch(context)),
+  mount: (context) => mountPage(withSearch(context)),
 }

@@ -3,14 +3,14 @@
 import assert from 'node:assert/strict'
 import { readFileSync } from 'node:fs'
 import { test } from 'node:test'
-import { nearMiss, within } from '../js/quiz/diagnose.js'
+import { nearMiss, isWithin } from '../js/quiz/diagnose.js'
 import { gradeChoice, gradeNumber, gradeOrder } from '../js/quiz/grade.js'
-import { moved, placeAt, placed, restored } from '../js/quiz/order.js'
+import { moveBy, placeAt, moveTo, restoreOrder } from '../js/quiz/order.js'
 import { compareBy, gradeOutput, lastPlace } from '../js/quiz/output.js'
 
 const INERTIA = { answer: 0.08, tolerance: 0.0001, unit: 'kg m^2' }
 const say = (text, asked) => {
-  const { state, near, problem } = gradeNumber(text, asked)
+  const { state, slip: near, problem } = gradeNumber(text, asked)
   return [state, near ?? problem].filter(Boolean).join(' ')
 }
 
@@ -107,9 +107,9 @@ test('an answer of 0 has an absolute tolerance and no near miss', () => {
 })
 
 test('what binary fractions cannot keep does not make a number wrong', () => {
-  assert.equal(within(0.1 + 0.2, 0.3, 0), true)
-  assert.equal(within(0.0801, 0.08, 0.0001), true)
-  assert.equal(within(0.08011, 0.08, 0.0001), false)
+  assert.equal(isWithin(0.1 + 0.2, 0.3, 0), true)
+  assert.equal(isWithin(0.0801, 0.08, 0.0001), true)
+  assert.equal(isWithin(0.08011, 0.08, 0.0001), false)
   assert.equal(say('0.1+0.2', { answer: 0.3, tolerance: 0, unit: '' }), 'right')
 })
 
@@ -130,9 +130,9 @@ test('a slip is found whatever the number, and what is right is never called one
     const asked = { answer, tolerance: 0.001 * Math.abs(answer), unit: '' }
     assert.equal(say(String(answer * (1 + (random() - 0.5) * 0.0019)), asked), 'right')
     for (const [name, slip] of Object.entries(slips)) {
-      const { state, near } = gradeNumber(`${slip(answer)}+0`, asked)
+      const { state, slip: near } = gradeNumber(`${slip(answer)}+0`, asked)
       // Two slips can give the same number; then one of them is named.
-      const alike = (other) => other !== slip && within(other(answer), slip(answer), Math.abs(slip(answer)) * 0.002)
+      const alike = (other) => other !== slip && isWithin(other(answer), slip(answer), Math.abs(slip(answer)) * 0.002)
       const again = state === 'right' || Object.values(slips).some(alike)
       assert.ok(near === name || again || near === 'ten' || near === 'close', `${answer}: ${slip(answer)} is ${near}, not ${name}`)
     }
@@ -164,7 +164,7 @@ test('every problem and every slip has its words', () => {
 // --- output
 
 const printed = (text, line, rule = 'digits') => {
-  const { right, near } = gradeOutput(text, line, compareBy(rule))
+  const { right, slip: near } = gradeOutput(text, line, compareBy(rule))
   return right ? 'right' : near || 'wrong'
 }
 
@@ -232,25 +232,25 @@ test('any text is right for itself', () => {
 // --- order
 
 test('orders', () => {
-  assert.deepEqual(gradeOrder(['a', 'b', 'c'], ['a', 'b', 'c']), { right: true, placed: 3 })
-  assert.deepEqual(gradeOrder(['b', 'a', 'c'], ['a', 'b', 'c']), { right: false, placed: 1 })
-  assert.deepEqual(gradeOrder(['a', 'b'], ['a', 'b', 'c']), { right: false, placed: 2 })
-  assert.deepEqual(gradeOrder(['a', 'b', 'c', 'd'], ['a', 'b', 'c']), { right: false, placed: 3 })
-  assert.deepEqual(moved(['a', 'b', 'c'], 'c', -1), ['a', 'c', 'b'])
-  assert.deepEqual(moved(['a', 'b', 'c'], 'c', 1), ['a', 'b', 'c'])
-  assert.deepEqual(moved(['a', 'b', 'c'], 'a', -5), ['a', 'b', 'c'])
-  assert.deepEqual(moved(['a', 'b', 'c'], 'a', 5), ['b', 'c', 'a'])
-  assert.deepEqual(moved(['a', 'b', 'c'], 'x', 1), ['a', 'b', 'c'])
-  assert.deepEqual(placed(['a', 'b', 'c'], 'b', 0), ['b', 'a', 'c'])
+  assert.deepEqual(gradeOrder(['a', 'b', 'c'], ['a', 'b', 'c']), { right: true, placedCount: 3 })
+  assert.deepEqual(gradeOrder(['b', 'a', 'c'], ['a', 'b', 'c']), { right: false, placedCount: 1 })
+  assert.deepEqual(gradeOrder(['a', 'b'], ['a', 'b', 'c']), { right: false, placedCount: 2 })
+  assert.deepEqual(gradeOrder(['a', 'b', 'c', 'd'], ['a', 'b', 'c']), { right: false, placedCount: 3 })
+  assert.deepEqual(moveBy(['a', 'b', 'c'], 'c', -1), ['a', 'c', 'b'])
+  assert.deepEqual(moveBy(['a', 'b', 'c'], 'c', 1), ['a', 'b', 'c'])
+  assert.deepEqual(moveBy(['a', 'b', 'c'], 'a', -5), ['a', 'b', 'c'])
+  assert.deepEqual(moveBy(['a', 'b', 'c'], 'a', 5), ['b', 'c', 'a'])
+  assert.deepEqual(moveBy(['a', 'b', 'c'], 'x', 1), ['a', 'b', 'c'])
+  assert.deepEqual(moveTo(['a', 'b', 'c'], 'b', 0), ['b', 'a', 'c'])
   assert.equal(placeAt(15, [10, 20, 30]), 1)
   assert.equal(placeAt(5, [10, 20]), 0)
   assert.equal(placeAt(50, [10, 20]), 2)
 })
 
 test('a kept order fits the items that there are now', () => {
-  assert.deepEqual(restored(['b', 'a'], ['a', 'b', 'c']), ['b', 'a', 'c'])
-  assert.deepEqual(restored(['x', 'b', 'b'], ['a', 'b']), ['b', 'a'])
-  for (const kept of [null, undefined, 'ab', 5, {}, [{}], [null]]) assert.deepEqual(restored(kept, ['a', 'b']), ['a', 'b'])
+  assert.deepEqual(restoreOrder(['b', 'a'], ['a', 'b', 'c']), ['b', 'a', 'c'])
+  assert.deepEqual(restoreOrder(['x', 'b', 'b'], ['a', 'b']), ['b', 'a'])
+  for (const kept of [null, undefined, 'ab', 5, {}, [{}], [null]]) assert.deepEqual(restoreOrder(kept, ['a', 'b']), ['a', 'b'])
 })
 
 test('moves never lose or double an item', () => {
@@ -262,7 +262,7 @@ test('moves never lose or double an item', () => {
   let order = ['a', 'b', 'c', 'd', 'e']
   for (let i = 0; i < 2000; i++) {
     const key = 'abcdex'[random(6)]
-    order = random(2) ? moved(order, key, random(9) - 4) : placed(order, key, random(9) - 2)
+    order = random(2) ? moveBy(order, key, random(9) - 4) : moveTo(order, key, random(9) - 2)
     assert.equal([...order].sort().join(''), 'abcde')
   }
 })

@@ -1,9 +1,9 @@
 import assert from 'node:assert/strict'
 import test from 'node:test'
-import { matching, numbered } from '../js/search/actions.js'
+import { matchActions, pagesByNumber } from '../js/search/actions.js'
 import { findPages } from '../js/search/pages.js'
 import { forgetQueries, noteQuery, recentQueries } from '../js/search/recent.js'
-import { excerpt, findSections, marked, phraseFactor, trail } from '../js/search/sections.js'
+import { excerpt, findSections, markWords, phraseFactor, trail } from '../js/search/sections.js'
 import { indexed } from './search-helpers.mjs'
 
 const COURSE = [
@@ -105,18 +105,18 @@ test('an excerpt shows the line of code, or the words around, marked', async () 
   assert.deepEqual(excerpt(opened[0].sections[3], words), {
     code: true,
     parts: [
-      { text: 'mujoco.', marked: false },
-      { text: 'mj_forward', marked: true },
-      { text: '(model, data)', marked: false },
+      { text: 'mujoco.', isMarked: false },
+      { text: 'mj_forward', isMarked: true },
+      { text: '(model, data)', isMarked: false },
     ],
   })
   const name = await findPages('data.qpos', source)
-  assert.deepEqual(marked('print(data.qpos[3])', name.words)[1], { text: 'data.qpos', marked: true })
+  assert.deepEqual(markWords('print(data.qpos[3])', name.words)[1], { text: 'data.qpos', isMarked: true })
   const long = ['', '', 0, [['t', `${'so '.repeat(60)}the energy of it ${'and on '.repeat(60)}`]], '']
   const { parts } = excerpt(long, (await findPages('energy', source)).words)
   assert.equal(parts[0].text, '… ')
   assert.equal(parts.at(-1).text, ' …')
-  assert.deepEqual(parts.filter((part) => part.marked), [{ text: 'energy', marked: true }])
+  assert.deepEqual(parts.filter((part) => part.isMarked), [{ text: 'energy', isMarked: true }])
   assert.ok(parts.map(({ text }) => text).join('').length < 200)
 })
 
@@ -124,7 +124,7 @@ test('marks keep the text whole', async () => {
   const { words } = await findPages('慣性力 <b>', source)
   for (const text of ['遠心力は慣性力である。', '<b>𝛚</b> & 慣性', '']) {
     assert.equal(
-      marked(text, words)
+      markWords(text, words)
         .map((part) => part.text)
         .join(''),
       text,
@@ -134,12 +134,12 @@ test('marks keep the text whole', async () => {
 
 test('actions are found by the beginnings of their words, lessons by number', () => {
   const actions = [{ title: 'Print this page' }, { title: 'Colours: Dark' }, { title: 'Course map' }]
-  assert.deepEqual(matching(actions, 'pri pa'), [actions[0]])
-  assert.deepEqual(matching(actions, 'dark'), [actions[1]])
-  assert.equal(matching(actions, '').length, 3)
-  assert.deepEqual(numbered(source.listing, '4.', 9).map(([, , , name]) => name), ['4.2', '4.3', '4.4'])
-  assert.deepEqual(numbered(source.listing, '4.3', 9).map(([, , , name]) => name), ['4.3'])
-  assert.deepEqual(numbered(source.listing, 'four', 9), [])
+  assert.deepEqual(matchActions(actions, 'pri pa'), [actions[0]])
+  assert.deepEqual(matchActions(actions, 'dark'), [actions[1]])
+  assert.equal(matchActions(actions, '').length, 3)
+  assert.deepEqual(pagesByNumber(source.listing, '4.', 9).map(([, , , name]) => name), ['4.2', '4.3', '4.4'])
+  assert.deepEqual(pagesByNumber(source.listing, '4.3', 9).map(([, , , name]) => name), ['4.3'])
+  assert.deepEqual(pagesByNumber(source.listing, 'four', 9), [])
 })
 
 test('queries are remembered, and damaged or closed storage is nothing', () => {

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict'
 import { readFileSync } from 'node:fs'
 import test from 'node:test'
 import { pageFile, readPages, readShard, shardFile } from '../js/search/index.js'
-import { distance, lexicon, likely, tolerance } from '../js/search/spelling.js'
+import { distance, lexicon, likelyTerms, tolerance } from '../js/search/spelling.js'
 import { hashOf, isFuzzy, placesOf, shelfOf, termsOf, wordsOf } from '../js/search/words.js'
 import { encoded } from './search-helpers.mjs'
 
@@ -93,11 +93,11 @@ test('short words have no mistakes, long ones two', () => {
 
 test('the likeliest word comes first', () => {
   const terms = lexicon(['drift', 'draft', 'orbit', 'profit', 'drifts', 'unit'])
-  assert.deepEqual(likely('drfit', [terms]), [['drift', 1]])
-  assert.deepEqual(likely('drift', [terms]), [
+  assert.deepEqual(likelyTerms('drfit', [terms]), [['drift', 1]])
+  assert.deepEqual(likelyTerms('drift', [terms]), [
     ['draft', 1],
     ['drifts', 1],
   ])
-  assert.deepEqual(likely('rift', [terms]), [['drift', 1]])
-  assert.deepEqual(likely('uni', [terms]), [])
+  assert.deepEqual(likelyTerms('rift', [terms]), [['drift', 1]])
+  assert.deepEqual(likelyTerms('uni', [terms]), [])
 })

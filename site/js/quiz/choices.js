@@ -3,13 +3,13 @@
 import { gradeChoice } from './grade.js'
 import { copyOf, fill, h, keysIn, shape } from './parts.js'
 
-/** Names are made of text, and a formula alone has none that every reader of screens takes: it is called as it is written in TeX. */
+/** Name an option that is only a formula by its TeX, as not every screen reader takes a name from MathML. */
 function nameFormula(input, text) {
   const formulas = [...text.querySelectorAll('math')]
   const words = [text.textContent, ...formulas.map((formula) => formula.textContent)].reduce((rest, part) => rest.replace(part, ''))
   if (formulas.length === 0 || words.trim()) return
-  const written = (formula) => formula.querySelector('annotation')?.textContent ?? formula.textContent
-  input.setAttribute('aria-label', formulas.map(written).join(' '))
+  const texOf = (formula) => formula.querySelector('annotation')?.textContent ?? formula.textContent
+  input.setAttribute('aria-label', formulas.map(texOf).join(' '))
 }
 
 export class Choices {
@@ -18,13 +18,13 @@ export class Choices {
     const { element, words } = question
     this.question = question
     this.words = words
-    this.predict = element.dataset.kind === 'predict'
+    this.isPrediction = element.dataset.kind === 'predict'
     this.several = element.dataset.kind === 'several' || 'several' in element.dataset
     this.answers = keysIn(element.dataset.answer)
     this.body = element.querySelector(':scope > .options')
     this.options = [...this.body.children].filter((item) => item.dataset.key).map((item) => this.#option(item))
-    this.submit = words(this.predict ? 'quiz.live.commit' : 'quiz.live.check')
-    this.final = this.predict
+    this.submit = words(this.isPrediction ? 'quiz.live.commit' : 'quiz.live.check')
+    this.final = this.isPrediction
   }
 
   #option(item) {
@@ -36,16 +36,16 @@ export class Choices {
     return { key: item.dataset.key, item, input, text, mark }
   }
 
-  given() {
+  entry() {
     const keys = this.options.filter(({ input }) => input.checked).map(({ key }) => key)
     return keys.length > 0 ? keys : null
   }
 
-  /** @returns {boolean} whether there is anything of it to show */
-  show(given) {
-    const keys = Array.isArray(given) ? given : []
+  /** @returns {boolean} whether there was anything to show */
+  show(entry) {
+    const keys = Array.isArray(entry) ? entry : []
     for (const { key, input } of this.options) input.checked = keys.includes(key)
-    return this.given() !== null
+    return this.entry() !== null
   }
 
   clear() {
@@ -59,35 +59,35 @@ export class Choices {
     this.options[0]?.input.focus()
   }
 
-  grade(given) {
-    const { right, extra, missing } = gradeChoice(given, this.answers)
-    const said = { right, state: right ? 'right' : 'wrong', feedback: given }
-    if (this.predict) return { ...said, finished: true, ...this.#happened(right) }
-    if (right || !this.several) return said
-    return { ...said, more: fill(this.words('quiz.live.chosen'), { extra, missing }) }
+  grade(entry) {
+    const { right, extra, missing } = gradeChoice(entry, this.answers)
+    const result = { right, state: right ? 'right' : 'wrong', feedback: entry }
+    if (this.isPrediction) return { ...result, finished: true, ...this.#happened(right) }
+    if (right || !this.several) return result
+    return { ...result, more: fill(this.words('quiz.live.chosen'), { extra, missing }) }
   }
 
-  /** What was predicted beside what happens. */
+  /** The prediction beside the outcome. */
   #happened(right) {
     const column = (name, keys) => {
       const texts = this.options.filter(({ key }) => keys.includes(key)).map(({ text }) => h('dd', {}, ...copyOf(text)))
       return h('div', {}, h('dt', {}, this.words(name)), ...texts)
     }
-    const columns = [column('quiz.live.predicted', this.given()), column('quiz.live.happens', this.answers)]
-    const shown = h('dl', { class: 'outcome' }, ...columns)
-    return { line: this.words(right ? 'quiz.live.as_predicted' : 'quiz.live.otherwise'), nodes: [shown], solution: false }
+    const columns = [column('quiz.live.predicted', this.entry()), column('quiz.live.happens', this.answers)]
+    const list = h('dl', { class: 'outcome' }, ...columns)
+    return { line: this.words(right ? 'quiz.live.as_predicted' : 'quiz.live.otherwise'), nodes: [list], solution: false }
   }
 
-  /** Mark the options, once something can be said of them. */
+  /** Mark the options whose verdict may be shown. */
   mark(result) {
-    const chosen = new Set(result?.feedback ?? [])
+    const selected = new Set(result?.feedback ?? [])
     for (const { key, item, input, mark } of this.options) {
       const right = this.answers.includes(key)
-      const told = result?.state === 'right' || result?.finished ? right || chosen.has(key) : !this.several && chosen.has(key)
-      const name = !result || !told ? '' : right ? 'right' : 'wrong'
+      const isDecided = result?.state === 'right' || result?.finished ? right || selected.has(key) : !this.several && selected.has(key)
+      const name = !result || !isDecided ? '' : right ? 'right' : 'wrong'
       item.dataset.mark = name
       mark.replaceChildren(...(name ? [shape(name), this.words(`quiz.live.mark_${name}`)] : []))
-      input.disabled = this.predict && Boolean(result?.finished)
+      input.disabled = this.isPrediction && Boolean(result?.finished)
     }
   }
 }

@@ -5,16 +5,16 @@ import { gradeNumber } from './grade.js'
 import { compareBy, gradeOutput } from './output.js'
 import { copyOf, fill, h } from './parts.js'
 
-/** A field with its label and what is said of it. */
+/** A field with its label and help. */
 class Entry {
-  keeps = true // what is wrong stays to be read while it is mended
+  keepsVerdict = true // the verdict stays while a wrong answer is being corrected
 
   constructor(question, label, { help = '', unit = null, code = false } = {}) {
     this.question = question
     this.words = question.words
     this.submit = this.words('quiz.live.check')
     const ids = { input: question.id('entry'), help: question.id('help'), unit: question.id('unit') }
-    const described = [unit && ids.unit, help && ids.help].filter(Boolean).join(' ')
+    const describedBy = [unit && ids.unit, help && ids.help].filter(Boolean).join(' ')
     this.input = h('input', {
       id: ids.input,
       type: 'text',
@@ -24,7 +24,7 @@ class Entry {
       autocapitalize: 'off',
       spellcheck: false,
       maxLength: 1000,
-      'aria-describedby': described || null,
+      'aria-describedby': describedBy || null,
     })
     this.body = h(
       'div',
@@ -35,13 +35,13 @@ class Entry {
     )
   }
 
-  given() {
+  entry() {
     return this.input.value.trim() === '' ? null : this.input.value
   }
 
-  show(given) {
-    this.input.value = typeof given === 'string' ? given : ''
-    return this.given() !== null
+  show(entry) {
+    this.input.value = typeof entry === 'string' ? entry : ''
+    return this.entry() !== null
   }
 
   clear() {
@@ -64,30 +64,30 @@ export class Numeric extends Entry {
     const unit = element.querySelector(':scope > .question-how .unit')
     super(question, words('quiz.live.number'), { help: words('quiz.live.number_help'), unit })
     this.unit = unit
-    this.asked = {
+    this.expected = {
       answer: Number(element.dataset.answer),
       tolerance: Number(element.dataset.tolerance),
       unit: element.dataset.unit ?? '',
     }
   }
 
-  grade(given) {
-    const result = gradeNumber(given, this.asked)
+  grade(entry) {
+    const result = gradeNumber(entry, this.expected)
     if (result.state === 'unread') {
       const [first = '', second = ''] = result.readings
       const text = fill(this.words(`quiz.live.unread.${result.problem}`), { detail: result.detail, first, second })
       return { state: 'unread', right: null, line: this.words('quiz.live.unread.line'), more: text }
     }
     const right = result.state === 'right'
-    // Where a point may have been meant to part thousands, it is told how it was read.
-    const unsure = !right && /(?:^|\D)[1-9]\d{0,2}\.\d{3}(?!\d)/.test(given)
-    const nodes = result.converted || (unsure && result.near !== 'unit') ? [this.#read(result.value)] : []
-    const more = result.near ? this.words(`quiz.live.near.${result.near}`) : ''
+    // A point may have been meant to separate thousands: show how it was read.
+    const unsure = !right && /(?:^|\D)[1-9]\d{0,2}\.\d{3}(?!\d)/.test(entry)
+    const nodes = result.converted || (unsure && result.slip !== 'unit') ? [this.#interpretation(result.value)] : []
+    const more = result.slip ? this.words(`quiz.live.near.${result.slip}`) : ''
     return { state: result.state, right, more, nodes, solution: right }
   }
 
-  /** How the entry was understood. */
-  #read(value) {
+  /** The number as it was understood. */
+  #interpretation(value) {
     const unit = this.unit ? [' ', ...copyOf(this.unit)] : []
     return h('p', { class: 'quiz-entry-read' }, `${this.words('quiz.live.read_as')} `, h('bdi', { dir: 'ltr' }, formatLabel(value), ...unit))
   }
@@ -97,12 +97,12 @@ export class Output extends Entry {
   constructor(question) {
     const { element, words } = question
     super(question, words('quiz.live.line'), { code: true })
-    this.printed = element.dataset.answer
-    this.same = compareBy(element.dataset.compare ?? 'digits')
+    this.expectedLine = element.dataset.answer
+    this.isEqual = compareBy(element.dataset.compare ?? 'digits')
   }
 
-  grade(given) {
-    const { right, near } = gradeOutput(given, this.printed, this.same)
-    return { state: right ? 'right' : 'wrong', right, more: near ? this.words(`quiz.live.printed.${near}`) : '', solution: right }
+  grade(entry) {
+    const { right, slip } = gradeOutput(entry, this.expectedLine, this.isEqual)
+    return { state: right ? 'right' : 'wrong', right, more: slip ? this.words(`quiz.live.printed.${slip}`) : '', solution: right }
   }
 }

@@ -1,20 +1,20 @@
 /**
- * What a learner enters for a number: a numeral or a calculation, and behind it perhaps a unit.
+ * Reads a learner's entry for a number: a numeral or a calculation, perhaps followed by a unit.
  *
  *   readQuantity('1/12*0.3*(0.1^2+0.2^2) kg m²') → { value: 0.00125, unit: 'kg m^2', step: null }
  *
- * 1. Signs that mean the same become one (`normalise`).
- * 2. One walk from left to right parses and computes: + − · / ^, parentheses, functions of one argument, π, τ, e. Nothing is evaluated
+ * 1. Replace signs that mean the same by one of them (`normalise`).
+ * 2. Parse and compute in one pass from left to right: + − · / ^, parentheses, functions of one argument, π, τ, e. Nothing is evaluated
  *    as code.
- * 3. The first name that is no function and no constant begins the unit, which goes on to the end.
+ * 3. The first name that is neither a function nor a constant begins the unit, which extends to the end.
  *
- * What can be read in two ways is not guessed: `1,200`, `1/2π`, and `3 e-3`.
+ * An ambiguous entry, such as `1,200`, `1/2π` or `3 e-3`, is refused.
  */
 
 import { normalise, numeralEnd, readNumeral } from './numbers.js'
 
 const LONGEST = 200 // characters
-const DEEPEST = 60 // calls inside each other
+const DEEPEST = 60 // nested calls
 
 const CONSTANTS = { pi: Math.PI, π: Math.PI, tau: 2 * Math.PI, τ: 2 * Math.PI, e: Math.E }
 const FUNCTIONS = {
@@ -23,7 +23,7 @@ const FUNCTIONS = {
   arctan: Math.atan, sinh: Math.sinh, cosh: Math.cosh, tanh: Math.tanh, asinh: Math.asinh, acosh: Math.acosh, atanh: Math.atanh,
 }
 
-/** Why a text cannot be read; `detail` is the part of it that is meant. */
+/** Why a text cannot be read; `detail` is the part in question. */
 class Unread extends Error {
   constructor(problem, detail = '', readings = []) {
     super(problem)
@@ -34,12 +34,12 @@ class Unread extends Error {
 /**
  * @param {string} text
  * @returns {{value: number, unit: string, step: number | null} | {problem: string, detail: string, readings: string[]}} `step`: a unit
- *   of the last place that was written, for a numeral; null for a calculation. Problems: empty, long, end, sign, numeral, numbers,
+ *   of the last place of a numeral; null for a calculation. Problems: empty, long, end, sign, numeral, numbers,
  *   comma, product, parenthesis, argument, log, finite
  */
 export function readQuantity(text) {
   if (text.length > LONGEST) return { problem: 'long', detail: '', readings: [] }
-  // `I = 0.08`, `≈ 3`: what is named there is what is asked for.
+  // `I = 0.08`, `≈ 3`: drop the name of the quantity.
   const source = normalise(text)
     .replace(/^(?:\p{L}[\p{L}\d_]*)? ?[=≈~] ?/u, '')
     .replace(/(\d) ?[.,;]$/, '$1')
@@ -56,20 +56,20 @@ export function readQuantity(text) {
   }
 }
 
-/** A unit of the last place of a numeral, with a power of ten perhaps; null for anything else. */
+/** A unit of the last place of a numeral, which may have a power of ten; null for anything else. */
 function stepOf(text) {
-  const found = /^[-+ ]*([\d., '’]*\d)[.]?(?:[eE]([-+]?\d+)| ?[*xX] ?10 ?\^ ?[({]? ?([-+]?) ?(\d+) ?[)}]?)? ?[*]? ?$/.exec(text)
-  if (!found) return null
-  const read = readNumeral(found[1].trim())
-  const exponent = Number(found[2] ?? `${found[3] ?? ''}${found[4] ?? 0}`)
-  return read.problem ? null : read.step * 10 ** exponent
+  const match = /^[-+ ]*([\d., '’]*\d)[.]?(?:[eE]([-+]?\d+)| ?[*xX] ?10 ?\^ ?[({]? ?([-+]?) ?(\d+) ?[)}]?)? ?[*]? ?$/.exec(text)
+  if (!match) return null
+  const numeral = readNumeral(match[1].trim())
+  const exponent = Number(match[2] ?? `${match[3] ?? ''}${match[4] ?? 0}`)
+  return numeral.problem ? null : numeral.step * 10 ** exponent
 }
 
 class Reader {
   #text
-  #at = 0
-  #inside = 0 // so many parentheses are open
-  #depth = 0 // so many calls are in each other
+  #index = 0
+  #inside = 0 // number of open parentheses
+  #depth = 0 // number of nested calls
 
   constructor(text) {
     this.#text = text
@@ -84,13 +84,13 @@ class Reader {
     }
   }
 
-  /** The unit behind the value: whatever is left. */
+  /** The unit after the value: the rest of the text. */
   rest() {
     const char = this.#peek()
-    const left = this.#text.slice(this.#at)
-    const begins = char === '/' ? this.#at + 1 : this.#at
-    if (left === '' || this.#startsUnit(begins) || (/^1 ?\//.test(left) && this.#startsUnit(begins + 1, '/'))) return left
-    throw new Unread(char === ')' ? 'parenthesis' : 'sign', left)
+    const remainder = this.#text.slice(this.#index)
+    const unitStart = char === '/' ? this.#index + 1 : this.#index
+    if (remainder === '' || this.#startsUnit(unitStart) || (/^1 ?\//.test(remainder) && this.#startsUnit(unitStart + 1, '/'))) return remainder
+    throw new Unread(char === ')' ? 'parenthesis' : 'sign', remainder)
   }
 
   #product() {
@@ -100,21 +100,21 @@ class Reader {
       const char = this.#peek()
       const times = char === '*' || this.#isCross()
       if (times || char === '/') {
-        if (this.#inside === 0 && this.#startsUnit(this.#at + 1)) {
-          if (times) this.#at += 1
+        if (this.#inside === 0 && this.#startsUnit(this.#index + 1)) {
+          if (times) this.#index += 1
           return value
         }
-        this.#at += 1
+        this.#index += 1
         const factor = this.#signed()
         value = times ? value * factor : value / factor
         divided = !times
       } else if (this.#startsValue()) {
-        const from = this.#at
-        if (/^1 ?\//.test(this.#text.slice(from)) && this.#inside === 0 && this.#startsUnit(from + 1, '/')) return value
-        if (numeralEnd(this.#text, from) > from) throw new Unread('numbers', this.#text)
-        if (/^e[-+]?\d/.test(this.#text.slice(from))) throw new Unread('product', this.#text)
+        const start = this.#index
+        if (/^1 ?\//.test(this.#text.slice(start)) && this.#inside === 0 && this.#startsUnit(start + 1, '/')) return value
+        if (numeralEnd(this.#text, start) > start) throw new Unread('numbers', this.#text)
+        if (/^e[-+]?\d/.test(this.#text.slice(start))) throw new Unread('product', this.#text)
         const factor = this.#power()
-        if (divided) throw new Unread('product', this.#text.slice(0, this.#at))
+        if (divided) throw new Unread('product', this.#text.slice(0, this.#index))
         value *= factor
       } else return value
     }
@@ -131,16 +131,16 @@ class Reader {
     if (!this.#take('^')) return base
     const braced = this.#take('{')
     const exponent = this.#deeper(() => this.#signed())
-    if (braced && !this.#take('}')) throw new Unread('sign', this.#text.slice(this.#at))
+    if (braced && !this.#take('}')) throw new Unread('sign', this.#text.slice(this.#index))
     return base ** exponent
   }
 
-  /** Degrees in the argument of a function. */
+  /** Convert a value in degrees in the argument of a function. */
   #angle(value) {
     if (this.#inside === 0) return value
     this.#skip()
-    const [unit] = /^(?:°|deg(?:rees?)?(?!\p{L})|rad(?:ians?)?(?!\p{L}))/u.exec(this.#text.slice(this.#at)) ?? ['']
-    this.#at += unit.length
+    const [unit] = /^(?:°|deg(?:rees?)?(?!\p{L})|rad(?:ians?)?(?!\p{L}))/u.exec(this.#text.slice(this.#index)) ?? ['']
+    this.#index += unit.length
     return /^[°d]/.test(unit) ? (value * Math.PI) / 180 : value
   }
 
@@ -148,57 +148,57 @@ class Reader {
     if (this.#take('(')) return this.#closed()
     if (this.#take('√')) return Math.sqrt(this.#deeper(() => this.#atom()))
     this.#skip()
-    const end = numeralEnd(this.#text, this.#at)
-    if (end > this.#at) return this.#numeral(end)
-    const name = this.#name(this.#at)
+    const end = numeralEnd(this.#text, this.#index)
+    if (end > this.#index) return this.#numeral(end)
+    const name = this.#name(this.#index)
     if (name === 'log') throw new Unread('log')
     if (Object.hasOwn(CONSTANTS, name)) {
-      this.#at += name.length
+      this.#index += name.length
       return CONSTANTS[name]
     }
     if (Object.hasOwn(FUNCTIONS, name)) {
-      this.#at += name.length
+      this.#index += name.length
       if (!this.#take('(')) throw new Unread('argument', name)
       return FUNCTIONS[name](this.#closed())
     }
-    throw new Unread(this.#peek() === '' ? 'end' : 'sign', this.#text.slice(this.#at))
+    throw new Unread(this.#peek() === '' ? 'end' : 'sign', this.#text.slice(this.#index))
   }
 
-  /** What stands up to the closing parenthesis. */
+  /** The value up to the closing parenthesis. */
   #closed() {
     this.#inside += 1
     const value = this.#deeper(() => this.sum())
-    if (!this.#take(')')) throw new Unread(this.#peek() === '' ? 'parenthesis' : 'sign', this.#text.slice(this.#at))
+    if (!this.#take(')')) throw new Unread(this.#peek() === '' ? 'parenthesis' : 'sign', this.#text.slice(this.#index))
     this.#inside -= 1
     return value
   }
 
-  #numeral(found) {
+  #numeral(limit) {
     // `5 1/s`: the 1 belongs to the unit.
-    const end = / 1$/.test(this.#text.slice(this.#at, found)) && this.#startsUnit(found, '/') ? found - 2 : found
-    const digits = this.#text.slice(this.#at, end)
-    const read = readNumeral(digits.replace(/[.]$/, ''))
-    if (read.problem) throw new Unread(read.problem, digits, read.readings)
+    const end = / 1$/.test(this.#text.slice(this.#index, limit)) && this.#startsUnit(limit, '/') ? limit - 2 : limit
+    const digits = this.#text.slice(this.#index, end)
+    const numeral = readNumeral(digits.replace(/[.]$/, ''))
+    if (numeral.problem) throw new Unread(numeral.problem, digits, numeral.readings)
     const [exponent] = /^[eE][-+]?\d+/.exec(this.#text.slice(end)) ?? ['']
-    this.#at = end + exponent.length
-    const plain = String(read.value)
-    return exponent === '' ? read.value : plain.includes('e') ? read.value * 10 ** exponent.slice(1) : Number(plain + exponent)
+    this.#index = end + exponent.length
+    const plain = String(numeral.value)
+    return exponent === '' ? numeral.value : plain.includes('e') ? numeral.value * 10 ** exponent.slice(1) : Number(plain + exponent)
   }
 
   // --- signs
 
   #skip() {
-    while (this.#text[this.#at] === ' ') this.#at += 1
+    while (this.#text[this.#index] === ' ') this.#index += 1
   }
 
   #peek() {
     this.#skip()
-    return this.#text[this.#at] ?? ''
+    return this.#text[this.#index] ?? ''
   }
 
   #take(char) {
     if (this.#peek() !== char) return false
-    this.#at += 1
+    this.#index += 1
     return true
   }
 
@@ -210,29 +210,29 @@ class Reader {
     return value
   }
 
-  #name(at) {
-    return /^(?:log10|log2|\p{L}+)/u.exec(this.#text.slice(at))?.[0] ?? ''
+  #name(index) {
+    return /^(?:log10|log2|\p{L}+)/u.exec(this.#text.slice(index))?.[0] ?? ''
   }
 
   /** Whether an `x` here is a times sign: `1.2 x 10^-3`. */
   #isCross() {
-    return /^[xX] ?[\d(]/.test(this.#text.slice(this.#at))
+    return /^[xX] ?[\d(]/.test(this.#text.slice(this.#index))
   }
 
   /** Whether a value begins here, rather than a sign or a unit. */
   #startsValue() {
     const char = this.#peek()
-    return char === '(' || char === '√' || numeralEnd(this.#text, this.#at) > this.#at || isKnown(this.#name(this.#at))
+    return char === '(' || char === '√' || numeralEnd(this.#text, this.#index) > this.#index || isKnown(this.#name(this.#index))
   }
 
-  /** Whether a unit begins at a place, behind a sign perhaps. */
-  #startsUnit(at, sign = '') {
-    while (this.#text[at] === ' ') at += 1
-    if (sign !== '' && this.#text[at] !== sign) return false
-    if (sign !== '') at += 1
-    while (this.#text[at] === ' ') at += 1
-    const name = this.#name(at)
-    return name !== '' ? !isKnown(name) : /[°%‰'"]/.test(this.#text[at] ?? '')
+  /** Whether a unit begins at a place, after `sign` if one is given. */
+  #startsUnit(index, sign = '') {
+    while (this.#text[index] === ' ') index += 1
+    if (sign !== '' && this.#text[index] !== sign) return false
+    if (sign !== '') index += 1
+    while (this.#text[index] === ' ') index += 1
+    const name = this.#name(index)
+    return name !== '' ? !isKnown(name) : /[°%‰'"]/.test(this.#text[index] ?? '')
   }
 }
 

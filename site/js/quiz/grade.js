@@ -1,85 +1,84 @@
 /**
- * Whether an answer is right, and what can be said of it: pure, by kind of question.
+ * Grades answers, by kind of question. Pure.
  *
- *   gradeChoice(given, answers)     → { right, extra, missing }
- *   gradeNumber(text, asked)        → { state: 'right' | 'wrong' | 'unread', … }
- *   gradeOrder(given, answers)      → { right, placed }
+ *   gradeChoice(entered, answers)   → { right, extra, missing }
+ *   gradeNumber(text, expected)     → { state: 'right' | 'wrong' | 'unread', … }
+ *   gradeOrder(entered, answers)    → { right, placedCount }
  *
- * Those of `output` questions are in output.js.
+ * output.js grades those to `output` questions.
  */
 
-import { nearMiss, within } from './diagnose.js'
+import { nearMiss, isWithin } from './diagnose.js'
 import { readQuantity } from './expressions.js'
 import { hasAngle, plain, readUnit, relation } from './units.js'
 
 /**
- * Options chosen, by their keys.
- * @returns {{right: boolean, extra: number, missing: number}} so many were chosen that do not belong, so many that belong were not
+ * Grade a choice of options, by their keys.
+ * @returns {{right: boolean, extra: number, missing: number}} the numbers of wrong options chosen, and of right ones not chosen
  */
-export function gradeChoice(given, answers) {
-  const chosen = new Set(given)
+export function gradeChoice(entered, answers) {
+  const selected = new Set(entered)
   const right = new Set(answers)
-  const extra = [...chosen].filter((key) => !right.has(key)).length
-  const missing = [...right].filter((key) => !chosen.has(key)).length
+  const extra = [...selected].filter((key) => !right.has(key)).length
+  const missing = [...right].filter((key) => !selected.has(key)).length
   return { right: extra === 0 && missing === 0, extra, missing }
 }
 
 /**
- * Items in an order, by their keys.
- * @returns {{right: boolean, placed: number}} so many stand where they belong
+ * Grade an order of items, by their keys.
+ * @returns {{right: boolean, placedCount: number}} the number of items in their right place
  */
-export function gradeOrder(given, answers) {
-  const placed = answers.filter((key, place) => given[place] === key).length
-  return { right: placed === answers.length && given.length === answers.length, placed }
+export function gradeOrder(entered, answers) {
+  const placedCount = answers.filter((key, place) => entered[place] === key).length
+  return { right: placedCount === answers.length && entered.length === answers.length, placedCount }
 }
 
 /**
- * @typedef {object} Asked
+ * @typedef {object} Expected
  * @property {number} answer in `unit`
  * @property {number} tolerance absolute, in `unit`
  * @property {string} unit as the author wrote it; empty: none
  */
 
 /**
- * A number, perhaps with a unit; without one it is in the unit that is asked for.
+ * Grade a number, perhaps with a unit; without one it is in the expected unit.
  *
  * @param {string} text what the learner entered
- * @param {Asked} asked
+ * @param {Expected} expected
  * @returns {{state: 'right', value: number, converted: boolean}
- *   | {state: 'wrong', near: string, value: number, converted: boolean}
+ *   | {state: 'wrong', slip: string, value: number, converted: boolean}
  *   | {state: 'unread', problem: string, detail: string, readings: string[]}}
- *   `value` in the unit that is asked for; `converted`: it is not what stands there, since it was computed or in another unit. `near`: see
- *   `nearMiss`, besides `unit` (it measures something else) and `scale` (the number is right in the unit that is asked for, not in the
- *   one that was written)
+ *   `value` in the expected unit; `converted`: it was computed, or entered in another unit. `slip`: one of `nearMiss`, or `unit` (the
+ *   unit measures something else), or `scale` (the number is right in the expected unit, but not in the entered one)
  */
 export function gradeNumber(text, { answer, tolerance, unit }) {
   const read = readQuantity(text)
   if (read.problem) return { state: 'unread', problem: read.problem, detail: read.detail, readings: read.readings }
-  const related = relate(read.unit, unit)
-  if (related.problem) return { state: 'unread', problem: related.problem, detail: read.unit, readings: [] }
-  if (related.fits === false) return { state: 'wrong', near: 'unit', value: read.value, converted: false }
-  const { factor, offset } = related
+  const conversion = relate(read.unit, unit)
+  if (conversion.problem) return { state: 'unread', problem: conversion.problem, detail: read.unit, readings: [] }
+  if (conversion.fits === false) return { state: 'wrong', slip: 'unit', value: read.value, converted: false }
+  const { factor, offset } = conversion
   const value = read.value * factor + offset
   const step = read.step === null ? null : read.step * factor
   const converted = read.step === null || factor !== 1 || offset !== 0
   if (!Number.isFinite(value)) return { state: 'unread', problem: 'finite', detail: '', readings: [] }
-  if (within(value, answer, tolerance)) return { state: 'right', value, converted }
-  const scaled = Math.abs(factor - 1) > 1e-9 || offset !== 0
+  if (isWithin(value, answer, tolerance)) return { state: 'right', value, converted }
+  const isScaled = Math.abs(factor - 1) > 1e-9 || offset !== 0
   const angle = hasAngle(readUnit(unit))
-  const near = scaled && within(read.value, answer, tolerance) ? 'scale' : nearMiss({ value, step }, { answer, tolerance, angle })
-  return { state: 'wrong', near, value, converted }
+  const slip = isScaled && isWithin(read.value, answer, tolerance) ? 'scale' : nearMiss({ value, step }, { answer, tolerance, angle })
+  return { state: 'wrong', slip, value, converted }
 }
 
-/** How what was written beside a number becomes what is asked for. */
-function relate(written, asked) {
-  const same = { factor: 1, offset: 0 }
-  if (written === '' || plain(written) === plain(asked)) return same
-  const given = readUnit(written)
-  const known = readUnit(asked)
-  if (given.length === 0) return { problem: /[\d+]/.test(plain(written).replace(/\^?\(?-?\d+(?:\/\d+)?\)?/g, '')) ? 'sign' : 'unit' }
-  // The author's unit is one that nobody knows, or the question is for a number alone.
-  if (known.length === 0) return { fits: false }
-  const related = relation(given, known)
-  if (related !== null) return related
-  return asked.trim() === '' ? { problem: 'no_unit' } : { fits: false }
+/** The conversion from the unit that was written to the expected one. */
+function relate(writtenUnit, expectedUnit) {
+  const identity = { factor: 1, offset: 0 }
+  if (writtenUnit === '' || plain(writtenUnit) === plain(expectedUnit)) return identity
+  const writtenReadings = readUnit(writtenUnit)
+  const expectedReadings = readUnit(expectedUnit)
+  if (writtenReadings.length === 0) return { problem: /[\d+]/.test(plain(writtenUnit).replace(/\^?\(?-?\d+(?:\/\d+)?\)?/g, '')) ? 'sign' : 'unit' }
+  // The author's unit is unknown.
+  if (expectedReadings.length === 0) return { fits: false }
+  const conversion = relation(writtenReadings, expectedReadings)
+  if (conversion !== null) return conversion
+  return expectedUnit.trim() === '' ? { problem: 'no_unit' } : { fits: false }
 }

@@ -5,32 +5,32 @@ import { h } from './parts.js'
 const MARKS = ['right', 'partly', 'wrong']
 
 export class Open {
-  stays = true // the reference stays in sight while the answer is worked over
+  keepsReference = true // the reference stays in sight while the answer is edited
 
   constructor(question) {
     this.question = question
     this.words = question.words
     this.submit = this.words('quiz.live.compare')
     const id = question.id('entry')
-    const changed = () => this.question.result?.finished && this.#marked()
-    this.input = h('textarea', { id, class: 'quiz-entry-field', dir: 'auto', rows: 4, maxLength: 20_000, onchange: changed })
+    const onChange = () => this.question.result?.finished && this.#gradeMark()
+    this.input = h('textarea', { id, class: 'quiz-entry-field', dir: 'auto', rows: 4, maxLength: 20_000, onchange: onChange })
     const label = h('label', { class: 'quiz-entry-label', for: id }, this.words('quiz.live.words'))
     this.body = h('div', { class: 'quiz-entry' }, label, this.input)
-    this.radios = MARKS.map((value) => h('input', { type: 'radio', name: 'mark', value, onchange: () => this.#marked() }))
+    this.radios = MARKS.map((value) => h('input', { type: 'radio', name: 'mark', value, onchange: () => this.#gradeMark() }))
     const name = (mark) => h('span', {}, this.words(`quiz.live.self.${mark}`))
     const labels = this.radios.map((radio) => h('label', { class: 'option' }, radio, name(radio.value)))
-    this.below = h('fieldset', { class: 'self-mark', hidden: true }, h('legend', {}, this.words('quiz.live.self.how')), ...labels)
+    this.footer = h('fieldset', { class: 'self-mark', hidden: true }, h('legend', {}, this.words('quiz.live.self.how')), ...labels)
   }
 
-  given() {
+  entry() {
     if (this.input.value.trim() === '') return null
     return { text: this.input.value, mark: this.radios.find(({ checked }) => checked)?.value ?? '' }
   }
 
-  show(given) {
-    this.input.value = typeof given?.text === 'string' ? given.text : ''
-    for (const radio of this.radios) radio.checked = radio.value === given?.mark
-    return this.given() !== null
+  show(entry) {
+    this.input.value = typeof entry?.text === 'string' ? entry.text : ''
+    for (const radio of this.radios) radio.checked = radio.value === entry?.mark
+    return this.entry() !== null
   }
 
   clear() {
@@ -44,17 +44,17 @@ export class Open {
 
   grade({ mark }) {
     const state = MARKS.includes(mark) ? mark : 'done'
-    // What is right in part comes back like what is wrong.
+    // A partly right answer comes back in the review like a wrong one.
     const right = state === 'done' ? null : state === 'right'
     const line = this.words(state === 'done' ? 'quiz.live.self.compare' : `quiz.live.self.said_${state}`)
     return { state, right, line, solution: true, finished: true }
   }
 
   mark(result) {
-    this.below.hidden = !result || result.state === 'unread'
+    this.footer.hidden = !result || result.state === 'unread'
   }
 
-  #marked() {
-    this.question.note(this.grade(this.given() ?? { mark: '' }))
+  #gradeMark() {
+    this.question.note(this.grade(this.entry() ?? { mark: '' }))
   }
 }

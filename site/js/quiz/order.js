@@ -1,34 +1,34 @@
-/** Putting items in order: pure. Orders are lists of keys. */
+/** Orders of items, as lists of keys. Pure. */
 
-/** The order after an item moved by some places; it stops at the ends. */
-export function moved(order, key, by) {
-  const from = order.indexOf(key)
-  if (from < 0) return order
-  return placed(order, key, from + by)
+/** Move an item by some places; it stops at the ends. */
+export function moveBy(order, key, steps) {
+  const index = order.indexOf(key)
+  if (index < 0) return order
+  return moveTo(order, key, index + steps)
 }
 
-/** The order after an item was put at a place. */
-export function placed(order, key, place) {
-  const from = order.indexOf(key)
-  if (from < 0) return order
-  const rest = order.filter((other) => other !== key)
-  const to = Math.min(Math.max(place, 0), rest.length)
-  return [...rest.slice(0, to), key, ...rest.slice(to)]
+/** Move an item to a place. */
+export function moveTo(order, key, place) {
+  const index = order.indexOf(key)
+  if (index < 0) return order
+  const rest = order.filter((item) => item !== key)
+  const target = Math.min(Math.max(place, 0), rest.length)
+  return [...rest.slice(0, target), key, ...rest.slice(target)]
 }
 
 /**
- * An order that was kept, for the items that there are now: those that have gone are left out, new ones come at the end.
- * @param {unknown} kept
+ * Adapt a stored order to the present items: removed ones are left out, new ones come at the end.
+ * @param {unknown} storedOrder
  * @param {string[]} present
  */
-export function restored(kept, present) {
-  if (!Array.isArray(kept)) return [...present]
-  const known = [...new Set(kept)].filter((key) => present.includes(key))
-  return [...known, ...present.filter((key) => !known.includes(key))]
+export function restoreOrder(storedOrder, present) {
+  if (!Array.isArray(storedOrder)) return [...present]
+  const valid = [...new Set(storedOrder)].filter((key) => present.includes(key))
+  return [...valid, ...present.filter((key) => !valid.includes(key))]
 }
 
 /**
- * The place for an item that is dragged: so many of the others have their middle above it.
+ * The place for a dragged item: the number of other items whose middle is above the pointer.
  * @param {number} y of the pointer
  * @param {number[]} middles of the other items, in their order
  */

@@ -1,12 +1,12 @@
 /**
- * Items that are put in order: by a button for each direction, by arrow keys on these, or drawn by their grip.
+ * Questions whose items are put in order: by a button for each direction, by arrow keys on these, or by dragging.
  *
- * An item that has the focus or the pointer never leaves its place in the document, since it would lose both: the others move.
+ * An item that has the focus or the pointer is never moved in the document, since it would lose both: the other items are.
  */
 
 import { gradeOrder } from './grade.js'
-import { moved, placeAt, placed, restored } from './order.js'
-import { fill, h, keysIn, shape, spoken } from './parts.js'
+import { moveBy, placeAt, moveTo, restoreOrder } from './order.js'
+import { fill, h, keysIn, shape, spokenText } from './parts.js'
 
 export class Ordering {
   constructor(question) {
@@ -16,88 +16,88 @@ export class Ordering {
     this.submit = words('quiz.live.check')
     this.answers = keysIn(element.dataset.answer)
     const list = element.querySelector(':scope > .items')
-    this.first = [...list.children].map((item) => item.dataset.key)
+    this.initialOrder = [...list.children].map((item) => item.dataset.key)
     this.items = new Map([...list.children].map((item) => [item.dataset.key, this.#item(item)]))
     this.list = h('ol', { class: 'ordering' }, ...[...this.items.values()].map(({ item }) => item))
-    this.said = h('p', { class: 'unseen', role: 'status' })
-    this.body = h('div', {}, this.list, this.said)
-    this.order = this.first
+    this.status = h('p', { class: 'unseen', role: 'status' })
+    this.body = h('div', {}, this.list, this.status)
+    this.order = this.initialOrder
     list.remove()
-    this.#ends()
+    this.#updateButtons()
   }
 
   #item(old) {
     const key = old.dataset.key
     const id = this.question.id(key)
     const text = h('span', { class: 'item-text', id }, ...old.childNodes)
-    const mover = (name, by) => {
-      const own = this.question.id(`${key}-${name}`)
+    const moveButton = (name, steps) => {
+      const buttonId = this.question.id(`${key}-${name}`)
       const label = this.words(`quiz.live.${name}`)
-      const properties = { id: own, class: 'quiz-button quiz-move', title: label, 'aria-label': label, 'aria-labelledby': `${own} ${id}` }
-      return h('button', { type: 'button', ...properties, onclick: () => this.move(key, by) }, shape(name))
+      const properties = { id: buttonId, class: 'quiz-button quiz-move', title: label, 'aria-label': label, 'aria-labelledby': `${buttonId} ${id}` }
+      return h('button', { type: 'button', ...properties, onclick: () => this.move(key, steps) }, shape(name))
     }
-    const up = mover('up', -1)
-    const down = mover('down', 1)
-    const grip = h('span', { class: 'item-grip', onpointerdown: (event) => this.#draw(key, event) }, shape('grip'))
-    const row = h('div', { class: 'item-row' }, grip, text, up, down)
-    const item = h('li', { class: 'item', onkeydown: (event) => this.#key(key, event) }, row)
+    const upButton = moveButton('up', -1)
+    const downButton = moveButton('down', 1)
+    const grip = h('span', { class: 'item-grip', onpointerdown: (event) => this.#startDrag(key, event) }, shape('grip'))
+    const row = h('div', { class: 'item-row' }, grip, text, upButton, downButton)
+    const item = h('li', { class: 'item', onkeydown: (event) => this.#onKey(key, event) }, row)
     item.dataset.key = key
-    return { item, text, up, down, grip }
+    return { item, text, up: upButton, down: downButton, grip }
   }
 
-  given() {
+  entry() {
     return this.order
   }
 
-  show(given) {
-    if (!Array.isArray(given)) return false
-    this.#arrange(restored(given, this.first))
+  show(entry) {
+    if (!Array.isArray(entry)) return false
+    this.#arrange(restoreOrder(entry, this.initialOrder))
     return true
   }
 
   clear() {
-    this.#arrange(this.first)
+    this.#arrange(this.initialOrder)
   }
 
   focus() {
     this.items.get(this.order[0]).down.focus()
   }
 
-  grade(given) {
-    const { right, placed: count } = gradeOrder(given, this.answers)
+  grade(entry) {
+    const { right, placedCount: count } = gradeOrder(entry, this.answers)
     const more = right ? '' : fill(this.words('quiz.live.placed'), { count, all: this.answers.length })
     return { state: right ? 'right' : 'wrong', right, more }
   }
 
   mark() {}
 
-  /** Move an item by some places, and say where it stands now. */
-  move(key, by) {
-    const order = moved(this.order, key, by)
-    const changed = order.join(' ') !== this.order.join(' ')
-    if (changed) {
+  /** Move an item by some places, and announce its new place. */
+  move(key, steps) {
+    const order = moveBy(this.order, key, steps)
+    const hasChanged = order.join(' ') !== this.order.join(' ')
+    if (hasChanged) {
       this.#arrange(order, key)
-      this.question.touched()
+      this.question.onEdit()
     }
-    this.#tell(key)
+    this.#announce(key)
   }
 
-  #tell(key) {
-    const item = spoken(this.items.get(key).text)
-    this.said.textContent = fill(this.words('quiz.live.moved'), { item, place: this.order.indexOf(key) + 1, all: this.order.length })
+  #announce(key) {
+    const item = spokenText(this.items.get(key).text)
+    this.status.textContent = fill(this.words('quiz.live.moved'), { item, place: this.order.indexOf(key) + 1, all: this.order.length })
   }
 
-  #arrange(order, kept = order[0]) {
+  #arrange(order, fixedKey = order[0]) {
     this.order = order
-    const still = this.items.get(kept).item
-    const at = order.indexOf(kept)
-    for (const key of order.slice(0, at)) still.before(this.items.get(key).item)
-    this.list.append(...order.slice(at + 1).map((key) => this.items.get(key).item))
-    this.#ends()
+    const still = this.items.get(fixedKey).item
+    const index = order.indexOf(fixedKey)
+    for (const key of order.slice(0, index)) still.before(this.items.get(key).item)
+    this.list.append(...order.slice(index + 1).map((key) => this.items.get(key).item))
+    this.#updateButtons()
   }
 
-  /** What cannot go further says so; it keeps the focus all the same. */
-  #ends() {
+  /** Disable buttons at the ends, by ARIA only, so that they keep the focus. */
+  #updateButtons() {
     this.order.forEach((key, place) => {
       const { up, down } = this.items.get(key)
       up.setAttribute('aria-disabled', String(place === 0))
@@ -105,28 +105,28 @@ export class Ordering {
     })
   }
 
-  #key(key, event) {
+  #onKey(key, event) {
     if (event.altKey || event.ctrlKey || event.metaKey) return
-    const by = { ArrowUp: -1, ArrowDown: 1, Home: -this.order.length, End: this.order.length }[event.key]
-    if (by === undefined) return
+    const steps = { ArrowUp: -1, ArrowDown: 1, Home: -this.order.length, End: this.order.length }[event.key]
+    if (steps === undefined) return
     event.preventDefault()
-    this.move(key, by)
+    this.move(key, steps)
   }
 
-  #draw(key, down) {
-    if (down.button !== 0) return
-    down.preventDefault()
+  #startDrag(key, press) {
+    if (press.button !== 0) return
+    press.preventDefault()
     const { item, grip } = this.items.get(key)
-    const before = this.order
-    grip.setPointerCapture(down.pointerId)
+    const previousOrder = this.order
+    grip.setPointerCapture(press.pointerId)
     item.classList.add('is-drawn')
     const follow = (event) => {
-      const others = this.order.filter((other) => other !== key)
-      const middles = others.map((other) => {
-        const box = this.items.get(other).item.getBoundingClientRect()
+      const otherKeys = this.order.filter((otherKey) => otherKey !== key)
+      const middles = otherKeys.map((otherKey) => {
+        const box = this.items.get(otherKey).item.getBoundingClientRect()
         return (box.top + box.bottom) / 2
       })
-      const order = placed(this.order, key, placeAt(event.clientY, middles))
+      const order = moveTo(this.order, key, placeAt(event.clientY, middles))
       if (order.join(' ') !== this.order.join(' ')) this.#arrange(order, key)
     }
     const end = (event) => {
@@ -134,10 +134,10 @@ export class Ordering {
       grip.removeEventListener('pointerup', end)
       grip.removeEventListener('pointercancel', end)
       item.classList.remove('is-drawn')
-      if (event.type === 'pointercancel') this.#arrange(before, key)
-      if (this.order.join(' ') === before.join(' ')) return
-      this.question.touched()
-      this.#tell(key)
+      if (event.type === 'pointercancel') this.#arrange(previousOrder, key)
+      if (this.order.join(' ') === previousOrder.join(' ')) return
+      this.question.onEdit()
+      this.#announce(key)
     }
     grip.addEventListener('pointermove', follow)
     grip.addEventListener('pointerup', end)

@@ -1,4 +1,4 @@
-/** Small things that all kinds of questions are made of. */
+/** Small parts that all kinds of questions share. */
 
 import { h, pictogram } from '../lab/page/dom.js'
 import { fill } from '../lab/page/words.js'
@@ -16,7 +16,7 @@ const SHAPES = {
   grip: 'M6 4v.01M10 4v.01M6 8v.01M10 8v.01M6 12v.01M10 12v.01',
 }
 
-/** A small drawing in the colour of the text; what it means is said in words beside it. */
+/** An icon in the colour of the text; words beside it say what it means. */
 export function shape(name) {
   const svg = pictogram(SHAPES[name])
   svg.classList.add('quiz-shape')
@@ -27,21 +27,21 @@ export function button(text, properties = {}) {
   return h('button', { type: 'button', class: 'quiz-button', ...properties }, text)
 }
 
-/** Show or hide an element that can be focused; one that has the focus hands it on. */
+/** Show or hide an element; if it has the focus, hand it on to `next`. */
 export function setHidden(element, hidden, next) {
   if (hidden && element.contains(document.activeElement)) next?.focus()
   element.hidden = hidden
 }
 
-/** A copy of what is in an element, without its ids. */
+/** A copy of an element's content, without ids. */
 export function copyOf(element) {
   const copy = element.cloneNode(true)
-  for (const one of copy.querySelectorAll('[id]')) one.removeAttribute('id')
+  for (const child of copy.querySelectorAll('[id]')) child.removeAttribute('id')
   return copy.childNodes
 }
 
-/** The text of an element as it is read: without the source of its formulas. */
-export function spoken(element) {
+/** The text of an element as it is read aloud: without the source of its formulas. */
+export function spokenText(element) {
   const copy = element.cloneNode(true)
   for (const source of copy.querySelectorAll('annotation, annotation-xml')) source.remove()
   return copy.textContent.replace(/\s+/g, ' ').trim()

@@ -1,13 +1,14 @@
 /**
- * A live question: the form around the controls of its kind, its hints, its verdict, and what is kept of it.
+ * A live question: the form around the control of its kind, its hints, its verdict, and its stored answer.
  *
- * The page has the question with its answer behind a fold. That fold stays, for paper; on a screen its parts (the solution, the
- * explanation, what is said of an option) move into the verdict when they are due, and back. Nothing is copied, so that no id is there
+ * The page has the question with its answer behind a fold. That fold stays, for print; on a screen its parts (the solution, the
+ * explanation, the feedback to options) move into the verdict when they are due, and back. Nothing is copied, so that no id occurs
  * twice.
  *
- * The controls of a kind have `body`, `given()`, `show(given)`, `clear()`, `focus()`, `grade(given)`, `mark(result)` and the text of
- * their button, `submit`. A result is `{ state, right, line, more, nodes, feedback, solution, finished }`: the verdict's first sentence
- * where it is not the usual one, what is added to it, elements below, the options whose feedback is shown, whether the solution is.
+ * The control of a kind has `body`, `entry()`, `show(entry)`, `clear()`, `focus()`, `grade(entry)`, `mark(result)` and the text of
+ * its button, `submit`. A result is `{ state, right, line, more, nodes, feedback, solution, finished }`: `line` replaces the verdict's
+ * usual sentence, `more` is added to it, `nodes` come below; `feedback` lists the options whose feedback is shown, and `solution` says
+ * whether the solution is.
  */
 
 import { Choices } from './choices.js'
@@ -18,7 +19,7 @@ import { button, fill, h, setHidden, shape } from './parts.js'
 
 const KINDS = { mcq: Choices, several: Choices, predict: Choices, numeric: Numeric, output: Output, open: Open, order: Ordering }
 
-/** Whether a question of the page can be answered there. One about a script that was not run has no answer. */
+/** Whether a question can be answered in the page. One about a script that was not run has no answer. */
 export function canBeLive(element) {
   const { kind, answer } = element.dataset
   return Object.hasOwn(KINDS, kind) && (kind === 'open' || answer !== undefined) && !element.classList.contains('is-live')
@@ -28,7 +29,7 @@ export class Question {
   /**
    * @param {HTMLElement} element the page's `.question`
    * @param {(key: string) => string} words
-   * @param {(answer: object) => void} keep called with what is to be kept
+   * @param {(answer: object) => void} keep called with each answer that is to be stored
    */
   constructor(element, words, keep) {
     this.element = element
@@ -38,7 +39,7 @@ export class Question {
     this.hints = 0
     this.result = null
     this.dirty = false
-    this.at = ''
+    this.savedAt = ''
     this.fold = element.querySelector(':scope > .answer')
     this.simulation = this.fold.querySelector(':scope > .simulation')
     this.home = [...this.fold.children].filter((child) => child.localName !== 'summary' && child !== this.simulation)
@@ -46,74 +47,74 @@ export class Question {
     this.#build()
   }
 
-  /** An id for a part of it; always the same, so that a page is the same whenever it came alive. */
+  /** The id of a part of the question; it does not depend on when the question was mounted. */
   id(name) {
     return `_${this.element.id || this.element.dataset.question}.${name}`
   }
 
-  // --- what is kept
+  // --- stored answers
 
-  /** Show an answer of before; nothing is kept again. @returns {boolean} whether there was anything to show */
-  restore({ given, tries, hints, at }) {
+  /** Show a stored answer, without storing it again. @returns {boolean} whether there was anything to show */
+  restore({ given: entry, tries, hints, at }) {
     this.control.clear()
-    if (!this.control.show(given)) return false
-    this.at = at
+    if (!this.control.show(entry)) return false
+    this.savedAt = at
     this.tries = Number.isFinite(tries) ? tries : 1
     this.#openHints(Number.isFinite(hints) ? hints : 0)
-    const entered = this.control.given()
+    const entered = this.control.entry()
     const result = this.control.grade(entered)
     this.dirty = false
     this.#set(result.state === 'unread' ? null : result)
     return true
   }
 
-  /** As it was before any answer. */
+  /** Reset the question to its state before any answer. */
   empty() {
     this.control.clear()
     this.tries = 0
-    this.at = ''
+    this.savedAt = ''
     this.dirty = false
     this.#set(null)
   }
 
-  /** What was entered since the last check. */
+  /** The entry, if it has changed since the last check, else null. */
   draft() {
-    return this.dirty ? this.control.given() : null
+    return this.dirty ? this.control.entry() : null
   }
 
-  showDraft(given) {
-    this.dirty = this.control.show(given)
-    if (this.dirty) this.#set(null) // a verdict would be that of another answer
+  showDraft(entry) {
+    this.dirty = this.control.show(entry)
+    if (this.dirty) this.#set(null) // the verdict was that of another answer
   }
 
-  // --- what happens
+  // --- actions
 
   check() {
     if (this.checking.getAttribute('aria-disabled') === 'true') return
-    const given = this.control.given()
-    if (given === null) {
-      const nothing = this.words(`quiz.live.nothing.${this.element.dataset.kind}`)
-      return this.#set({ state: 'unread', right: null, line: nothing })
+    const entry = this.control.entry()
+    if (entry === null) {
+      const message = this.words(`quiz.live.nothing.${this.element.dataset.kind}`)
+      return this.#set({ state: 'unread', right: null, line: message })
     }
-    const result = this.control.grade(given)
+    const result = this.control.grade(entry)
     if (result.state !== 'unread') this.tries += 1
     this.note(result)
   }
 
-  /** Take a result, and keep it where there is one. */
+  /** Show a result, and store the answer unless it was unreadable. */
   note(result) {
     this.#set(result)
     if (result.state === 'unread') return
     this.dirty = false
-    this.at = new Date().toISOString()
-    this.keep({ given: this.control.given(), right: result.right, tries: this.tries, hints: this.hints, at: this.at })
+    this.savedAt = new Date().toISOString()
+    this.keep({ given: this.control.entry(), right: result.right, tries: this.tries, hints: this.hints, at: this.savedAt })
   }
 
   reveal() {
     this.#set({ ...this.result, state: 'done', line: this.words('quiz.live.answer'), more: '', nodes: [], solution: true, finished: true })
   }
 
-  again() {
+  retry() {
     this.control.clear()
     this.dirty = false
     this.#set(null)
@@ -121,41 +122,41 @@ export class Question {
   }
 
   /** The learner has changed the answer. */
-  touched() {
+  onEdit() {
     this.dirty = true
     const { control, result } = this
-    if (result === null || (result.finished && (control.stays || control.final))) return
-    const mending = control.keeps && !result.finished && result.state !== 'right'
-    if (!mending) this.#set(null)
+    if (result === null || (result.finished && (control.keepsReference || control.final))) return
+    const isMending = control.keepsVerdict && !result.finished && result.state !== 'right'
+    if (!isMending) this.#set(null)
   }
 
-  // --- how it looks
+  // --- elements
 
   #build() {
     const { element, control } = this
     this.verdict = h('div', { class: 'verdict', role: 'status', 'aria-atomic': 'false' })
     this.checking = h('button', { type: 'submit', class: 'quiz-button quiz-check' }, control.submit)
     this.revealing = button(this.words('quiz.live.reveal'), { hidden: true, onclick: () => this.reveal() })
-    this.retrying = button(this.words('quiz.live.again'), { hidden: true, onclick: () => this.again() })
+    this.retrying = button(this.words('quiz.live.again'), { hidden: true, onclick: () => this.retry() })
     const submit = (event) => {
       event.preventDefault()
       this.check()
     }
-    const how = element.querySelector(':scope > .question-how')
-    if (how) how.id = this.id('how')
+    const instructions = element.querySelector(':scope > .question-how')
+    if (instructions) instructions.id = this.id('how')
     const legend = this.#legend()
-    const described = [how, ...legend].filter((part) => part?.id && part.localName !== 'legend').map((part) => part.id)
-    const fields = h('fieldset', { 'aria-describedby': described.join(' ') || null }, ...legend, how, control.body)
-    fields.addEventListener('input', () => this.touched())
+    const describedBy = [instructions, ...legend].filter((part) => part?.id && part.localName !== 'legend').map((part) => part.id)
+    const fields = h('fieldset', { 'aria-describedby': describedBy.join(' ') || null }, ...legend, instructions, control.body)
+    fields.addEventListener('input', () => this.onEdit())
     const actions = h('div', { class: 'question-actions' }, this.checking, this.revealing, this.retrying)
     this.form = h('form', { class: 'question-form', noValidate: true, autocomplete: 'off', onsubmit: submit }, fields)
-    this.form.append(...this.#takeHints(), actions, this.verdict, ...(control.below ? [control.below] : []))
+    this.form.append(...this.#takeHints(), actions, this.verdict, ...(control.footer ? [control.footer] : []))
     this.fold.before(this.form)
     element.classList.add('is-live')
     this.#set(null)
   }
 
-  /** The question as the group's name: its first paragraph; the rest describes it. */
+  /** The legend that names the group: the question's first paragraph; the rest describes the group. */
   #legend() {
     const text = this.element.querySelector(':scope > .question-text')
     const lead = [...text.childNodes].find((node) => node.nodeType !== Node.TEXT_NODE || node.data.trim() !== '')
@@ -171,7 +172,7 @@ export class Question {
     return [legend]
   }
 
-  /** The hints, of which each shows when the one before was opened. */
+  /** The hints; each is shown once the one before is opened. */
   #takeHints() {
     this.hintFolds = [...this.element.querySelectorAll(':scope > .hint')]
     this.hintFolds.forEach((fold, index) => {
@@ -188,25 +189,25 @@ export class Question {
 
   #set(result) {
     const { control, fold, verdict } = this
-    const shown = this.result
+    const previous = this.result
     this.result = result
-    const over = result?.state === 'right' || Boolean(result?.finished)
+    const isOver = result?.state === 'right' || Boolean(result?.finished)
     verdict.dataset.state = result?.state ?? ''
-    if (control.stays && shown?.finished && over) verdict.firstElementChild.replaceWith(this.#line(result))
+    if (control.keepsReference && previous?.finished && isOver) verdict.firstElementChild.replaceWith(this.#line(result))
     else {
-      const said = result ? [this.#line(result), ...this.#details(result, over)] : []
-      fold.append(...this.home.filter((part) => !said.includes(part)))
-      verdict.replaceChildren(...said)
+      const nodes = result ? [this.#line(result), ...this.#details(result, isOver)] : []
+      fold.append(...this.home.filter((part) => !nodes.includes(part)))
+      verdict.replaceChildren(...nodes)
     }
-    if (this.simulation) this.#place(over)
+    if (this.simulation) this.#place(isOver)
     fold.classList.toggle('is-empty', fold.childElementCount === 1)
     control.mark(result)
-    this.checking.setAttribute('aria-disabled', String(over))
-    setHidden(this.retrying, !over || Boolean(control.final), this.checking)
-    setHidden(this.revealing, over || this.tries === 0 || Boolean(control.final || control.stays), over ? this.retrying : this.checking)
+    this.checking.setAttribute('aria-disabled', String(isOver))
+    setHidden(this.retrying, !isOver || Boolean(control.final), this.checking)
+    setHidden(this.revealing, isOver || this.tries === 0 || Boolean(control.final || control.keepsReference), isOver ? this.retrying : this.checking)
   }
 
-  /** The simulation, outside of the form: what is pressed there answers nothing. It is only moved where it is not yet. */
+  /** Put the simulation after the form, so that its buttons do not submit it, or back into the fold; only if it is not there yet. */
   #place(open) {
     const { simulation, fold, form } = this
     if (open && form.nextElementSibling !== simulation) form.after(simulation)
@@ -219,10 +220,10 @@ export class Question {
     return h('p', { class: 'verdict-line' }, shape(state), h('strong', {}, line), result.more ? ` ${result.more}` : null)
   }
 
-  /** Below the line: what belongs to the options that were chosen, the solution, the explanation. */
-  #details(result, over) {
+  /** The parts below the line: feedback to the chosen options, the solution, the explanation. */
+  #details(result, isOver) {
     const part = (name) => this.home.filter((child) => child.classList.contains(name))
     const feedback = (result.feedback ?? []).flatMap((key) => part('feedback').filter((child) => child.dataset.key === key))
-    return [...(result.nodes ?? []), ...feedback, ...(result.solution ? part('solution') : []), ...(over ? part('explain') : [])]
+    return [...(result.nodes ?? []), ...feedback, ...(result.solution ? part('solution') : []), ...(isOver ? part('explain') : [])]
   }
 }

@@ -1,11 +1,11 @@
 /**
- * Units: read, and set in relation by what they measure.
+ * Reads units, and converts between those that measure the same.
  *
  *   readUnit('kg·m²')[0]                     → { scale: 1, offset: 0, powers: { kg: 1, m: 2 } }
  *   relation(readUnit('g cm^2'), readUnit('kg m^2'))  → { factor: 1e-7, offset: 0 }
  *
- * The SI with its prefixes, what is in use beside it, and angles. An angle is no dimension, but telling it apart shows mistakes: `rad`
- * and `deg` can be left out or put in; but hertz count cycles, and are not taken for radians a second.
+ * The SI with its prefixes, other common units, and angles. An angle is no dimension, but treating it as one reveals mistakes: `rad`
+ * and `deg` may be omitted or added, but hertz count cycles and are not taken for radians per second.
  */
 
 import { normalise } from './numbers.js'
@@ -92,13 +92,13 @@ const NAMES = {
 const KELVIN = 273.15
 
 /**
- * @typedef {{scale: number, offset: number, powers: Object<string, number>}} Unit in base units; `offset`, K: what is added first (°C)
+ * @typedef {{scale: number, offset: number, powers: Object<string, number>}} Unit in base units; `offset` (K) is added first (°C)
  */
 
 /**
- * What a text may mean as a unit: mostly one thing; two where several factors follow a solidus (`J/kg K`), the strict one first.
+ * The readings of a text as a unit: mostly one; two if several factors follow a solidus (`J/kg K`), the strict one first.
  *
- * @returns {Unit[]} none where it is no unit; an empty text is the unit 1
+ * @returns {Unit[]} empty if it is no unit; an empty text is the unit 1
  */
 export function readUnit(text) {
   const source = plain(text)
@@ -108,7 +108,7 @@ export function readUnit(text) {
   return readings.filter((unit) => unit !== null)
 }
 
-/** A unit's text, whatever signs were chosen: for units that nobody knows. */
+/** The normalised text of a unit, to compare units that are unknown. */
 export function plain(text) {
   const bare = text
     .slice(0, 100)
@@ -133,100 +133,100 @@ export function plain(text) {
     .trim()
 }
 
-/** How to come from a value in one unit to the same in another: `value · factor + offset`; null where they measure different things. */
-export function relation(given, asked) {
-  for (const one of given) {
-    for (const other of asked) {
-      if (!alike(one.powers, other.powers)) continue
-      const factor = one.scale / other.scale
-      return { factor, offset: one.offset === other.offset ? 0 : (one.offset - other.offset) / other.scale }
+/** The conversion from one unit to another, `value · factor + offset`; null if they measure different things. */
+export function relation(first, second) {
+  for (const a of first) {
+    for (const b of second) {
+      if (!sameDimensions(a.powers, b.powers)) continue
+      const factor = a.scale / b.scale
+      return { factor, offset: a.offset === b.offset ? 0 : (a.offset - b.offset) / b.scale }
     }
   }
   return null
 }
 
-/** Whether two units measure the same; an angle can be left out of either. */
-function alike(one, other) {
-  const names = new Set([...Object.keys(one), ...Object.keys(other)])
+/** Whether two units measure the same; either may omit an angle. */
+function sameDimensions(first, second) {
+  const names = new Set([...Object.keys(first), ...Object.keys(second)])
   names.delete(ANGLE)
   names.delete(CYCLES)
-  for (const name of names) if (Math.abs((one[name] ?? 0) - (other[name] ?? 0)) > 1e-9) return false
-  const [a, b] = [angular(one), angular(other)]
+  for (const name of names) if (Math.abs((first[name] ?? 0) - (second[name] ?? 0)) > 1e-9) return false
+  const [a, b] = [angular(first), angular(second)]
   return a === 0 || b === 0 || a === b
 }
 
-/** 0: no angle, else which. */
+/** The kind of angle in a unit; 0: none. */
 const angular = (powers) => (powers[CYCLES] ? CYCLES : powers[ANGLE] ? ANGLE : 0)
 
-/** Whether a unit has an angle in it that is counted in radians (or degrees). */
+/** Whether a unit contains an angle in radians (or degrees). */
 export const hasAngle = (units) => units.some(({ powers }) => angular(powers) === ANGLE)
 
 // --- reading
 
 function parse(source, wide) {
-  const reader = { text: source, at: 0, wide, depth: 0 }
+  const reader = { text: source, index: 0, wide, depth: 0 }
   const unit = product(reader)
-  return unit !== null && reader.at === source.length && Number.isFinite(unit.scale) && unit.scale > 0 ? unit : null
+  return unit !== null && reader.index === source.length && Number.isFinite(unit.scale) && unit.scale > 0 ? unit : null
 }
 
-/** Factors with signs between them; with `wide`, all that follows a solidus is below the line. */
+/** Factors with signs between them; with `wide`, everything after a solidus is in the denominator. */
 function product(reader) {
   let unit = { scale: 1, offset: 0, powers: {} }
   let sign = 1
-  let first = true
+  let isFirst = true
   for (;;) {
-    const char = reader.text[reader.at] ?? ''
+    const char = reader.text[reader.index] ?? ''
     if (char === '/') {
-      reader.at += 1
+      reader.index += 1
       sign = -1
-    } else if (!first && (char === '*' || char === ' ')) reader.at += 1
-    else if (!first && (char === '' || char === ')')) return unit
+    } else if (!isFirst && (char === '*' || char === ' ')) reader.index += 1
+    else if (!isFirst && (char === '' || char === ')')) return unit
     const factor = group(reader)
     if (factor === null) return null
-    if ((!first || sign < 0) && (factor.offset || unit.offset)) return null // °C stands alone
-    unit = times(unit, factor, sign)
+    if ((!isFirst || sign < 0) && (factor.offset || unit.offset)) return null // °C stands alone
+    unit = multiply(unit, factor, sign)
     if (!reader.wide) sign = 1
-    first = false
+    isFirst = false
   }
 }
 
 function group(reader) {
   let unit
-  if (reader.text[reader.at] === '(') {
+  if (reader.text[reader.index] === '(') {
     if (++reader.depth > 5) return null
-    reader.at += 1
+    reader.index += 1
     unit = product(reader)
-    if (unit === null || reader.text[reader.at] !== ')') return null
-    reader.at += 1
+    if (unit === null || reader.text[reader.index] !== ')') return null
+    reader.index += 1
     reader.depth -= 1
   } else {
-    const symbol = /^(?:°C|[°%‰'"]|\p{L}+|1(?![\d.]))/u.exec(reader.text.slice(reader.at))?.[0]
+    const symbol = /^(?:°C|[°%‰'"]|\p{L}+|1(?![\d.]))/u.exec(reader.text.slice(reader.index))?.[0]
     if (symbol === undefined) return null
-    reader.at += symbol.length
+    reader.index += symbol.length
     if (symbol === '1') return { scale: 1, offset: 0, powers: {} }
-    const parts = named(symbol)
+    const parts = unitsOf(symbol)
     if (parts === null) return null
     const power = exponent(reader)
     if (power === null) return null
-    // Of units written together, an exponent belongs to the last.
-    const raised = raise(parts.at(-1), power)
-    return parts.slice(0, -1).reduce((all, part) => times(all, part, 1), raised)
+    // After units written together, an exponent belongs to the last.
+    const last = raise(parts.at(-1), power)
+    return parts.slice(0, -1).reduce((result, part) => multiply(result, part, 1), last)
   }
   const power = exponent(reader)
   return power === null ? null : raise(unit, power)
 }
 
-/** An exponent as written: `^2`, `^-1`, `^(1/2)`, `2`, `-1`; 1 where there is none; null where it is none. */
+/** An exponent as written: `^2`, `^-1`, `^(1/2)`, `2`, `-1`; 1 if there is none; null if it is malformed. */
 function exponent(reader) {
-  const found = /^(?:\^(?:\(([-+]?\d+(?:\.\d+)?)(?:\/(\d+))?\)|([-+]?\d+(?:\.\d+)?))|([-+]?\d+))/.exec(reader.text.slice(reader.at))
-  if (!found) return reader.text[reader.at] === '^' ? null : 1
-  reader.at += found[0].length
-  const power = Number(found[1] ?? found[3] ?? found[4]) / Number(found[2] ?? 1)
+  const match = /^(?:\^(?:\(([-+]?\d+(?:\.\d+)?)(?:\/(\d+))?\)|([-+]?\d+(?:\.\d+)?))|([-+]?\d+))/.exec(reader.text.slice(reader.index))
+  if (!match) return reader.text[reader.index] === '^' ? null : 1
+  reader.index += match[0].length
+  const power = Number(match[1] ?? match[3] ?? match[4]) / Number(match[2] ?? 1)
   return Number.isFinite(power) && Math.abs(power) <= 12 ? power : null
 }
 
 /** The units that a word stands for: one, or several written together (`Nm`, `kgm`). */
-function named(word) {
+function unitsOf(word) {
   const name = Object.hasOwn(NAMES, word) ? NAMES[word] : word
   if (name.includes(' ')) return name.split(' ').map((part) => single(part))
   const whole = single(name)
@@ -234,7 +234,7 @@ function named(word) {
   if (word.length > 12) return null
   for (let end = word.length - 1; end > 0; end--) {
     const head = single(word.slice(0, end))
-    const tail = head === null ? null : named(word.slice(end))
+    const tail = head === null ? null : unitsOf(word.slice(end))
     if (tail !== null) return [head, ...tail]
   }
   return null
@@ -253,23 +253,23 @@ function single(symbol) {
 
 function base(symbol, prefix) {
   const [scale, powers] = UNITS[symbol]
-  // Written so, a kilogram is exactly 1.
+  // So that a kilogram is exactly 1.
   return { scale: prefix === 1e3 && scale === 1e-3 ? 1 : scale * prefix, offset: symbol === '°C' ? KELVIN : 0, powers }
 }
 
-function times(one, other, sign) {
-  const powers = { ...one.powers }
-  for (const [name, power] of Object.entries(other.powers)) {
+function multiply(first, second, sign) {
+  const powers = { ...first.powers }
+  for (const [name, power] of Object.entries(second.powers)) {
     powers[name] = (powers[name] ?? 0) + sign * power
     if (powers[name] === 0) delete powers[name]
   }
-  const scale = sign > 0 ? one.scale * other.scale : one.scale / other.scale
-  return { scale, offset: one.offset || (sign > 0 ? other.offset : 0), powers }
+  const scale = sign > 0 ? first.scale * second.scale : first.scale / second.scale
+  return { scale, offset: first.offset || (sign > 0 ? second.offset : 0), powers }
 }
 
 function raise(unit, power) {
   if (power === 1) return unit
   if (unit.offset) return { scale: Number.NaN, offset: 0, powers: {} } // no power of °C
-  const powers = Object.fromEntries(Object.entries(unit.powers).map(([name, own]) => [name, own * power]))
+  const powers = Object.fromEntries(Object.entries(unit.powers).map(([name, value]) => [name, value * power]))
   return { scale: unit.scale ** power, offset: 0, powers }
 }

@@ -1,27 +1,27 @@
 /**
- * What can be done on any page: commands that are made from what the page shows, and lessons by their number.
+ * The actions of a page: commands made from its elements, and lessons by their number.
  */
 
 import { termsOf } from './words.js'
-import { filled } from './view.js'
+import { fillIn } from './view.js'
 
-/** The commands of a page, each with a name and a title; `href` is where it leads, `run` does it and may give a text to say. */
+/** The commands of a page, each with an id and a title; `href` is its target, `run` does it and may return a message. */
 export function pageActions(document, strings) {
-  return [...ways(document, strings), ...doings(document, strings), ...places(document)]
+  return [...pageLinks(document, strings), ...commands(document, strings), ...menuPages(document)]
 }
 
-function* ways(document, strings) {
+function* pageLinks(document, strings) {
   for (const [rel, text] of [
     ['next', strings.command_next],
     ['prev', strings.command_previous],
   ]) {
     const link = document.querySelector(`.pager a[rel="${rel}"]`)
     const title = link?.querySelector('.pager-title') ?? link
-    if (link) yield { id: rel, title: filled(text, { title: plain(title) }), href: link.href }
+    if (link) yield { id: rel, title: fillIn(text, { title: plain(title) }), href: link.href }
   }
 }
 
-function* doings(document, strings) {
+function* commands(document, strings) {
   yield {
     id: 'link',
     title: strings.command_link,
@@ -39,41 +39,41 @@ function* doings(document, strings) {
       themes.value = option.value
       themes.dispatchEvent(new Event('change', { bubbles: true }))
     }
-    yield { id: `theme-${option.value}`, title: filled(strings.command_theme, { theme: option.text }), run }
+    yield { id: `theme-${option.value}`, title: fillIn(strings.command_theme, { theme: option.text }), run }
   }
 }
 
 /** The pages that the site's menu and foot list. */
-function* places(document) {
-  const seen = new Set()
+function* menuPages(document) {
+  const hrefs = new Set()
   for (const link of document.querySelectorAll('.site-nav a[href], .site-more a[href]:not([download])')) {
-    if (!seen.has(link.href)) yield { id: `page ${link.href}`, title: plain(link), href: link.href }
-    seen.add(link.href)
+    if (!hrefs.has(link.href)) yield { id: `page ${link.href}`, title: plain(link), href: link.href }
+    hrefs.add(link.href)
   }
 }
 
 const plain = (node) => node.textContent.replace(/\s+/g, ' ').trim()
 
-/** The address of the section that is being read. */
+/** The address of the current section. */
 export function hereAddress(document) {
   const headings = [...document.querySelectorAll('main :is(h2, h3, h4, h5, h6)[id]')]
-  const read = headings.filter((heading) => heading.getBoundingClientRect().top <= innerHeight * 0.25).pop()
-  return document.baseURI.split('#')[0] + (read ? `#${encodeURIComponent(read.id)}` : '')
+  const current = headings.filter((heading) => heading.getBoundingClientRect().top <= innerHeight * 0.25).pop()
+  return document.baseURI.split('#')[0] + (current ? `#${encodeURIComponent(current.id)}` : '')
 }
 
-/** Actions whose title has every word that was typed, or its beginning; all of them where nothing was typed. */
-export function matching(actions, typed) {
-  const wanted = termsOf(typed)
+/** The actions whose title has a word beginning with each word of the query; all of them for an empty query. */
+export function matchActions(actions, query) {
+  const terms = termsOf(query)
   return actions.filter(({ title }) => {
-    const has = termsOf(title)
-    return wanted.every((word) => has.some((term) => term.startsWith(word)))
+    const titleTerms = termsOf(title)
+    return terms.every((word) => titleTerms.some((term) => term.startsWith(word)))
   })
 }
 
-/** Pages of the course whose number begins with what was typed. */
-export function numbered(listing, typed, most) {
-  const number = typed.trim().toLowerCase()
+/** The pages of the course whose number begins with the query. */
+export function pagesByNumber(listing, query, limit) {
+  const number = query.trim().toLowerCase()
   if (!/^\d[\d.]*[a-z]?$/.test(number)) return []
-  const found = listing.pages.filter(([, , , name]) => name && (name.toLowerCase() === number || name.toLowerCase().startsWith(number)))
-  return found.sort((a, b) => (a[3] === number ? -1 : b[3] === number ? 1 : 0)).slice(0, most)
+  const pages = listing.pages.filter(([, , , name]) => name && (name.toLowerCase() === number || name.toLowerCase().startsWith(number)))
+  return pages.sort((a, b) => (a[3] === number ? -1 : b[3] === number ? 1 : 0)).slice(0, limit)
 }

@@ -1,19 +1,19 @@
 /**
- * The files of the index. Each is a script that hands its value to `coursebuildSearch.take`: browsers load scripts from
- * a disk, but no other data, and so there is one way for both.
+ * Loads the files of the index. Each is a script that passes its value to `coursebuildSearch.take`, as browsers load
+ * scripts from disk, but no other data.
  */
 
-/** A file that did not come. */
+/** A file could not be loaded. */
 export class DataError extends Error {}
 
-const arrivals = new WeakMap() // script element → what it handed over
+const arrivals = new WeakMap() // script element → its value
 
-/** What the files call, while they run. */
+/** Called by the files while they run. */
 export function take(kind, name, value) {
   arrivals.set(document.currentScript, value)
 }
 
-/** The value of a file. */
+/** Load the value of a file. */
 export function loadFile(address) {
   return new Promise((resolve, reject) => {
     const script = document.createElement('script')
@@ -31,18 +31,18 @@ export function loadFile(address) {
   })
 }
 
-/** A function whose last results are remembered by its argument, as promises; those that fail are forgotten. */
-export function remembered(make, most) {
-  const known = new Map()
+/** A function that caches its last results, promises, by its argument; rejected ones are dropped. */
+export function memoize(make, limit) {
+  const cache = new Map()
   return (key) => {
-    let found = known.get(key)
-    known.delete(key)
-    if (found === undefined) {
-      found = make(key)
-      found.catch(() => known.get(key) === found && known.delete(key))
+    let promise = cache.get(key)
+    cache.delete(key)
+    if (promise === undefined) {
+      promise = make(key)
+      promise.catch(() => cache.get(key) === promise && cache.delete(key))
     }
-    known.set(key, found)
-    if (known.size > most) known.delete(known.keys().next().value)
-    return found
+    cache.set(key, promise)
+    if (cache.size > limit) cache.delete(cache.keys().next().value)
+    return promise
   }
 }

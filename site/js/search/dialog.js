@@ -1,11 +1,11 @@
 /**
- * The dialog: a field with a list of what is found, by the pattern of a combobox. The focus stays in the field; arrow
- * keys choose in the list, Enter does what is chosen, Escape closes, and the focus goes back to where it was.
+ * The search dialog: a combobox, that is a field with a list of results. The focus stays in the field; arrow keys choose
+ * an option, Enter opens it, Escape closes the dialog, and the focus returns to where it was.
  */
 
-import { matching, numbered, pageActions } from './actions.js'
+import { matchActions, pagesByNumber, pageActions } from './actions.js'
 import { forgetQueries, noteQuery, recentQueries } from './recent.js'
-import { address, element, filled, hitParts, pageTitle, summary } from './view.js'
+import { address, element, fillIn, hitParts, pageTitle, summary } from './view.js'
 
 const PAGES = 8
 const ACTIONS = 3 // beside results
@@ -14,7 +14,7 @@ const WAIT = 90 // ms after the last key
 
 let dialog = null
 
-/** Open it, with what was typed last selected. */
+/** Open the dialog, with the last query selected. */
 export function openDialog(context) {
   dialog ??= new SearchDialog(context)
   dialog.open()
@@ -24,8 +24,8 @@ class SearchDialog {
   constructor(context) {
     this.context = context
     this.strings = null
-    this.asked = 0
-    this.shown = null // what the list is of
+    this.requestNumber = 0
+    this.listedQuery = null // the query whose results are listed
     this.options = []
     this.active = -1
     this.build()
@@ -47,24 +47,24 @@ class SearchDialog {
       spellcheck: 'false',
       maxlength: '200',
     })
-    this.closing = element('button', { type: 'button', class: 'search-close' }, 'Esc')
+    this.closeButton = element('button', { type: 'button', class: 'search-close' }, 'Esc')
     this.status = element('p', { class: 'search-status', role: 'status' })
     this.list = element('div', { id: '_search-list', class: 'search-list', role: 'listbox' })
     this.foot = element('div', { class: 'search-foot' })
-    const bar = element('div', { class: 'search-bar' }, this.input, this.closing)
+    const bar = element('div', { class: 'search-bar' }, this.input, this.closeButton)
     this.dialog = element('dialog', { class: 'search-dialog' }, bar, this.status, this.list, this.foot)
     document.body.append(this.dialog)
-    this.closing.addEventListener('click', () => this.close())
+    this.closeButton.addEventListener('click', () => this.close())
     this.dialog.addEventListener('click', (event) => event.target === this.dialog && this.close())
-    this.input.addEventListener('input', () => this.later())
-    this.input.addEventListener('keydown', (event) => this.key(event))
-    this.list.addEventListener('click', (event) => this.clicked(event))
-    this.list.addEventListener('pointermove', (event) => this.pointed(event))
+    this.input.addEventListener('input', () => this.scheduleSearch())
+    this.input.addEventListener('keydown', (event) => this.onKey(event))
+    this.list.addEventListener('click', (event) => this.onClick(event))
+    this.list.addEventListener('pointermove', (event) => this.onPointerMove(event))
   }
 
   async open() {
     if (this.dialog.open) return this.input.select()
-    clearTimeout(this.timer) // of a key before it was closed; the event `close` would come after the next key
+    clearTimeout(this.timer) // of a key before the dialog was closed; an event `close` would come too late
     this.dialog.showModal()
     this.input.focus()
     this.input.select()
@@ -72,7 +72,7 @@ class SearchDialog {
     this.show(this.input.value)
   }
 
-  /** Words come with the list of pages. */
+  /** Load the list of pages, which holds the interface texts. */
   async prepare() {
     this.status.textContent = '…'
     try {
@@ -87,7 +87,7 @@ class SearchDialog {
     this.input.setAttribute('aria-label', this.strings.dialog)
     this.input.placeholder = this.strings.placeholder
     this.list.setAttribute('aria-label', this.strings.list)
-    this.closing.textContent = this.strings.close
+    this.closeButton.textContent = this.strings.close
     this.foot.replaceChildren(hint(this.strings), this.shortcutSwitch())
   }
 
@@ -95,49 +95,49 @@ class SearchDialog {
     if (this.dialog.open) this.dialog.close()
   }
 
-  later() {
+  scheduleSearch() {
     clearTimeout(this.timer)
     this.timer = setTimeout(() => this.show(this.input.value), WAIT)
   }
 
-  // --- what is shown
+  // --- results
 
-  async show(typed) {
+  async show(query) {
     if (this.strings === null) return
-    const asked = ++this.asked
-    this.showing = typed
+    const request = ++this.requestNumber
+    this.currentQuery = query
     const actions = pageActions(document, this.strings)
-    if (typed.trim() === '') return this.render(this.suggestions(actions), '')
-    if (typed.trimStart().startsWith('>')) {
-      const found = matching(actions, typed.trimStart().slice(1))
-      const said = found.length > 0 ? '' : filled(this.strings.none, { query: typed.trim() })
-      return this.render([this.actionGroup(found)], said)
+    if (query.trim() === '') return this.render(this.suggestions(actions), '')
+    if (query.trimStart().startsWith('>')) {
+      const matches = matchActions(actions, query.trimStart().slice(1))
+      const status = matches.length > 0 ? '' : fillIn(this.strings.none, { query: query.trim() })
+      return this.render([this.actionGroup(matches)], status)
     }
-    let found
+    let result
     try {
-      found = await this.context.find(typed, PAGES)
+      result = await this.context.find(query, PAGES)
     } catch {
-      if (asked === this.asked) this.render([], this.strings.failed)
+      if (request === this.requestNumber) this.render([], this.strings.failed)
       return
     }
-    if (asked !== this.asked) return
-    const lessons = numbered(this.listing, typed, LESSONS).map((page) => this.lesson(page))
+    if (request !== this.requestNumber) return
+    const lessons = pagesByNumber(this.listing, query, LESSONS).map((page) => this.lesson(page))
     const groups = [
       { name: this.strings.goto, options: lessons },
-      ...found.pages.map((page) => this.pageGroup(page)),
-      this.actionGroup(matching(actions, typed).slice(0, ACTIONS)),
+      ...result.pages.map((page) => this.pageGroup(page)),
+      this.actionGroup(matchActions(actions, query).slice(0, ACTIONS)),
     ]
-    if (found.count > PAGES) groups.push({ name: null, options: [this.all(typed)] })
-    const nothing = found.count === 0 && groups.every(({ options }) => options.length === 0)
-    this.render(groups, nothing || found.count > 0 ? summary(found, this.strings) : '', nothing ? this.strings.advice : '')
+    if (result.count > PAGES) groups.push({ name: null, options: [this.allResults(query)] })
+    const isEmpty = result.count === 0 && groups.every(({ options }) => options.length === 0)
+    this.render(groups, isEmpty || result.count > 0 ? summary(result, this.strings) : '', isEmpty ? this.strings.advice : '')
   }
 
   suggestions(actions) {
     const recent = recentQueries(this.context.course)
-    const again = (query) => ({ parts: [query], run: () => this.type(query) })
+    const repeat = (query) => ({ parts: [query], run: () => this.type(query) })
     const forget = { parts: [this.strings.forget], quiet: true, run: () => this.forget() }
     return [
-      { name: this.strings.recent, options: recent.length > 0 ? [...recent.map(again), forget] : [] },
+      { name: this.strings.recent, options: recent.length > 0 ? [...recent.map(repeat), forget] : [] },
       this.actionGroup(actions),
     ]
   }
@@ -160,7 +160,7 @@ class SearchDialog {
   }
 
   lesson([path, kind, title, name]) {
-    const page = { kind: this.listing.kinds[kind], name, title: [{ text: title, marked: false }] }
+    const page = { kind: this.listing.kinds[kind], name, title: [{ text: title, isMarked: false }] }
     return { parts: pageTitle(page, this.strings), href: address(this.context.root, path) }
   }
 
@@ -174,34 +174,34 @@ class SearchDialog {
       ...places.map((hit) => ({ parts: hitParts(hit), href: href(hit.anchor), inner: true })),
     ]
     const label = `${page.name} ${page.title.map(({ text }) => text).join('')}`.trim()
-    return { name: label, hidden: true, options: options.map((option) => ({ ...option, found: true })) }
+    return { name: label, hidden: true, options: options.map((option) => ({ ...option, isResult: true })) }
   }
 
-  all(typed) {
-    const href = `${this.context.root}search/index.html?q=${encodeURIComponent(typed.trim())}`
-    return { parts: [this.strings.all], href, quiet: true, found: true }
+  allResults(query) {
+    const href = `${this.context.root}search/index.html?q=${encodeURIComponent(query.trim())}`
+    return { parts: [this.strings.all], href, quiet: true, isResult: true }
   }
 
-  render(groups, said, advice = '') {
-    this.shown = this.showing
-    this.dialog.dataset.shown = this.shown // what the list is of, for those who watch the page
-    const shown = groups.filter(({ options }) => options.length > 0)
-    this.options = shown.flatMap(({ options }) => options)
+  render(groups, status, advice = '') {
+    this.listedQuery = this.currentQuery
+    this.dialog.dataset.shown = this.listedQuery // for tests and other observers of the page
+    const visibleGroups = groups.filter(({ options }) => options.length > 0)
+    this.options = visibleGroups.flatMap(({ options }) => options)
     let number = 0
     this.list.replaceChildren(
-      ...shown.map(({ name, hidden, options }) => {
-        const made = options.map((option) => this.optionElement(option, number++))
-        if (name === null) return made[0]
+      ...visibleGroups.map(({ name, hidden, options }) => {
+        const elements = options.map((option) => this.optionElement(option, number++))
+        if (name === null) return elements[0]
         const group = element('div', { role: 'group', 'aria-label': name, class: 'search-group' })
         if (!hidden) group.append(element('div', { class: 'search-label', 'aria-hidden': 'true' }, name))
-        group.append(...made)
+        group.append(...elements)
         return group
       }),
     )
     this.list.scrollTop = 0
     this.list.hidden = this.options.length === 0
     this.input.setAttribute('aria-expanded', String(this.options.length > 0))
-    this.status.textContent = [said, advice].filter(Boolean).join(' ')
+    this.status.textContent = [status, advice].filter(Boolean).join(' ')
     this.choose(this.options.length > 0 ? 0 : -1)
   }
 
@@ -211,21 +211,21 @@ class SearchDialog {
     return href ? element('a', { ...attributes, href }, ...parts) : element('div', attributes, ...parts)
   }
 
-  // --- what is chosen
+  // --- choice
 
   choose(number) {
     const elements = this.list.querySelectorAll('[role="option"]')
     elements[this.active]?.setAttribute('aria-selected', 'false')
     this.active = number
-    const chosen = elements[number]
-    if (!chosen) return this.input.removeAttribute('aria-activedescendant')
-    chosen.setAttribute('aria-selected', 'true')
-    this.input.setAttribute('aria-activedescendant', chosen.id)
+    const option = elements[number]
+    if (!option) return this.input.removeAttribute('aria-activedescendant')
+    option.setAttribute('aria-selected', 'true')
+    this.input.setAttribute('aria-activedescendant', option.id)
     if (number === 0) this.list.scrollTop = 0
-    else chosen.scrollIntoView({ block: 'nearest' })
+    else option.scrollIntoView({ block: 'nearest' })
   }
 
-  key(event) {
+  onKey(event) {
     const last = this.options.length - 1
     if (event.isComposing) return
     if (event.key === 'ArrowDown' || event.key === 'ArrowUp') {
@@ -238,26 +238,26 @@ class SearchDialog {
     }
   }
 
-  /** Enter: at once, even where the list is still that of what was typed before. */
+  /** Enter: open the first result of the present query, even if the list still shows those of an earlier one. */
   async enter(event) {
     clearTimeout(this.timer)
-    if (this.shown !== this.input.value) await this.show(this.input.value)
-    const chosen = this.list.querySelectorAll('[role="option"]')[this.active]
-    if (!chosen) return
-    if (chosen.href && (event.ctrlKey || event.metaKey)) window.open(chosen.href, '_blank', 'noopener')
-    else chosen.click()
+    if (this.listedQuery !== this.input.value) await this.show(this.input.value)
+    const option = this.list.querySelectorAll('[role="option"]')[this.active]
+    if (!option) return
+    if (option.href && (event.ctrlKey || event.metaKey)) window.open(option.href, '_blank', 'noopener')
+    else option.click()
   }
 
-  pointed({ target }) {
-    const at = target.closest('[role="option"]')?.dataset.at
-    if (at !== undefined && Number(at) !== this.active) this.choose(Number(at))
+  onPointerMove({ target }) {
+    const index = target.closest('[role="option"]')?.dataset.at
+    if (index !== undefined && Number(index) !== this.active) this.choose(Number(index))
   }
 
-  clicked(event) {
-    const chosen = event.target.closest('[role="option"]')
-    if (!chosen) return
-    const option = this.options[Number(chosen.dataset.at)]
-    if (option.found) noteQuery(this.context.course, this.input.value)
+  onClick(event) {
+    const target = event.target.closest('[role="option"]')
+    if (!target) return
+    const option = this.options[Number(target.dataset.at)]
+    if (option.isResult) noteQuery(this.context.course, this.input.value)
     if (option.run) {
       if (option.run() !== true) this.close()
       else this.input.focus()
@@ -266,16 +266,16 @@ class SearchDialog {
     }
   }
 
-  /** Do something; what it has to say is said where the reader is afterwards. */
+  /** Do an action, and show its message on the page that the reader is then on. */
   async run(action) {
     this.close()
-    let said
+    let message
     try {
-      said = await action()
+      message = await action()
     } catch {
       return
     }
-    if (typeof said === 'string') say(said)
+    if (typeof message === 'string') say(message)
   }
 
   shortcutSwitch() {
@@ -287,15 +287,15 @@ class SearchDialog {
 }
 
 function hint(strings) {
-  const text = filled(strings.hint, { up: '↑', down: '↓', enter: '↵', escape: 'Esc' })
+  const text = fillIn(strings.hint, { up: '↑', down: '↓', enter: '↵', escape: 'Esc' })
   return element('p', { 'aria-hidden': 'true' }, text)
 }
 
-/** Say something that is shown for a moment. */
+/** Show a message for a moment. */
 function say(text) {
   const note = element('p', { class: 'search-said', role: 'status' })
   document.body.append(note)
-  // A live region has to be there before its text is.
+  // A live region must exist before its text.
   setTimeout(() => (note.textContent = text), 50)
   setTimeout(() => note.remove(), 3000)
 }

@@ -5,75 +5,75 @@
  */
 
 import { pageFile, readShard, shardFile } from './index.js'
-import { remembered } from './data.js'
+import { memoize } from './data.js'
 import { findPages } from './pages.js'
-import { excerpt, findSections, marked, openPage, phraseFactor, trail } from './sections.js'
+import { excerpt, findSections, markWords, openPage, phraseFactor, trail } from './sections.js'
 import { lexicon } from './spelling.js'
 
 const LISTING = 'search/index.js'
-const SHARDS = 96 // that are remembered, and so on
+const SHARDS = 96 // that are cached, and so on
 const SPELLINGS = 40
 const PAGES = 80
-const SECTIONS = 3 // of a page that are shown
-const AHEAD = 2 // pages more than are shown, of which the text may change the order
-const BREATH = 15 // ms of work after which the page may do something else
+const SECTIONS = 3 // of a page, in its result
+const AHEAD = 2 // pages beyond those shown, as their texts may change the order
+const BREATH = 15 // ms of work after which the browser may do something else
 
 /**
- * @param {(path: string) => Promise<unknown>} load gives the value of a file by its path from the site's root
+ * @param {(path: string) => Promise<unknown>} load loads the value of a file by its path from the site's root
  */
 export async function openSearch(load) {
   const listing = await load(LISTING)
   const source = {
     listing,
-    shard: remembered(async (number) => readShard(await load(shardFile(listing, number))), SHARDS),
-    spelling: remembered(async (number) => lexicon((await load(shardFile(listing, number))).split('\n').filter(Boolean)), SPELLINGS),
+    shard: memoize(async (number) => readShard(await load(shardFile(listing, number))), SHARDS),
+    spelling: memoize(async (number) => lexicon((await load(shardFile(listing, number))).split('\n').filter(Boolean)), SPELLINGS),
   }
-  const text = remembered(async (number) => openPage(await load(pageFile(listing.pages[number]))), PAGES)
+  const text = memoize(async (number) => openPage(await load(pageFile(listing.pages[number]))), PAGES)
 
-  /** The first `most` pages that a query means, what was found on each, how many there are, and which words were respelt. */
-  async function find(query, most) {
+  /** The first `limit` pages for a query with their sections, the number of all pages, and the respelt words. */
+  async function find(query, limit) {
     const { pages, words } = await findPages(query, source)
-    const shown = pages.slice(0, most + AHEAD)
+    const candidates = pages.slice(0, limit + AHEAD)
     let complete = true
-    const read = await Promise.all(
-      shown.map(({ page }) =>
+    const texts = await Promise.all(
+      candidates.map(({ page }) =>
         text(page).catch(() => {
           complete = false
           return null
         }),
       ),
     )
-    const found = []
-    let began = performance.now()
-    for (const [at, { page, score }] of shown.entries()) {
-      found.push(described(listing, page, read[at], words, score))
-      if (performance.now() - began < BREATH) continue
-      await new Promise((go) => setTimeout(go))
-      began = performance.now()
+    const results = []
+    let sliceStart = performance.now()
+    for (const [index, { page, score }] of candidates.entries()) {
+      results.push(makeResult(listing, page, texts[index], words, score))
+      if (performance.now() - sliceStart < BREATH) continue
+      await new Promise((resolve) => setTimeout(resolve))
+      sliceStart = performance.now()
     }
-    found.sort((a, b) => b.score - a.score)
+    results.sort((a, b) => b.score - a.score)
     const instead = words.filter(({ instead }) => instead !== null).map(({ instead }) => instead)
-    return { query, pages: found.slice(0, most), count: pages.length, instead, complete }
+    return { query, pages: results.slice(0, limit), count: pages.length, instead, complete }
   }
 
   return { listing, find }
 }
 
 /** A page as a result. */
-function described(listing, number, page, words, score) {
+function makeResult(listing, number, page, words, score) {
   const [path, kind, title, name] = listing.pages[number]
-  const result = { path, kind: listing.kinds[kind], name, title: marked(title, words), score, hits: [] }
+  const result = { path, kind: listing.kinds[kind], name, title: markWords(title, words), score, hits: [] }
   if (page === null) return result
   result.score *= phraseFactor(page, title, words)
-  const found = findSections(page, words)
-  const most = found[0]?.words ?? 0
-  result.hits = found
-    .filter((hit) => hit.words === most)
+  const hits = findSections(page, words)
+  const mostWords = hits[0]?.words ?? 0
+  result.hits = hits
+    .filter((hit) => hit.words === mostWords)
     .slice(0, SECTIONS)
-    .map(({ at }) => ({
-      anchor: page.sections[at][0],
-      trail: trail(page.sections, at).map((heading) => marked(heading, words)),
-      excerpt: excerpt(page.sections[at], words),
+    .map(({ at: index }) => ({
+      anchor: page.sections[index][0],
+      trail: trail(page.sections, index).map((heading) => markWords(heading, words)),
+      excerpt: excerpt(page.sections[index], words),
     }))
   return result
 }

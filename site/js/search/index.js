@@ -1,5 +1,5 @@
 /**
- * The index as files have it: which file has a term, and what a file says.
+ * The format of the index: which file has a term, and how to read it.
  *
  * A shard is a text of lines: a term, and after a blank the pages that have it, rising, as differences times 16 plus a
  * weight, in digits of five bits with the lowest first. The weight is the field (3 title, 2 heading, 1 text, 0 code)
@@ -17,13 +17,13 @@ export const shardOf = (listing, term) => hashOf(shelfOf(term)) & (listing.terms
 /** The number of the shard with the terms that begin with a letter. */
 export const spellingOf = (listing, letter) => listing.terms + (hashOf(letter) & (listing.words - 1))
 
-/** Where the file of a shard is, from the site's root. */
+/** The path of a shard's file from the site's root. */
 export function shardFile(listing, number) {
   const name = listing.files.slice(8 * number, 8 * number + 8)
   return `assets/search/${number.toString(16).padStart(4, '0')}.${name}.js`
 }
 
-/** Where the file with the text of a page is. */
+/** The path of the file with the text of a page. */
 export const pageFile = (page) => `assets/search/${page[4]}.js`
 
 /** The lines of a shard by their term. */
@@ -42,7 +42,7 @@ export function readShard(text) {
  * @returns {Array<[page: number, weight: number]>}
  */
 export function readPages(line) {
-  const found = []
+  const pages = []
   let page = 0
   let value = 0
   let shift = 0
@@ -52,8 +52,8 @@ export function readPages(line) {
     shift += 5
     if (bits & 32) continue
     page += Math.floor(value / 16)
-    found.push([page, value % 16])
+    pages.push([page, value % 16])
     value = shift = 0
   }
-  return found
+  return pages
 }

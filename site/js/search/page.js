@@ -1,4 +1,4 @@
-/** The page of the search: a form, and under it the results as a list that is read like any text. */
+/** The search page: a form, and below it the results as a list. */
 
 import { noteQuery } from './recent.js'
 import { address, element, hitParts, pageTitle, summary } from './view.js'
@@ -6,40 +6,40 @@ import { address, element, hitParts, pageTitle, summary } from './view.js'
 const STEP = 15 // pages at a time
 const WAIT = 200 // ms after the last key
 
-/** Bring the form to life; what the address asks for is searched at once. */
+/** Mount the form; a query in the address is searched at once. */
 export async function mountPage(context) {
   const form = document.querySelector('[data-search-form]')
   const input = form.querySelector('input')
   const place = document.querySelector('[data-search-results]')
   const status = element('p', { class: 'search-status', role: 'status' })
   const list = element('ol', { class: 'found-pages' })
-  const more = element('button', { type: 'button', class: 'search-more', hidden: true })
-  place.replaceChildren(status, list, more)
-  let asked = 0
-  let most = STEP
+  const moreButton = element('button', { type: 'button', class: 'search-more', hidden: true })
+  place.replaceChildren(status, list, moreButton)
+  let lastRequest = 0
+  let limit = STEP
   let timer = 0
 
   const search = async ({ keep = false } = {}) => {
     const query = input.value.trim()
-    const mine = ++asked
-    if (!keep) most = STEP
+    const request = ++lastRequest
+    if (!keep) limit = STEP
     if (query === '') return show(null, query)
     try {
-      const [found, listing] = [await context.find(query, most), await context.listing()]
-      if (mine === asked) show(found, query, listing.strings)
+      const [result, listing] = [await context.find(query, limit), await context.listing()]
+      if (request === lastRequest) show(result, query, listing.strings)
     } catch {
-      if (mine === asked) status.textContent = document.querySelector('#_words').content.querySelector('[data-key="search.failed"]').textContent
+      if (request === lastRequest) status.textContent = document.querySelector('#_words').content.querySelector('[data-key="search.failed"]').textContent
     }
   }
 
-  const show = (found, query, strings) => {
-    const had = list.children.length
-    status.textContent = found ? summary(found, strings) + (found.count === 0 ? ` ${strings.advice}` : '') : ''
-    list.replaceChildren(...(found?.pages ?? []).map((page) => pageItem(page, context.root, strings)))
-    more.hidden = !found || found.count <= most
-    more.textContent = strings?.more ?? ''
+  const show = (result, query, strings) => {
+    const count = list.children.length
+    status.textContent = result ? summary(result, strings) + (result.count === 0 ? ` ${strings.advice}` : '') : ''
+    list.replaceChildren(...(result?.pages ?? []).map((page) => pageItem(page, context.root, strings)))
+    moreButton.hidden = !result || result.count <= limit
+    moreButton.textContent = strings?.more ?? ''
     history.replaceState(history.state, '', query ? `?q=${encodeURIComponent(query)}` : location.pathname)
-    return had
+    return count
   }
 
   form.addEventListener('submit', (event) => {
@@ -52,11 +52,11 @@ export async function mountPage(context) {
     clearTimeout(timer)
     timer = setTimeout(search, WAIT)
   })
-  more.addEventListener('click', async () => {
-    const had = list.children.length
-    most += STEP
+  moreButton.addEventListener('click', async () => {
+    const count = list.children.length
+    limit += STEP
     await search({ keep: true })
-    list.children[had]?.querySelector('a').focus()
+    list.children[count]?.querySelector('a').focus()
   })
   input.value = new URLSearchParams(location.search).get('q') ?? ''
   if (input.value) search()

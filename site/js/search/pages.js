@@ -1,77 +1,76 @@
 /**
- * Which pages a query means: by the index alone, before the text of any page is loaded.
+ * Finds the pages for a query by the index alone, before the text of any page is loaded.
  *
  * Entry point: `findPages(query, source)`.
  *
- * 1. Each word is looked up as it is, as the beginning of others, and, where it is a name, by its parts.
- * 2. A word that is nowhere, or a query that finds next to nothing, is looked up in the spelling that is most like it.
- * 3. A page counts for each word once, by the best of what it has of it: exact before begun before misspelt, and title
- *    before heading before text before code. A word counts the more the fewer pages have it. A page that lacks words
- *    falls behind.
+ * 1. Each word is looked up as it is, as the beginning of longer terms, and, if it is a name, by its parts.
+ * 2. An unknown word, or all words of a query that finds next to nothing, is looked up in the most similar spelling.
+ * 3. A page scores once for each word, by its best match: exact before prefix before misspelt, and title before heading
+ *    before text before code. A word counts the more the fewer pages have it. A page that lacks words gets less.
  */
 
 import { readPages, shardOf, spellingOf } from './index.js'
-import { likely, tolerance } from './spelling.js'
+import { likelyTerms, tolerance } from './spelling.js'
 import { BEGINNING, isFuzzy, isRow, termsOf, wordsOf } from './words.js'
 
 const EXACT = 1
-const BEGUN = 0.55
+const PREFIX = 0.55
 const PARTS = 0.5
 const MISSPELT = [0, 0.45, 0.3] // by mistakes
 const FIELDS = [0.7, 1, 2.4, 5] // code, text, heading, title
 const TITLE = 3 << 2
-const OFTEN = 0.22 // for each step of how often
-const NAMED = 2.5 // a page that is called so
+const OFTEN = 0.22 // for each step of the frequency
+const NAMED = 2.5 // a page whose name is in the query
 const KINDS = { lesson: 1, level: 0.8, stub: 0.5 } // lessons come before documents of the tool
 const OTHER = 0.7
-const FEW = 1 // pages with all words; below, other spellings are looked at as well
+const FEW = 1 // pages with all words; if there are fewer, other spellings are tried as well
 const MOST_BEGUN = 64 // terms that begin with a word
 
 /**
  * @param {string} query
  * @param {{ listing: object, shard: (n: number) => Promise<Map<string, string>>, spelling: (n: number) => Promise<object> }} source
  * @returns {Promise<{ pages: { page: number, score: number, words: number }[], words: object[] }>} pages, the best first;
- *   of each word its terms by how well they fit, and whether it was taken for another (`instead`)
+ *   of each word its terms by how well they fit, and the spelling that it was taken for (`instead`)
  */
 export async function findPages(query, source) {
   const words = (await Promise.all(distinct(wordsOf(plainQuery(query))).map((terms) => lookUpAll(terms, source)))).flat()
   const lost = words.filter((word) => word.terms.size === 0)
   await Promise.all(lost.map((word) => respell(word, source, true)))
-  let pages = ranked(words, source.listing)
+  let pages = rankPages(words, source.listing)
   if (pages.filter((page) => page.words === words.length).length < FEW) {
     await Promise.all(words.filter((word) => !lost.includes(word)).map((word) => respell(word, source, false)))
-    pages = ranked(words, source.listing)
+    pages = rankPages(words, source.listing)
   }
   return { pages, words }
 }
 
-/** A query without the TeX that says how a formula looks: an index is written as in plain text. */
+/** A query without the TeX for the look of a formula, and with subscripts as in plain text. */
 export const plainQuery = (query) =>
   query
     .replace(/\\(?:math[a-z]+|text[a-z]*|boldsymbol|bm|left|right|operatorname)(?![a-z])/g, ' ')
     .replace(/([A-Za-z0-9])_\{(\w+)\}/g, '$1_$2')
 
-/** Each word once; more than a dozen are no query. */
+/** The words without duplicates, at most a dozen. */
 function distinct(words) {
   return [...new Map(words.map((terms) => [terms[0], terms])).values()].slice(0, 12)
 }
 
-/** A word, or instead of a name with dots that is nowhere its parts. */
+/** Look a word up, or, for an unknown name with dots, its parts. */
 async function lookUpAll(terms, source) {
   const word = await lookUp(terms, source)
   const parts = terms[0].includes('.') && word.terms.size === 0 ? wordsOf(terms[0].replaceAll('.', ' ')) : []
   return parts.length > 0 ? Promise.all(parts.map((part) => lookUp(part, source))) : [word]
 }
 
-/** A word with the pages that have it: `pages` by number, each with the best fit and weight. */
+/** Look a word up: `pages` by number, each with its best value. */
 async function lookUp(terms, source) {
   const [whole, ...parts] = terms
   const word = { whole, terms: new Map(), pages: new Map(), instead: null }
   const lines = await source.shard(shardOf(source.listing, whole))
   if (lines.has(whole)) add(word, whole, lines.get(whole), EXACT)
   if ([...whole].length >= BEGINNING || isRow(whole)) {
-    const begun = [...lines.keys()].filter((term) => term !== whole && term.startsWith(whole))
-    for (const term of begun.slice(0, MOST_BEGUN)) add(word, term, lines.get(term), BEGUN)
+    const longerTerms = [...lines.keys()].filter((term) => term !== whole && term.startsWith(whole))
+    for (const term of longerTerms.slice(0, MOST_BEGUN)) add(word, term, lines.get(term), PREFIX)
   } else {
     byTitle(word, source.listing)
   }
@@ -81,7 +80,7 @@ async function lookUp(terms, source) {
 
 const titles = new WeakMap() // list of pages → terms of each title
 
-/** Of a short word, which may begin terms in any file, only titles are known. */
+/** Match a short word, which may begin terms in any file, with titles only. */
 function byTitle(word, listing) {
   if (!titles.has(listing)) {
     titles.set(
@@ -92,74 +91,74 @@ function byTitle(word, listing) {
   titles.get(listing).forEach((terms, page) => {
     for (const term of terms) {
       if (term === word.whole || !term.startsWith(word.whole)) continue
-      word.terms.set(term, BEGUN)
-      best(word.pages, page, BEGUN, TITLE)
+      word.terms.set(term, PREFIX)
+      raise(word.pages, page, PREFIX, TITLE)
     }
   })
 }
 
-/** Pages that have every part of a name. */
+/** Match a name with the pages that have every part of it. */
 async function byParts(word, parts, source) {
   const lines = await Promise.all(parts.map(async (part) => (await source.shard(shardOf(source.listing, part))).get(part)))
   if (lines.includes(undefined)) return
-  const found = lines.map((line) => new Map(readPages(line)))
-  const [first, ...others] = found
-  for (const [page, weight] of first) {
-    if (others.every((pages) => pages.has(page))) best(word.pages, page, PARTS, weight)
+  const pagesByPart = lines.map((line) => new Map(readPages(line)))
+  const [smallest, ...others] = pagesByPart
+  for (const [page, weight] of smallest) {
+    if (others.every((pages) => pages.has(page))) raise(word.pages, page, PARTS, weight)
   }
   if (word.pages.size > 0) parts.forEach((part) => word.terms.set(part, PARTS))
 }
 
 /**
- * Look a word up in other spellings. Where the first letter is wrong or missing the right one is unknown, and for a word
- * that is nowhere all spellings are looked at.
+ * Look a word up in similar spellings, first among those with the same first letters; if `thorough`, then among all, as
+ * the first letter may be wrong.
  */
 async function respell(word, source, thorough) {
   if (tolerance(word.whole) === 0 || !isFuzzy(word.whole)) return
   const { listing } = source
-  const near = new Set([...word.whole].slice(0, 2).map((letter) => spellingOf(listing, letter)))
-  let found = likely(word.whole, await Promise.all([...near].map(source.spelling)))
-  if (thorough && found.length === 0) {
-    const all = Array.from({ length: listing.words }, (_, at) => listing.terms + at)
-    found = likely(word.whole, await Promise.all(all.map(source.spelling)))
+  const likelyShards = new Set([...word.whole].slice(0, 2).map((letter) => spellingOf(listing, letter)))
+  let candidates = likelyTerms(word.whole, await Promise.all([...likelyShards].map(source.spelling)))
+  if (thorough && candidates.length === 0) {
+    const everyShard = Array.from({ length: listing.words }, (_, index) => listing.terms + index)
+    candidates = likelyTerms(word.whole, await Promise.all(everyShard.map(source.spelling)))
   }
-  const shards = await Promise.all(found.map(([term]) => source.shard(shardOf(listing, term))))
-  found.forEach(([term, mistakes], at) => {
-    if (shards[at].has(term)) add(word, term, shards[at].get(term), MISSPELT[mistakes])
+  const shards = await Promise.all(candidates.map(([term]) => source.shard(shardOf(listing, term))))
+  candidates.forEach(([term, mistakes], index) => {
+    if (shards[index].has(term)) add(word, term, shards[index].get(term), MISSPELT[mistakes])
   })
-  if (thorough && found.length > 0) word.instead = found[0][0]
+  if (thorough && candidates.length > 0) word.instead = candidates[0][0]
 }
 
 function add(word, term, line, fit) {
   word.terms.set(term, fit)
-  for (const [page, weight] of readPages(line)) best(word.pages, page, fit, weight)
+  for (const [page, weight] of readPages(line)) raise(word.pages, page, fit, weight)
 }
 
-function best(pages, page, fit, weight) {
+function raise(pages, page, fit, weight) {
   const value = fit * FIELDS[weight >> 2] * (1 + OFTEN * (weight & 3))
   if (value > (pages.get(page) ?? 0)) pages.set(page, value)
 }
 
-/** Pages by score, and among equals in the order of the course. */
-function ranked(words, listing) {
-  const all = listing.pages.length
-  const rarity = words.map(({ pages }) => Math.log(1 + (all - pages.size + 0.5) / (pages.size + 0.5)))
+/** The pages by score, those of equal score in the order of the course. */
+function rankPages(words, listing) {
+  const pageCount = listing.pages.length
+  const rarity = words.map(({ pages }) => Math.log(1 + (pageCount - pages.size + 0.5) / (pages.size + 0.5)))
   const whole = rarity.reduce((sum, value) => sum + value, 0)
-  const found = new Map()
-  words.forEach(({ pages }, at) => {
+  const sums = new Map()
+  words.forEach(({ pages }, index) => {
     for (const [page, value] of pages) {
-      const sum = found.get(page) ?? { page, score: 0, share: 0, words: 0 }
-      sum.score += value * rarity[at]
-      sum.share += rarity[at] / whole
+      const sum = sums.get(page) ?? { page, score: 0, share: 0, words: 0 }
+      sum.score += value * rarity[index]
+      sum.share += rarity[index] / whole
       sum.words += 1
-      found.set(page, sum)
+      sums.set(page, sum)
     }
   })
-  const called = new Set(words.map(({ whole }) => whole))
-  for (const sum of found.values()) {
+  const names = new Set(words.map(({ whole }) => whole))
+  for (const sum of sums.values()) {
     const [, kind, , name] = listing.pages[sum.page]
     sum.score *= sum.share ** 2 * (KINDS[listing.kinds[kind]] ?? OTHER)
-    if (name && called.has(name.toLowerCase())) sum.score *= NAMED
+    if (name && names.has(name.toLowerCase())) sum.score *= NAMED
   }
-  return [...found.values()].sort((a, b) => b.score - a.score || a.page - b.page)
+  return [...sums.values()].sort((a, b) => b.score - a.score || a.page - b.page)
 }

@@ -1,40 +1,40 @@
-/** What the reader searched for before, in this browser only; without storage there is nothing. */
+/** The reader's recent queries, stored in this browser only. */
 
 const MOST = 5
 const key = (course) => `coursebuild.search.${course}`
 
 /** The last queries, the newest first. */
-export function recentQueries(course, storage = localStorageOrNothing()) {
+export function recentQueries(course, storage = openStorage()) {
   try {
-    const found = JSON.parse(storage.getItem(key(course)))
-    return Array.isArray(found) ? found.filter((query) => typeof query === 'string' && query !== '').slice(0, MOST) : []
+    const stored = JSON.parse(storage.getItem(key(course)))
+    return Array.isArray(stored) ? stored.filter((query) => typeof query === 'string' && query !== '').slice(0, MOST) : []
   } catch {
     return []
   }
 }
 
-/** Note a query that led somewhere. */
-export function noteQuery(course, query, storage = localStorageOrNothing()) {
-  const said = query.trim().slice(0, 80)
-  if (said === '') return
-  const others = recentQueries(course, storage).filter((other) => other !== said)
+/** Store a query that led somewhere. */
+export function noteQuery(course, query, storage = openStorage()) {
+  const trimmed = query.trim().slice(0, 80)
+  if (trimmed === '') return
+  const rest = recentQueries(course, storage).filter((item) => item !== trimmed)
   try {
-    storage.setItem(key(course), JSON.stringify([said, ...others].slice(0, MOST)))
+    storage.setItem(key(course), JSON.stringify([trimmed, ...rest].slice(0, MOST)))
   } catch {
-    // Storage is closed or full: nothing is remembered.
+    // Storage is blocked or full: nothing is stored.
   }
 }
 
-/** Forget them. */
-export function forgetQueries(course, storage = localStorageOrNothing()) {
+/** Forget all queries. */
+export function forgetQueries(course, storage = openStorage()) {
   try {
     storage.removeItem(key(course))
   } catch {
-    // Then nothing was remembered.
+    // Storage is blocked: nothing was stored.
   }
 }
 
-function localStorageOrNothing() {
+function openStorage() {
   try {
     return globalThis.localStorage ?? null
   } catch {

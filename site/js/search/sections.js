@@ -1,5 +1,5 @@
 /**
- * Which sections of a page a query means, and what to show of them. The text of a page is an array of sections,
+ * Finds the sections of a page for a query, and makes their excerpts. The text of a page is an array of sections,
  * `[anchor, heading, level, [[kind, text], …], also]`, with kinds `t` text, `f` formula, `c` code, `o` output.
  */
 
@@ -8,10 +8,10 @@ import { placesOf, termsOf } from './words.js'
 
 const ROOM = 150 // characters of an excerpt
 const BEFORE = 50 // of them before the first match
-const PHRASE = [1, 1.35, 1.7] // for words that follow each other: nowhere, in a text, in a heading
+const PHRASE = [1, 1.35, 1.7] // factor for words in sequence: nowhere, in a text, in a heading
 const CODE = new Set(['c', 'o'])
 
-/** A page's text, ready to be searched. */
+/** Prepare a page's text for the search. */
 export function openPage(sections) {
   const finder = new MiniSearch({
     fields: ['heading', 'text', 'code'],
@@ -19,14 +19,14 @@ export function openPage(sections) {
     processTerm: (term) => term,
     searchOptions: { boost: { heading: 3, text: 1, code: 0.6 } },
   })
-  const said = sections.map(([, heading, , pieces, also], id) => ({
+  const termTexts = sections.map(([, heading, , pieces, also], id) => ({
     id,
-    heading: joined(heading),
-    text: joined(texts(pieces, false)),
-    code: joined(`${texts(pieces, true)}\n${also}`),
+    heading: termText(heading),
+    text: termText(texts(pieces, false)),
+    code: termText(`${texts(pieces, true)}\n${also}`),
   }))
-  finder.addAll(said)
-  return { sections, said, finder }
+  finder.addAll(termTexts)
+  return { sections, termTexts, finder }
 }
 
 const texts = (pieces, code) =>
@@ -34,12 +34,12 @@ const texts = (pieces, code) =>
     .filter(([kind]) => CODE.has(kind) === code)
     .map(([, text]) => text)
     .join('\n')
-const joined = (text) => termsOf(text).join(' ')
+const termText = (text) => termsOf(text).join(' ')
 
 /**
- * The sections of a page that have most of a query, the best first.
+ * The sections of a page by the number of the query's words in them, then by score.
  * @param {ReturnType<typeof openPage>} page
- * @param {{ whole: string, terms: Map<string, number> }[]} words as `findPages` gives them
+ * @param {{ whole: string, terms: Map<string, number> }[]} words as `findPages` returns them
  */
 export function findSections(page, words) {
   const queries = words
@@ -49,67 +49,67 @@ export function findSections(page, words) {
       queries: [...terms].map(([term, fit]) => ({ queries: [term], boostTerm: () => fit })),
     }))
   if (queries.length === 0) return []
-  const found = page.finder.search({ combineWith: 'OR', queries })
-  const many = (result) => words.filter(({ terms }) => result.terms.some((term) => terms.has(term))).length
-  return found
-    .map((result) => ({ at: result.id, score: result.score, words: many(result) }))
+  const hits = page.finder.search({ combineWith: 'OR', queries })
+  const countWords = (result) => words.filter(({ terms }) => result.terms.some((term) => terms.has(term))).length
+  return hits
+    .map((result) => ({ at: result.id, score: result.score, words: countWords(result) }))
     .sort((a, b) => b.words - a.words || b.score - a.score || a.at - b.at)
 }
 
-/** How much more a page counts because words of the query follow each other on it. */
+/** The factor of a page's score for words of the query that follow each other. */
 export function phraseFactor(page, title, words) {
-  const pairs = words.slice(1).map(({ whole }, at) => ` ${words[at].whole} ${whole} `)
+  const pairs = words.slice(1).map(({ whole }, index) => ` ${words[index].whole} ${whole} `)
   const has = (text) => pairs.filter((pair) => ` ${text} `.includes(pair)).length
   if (pairs.length === 0) return 1
-  if (has(joined(title)) || page.said.some(({ heading }) => has(heading))) return PHRASE[2]
-  return page.said.some(({ text, code }) => has(text) || has(code)) ? PHRASE[1] : PHRASE[0]
+  if (has(termText(title)) || page.termTexts.some(({ heading }) => has(heading))) return PHRASE[2]
+  return page.termTexts.some(({ text, code }) => has(text) || has(code)) ? PHRASE[1] : PHRASE[0]
 }
 
-/** The headings above a section, outermost first, with its own. */
-export function trail(sections, at) {
+/** The headings of a section's ancestors, outermost first, and its own. */
+export function trail(sections, index) {
   const path = []
-  for (let i = at, level = Infinity; i >= 0; i--) {
-    const [, heading, own] = sections[i]
-    if (own > 0 && own < level) {
+  for (let i = index, level = Infinity; i >= 0; i--) {
+    const [, heading, headingLevel] = sections[i]
+    if (headingLevel > 0 && headingLevel < level) {
       if (heading) path.unshift(heading)
-      level = own
+      level = headingLevel
     }
   }
   return path
 }
 
 /**
- * A few words of a section around what was found.
+ * A few words of a section around its best match.
  * @returns {{ code: boolean, parts: { text: string, marked: boolean }[] } | null}
  */
 export function excerpt([, , , pieces], words) {
-  let chosen = null
+  let best = null
   for (const [kind, text] of pieces) {
     const places = marks(text, words)
-    const many = new Set(places.flatMap(({ words: of }) => of)).size
-    if (places.length > 0 && many > (chosen?.many ?? 0)) chosen = { kind, text, places, many }
+    const many = new Set(places.flatMap(({ words: indices }) => indices)).size
+    if (places.length > 0 && many > (best?.many ?? 0)) best = { kind, text, places, many }
   }
-  if (chosen === null) {
-    const first = pieces.find(([kind]) => kind === 't')
-    return first ? cut(first[1], [], false) : null
+  if (best === null) {
+    const firstText = pieces.find(([kind]) => kind === 't')
+    return firstText ? makeExcerpt(firstText[1], [], false) : null
   }
-  return cut(chosen.text, chosen.places, CODE.has(chosen.kind))
+  return makeExcerpt(best.text, best.places, CODE.has(best.kind))
 }
 
-/** Text with what was found of a query marked. */
-export const marked = (text, words) => split(text, marks(text, words), 0, text.length)
+/** Mark the words of a query in a text. */
+export const markWords = (text, words) => split(text, marks(text, words), 0, text.length)
 
-/** Where words of a query stand in a text. */
+/** The places of a query's words in a text. */
 function marks(text, words) {
-  const found = []
+  const spans = []
   for (const { start, end, terms } of placesOf(text)) {
-    const of = words.flatMap((word, at) => (terms.some((term) => word.terms.has(term)) ? [at] : []))
-    if (of.length > 0) found.push({ start, end, words: of })
+    const indices = words.flatMap((word, index) => (terms.some((term) => word.terms.has(term)) ? [index] : []))
+    if (indices.length > 0) spans.push({ start, end, words: indices })
   }
-  return found
+  return spans
 }
 
-function cut(text, places, code) {
+function makeExcerpt(text, places, code) {
   const focus = densest(places)
   if (code) {
     const begin = text.lastIndexOf('\n', focus) + 1
@@ -121,39 +121,39 @@ function cut(text, places, code) {
   let start = focus <= BEFORE ? 0 : Math.max(text.lastIndexOf(' ', focus - BEFORE) + 1, focus - 2 * BEFORE)
   let end = start + ROOM >= text.length ? text.length : text.lastIndexOf(' ', start + ROOM)
   if (end <= focus) end = Math.min(text.length, start + ROOM)
-  start = whole(text, start)
-  end = whole(text, end)
+  start = wholeCharacter(text, start)
+  end = wholeCharacter(text, end)
   const parts = split(text, places, start, end)
-  if (start > 0) parts.unshift({ text: '… ', marked: false })
-  if (end < text.length) parts.push({ text: ' …', marked: false })
+  if (start > 0) parts.unshift({ text: '… ', isMarked: false })
+  if (end < text.length) parts.push({ text: ' …', isMarked: false })
   return { code, parts }
 }
 
-/** The place after which most different words stand within an excerpt. */
+/** The start of the excerpt with the most different words. */
 function densest(places) {
-  let chosen = places[0]?.start ?? 0
-  let most = 0
+  let bestStart = places[0]?.start ?? 0
+  let max = 0
   for (const { start } of places) {
-    const near = places.filter((place) => place.start >= start && place.end <= start + ROOM - BEFORE)
-    const many = new Set(near.flatMap(({ words }) => words)).size
-    if (many > most) [chosen, most] = [start, many]
+    const nearby = places.filter((place) => place.start >= start && place.end <= start + ROOM - BEFORE)
+    const many = new Set(nearby.flatMap(({ words }) => words)).size
+    if (many > max) [bestStart, max] = [start, many]
   }
-  return chosen
+  return bestStart
 }
 
-/** Never between the halves of a character. */
-const whole = (text, at) => (/[\udc00-\udfff]/.test(text[at] ?? '') ? at - 1 : at)
+/** The index, moved back if it splits a surrogate pair. */
+const wholeCharacter = (text, index) => (/[\udc00-\udfff]/.test(text[index] ?? '') ? index - 1 : index)
 
 function split(text, places, start, end) {
   const parts = []
-  let at = start
+  let position = start
   for (const place of places) {
-    if (place.end <= at || place.start >= end) continue
-    const from = Math.max(at, place.start)
-    if (from > at) parts.push({ text: text.slice(at, from), marked: false })
-    parts.push({ text: text.slice(from, Math.min(end, place.end)), marked: true })
-    at = Math.min(end, place.end)
+    if (place.end <= position || place.start >= end) continue
+    const matchStart = Math.max(position, place.start)
+    if (matchStart > position) parts.push({ text: text.slice(position, matchStart), isMarked: false })
+    parts.push({ text: text.slice(matchStart, Math.min(end, place.end)), isMarked: true })
+    position = Math.min(end, place.end)
   }
-  if (at < end) parts.push({ text: text.slice(at, end), marked: false })
+  if (position < end) parts.push({ text: text.slice(position, end), isMarked: false })
   return parts
 }

@@ -1,27 +1,27 @@
-/** Results as elements. What comes from the index is text and becomes text nodes: nothing of it is read as HTML. */
+/** Shows results as elements. Texts from the index become text nodes; none is parsed as HTML. */
 
 import { form } from '../page/words.js'
 
 /** An element with attributes and children; `null` children are left out. */
 export function element(name, attributes = {}, ...children) {
-  const made = document.createElement(name)
+  const node = document.createElement(name)
   for (const [key, value] of Object.entries(attributes)) {
-    if (value !== null && value !== false) made.setAttribute(key, value === true ? '' : value)
+    if (value !== null && value !== false) node.setAttribute(key, value === true ? '' : value)
   }
-  made.append(...children.filter((child) => child !== null))
-  return made
+  node.append(...children.filter((child) => child !== null))
+  return node
 }
 
-/** Text with marks. */
-export const markedText = (parts) => parts.map(({ text, marked }) => (marked ? element('mark', {}, text) : text))
+/** The nodes of a text with marks. */
+export const markedText = (parts) => parts.map(({ text, isMarked }) => (isMarked ? element('mark', {}, text) : text))
 
 /** The address of a page of the course, or of a place on it. */
 export function address(root, path, anchor = '') {
-  const encoded = path.split('/').map(encodeURIComponent).join('/')
-  return root + encoded + (anchor ? `#${encodeURIComponent(anchor)}` : '')
+  const encodedPath = path.split('/').map(encodeURIComponent).join('/')
+  return root + encodedPath + (anchor ? `#${encodeURIComponent(anchor)}` : '')
 }
 
-/** Title of a page, with its number or what kind of page it is. */
+/** The title of a page, with its number or its kind. */
 export function pageTitle(page, strings) {
   const kind = strings[`kind_${page.kind}`] ?? strings.kind_page
   return [
@@ -32,26 +32,26 @@ export function pageTitle(page, strings) {
   ].filter((part) => part !== null)
 }
 
-/** What was found at a place of a page: its headings, and some words of it. */
+/** A hit in a page: its headings, and an excerpt. */
 export function hitParts({ trail, excerpt }) {
-  const path = trail.flatMap((heading, at) => [
-    ...(at > 0 ? [element('span', { class: 'found-step', 'aria-hidden': 'true' }, ' › ')] : []),
+  const path = trail.flatMap((heading, index) => [
+    ...(index > 0 ? [element('span', { class: 'found-step', 'aria-hidden': 'true' }, ' › ')] : []),
     ...markedText(heading),
   ])
-  const shown = excerpt && excerpt.parts.length > 0
+  const hasExcerpt = excerpt && excerpt.parts.length > 0
   return [
     path.length > 0 ? element('span', { class: 'found-trail' }, ...path) : null,
-    shown ? element('span', { class: excerpt.code ? 'found-text found-code' : 'found-text' }, ...markedText(excerpt.parts)) : null,
+    hasExcerpt ? element('span', { class: excerpt.code ? 'found-text found-code' : 'found-text' }, ...markedText(excerpt.parts)) : null,
   ].filter((part) => part !== null)
 }
 
-/** A text of the interface with values put in. */
-export const filled = (text, values) => text.replace(/\{(\w+)\}/g, (all, key) => (key in values ? String(values[key]) : all))
+/** Put values into an interface text. */
+export const fillIn = (text, values) => text.replace(/\{(\w+)\}/g, (match, key) => (key in values ? String(values[key]) : match))
 
-/** How much was found, in words. */
-export function summary(found, strings) {
-  if (found.count === 0) return filled(strings.none, { query: found.query })
-  const count = filled(form((key) => strings[key] ?? key, 'count', found.count), { n: found.count })
-  const instead = found.instead.length > 0 ? filled(strings.instead, { words: found.instead.map((word) => `“${word}”`).join(', ') }) : ''
-  return [`${count}.`, instead, found.complete ? '' : strings.part_failed].filter(Boolean).join(' ')
+/** The number of results, in words. */
+export function summary(result, strings) {
+  if (result.count === 0) return fillIn(strings.none, { query: result.query })
+  const count = fillIn(form((key) => strings[key] ?? key, 'count', result.count), { n: result.count })
+  const instead = result.instead.length > 0 ? fillIn(strings.instead, { words: result.instead.map((word) => `“${word}”`).join(', ') }) : ''
+  return [`${count}.`, instead, result.complete ? '' : strings.part_failed].filter(Boolean).join(' ')
 }

@@ -1,6 +1,6 @@
 /**
- * The terms that a text is found by: the same rules as in coursebuild/features/search/words.py, by which the index is
- * made; site/tests/search-words.json holds both to them.
+ * Extracts the terms of a text, by the same rules as coursebuild/features/search/words.py, which makes the index;
+ * site/tests/search-words.json tests both.
  */
 
 const LONGEST = 48
@@ -58,21 +58,21 @@ function tokensOf(text) {
 
 /** The terms of a text, in order, with repeats. */
 export function termsOf(text) {
-  return tokensOf(text).flatMap(expanded)
+  return tokensOf(text).flatMap(expand)
 }
 
 /**
- * The terms of a query by the word that they come from: of each word the whole first, then its parts. In a script
- * without spaces each pair of characters is a word, and the last character only where it is alone.
+ * The terms of a query, grouped by word: of each word the whole first, then its parts. In a script without spaces each
+ * pair of characters is a word, and a single character only if it is alone.
  */
 export function wordsOf(text) {
   return tokensOf(text).flatMap((token) => {
-    const terms = expanded(token)
+    const terms = expand(token)
     const pairs = terms.filter(isRow)
-    const others = terms.filter((term) => !isRow(term))
-    const joined = others.length > 1 && !ASCII.test(token) ? others.pop() : null
-    if (joined !== null) others.unshift(joined)
-    return [others, ...pairs.filter((pair) => [...pair].length > 1 || pairs.length === 1).map((pair) => [pair])]
+    const wholeTerms = terms.filter((term) => !isRow(term))
+    const joinedTerm = wholeTerms.length > 1 && !ASCII.test(token) ? wholeTerms.pop() : null
+    if (joinedTerm !== null) wholeTerms.unshift(joinedTerm)
+    return [wholeTerms, ...pairs.filter((pair) => [...pair].length > 1 || pairs.length === 1).map((pair) => [pair])]
   }).filter((word) => word.length > 0)
 }
 
@@ -80,22 +80,22 @@ export function wordsOf(text) {
 export const isRow = (term) => ROW.test(term)
 
 /**
- * Words of a text with their places, for marking: a place is given in the text as it is, though terms are made of its
- * compatible form.
+ * The words of a text with their places, for marking. Places are in the original text, though terms are made from its
+ * compatibility form.
  * @returns {{ start: number, end: number, terms: string[] }[]}
  */
 export function placesOf(text) {
-  const found = []
-  const cut = /[\p{L}\p{N}\p{M}_.]+|[^\s\p{L}\p{N}\p{M}_.]/gu
-  for (const { 0: piece, index } of text.matchAll(cut)) {
+  const places = []
+  const pieces = /[\p{L}\p{N}\p{M}_.]+|[^\s\p{L}\p{N}\p{M}_.]/gu
+  for (const { 0: piece, index } of text.matchAll(pieces)) {
     const terms = termsOf(piece)
-    if (terms.some(isRow)) found.push(...pairPlaces(piece, index))
-    else if (terms.length > 0) found.push(...namePlaces(piece, index, terms))
+    if (terms.some(isRow)) places.push(...pairPlaces(piece, index))
+    else if (terms.length > 0) places.push(...namePlaces(piece, index, terms))
   }
-  return found
+  return places
 }
 
-/** A word, or of a name with dots the whole and then what the dots part; of a number with dots the whole alone. */
+/** The places of a word; of a name with dots the whole and then its parts; of a number with dots only the whole. */
 function namePlaces(piece, start, terms) {
   const whole = { start, end: start + piece.replace(/\.+$/, '').length, terms }
   if (!/[^.]\.[^.]/.test(piece) || NUMBER.test(piece)) return [whole]
@@ -107,29 +107,29 @@ function namePlaces(piece, start, terms) {
   return [{ ...whole, terms: terms.slice(0, 1) }, ...parts]
 }
 
-/** Of a script without spaces every pair of characters has a place. */
+/** The places of every pair of characters in a script without spaces. */
 function pairPlaces(piece, start) {
-  let at = start
-  const signs = [...piece].map((sign) => ({ sign, from: at, to: (at += sign.length) }))
+  let position = start
+  const signs = [...piece].map((sign) => ({ sign, from: position, to: (position += sign.length) }))
   return signs.map(({ sign, from, to }, i) => {
     const next = signs[i + 1]
     return { start: from, end: next?.to ?? to, terms: termsOf(sign + (next?.sign ?? '')) }
   })
 }
 
-const known = new Map()
+const cache = new Map()
 
-function expanded(token) {
-  let terms = known.get(token)
+function expand(token) {
+  let terms = cache.get(token)
   if (terms === undefined) {
-    if (known.size > 20000) known.clear()
-    terms = [...new Set(made(token))]
-    known.set(token, terms)
+    if (cache.size > 20000) cache.clear()
+    terms = [...new Set(makeTerms(token))]
+    cache.set(token, terms)
   }
   return terms
 }
 
-function made(token) {
+function makeTerms(token) {
   if (SIMPLE.test(token)) return token.length <= LONGEST ? [token] : []
   if (Object.hasOwn(SYMBOLS, token)) return SYMBOLS[token]
   const name = token.replace(/^_+|_+$/g, '')
@@ -138,52 +138,52 @@ function made(token) {
   return ASCII.test(name) ? latin(name) : mixed(name)
 }
 
-/** A name, and what it is put together from. */
+/** The terms of a name: the whole, and its parts. */
 function latin(token) {
-  const found = [token.toLowerCase()]
-  for (const given of token.split('.')) {
-    const name = given.replace(/^_+|_+$/g, '')
-    if (name.length > 1) found.push(name.toLowerCase())
+  const terms = [token.toLowerCase()]
+  for (const segment of token.split('.')) {
+    const name = segment.replace(/^_+|_+$/g, '')
+    if (name.length > 1) terms.push(name.toLowerCase())
     const parts = name.split(SEAM).filter(Boolean)
     if (parts.length < 2) continue
-    if (name.includes('_')) found.push(name.toLowerCase().replaceAll('_', ''))
-    found.push(...parts.filter((part) => part.length > 1).map((part) => part.toLowerCase()))
+    if (name.includes('_')) terms.push(name.toLowerCase().replaceAll('_', ''))
+    terms.push(...parts.filter((part) => part.length > 1).map((part) => part.toLowerCase()))
   }
-  return found
+  return terms
 }
 
-/** A word with letters of other scripts. */
+/** The terms of a word with letters of other scripts. */
 function mixed(token) {
   const runs = [...token.matchAll(RUN)]
-  const found = []
-  const said = []
+  const terms = []
+  const spelling = []
   for (const [run, row, greek] of runs) {
     const text = run.toLowerCase().normalize('NFC')
     if (row) {
       const signs = [...text]
-      signs.forEach((sign, at) => found.push(sign + (signs[at + 1] ?? '')))
+      signs.forEach((sign, index) => terms.push(sign + (signs[index + 1] ?? '')))
     } else if (greek && Object.hasOwn(GREEK, text)) {
-      said.push(GREEK[text])
-      found.push(GREEK[text])
+      spelling.push(GREEK[text])
+      terms.push(GREEK[text])
     } else {
       const word = text.replaceAll('ς', 'σ').replace(/^[._]+|[._]+$/g, '')
-      said.push(word)
+      spelling.push(word)
       if (runs.length > 1 && [...word].length < 2) continue
-      if (ASCII.test(word)) found.push(...latin(run.replace(/^[._]+|[._]+$/g, '')))
-      else found.push(word)
+      if (ASCII.test(word)) terms.push(...latin(run.replace(/^[._]+|[._]+$/g, '')))
+      else terms.push(word)
     }
   }
-  const joined = said.join('').replaceAll('_', '')
-  if (said.length > 1 && [...joined].length <= LONGEST) found.push(joined)
-  return found.filter(Boolean)
+  const whole = spelling.join('').replaceAll('_', '')
+  if (spelling.length > 1 && [...whole].length <= LONGEST) terms.push(whole)
+  return terms.filter(Boolean)
 }
 
 const isDigit = (sign) => sign >= '0' && sign <= '9'
 
-/** Characters by which words are found that begin with them. */
+/** The number of characters from which on longer terms are found by their beginning. */
 export const BEGINNING = 4
 
-/** Terms with the same shelf stand in the same file: those that begin alike, but numbers, and by the end of a name. */
+/** The shelf of a term; terms of a shelf are in the same file: those that begin alike. Of a name with dots the last part counts. */
 export function shelfOf(term) {
   if (isDigit(term[0])) return term
   if (ROW.test(term)) return [...term][0]
