@@ -13,6 +13,7 @@ from coursebuild.core.model.sensitivity import Doubt, Flip, Sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.rules import HELP, RULES
 from coursebuild.core.text.source import Span
+from coursebuild.core.text.xml import clean_xml
 from coursebuild.report.terminal import Style
 from coursebuild.report.text import diagnostic_text, location
 from coursebuild.report.values import Report, ScriptLine, json_text, plain
@@ -92,19 +93,11 @@ def _case(suite: Element, group: str, name: str, seconds: float) -> Element:
 
 def _outcome(case: Element, d: Diagnostic) -> None:
     if d.is_error:
-        message = _xml_text(f"{location(d.span)}: {d.message}")
+        message = clean_xml(f"{location(d.span)}: {d.message}")
         told = SubElement(case, "failure", type=d.rule, message=message)
     else:
         told = SubElement(case, "system-out")
-    told.text = _xml_text(diagnostic_text(d, Style()))
-
-
-def _xml_text(text: str) -> str:
-    """XML 1.0 has no control characters: they are replaced."""
-    return "".join(
-        ch if ch in "\t\n\r" or (ord(ch) >= 0x20 and ch not in "\ufffe\uffff") else "\ufffd"
-        for ch in text
-    )
+    told.text = clean_xml(diagnostic_text(d, Style()))
 
 
 # --- SARIF

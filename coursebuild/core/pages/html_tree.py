@@ -17,6 +17,8 @@ from typing import TypeAlias
 from msgspec import Struct, field
 from selectolax.lexbor import LexborHTMLParser, LexborNode
 
+from coursebuild.core.text.xml import clean_xml
+
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
 """Elements that have no content and no end."""
 _RAW = frozenset("script style xmp iframe noembed noframes plaintext".split())
@@ -29,7 +31,6 @@ _NAMESPACES = {
 }
 _XLINK = "http://www.w3.org/1999/xlink"
 _XML_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
-_NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
 class HtmlElement(Struct):
@@ -165,4 +166,4 @@ def _xml_attribute(name: str, value: str) -> str:
 
 
 def _xml_text(text: str) -> str:
-    return _NOT_XML.sub("\ufffd", escape(text, quote=False))
+    return clean_xml(escape(text, quote=False))

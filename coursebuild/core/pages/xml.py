@@ -18,19 +18,14 @@ from xml.etree.ElementTree import tostring
 from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup, escape
 
+from coursebuild.core.text.xml import clean_xml
+
 Child: TypeAlias = "Element | str | None"
-
-_FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""What XML 1.0 has no place for, section 2.2."""
-
-
-def _clean(text: str) -> str:
-    return _FORBIDDEN.sub("\ufffd", text)
 
 
 def element(name: str, attributes: dict[str, str] | None = None, *children: Child) -> Element:
     """An element; a child that is `None` is left out."""
-    made = Element(name, {key: _clean(value) for key, value in (attributes or {}).items()})
+    made = Element(name, {key: clean_xml(value) for key, value in (attributes or {}).items()})
     add(made, *children)
     return made
 
@@ -43,14 +38,14 @@ def add(parent: Element, *children: Child) -> None:
         if isinstance(child, Element):
             parent.append(child)
         elif len(parent):
-            parent[-1].tail = (parent[-1].tail or "") + _clean(child)
+            parent[-1].tail = (parent[-1].tail or "") + clean_xml(child)
         else:
-            parent.text = (parent.text or "") + _clean(child)
+            parent.text = (parent.text or "") + clean_xml(child)
 
 
 def render_xml(template: Path, **values: Any) -> bytes:
     """A whole file; what is not `Markup` is escaped."""
-    return _clean(_template(template).render(values)).encode()
+    return clean_xml(_template(template).render(values)).encode()
 
 
 @functools.cache
