@@ -22,7 +22,7 @@ from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptRun
-from coursebuild.core.run.environments import environment, latest_version, other_version
+from coursebuild.core.run.environments import check_other_version, environment, latest_version
 from coursebuild.core.run.script_environment import OtherEnvironment
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.against import (
@@ -54,7 +54,7 @@ def against(options: Options, names: tuple[str, ...], version: str) -> AgainstRe
         version = latest_version()
         if version == engine_version():
             return AgainstReport(version, version, python_version(), (), ())
-    other = other_version(version)
+    other = check_other_version(version)
     progress = Progress(quiet=options.quiet)
     options.store.listen(progress.say)
     with project_lock(options.root, progress.say):

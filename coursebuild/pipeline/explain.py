@@ -33,7 +33,7 @@ from coursebuild.core.run.dependencies import (
     sought_files,
     state_changes,
 )
-from coursebuild.core.run.mjcf import parts
+from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.run.run_record import RunRecord
 from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.text.diagnostics import nearest
@@ -59,7 +59,7 @@ class _Explainer:
         self.root = options.root
         self.memory = options.for_course(course).memory()
         self.models = {
-            model.source.path: parts(options.root, model.source.path, model.source.text)
+            model.source.path: existing_files(options.root, model.source.path, model.source.text)
             for model in course.models
         }
         extractions = extract(course).value
@@ -128,32 +128,32 @@ class _Explainer:
         if extraction.script.norun:
             return Explained("script", path, extraction.owner, "norun")
         inputs = self.memory.inputs(job, extraction.data)
-        record = self.memory.remembered(inputs)
+        record = self.memory.find_record(inputs)
         if record is not None:
             return _explained("script", path, extraction.owner, record, ())
-        last, reasons = self.memory.last(path), self.memory.reasons(inputs)
+        last, reasons = self.memory.last_record(path), self.memory.reasons(inputs)
         return _explained("script", path, extraction.owner, last, tuple(reasons))
 
     def _lab(self, name: str) -> Explained:
         inputs, trial = self.labs[name]
-        last = self.memory.last(inputs.path)
+        last = self.memory.last_record(inputs.path)
         holds = last is not None and self._lab_holds(last, inputs)
         reasons = [] if holds else self.memory.reasons(inputs)
         return _explained("lab", name, trial.owner, last, tuple(reasons))
 
     def _lab_holds(self, last: RunRecord, inputs: Inputs) -> bool:
-        same = not last.forgotten and last.inputs == inputs
+        same = not last.reason_forgotten and last.inputs == inputs
         return same and not list(state_changes(last.dependencies, self.memory.states))
 
     def _dependents(self, path: str) -> tuple[Explained, ...]:
         """Scripts and labs whose last results depend on a file or on the listing of its folder."""
         found = []
         for script in self.scripts:
-            if script != path and self._depends(self.memory.last(script), path):
+            if script != path and self._depends(self.memory.last_record(script), path):
                 found.append(self._script(script))
         for name, (inputs, trial) in self.labs.items():
             models = [f"models/{model}.xml" for model in trial.block.models()]
-            if path in models or self._depends(self.memory.last(inputs.path), path):
+            if path in models or self._depends(self.memory.last_record(inputs.path), path):
                 found.append(self._lab(name))
         return tuple(found)
 
@@ -219,7 +219,7 @@ def _explained(
     if record is None:
         return Explained(kind, name, owner, state, reasons)
     depends = [describe(dependency) for dependency in record.dependencies]
-    depends += [f"{what}: {value}" for what, value in record.inputs.around]
+    depends += [f"{what}: {value}" for what, value in record.inputs.conditions]
     return Explained(
         kind,
         name,
@@ -227,7 +227,7 @@ def _explained(
         state,
         reasons,
         tuple(depends),
-        record.made,
-        record.kept.seconds,
-        record.kept.outcome.value,
+        record.timestamp,
+        record.stored_run.seconds,
+        record.stored_run.outcome.value,
     )

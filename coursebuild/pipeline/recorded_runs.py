@@ -48,10 +48,10 @@ class RecordedRun(Struct, frozen=True):
 
     def run(self) -> ScriptRun:
         """The run as if it had been made now."""
-        date = time.strftime("%Y-%m-%d", time.gmtime(self.record.made))
+        date = time.strftime("%Y-%m-%d", time.gmtime(self.record.timestamp))
         where = ", ".join(filter(None, (self.machine.cpu, self.machine.system)))
         versions = f"MuJoCo {self.machine.engine}, Python {self.machine.python}"
-        return replace(self.record.run(()), recorded=f"{date}, {versions}, {where}")
+        return replace(self.record.restore(()), recorded=f"{date}, {versions}, {where}")
 
 
 def recorded_runs(scripts: Iterable[Extraction], options: Options) -> dict[str, ScriptRun]:
@@ -105,7 +105,9 @@ def keep_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], options:
         packages = tuple(one.state for one in looked if one.kind is Kind.MODULE and one.state)
         kept = RecordedRun(machine(place=options.place), packages, record)
         before = _read(extraction, options)
-        if before is not None and replace(before.record, made=0) == replace(record, made=0):
+        if before is not None and replace(before.record, timestamp=0) == replace(
+            record, timestamp=0
+        ):
             continue
         file = options.root / path
         data = msgspec.json.format(msgspec.json.encode(kept), indent=2) + b"\n"

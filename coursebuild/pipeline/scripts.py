@@ -146,14 +146,14 @@ def _run(
         return ()
     from coursebuild.core.run.runner import ScriptServer
 
-    lasted = (memory.last(job.path) for job in todo)
-    seconds = {last.inputs.path: last.kept.seconds for last in lasted if last is not None}
+    lasted = (memory.last_record(job.path) for job in todo)
+    seconds = {last.inputs.path: last.stored_run.seconds for last in lasted if last is not None}
 
-    def started(path: str) -> None:
-        memory.started(path)
+    def on_start(path: str) -> None:
+        memory.note_start(path)
         progress.started(path)
 
-    def finished(done: ScriptRun) -> None:
+    def on_finish(done: ScriptRun) -> None:
         memory.keep(inputs[done.path], done)
         progress.finished(done.path, done.outcome.value, done.seconds)
 
@@ -167,8 +167,8 @@ def _run(
             options.root,
             longest_first(todo, seconds),
             parallel=options.jobs,
-            started=started,
-            finished=finished,
+            on_start=on_start,
+            on_finish=on_finish,
             place=options.place,
         )
 

@@ -104,10 +104,10 @@ def verify(
     broken = [f"models/{name}.xml" for name, model in models if model.error]
     everything = extracted.all
     found += script_findings(course, chosen, runs, verdicts, held, everything, again, broken)
-    if memory.differing:
+    if memory.differing_runs:
         from coursebuild.core.scripts.repeat import repeat_findings
 
-        found += repeat_findings(course, chosen, memory.differing)
+        found += repeat_findings(course, chosen, memory.differing_runs)
     found += check_runs(course, runs)
     found += _nothing(course, () if shard is not None else runs)
     found += figure_findings(course, runs, functools.partial(read_recorded, options.root))
@@ -195,12 +195,14 @@ def compile_models(
     if not course.models and not texts:
         return (), ()
     from coursebuild.core.run import mjcf
-    from coursebuild.core.run.model_memory import compile_kept
+    from coursebuild.core.run.model_memory import compile_or_recall
 
     stage = functools.partial(progress.stage, "compiling models")
     everything = [(model.source.path, model.source.text) for model in course.models]
     everything += [(mjcf.TEXT_PATH, text.text) for text in texts]
-    results = compile_kept(options.root, options.store, everything, stage, course.limits.memory)
+    results = compile_or_recall(
+        options.root, options.store, everything, stage, course.limits.memory
+    )
     models = tuple(zip((model.name for model in course.models), results, strict=False))
     made = tuple(zip(texts, results[len(models) :], strict=True))
     found = check_compiled(course, dict(models), made, mjcf.readable_error)

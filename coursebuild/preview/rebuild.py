@@ -29,7 +29,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptJob, ScriptRun
-from coursebuild.core.run.runner import Finished, RunAll, RunStoppedError, ScriptServer, Started
+from coursebuild.core.run.runner import OnFinish, OnStart, RunAll, RunStoppedError, ScriptServer
 from coursebuild.core.scripts.bindings import BindingEvidence
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -202,16 +202,16 @@ class BackgroundRebuild:
             root: Path,
             todo: Sequence[ScriptJob],
             *,
-            started: Started,
-            finished: Finished,
+            on_start: OnStart,
+            on_finish: OnFinish,
             **where: Any,
         ) -> tuple[ScriptRun, ...]:
             def ended(run: ScriptRun) -> None:
-                finished(run)
+                on_finish(run)
                 session.take_run(keys[run.path], run)
 
             there = functools.partial(serve, root, **where)
-            runs = there(todo, started=started, finished=ended)
+            runs = there(todo, on_start=on_start, on_finish=ended)
             # Run again at once: an author who sees a new output can accept it before labs have run.
             drifted = session.drifted(runs)
             left = [job for job in todo if job.path in drifted]
@@ -233,7 +233,7 @@ class BackgroundRebuild:
                 now = script_keys(session.course)
             return any(now.get(path) != keys[path] for path in running)
 
-        return functools.partial(self._server.run, unwanted=unwanted)
+        return functools.partial(self._server.run, is_unwanted=unwanted)
 
     def _run_again(self, course: Course, drifted: Collection[str]) -> None:
         """Run those that drifted once more, where what they did was remembered."""

@@ -44,7 +44,7 @@ def entries(desk: Desk) -> list[Path]:
 
 def test_results_and_failures_are_remembered_whole(desk: Desk) -> None:
     assert desk.recall() is None
-    assert desk.memory().last(PATH) is None
+    assert desk.memory().last_record(PATH) is None
     stderr = f'File "{desk.root}/examples/a.py", line 1\nValueError: no\n'
     for outcome, status in (
         (Outcome.OK, 0),
@@ -54,11 +54,11 @@ def test_results_and_failures_are_remembered_whole(desk: Desk) -> None:
     ):
         shutil.rmtree(desk.root / ".coursebuild", ignore_errors=True)
         desk.run(outcome=outcome, status=status, stderr=stderr, seconds=2.5)
-        found, last = desk.recall(), desk.memory().last(PATH)
+        found, last = desk.recall(), desk.memory().last_record(PATH)
         assert found is not None and last is not None
         fields = found.outcome, found.status, found.stdout, found.stderr, found.seconds
         assert fields == (outcome, status, "hello\n", stderr, 2.5)
-        assert found.cached and last.kept.seconds == 2.5
+        assert found.cached and last.stored_run.seconds == 2.5
 
 
 def outside(path: str) -> dict[str, Trace]:
@@ -84,8 +84,8 @@ def test_runs_that_another_may_not_repeat_are_not_remembered(desk: Desk) -> None
         shutil.rmtree(desk.root / ".coursebuild", ignore_errors=True)
         desk.run(outcome=outcome, **fields)
         assert (desk.recall(), desk.why()) == (None, why)
-        last = desk.memory().last(PATH)
-        assert last is not None and last.kept.outcome is outcome
+        last = desk.memory().last_record(PATH)
+        assert last is not None and last.stored_run.outcome is outcome
 
 
 def test_another_text_option_or_environment_is_another_result(
@@ -138,12 +138,12 @@ def test_poisoned_results_of_a_shared_cache_are_one_or_told(tmp_path: Path) -> N
         run = victim.recall()
         memory = victim.memory()
         reasons = memory.reasons(memory.inputs(JOB, SCRIPT))
-        last = memory.last(PATH)
+        last = memory.last_record(PATH)
         shown = Explained("script", PATH, "1.1", "remembered", tuple(reasons))
         if last is not None:
             depends = tuple(map(describe, last.dependencies))
-            seconds = last.kept.seconds
-            shown = replace(shown, depends=depends, made=last.made, seconds=seconds)
+            seconds = last.stored_run.seconds
+            shown = replace(shown, depends=depends, made=last.timestamp, seconds=seconds)
         text = explained_text(Explanation(PATH, "script", (shown,)), Style(colour=False))
         assert "\x1b" not in text
         if run is None:
@@ -368,12 +368,12 @@ def test_a_fresh_run_says_what_differs(desk: Desk) -> None:
     desk.run(LOOKED, stdout="one\n")
     desk.fresh = True
     assert desk.recall() is None
-    ((before, now),) = desk.run(LOOKED, stdout="two\n").differing
+    ((before, now),) = desk.run(LOOKED, stdout="two\n").differing_runs
     assert (before.stdout, now.stdout) == ("one\n", "two\n")
-    assert desk.run(LOOKED, stdout="two\n").differing == []
+    assert desk.run(LOOKED, stdout="two\n").differing_runs == []
     desk.write("models/a.xml", b"other")
     desk.settle()
-    assert desk.run(LOOKED, stdout="three\n").differing == []
+    assert desk.run(LOOKED, stdout="three\n").differing_runs == []
     desk.fresh = False
     found = desk.recall()
     assert found is not None and found.stdout == "three\n", "the new result is the one that is kept"

@@ -70,7 +70,7 @@ class Desk:
         """A run that looked at these things, and what is remembered of it."""
         memory = self.memory()
         memory.begin()
-        memory.started(job.path)
+        memory.note_start(job.path)
         if callable(during):
             self.settle()
             during()
@@ -80,6 +80,6 @@ class Desk:
         return memory
 
     def why(self) -> str:
-        last = self.memory().last(PATH)
+        last = self.memory().last_record(PATH)
         assert last is not None
-        return last.forgotten
+        return last.reason_forgotten

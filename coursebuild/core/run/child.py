@@ -4,7 +4,7 @@ Entry point: `JsonChild`, a context manager.
 
 1. The child runs a file of this package in a temporary folder and a clean environment. It says
    `ready`, then answers each line with one line.
-2. It is started when it is first asked, and again after it died. A request gives `None` when the
+2. It is started with the first request, and again after it died. A request gives `None` when the
    child did not answer; `death()` says why.
 """
 
@@ -38,16 +38,16 @@ class JsonChild:
     def __init__(
         self, script: str, seconds: float, python: str | None = None, memory: int = MEMORY
     ) -> None:
-        """A child ends itself, by SIGPROF, after so many seconds of processor time for a request.
+        """A child ends itself, by SIGPROF, after `seconds` of processor time for a request.
 
-        One that does not compute is waited for ten times as long. One that asks for more than
-        `memory` MiB gets none, where the system can see to that.
+        If it does not compute, it is killed after ten times as long. It cannot take more than
+        `memory` MiB, where the system can enforce that.
         """
         self.memory = memory
         self._python = python or sys.executable
         self._script = script
         self._seconds = seconds
-        self._life = contextlib.ExitStack()
+        self._resources = contextlib.ExitStack()
         self._folder = ""
         self._process: subprocess.Popen[bytes] | None = None
         self._interrupted = False
@@ -57,27 +57,27 @@ class JsonChild:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-        self._life.close()
+        self._resources.close()
         self._folder = ""
 
     def ask(self, request: Any) -> Any:
         """The child's answer; `None` if it died, or said nothing for too long.
 
         Raises:
-            EffectError: MuJoCo cannot be loaded, or somebody interrupted.
+            EffectError: MuJoCo cannot be loaded, or `interrupt` was called.
         """
         process = self._process or self._start()
         assert process.stdin is not None
         if self._interrupted:
             raise EffectError("interrupted")
-        with contextlib.suppress(BrokenPipeError):  # it died; reading tells
+        with contextlib.suppress(BrokenPipeError):  # it died, which reading will show
             process.stdin.write(json.dumps(request).encode() + b"\n")
             process.stdin.flush()
         line = self._read_line(10 * self._seconds)
         return None if line is None else json.loads(line)
 
     def stop(self) -> None:
-        """End the child, whatever it does."""
+        """End the child, whatever it is doing."""
         process, self._process = self._process, None
         if process is None:
             return
@@ -89,7 +89,7 @@ class JsonChild:
                     pipe.close()
 
     def interrupt(self) -> None:
-        """From another thread: end the child; what it is asked gets no answer any more."""
+        """From another thread: end the child and refuse all further requests."""
         self._interrupted = True
         if (process := self._process) is not None:
             process.kill()
@@ -108,7 +108,7 @@ class JsonChild:
         return f"ended with status {status}"
 
     def _start(self) -> subprocess.Popen[bytes]:
-        self._folder = self._folder or self._life.enter_context(temporary_folder())
+        self._folder = self._folder or self._resources.enter_context(temporary_folder())
         with tempfile.TemporaryFile() as errors:
             self._process = process = subprocess.Popen(
                 [self._python, "-E", "-P", self._script],
@@ -122,9 +122,9 @@ class JsonChild:
             if self._read_line(_START) != b"ready":
                 self.stop()
                 errors.seek(0)
-                said = errors.read().decode("utf-8", "replace").strip().splitlines()
+                lines = errors.read().decode("utf-8", "replace").strip().splitlines()
                 raise EffectError(
-                    f"MuJoCo cannot be loaded: {said[-1] if said else 'the import crashed'}"
+                    f"MuJoCo cannot be loaded: {lines[-1] if lines else 'the import crashed'}"
                 )
         with contextlib.suppress(AttributeError, OSError):  # only Linux can
             resource.prlimit(process.pid, resource.RLIMIT_DATA, (self.memory << 20,) * 2)
@@ -132,7 +132,7 @@ class JsonChild:
         return process
 
     def _read_line(self, seconds: float) -> bytes | None:
-        """The next line of the child; `None` if it died, or did not end one for so long."""
+        """The next line of the child; `None` if it died, or sent no whole line in this time."""
         assert self._process is not None and self._process.stdout is not None
         until = time.monotonic() + seconds
         line = bytearray()

@@ -1,11 +1,11 @@
-"""What the result of a script depends on, and in which words to say that it changed.
+"""What the result of a script depends on, and how to say that it changed.
 
-Entry points: `group_key`, `dependencies_of`, `input_changes`, `state_changes`, `forgotten`.
+Entry points: `group_key`, `dependencies_of`, `input_changes`, `state_changes`, `reason_forgotten`.
 
-1. What is known before a script runs (`Inputs`) names a group of results.
-2. What it looked at while it ran (a `Trace`) names its needs; each with its state at that time is a
-   `Dependency`.
-3. A result holds as long as every state is as it was.
+1. What is known before a script runs (`Inputs`) determines a group of results.
+2. What it looked at while it ran (a `Trace`) determines its needs; a need with its state at that
+   time is a `Dependency`.
+3. A result holds as long as every state is the same.
 """
 
 from __future__ import annotations
@@ -25,45 +25,45 @@ from coursebuild.core.model import Limits
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 
 VERSION = "6"
-"""To be changed with how scripts are run and watched: older results then count no more."""
+"""Change it when scripts are run or watched in another way: older results then no longer count."""
 
 _MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)
 _PERTURBATION = "moved states"
-"""Another name, once what is kept of such runs means something else: then they run again."""
+"""Change it when the results of such runs mean something else: they then run again."""
 _SHOWN = 6
-"""Names of modules that are shown of a list."""
+"""The most modules of a list that are shown."""
 _CHANGING = ("/proc/", "/sys/", "/dev/")
 
 
 class Kind(enum.Enum):
-    """What sort of thing a script looked at."""
+    """What kind of thing a script looked at."""
 
     FILE = "file"
-    """Of the project, by its path there."""
+    """A file of the project, by its path there."""
     LISTING = "listing"
     """The names in a folder of the project."""
     SOUGHT = "sought"
-    """Modules that were looked for in a folder of the project (`folder/{one,two}`); its state is
-    which of them are there."""
+    """Modules that were looked for in vain in a folder of the project (`folder/{one,two}`); its
+    state says which of them are there."""
     OUTSIDE = "outside"
     """A file elsewhere on this machine, by its absolute path."""
     MODULE = "module"
-    """An installed one, by its name; its state is which versions of what provide it."""
+    """An installed module, by its name; its state says which packages provide it, with versions."""
     PLACE = "place"
-    """Where something lies on this machine, for a script that printed it."""
+    """The path of something on this machine, for a script that printed it."""
 
     __hash__ = object.__hash__  # that of enumerations is much slower, and needs are many
 
 
 class Need(Struct, frozen=True):
-    """Something whose state counts."""
+    """Something whose state matters to a result."""
 
     kind: Kind
     name: str
 
 
 class Dependency(Struct, frozen=True):
-    """Something that a script looked at, and how it was then."""
+    """Something that a script looked at, with its state at that time."""
 
     kind: Kind
     name: str
@@ -75,8 +75,8 @@ class Dependency(Struct, frozen=True):
         return Need(self.kind, self.name)
 
 
-class Inputs(Struct, frozen=True):
-    """All that counts and is known before a script runs."""
+class Inputs(Struct, frozen=True, rename={"conditions": "around"}):
+    """All that a result depends on and that is known before the script runs."""
 
     path: str
     text: str
@@ -84,32 +84,32 @@ class Inputs(Struct, frozen=True):
     args: tuple[str, ...]
     timeout: float
     requires: tuple[str, ...]
-    around: tuple[tuple[str, str], ...]
-    """What runs it, by name: the interpreter, the platform, variables of the environment."""
+    conditions: tuple[tuple[str, str], ...]
+    """By name: the interpreter, the platform, variables of the environment, options of the job."""
     version: str = VERSION
 
 
-def inputs_of(job: ScriptJob, text: bytes, around: tuple[tuple[str, str], ...]) -> Inputs:
-    """What is known of a job whose file holds this text."""
+def inputs_of(job: ScriptJob, text: bytes, conditions: tuple[tuple[str, str], ...]) -> Inputs:
+    """The inputs of a job whose file holds this text."""
     digest = hashlib.sha256(text).hexdigest()
-    more = [(f"environment variable {name}", value) for name, value in job.environment]
+    job_conditions = [(f"environment variable {name}", value) for name, value in job.environment]
     if job.packages:
-        more.append(("packages of the course", " ".join(job.packages)))
+        job_conditions.append(("packages of the course", " ".join(job.packages)))
     if job.writes:
-        more.append(("folders that it may write into", " ".join(job.writes)))
+        job_conditions.append(("folders that it may write into", " ".join(job.writes)))
     if job.figures:
-        more.append(("figures that it draws", " ".join(job.figures)))
+        job_conditions.append(("figures that it draws", " ".join(job.figures)))
     if job.memory != Limits().scripts:
-        more.append(("MiB that it may take", str(job.memory)))
+        job_conditions.append(("MiB that it may take", str(job.memory)))
     if job.perturbation:
-        more.append((_PERTURBATION, str(job.perturbation)))
-    around = tuple(sorted((*around, *more)))
-    return Inputs(job.path, digest, job.args, float(job.timeout), job.requires, around)
+        job_conditions.append((_PERTURBATION, str(job.perturbation)))
+    conditions = tuple(sorted((*conditions, *job_conditions)))
+    return Inputs(job.path, digest, job.args, float(job.timeout), job.requires, conditions)
 
 
 def is_perturbed(inputs: Inputs) -> bool:
     """Whether these are of a run whose initial states are moved."""
-    return any(name == _PERTURBATION for name, _ in inputs.around)
+    return any(name == _PERTURBATION for name, _ in inputs.conditions)
 
 
 def group_key(inputs: Inputs) -> str:
@@ -137,44 +137,45 @@ def dependencies_of(
     trace = run.trace
     if trace is None:
         return ()
-    found = {Need(Kind.FILE, path) for path in trace.files}
-    found |= {Need(Kind.LISTING, path) for path in trace.folders}
-    found |= {Need(Kind.SOUGHT, name) for name in trace.sought}
-    found |= {Need(Kind.MODULE, name) for name in trace.modules}
-    found |= {Need(Kind.MODULE, name.partition(".")[0]) for name in requires}
-    known = dict(places)
-    ours = f"{known['library'].rstrip('/')}/mjcourse/"
+    needs = {Need(Kind.FILE, path) for path in trace.files}
+    needs |= {Need(Kind.LISTING, path) for path in trace.folders}
+    needs |= {Need(Kind.SOUGHT, name) for name in trace.sought}
+    needs |= {Need(Kind.MODULE, name) for name in trace.modules}
+    needs |= {Need(Kind.MODULE, name.partition(".")[0]) for name in requires}
+    folders = dict(places)
+    library_prefix = f"{folders['library'].rstrip('/')}/mjcourse/"
     for path in trace.outside:
-        # It may lie elsewhere on another machine, and is the same.
-        inside = path.startswith(ours)
-        found.add(Need(Kind.MODULE, "mjcourse") if inside else Need(Kind.OUTSIDE, path))
-    for name, folder in known.items():
+        # `mjcourse` may lie elsewhere on another machine, and is still the same.
+        inside = path.startswith(library_prefix)
+        needs.add(Need(Kind.MODULE, "mjcourse") if inside else Need(Kind.OUTSIDE, path))
+    for name, folder in folders.items():
         if len(folder) > 1 and folder in run.stdout:
-            found.add(Need(Kind.PLACE, name))
-    needs = sorted(found, key=lambda need: (need.kind.value, need.name))
-    # What was sought in vain was not there, whatever is there by now.
-    states = ("" if need.kind is Kind.SOUGHT else state(need) for need in needs)
+            needs.add(Need(Kind.PLACE, name))
+    # A module that was sought in vain was absent then, whatever is there by now.
     return tuple(
-        Dependency(need.kind, need.name, now) for need, now in zip(needs, states, strict=True)
+        Dependency(need.kind, need.name, "" if need.kind is Kind.SOUGHT else state(need))
+        for need in sorted(needs, key=lambda need: (need.kind.value, need.name))
     )
 
 
-def sought(name: str) -> tuple[str, tuple[str, ...]]:
-    """The folder and the modules of a need of the kind `SOUGHT`."""
+def parse_sought(name: str) -> tuple[str, tuple[str, ...]]:
+    """The folder and the modules in the name of a need of kind `SOUGHT`."""
     folder, _, modules = name.rpartition("/{")
     return folder, tuple(modules.removesuffix("}").split(","))
 
 
 @functools.lru_cache(maxsize=64)
 def sought_files(name: str) -> tuple[str, ...]:
-    """The files that were looked for, of a need of the kind `SOUGHT`."""
-    folder, modules = sought(name)
-    before = f"{folder}/" if folder else ""  # the project's own folder has no name
-    return tuple(f"{before}{module}{end}" for module in modules for end in (".py", "/__init__.py"))
+    """The files that were looked for, given the name of a need of kind `SOUGHT`."""
+    folder, modules = parse_sought(name)
+    prefix = f"{folder}/" if folder else ""  # the project's own folder has no name
+    return tuple(
+        f"{prefix}{module}{suffix}" for module in modules for suffix in (".py", "/__init__.py")
+    )
 
 
-def forgotten(run: ScriptRun) -> str:
-    """Why the result of a run is not remembered, as the end of a sentence; empty if it is."""
+def reason_forgotten(run: ScriptRun) -> str:
+    """Why a run is not remembered, as the end of a sentence; empty where it is."""
     match run.outcome:
         case Outcome.TIMEOUT:
             return "it was stopped after its time limit"
@@ -202,30 +203,30 @@ def forgotten(run: ScriptRun) -> str:
 
 
 def input_changes(old: Inputs, new: Inputs) -> list[str]:
-    """What is different, each as a clause."""
-    found = ["its text changed"] if old.text != new.text else []
-    before, now = dict(old.around), dict(new.around)
+    """The differences between two inputs, each as a clause."""
+    clauses = ["its text changed"] if old.text != new.text else []
+    before, now = dict(old.conditions), dict(new.conditions)
     names = sorted({*before, *now})
-    for what, one, two in (
+    for clause, old_value, new_value in (
         ("its arguments changed", _list(old.args), _list(new.args)),
         ("its option `timeout` changed", f"{old.timeout:g}", f"{new.timeout:g}"),
         ("its option `requires` changed", _list(old.requires), _list(new.requires)),
         *((name, before.get(name, "unset"), now.get(name, "unset")) for name in names),
     ):
-        if one != two:
-            found.append(f"{what}: {one} → {two}")
+        if old_value != new_value:
+            clauses.append(f"{clause}: {old_value} → {new_value}")
     if old.version != new.version:
-        found.append("this version of coursebuild runs scripts in another way")
-    return found
+        clauses.append("this version of coursebuild runs scripts in another way")
+    return clauses
 
 
 def state_changes(
     dependencies: Iterable[Dependency], state: Callable[[Need], str]
 ) -> Iterator[str]:
-    """What is no longer as it was, each as a clause, in order; nothing where a result holds."""
+    """The dependencies whose state has changed, each as a clause; none where a result holds."""
     for dependency in dependencies:
         now = state(dependency.need)
-        # What a device gives is never known to be the same.
+        # A device may give something else each time.
         if now != dependency.state or now == SPECIAL:
             yield _change(dependency, now)
 
@@ -239,7 +240,7 @@ def _change(old: Dependency, now: str) -> str:
                 return f"the folder {old.name} {_became(old.state, now)}"
             return f"the list of files in {old.name} changed"
         case Kind.SOUGHT:
-            folder = sought(old.name)[0]
+            folder = parse_sought(old.name)[0]
             return f"{folder} has a file now with the name of a module: {now}"
         case Kind.MODULE:
             if not now:
@@ -279,10 +280,10 @@ def describe(dependency: Dependency) -> str:
         case Kind.LISTING:
             return f"the list of files in {dependency.name or '.'}"
         case Kind.SOUGHT:
-            folder, modules = sought(dependency.name)
-            shown = ", ".join(modules[:_SHOWN])
-            more = f" and {len(modules) - _SHOWN} more" if len(modules) > _SHOWN else ""
-            return f"no file of {folder or 'the course'} has the name of a module ({shown}{more})"
+            folder, modules = parse_sought(dependency.name)
+            names = ", ".join(modules[:_SHOWN])
+            rest = f" and {len(modules) - _SHOWN} more" if len(modules) > _SHOWN else ""
+            return f"no file of {folder or 'the course'} has the name of a module ({names}{rest})"
         case Kind.MODULE:
             if not dependency.state:
                 return f"the module {dependency.name} (not installed)"

@@ -1,14 +1,13 @@
-"""Environments with another version of MuJoCo and otherwise the packages of here.
+"""Environments with another version of MuJoCo and, apart from that, the packages installed here.
 
-Entry points: `other_version`, what the user may name; `latest_version`, the one that pip finds;
-`environment`, which makes one.
+Entry points: `check_other_version`, for what the user names; `latest_version`, the one that pip
+finds; `environment`, which makes one.
 
-1. An environment lies in `.coursebuild/environments`: one that is there is used again. The ones
-   used last are kept.
-2. A new one is made beside its place and renamed there when MuJoCo can be imported in it, so that
-   none is ever half there. The remains of a process that was killed are removed the next time.
-3. pip, as the user has configured it, installs MuJoCo, with the packages that it consists of, and
-   nothing else. All other packages are found where they are installed here.
+1. Environments lie in `.coursebuild/environments` and are used again. The ones used last are kept.
+2. A new one is made under a temporary name, and renamed when MuJoCo can be imported in it, so that
+   none is ever incomplete. What a killed process left is removed the next time.
+3. pip, as the user has configured it, installs MuJoCo with the packages that it consists of, and
+   nothing else. All other packages are used from where they are installed here.
 """
 
 from __future__ import annotations
@@ -39,29 +38,29 @@ from coursebuild.core.run.versions import engine_version, python_version
 
 _FOLDER = "environments"
 _KEPT = 4
-"""Environments that stay."""
+"""Environments that are kept."""
 _VERSION = re.compile(
     r"\d+(\.\d+){0,3}((a|b|rc)\d+)?(\.post\d+)?(\.dev\d+)?(\+[a-z0-9.]+)?", re.ASCII
 )
 _ENGINE = "mujoco"
 _INSTALL = ("install", "--no-deps", "--no-input", "--progress-bar", "off", "--only-binary", ":all:")
 _LINES = 4
-"""Of what pip says where it fails, so many lines are told."""
+"""The most lines of pip's that an error quotes."""
 _OFFLINE = (
     "without a network let pip find the wheels in a folder, by the environment variables "
     "PIP_FIND_LINKS and PIP_NO_INDEX"
 )
 
 
-def other_version(text: str) -> str:
-    """A version of MuJoCo that is not the one of here.
+def check_other_version(text: str) -> str:
+    """The version of MuJoCo that a text names, which must not be the one installed here.
 
     Raises:
-        UsageError: it is no version, or the one of here.
+        UsageError: it is no version, or the one installed here.
     """
     if not _VERSION.fullmatch(text):
         raise UsageError(f"--against: {text!r} is no version of MuJoCo, such as 3.13.0")
-    if _shortened(text) == _shortened(engine_version()):
+    if _without_zeros(text) == _without_zeros(engine_version()):
         raise UsageError(f"--against: MuJoCo {engine_version()} is the version installed here")
     return text
 
@@ -74,16 +73,16 @@ def latest_version() -> str:
     """
     _require_pip()
     pip = [sys.executable, "-m", "pip", *_INSTALL, "--dry-run", "--ignore-installed", "--quiet"]
-    status, said = _run([*pip, "--report", "-", _ENGINE])
+    status, output = _run([*pip, "--report", "-", _ENGINE])
     if status:
-        raise _pip_error("at all", said)
-    report, _ = json.JSONDecoder().raw_decode(said, said.index("{"))  # warnings stand around it
+        raise _pip_error("at all", output)
+    report, _ = json.JSONDecoder().raw_decode(output, output.index("{"))  # among pip's warnings
     version: str = report["install"][0]["metadata"]["version"]
     return version
 
 
-def _shortened(version: str) -> str:
-    """3.13 for 3.13.0, which is the same version."""
+def _without_zeros(version: str) -> str:
+    """A version without trailing zeros: 3.13 for 3.13.0."""
     return re.sub(r"(\.0)+(?=$|[a-z+]|\.(?:post|dev))", "", version)
 
 
@@ -106,7 +105,7 @@ def environment(root: Path, engine: str, say: Callable[[str], None]) -> OtherEnv
             shutil.rmtree(remains, ignore_errors=True)
         if not (prefix / "pyvenv.cfg").is_file():
             say(f"installing MuJoCo {engine} into .coursebuild/{_FOLDER}/{name}")
-            _make(prefix, engine)
+            _create_environment(prefix, engine)
         os.utime(prefix)
         _remove_unused(folder, prefix)
     except OSError as error:
@@ -135,7 +134,7 @@ def _require_pip() -> None:
         )
 
 
-def _make(prefix: Path, engine: str) -> None:
+def _create_environment(prefix: Path, engine: str) -> None:
     _require_pip()
     new = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=prefix.parent))
     try:
@@ -145,26 +144,26 @@ def _make(prefix: Path, engine: str) -> None:
             shutil.copyfile(configured, new / "pip.conf")
         python = str(new / "bin" / "python")
         pip = [sys.executable, "-m", "pip", "--python", python, *_INSTALL]
-        wanted, installed = {f"{_ENGINE}=={engine}"}, set[str]()
-        while wanted:
-            status, said = _run([*pip, *sorted(wanted)])
+        requirements, installed = {f"{_ENGINE}=={engine}"}, set[str]()
+        while requirements:
+            status, output = _run([*pip, *sorted(requirements)])
             if status:
-                raise _pip_error(engine, said)
-            installed |= wanted
-            wanted = _parts(_packages(new)) - installed
+                raise _pip_error(engine, output)
+            installed |= requirements
+            requirements = _mujoco_requirements(_packages(new)) - installed
         lines = (f"import site; site.addsitedir({folder!r})\n" for folder in site_folders())
         (_packages(new) / "packages_of_here.pth").write_text("".join(lines))
-        status, said = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
+        status, output = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
         if status:
-            beside = f"MuJoCo {engine} cannot be imported beside the other packages of here"
-            raise EffectError(f"{beside}: {_last(said)}")
+            message = f"MuJoCo {engine} cannot be imported beside the other packages of here"
+            raise EffectError(f"{message}: {_last_line(output)}")
         new.rename(prefix)
     finally:
         shutil.rmtree(new, ignore_errors=True)
 
 
-def _parts(packages: Path) -> set[str]:
-    """What MuJoCo needs of its own packages, as `mujoco-core==4.0.0`."""
+def _mujoco_requirements(packages: Path) -> set[str]:
+    """The packages of MuJoCo's own that it requires, as `mujoco-core==4.0.0`."""
     needs = {
         need
         for installed in importlib.metadata.distributions(path=[str(packages)])
@@ -173,28 +172,30 @@ def _parts(packages: Path) -> set[str]:
     return {need for need in needs if need.startswith(f"{_ENGINE}-") and "extra ==" not in need}
 
 
-def _pip_error(engine: str, said: str) -> EffectError:
+def _pip_error(engine: str, output: str) -> EffectError:
     """Why pip did not install this version of MuJoCo, mostly in its own words."""
-    if f"No matching distribution found for {_ENGINE}" in said:
-        where = f"Python {'.'.join(platform.python_version_tuple()[:2])} on {platform.machine()}"
-        return EffectError(f"pip finds no MuJoCo {engine} for {where}", help=_OFFLINE)
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    if f"No matching distribution found for {_ENGINE}" in output:
+        host = f"Python {'.'.join(platform.python_version_tuple()[:2])} on {platform.machine()}"
+        return EffectError(f"pip finds no MuJoCo {engine} for {host}", help=_OFFLINE)
+    lines = [line.strip() for line in output.splitlines() if line.strip()]
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
-    told = errors if errors != ["Exception:"] else lines[-1:]  # pip's own traceback
+    reasons = errors if errors != ["Exception:"] else lines[-1:]  # pip's own traceback
     return EffectError(
-        f"pip cannot install MuJoCo {engine}: {'; '.join((told or lines)[-_LINES:])}"
+        f"pip cannot install MuJoCo {engine}: {'; '.join((reasons or lines)[-_LINES:])}"
     )
 
 
-def _last(said: str) -> str:
-    return next((line.strip() for line in reversed(said.splitlines()) if line.strip()), "no reason")
+def _last_line(output: str) -> str:
+    return next(
+        (line.strip() for line in reversed(output.splitlines()) if line.strip()), "no reason"
+    )
 
 
 def _run(command: Sequence[str]) -> tuple[int, str]:
-    """The status of a program and what it said; if we are interrupted it ends with its children."""
-    # What is meant for this process's Python, such as warnings as errors, would disturb pip's.
-    unsaid = ("PYTHON", "PIP_TARGET", "PIP_PREFIX", "PIP_PYTHON")
-    outer = {name: value for name, value in os.environ.items() if not name.startswith(unsaid)}
+    """Run a program: its status and output; an interrupt ends it with its children."""
+    # Variables for this process's Python, such as warnings as errors, would disturb pip's.
+    excluded = ("PYTHON", "PIP_TARGET", "PIP_PREFIX", "PIP_PYTHON")
+    outer = {name: value for name, value in os.environ.items() if not name.startswith(excluded)}
     ours = {"PIP_USER": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1", "LC_ALL": "C.UTF-8"}
     with subprocess.Popen(
         command,
@@ -208,17 +209,17 @@ def _run(command: Sequence[str]) -> tuple[int, str]:
         start_new_session=True,
     ) as process:
         try:
-            said, _ = process.communicate()
+            output, _ = process.communicate()
         except BaseException:
             with contextlib.suppress(OSError):
                 os.killpg(process.pid, signal.SIGKILL)
             raise
-    return process.returncode, said
+    return process.returncode, output
 
 
-def _remove_unused(folder: Path, used: Path) -> None:
-    """Keep the environments that were used last."""
-    others = [path for path in folder.iterdir() if path != used]
-    others.sort(key=lambda path: path.stat().st_mtime, reverse=True)
-    for path in others[_KEPT - 1 :]:
+def _remove_unused(folder: Path, current: Path) -> None:
+    """Remove all environments except those that were used last."""
+    rest = [path for path in folder.iterdir() if path != current]
+    rest.sort(key=lambda path: path.stat().st_mtime, reverse=True)
+    for path in rest[_KEPT - 1 :]:
         shutil.rmtree(path, ignore_errors=True)

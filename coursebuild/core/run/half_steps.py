@@ -1,14 +1,14 @@
-"""A script run with each step of its simulations made as two of half the timestep.
+"""Run a script with each step of its simulations made as two of half the timestep.
 
-Entry point: `install`, in a process that is to run so.
+Entry point: `install`, in the process of such a run.
 
-1. Both halves have the commands and forces that the script has set for the whole. The clock then
-   says what it would have said: a script that counts steps, or looks at the clock, makes as many
-   calls as ever.
-2. The model's timestep is half as long only meanwhile: the script reads and sets its own.
+1. Both halves have the commands and forces that the script has set for the whole. Then the clock is
+   set to what it would have been, so that a script that counts steps, or looks at the clock, makes
+   as many calls as before.
+2. The model's timestep is halved only during the step: the script reads and sets its own.
 3. Rollouts are made with each row of controls twice, and give every second state.
 
-What a script integrates itself, without a function of MuJoCo's that makes a step, stays as it is.
+What a script integrates itself, without one of MuJoCo's functions that make a step, is not halved.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from typing import Any
 
 from coursebuild.core.run import mujoco_tracing
 
-_OWN = ("mj_Euler", "mj_implicit", "mj_RungeKutta")
-"""Integrators, before which a script has computed accelerations itself."""
+_INTEGRATORS = ("mj_Euler", "mj_implicit", "mj_RungeKutta")
+"""Integrators; a script has computed the accelerations itself before it calls one."""
 
 
 def install(mujoco: ModuleType, numpy: ModuleType) -> None:
@@ -31,7 +31,7 @@ def install(mujoco: ModuleType, numpy: ModuleType) -> None:
 
 
 class _HalfSteps:
-    """Is in the place of MuJoCo's functions once it is made."""
+    """Replaces MuJoCo's functions when it is made."""
 
     def __init__(self, mujoco: Any, numpy: Any) -> None:
         self._mujoco = mujoco
@@ -41,12 +41,12 @@ class _HalfSteps:
         self._replace("mj_step", self._whole)
         self._replace("mj_step1", lambda real, model, data: real(model, data))
         self._replace("mj_step2", self._second)
-        for name in _OWN:
-            self._replace(name, self._own)
+        for name in _INTEGRATORS:
+            self._replace(name, self._integrate)
         mujoco_tracing.replace_rollout(self._mujoco, self._rollout)
 
     def _replace(self, name: str, halved: Callable[..., None]) -> None:
-        """Put what makes two half steps in the place of a function that makes one."""
+        """Replace a function that makes a step by one that makes two half steps."""
         real = getattr(self._mujoco, name)
 
         def function(m: Any, d: Any, *args: Any, **keywords: Any) -> None:
@@ -56,7 +56,7 @@ class _HalfSteps:
             with self._half([m]):
                 halved(real, m, d, *args, **keywords)
 
-        new = mujoco_tracing.wrapped(function, like=real)
+        new = mujoco_tracing.wrap_function(function, like=real)
         mujoco_tracing.replace_function(self._mujoco, name, new)
 
     def _whole(self, real: Callable[..., None], model: Any, data: Any, nstep: int = 1) -> None:
@@ -68,7 +68,7 @@ class _HalfSteps:
             real(model, data)
             self._step(model, data)
 
-    def _own(self, real: Callable[..., None], model: Any, data: Any, *stages: int) -> None:
+    def _integrate(self, real: Callable[..., None], model: Any, data: Any, *stages: int) -> None:
         with self._clock(model, data, 1):
             real(model, data, *stages)
             self._forward(model, data)
@@ -88,7 +88,7 @@ class _HalfSteps:
 
     @contextlib.contextmanager
     def _clock(self, model: Any, data: Any, steps: int) -> Iterator[None]:
-        """The clock as whole steps move it, unless MuJoCo resets it."""
+        """Set the clock to where whole steps lead, unless MuJoCo resets it."""
         timestep, time = 2 * float(model.opt.timestep), float(data.time)
         yield
         for _ in range(steps):
@@ -100,14 +100,28 @@ class _HalfSteps:
     def _rollout(self, real: Callable[..., None]) -> Callable[..., None]:
         numpy = self._numpy
 
+        def double_rows(array: Any) -> Any:
+            return array if array is None else numpy.repeat(array, 2, axis=1)
+
         def rollout(of: Any, models: Any, data: Any, nstep: int, spec: int, *rest: Any) -> None:
             """As MuJoCo's, in half steps."""
             begin, warm, control, *outputs = rest[:5]
-            made = [one if one is None else numpy.repeat(one, 2, axis=1) for one in outputs]
-            twice = control if control is None else numpy.repeat(control, 2, axis=1)
-            with self._half(list({id(one): one for one in models}.values())):
-                real(of, models, data, 2 * nstep, spec, begin, warm, twice, *made, *rest[5:])
-            for output, halves in zip(outputs, made, strict=True):
+            half_outputs = [double_rows(output) for output in outputs]
+            controls = double_rows(control)
+            with self._half(list({id(model): model for model in models}.values())):
+                real(
+                    of,
+                    models,
+                    data,
+                    2 * nstep,
+                    spec,
+                    begin,
+                    warm,
+                    controls,
+                    *half_outputs,
+                    *rest[5:],
+                )
+            for output, halves in zip(outputs, half_outputs, strict=True):
                 if output is not None and halves is not None:
                     output[:] = halves[:, 1::2]
             mujoco_tracing.note("p")

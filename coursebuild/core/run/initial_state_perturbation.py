@@ -1,20 +1,20 @@
-"""A script run again with its initial states a little elsewhere: which printed digits hold?
+"""Run a script with slightly moved initial states, to see which printed digits hold.
 
-Entry points: `install`, in a process that is to run so; `last_look`, at an `MjData` that the script
-lets go of.
+Entry points: `install`, in the process of such a run; `note_final_state`, for an `MjData` that the
+script no longer uses.
 
 1. What the script has put into `qpos`, `qvel` and `act` since MuJoCo last computed anything from
-   them is an initial state, all of it for new data and after the clock went back. Before MuJoCo
+   them is an initial state: all of it for new data and after the clock went back. Before MuJoCo
    next computes from it, each number x becomes x (1 ± SIZE). Quaternions keep their length.
 2. The sign belongs to the place of the number and to the number of the run: equal states are moved
    equally, so that what a script compares (two timesteps, a difference quotient) stays comparable.
    Runs come in pairs with opposite signs; those of the second pair are half as far away.
 3. Zeros stay zero: most often they say that something rests or moves in a plane, which holds
-   exactly, on every machine. But a kinematic tree that has nothing but zeros when it begins would
-   not be moved at all: its coordinates become ±SIZE, and its bodies turn by as much.
-4. A state that the script puts back bit by bit is no initial state: it was moved already. Nor is a
-   correction in the last places, such as the length of a quaternion.
-5. The final state is told, with the sizes that it is compared by (`trajectory_extent`).
+   exactly, on every machine. But a kinematic tree that begins with nothing but zeros would then not
+   move at all: its coordinates become ±SIZE, and its bodies turn by as much.
+4. A state that the script restores bit by bit is no initial state: it was moved already. Nor is a
+   correction in the last places, such as of the length of a quaternion.
+5. The final state is noted, with the sizes that it is compared by (`trajectory_extent`).
 
 The model, the time, controls and forces stay as they are.
 """
@@ -31,9 +31,9 @@ from coursebuild.core.run import mujoco_tracing
 from coursebuild.core.run.trajectory_extent import TrajectoryExtent
 
 SIZE = 1e-12
-"""Relative; of what is all zero absolute, in rad, m, or what else the coordinate is in."""
+"""Relative; for a state of zeros absolute, in the unit of the coordinate (rad, m)."""
 _CORRECTION = 1e-9
-"""Changes smaller than this part of the largest number of a field correct a rounding."""
+"""Changes below this part of the largest number of a field only correct a rounding."""
 _COMPUTING = (
     "mj_step",
     "mj_step1",
@@ -55,7 +55,7 @@ _INTEGRATING = ("mj_step2", "mj_Euler", "mj_implicit", "mj_RungeKutta")
 """Functions that go on with what was computed."""
 _MOST_KNOWN = 500_000
 _MOST_NUMBERS = 8192
-"""Numbers of all final states that are told."""
+"""The most numbers of all final states that are noted."""
 _FIELDS = ("qpos", "qvel", "act")
 
 
@@ -65,24 +65,24 @@ def install(mujoco: ModuleType, numpy: ModuleType, run: int) -> None:
     _perturbation = _Perturbation(mujoco, numpy, run)
 
 
-def last_look(data: Any) -> None:
-    """Tell of the final state of an `MjData`."""
+def note_final_state(data: Any) -> None:
+    """Note the final state of an `MjData`."""
     if _perturbation is not None:
-        _perturbation.last_look(data)
+        _perturbation.note_final_state(data)
 
 
 _perturbation: _Perturbation | None = None
 
 
 class _Perturbation:
-    """Is told of what MuJoCo computes once it is made."""
+    """Moves initial states before MuJoCo computes from them."""
 
     def __init__(self, mujoco: Any, numpy: Any, run: int) -> None:
         self._mujoco = mujoco
         self._numpy = numpy
         self._run = run
         self._extents: dict[int, TrajectoryExtent] = {}
-        self._known: set[int] = set()
+        self._known_hashes: set[int] = set()
         self._plans: dict[int, tuple[Any, _Plan]] = {}
         self._count = 0
         self._numbers = 0
@@ -103,7 +103,7 @@ class _Perturbation:
             return
         self._move(model, data, extent)
 
-    def _after(self, args: tuple[Any, ...], keywords: Mapping[str, Any], made: Any) -> None:
+    def _after(self, args: tuple[Any, ...], keywords: Mapping[str, Any], result: Any) -> None:
         data = _model_and_data(args, keywords)[1]
         extent = self._extents.get(id(data))
         if extent is not None and extent.of() is data:
@@ -113,33 +113,33 @@ class _Perturbation:
     def _remember(self, extent: TrajectoryExtent, data: Any) -> None:
         extent.time = data.time
         extent.states = states = _states(data)
-        if len(self._known) < _MOST_KNOWN:
-            self._known.update(hash((i, state)) for i, state in enumerate(states))
+        if len(self._known_hashes) < _MOST_KNOWN:
+            self._known_hashes.update(hash((i, state)) for i, state in enumerate(states))
 
     def _move(self, model: Any, data: Any, extent: TrajectoryExtent) -> None:
         begins = not extent.states or data.time < extent.time
-        plan = self._plan(model)
+        plan = self._get_plan(model)
         arrays = [getattr(data, name) for name in _FIELDS]
-        befores = extent.states if extent.states else (None,) * len(_FIELDS)
-        new = [
-            self._new(i, array, before, begins)
-            for i, (array, before) in enumerate(zip(arrays, befores, strict=True))
+        old_states = extent.states if extent.states else (None,) * len(_FIELDS)
+        masks = [
+            self._find_new(i, array, old, begins)
+            for i, (array, old) in enumerate(zip(arrays, old_states, strict=True))
         ]
         qpos, qvel, act = arrays
         zeros = qpos == 0
-        moved = plan.move(qpos, qvel, act, new, begins)
+        has_moved = plan.move(qpos, qvel, act, masks, begins)
         if begins:
             extent.begin(data.time)
         extent.cover(data)
         extent.from_zero = extent.from_zero or bool((qpos[zeros] != 0).any())
-        if moved:
+        if has_moved:
             mujoco_tracing.note("p")
         self._remember(extent, data)
 
-    def _new(self, field: int, array: Any, before: bytes | None, begins: bool) -> Any:
-        """Which numbers of a field are those of an initial state."""
+    def _find_new(self, field: int, array: Any, before: bytes | None, begins: bool) -> Any:
+        """A mask of the numbers of a field that belong to an initial state."""
         numpy = self._numpy
-        if hash((field, array.tobytes())) in self._known:
+        if hash((field, array.tobytes())) in self._known_hashes:
             return numpy.zeros(len(array), bool)
         if begins or before is None:
             return numpy.ones(len(array), bool)
@@ -149,10 +149,10 @@ class _Perturbation:
         largest = max(float(numpy.abs(array).max(initial=0.0)), 1e-300)
         return ~(numpy.abs(array - old) <= _CORRECTION * largest)
 
-    def _plan(self, model: Any) -> _Plan:
-        known = self._plans.get(id(model))
-        if known is not None and known[0]() is model:
-            return known[1]
+    def _get_plan(self, model: Any) -> _Plan:
+        entry = self._plans.get(id(model))
+        if entry is not None and entry[0]() is model:
+            return entry[1]
         plan = _Plan(self._mujoco, self._numpy, model, self._run)
         self._plans[id(model)] = weakref.ref(model), plan
         return plan
@@ -163,12 +163,12 @@ class _Perturbation:
         def rollout(*args: Any, **keywords: Any) -> Any:
             """As MuJoCo's, from states that were moved."""
             with contextlib.suppress(Exception):  # MuJoCo says what is wrong with its arguments
-                args = self._moved_rollout(args)
+                args = self._move_rollout(args)
             return real(*args, **keywords)
 
         return rollout
 
-    def _moved_rollout(self, args: tuple[Any, ...]) -> tuple[Any, ...]:
+    def _move_rollout(self, args: tuple[Any, ...]) -> tuple[Any, ...]:
         models, initial = args[1], args[5]
         states = self._numpy.array(initial, dtype=float, copy=True)
         rows = states.reshape(-1, states.shape[-1])
@@ -179,14 +179,14 @@ class _Perturbation:
             qpos, qvel = row[1 : 1 + nq], row[1 + nq : 1 + nq + nv]  # the time comes first
             act = row[1 + nq + nv : 1 + nq + nv + na]
             fields = (qpos, qvel, act)
-            new = [self._new(k, array, None, True) for k, array in enumerate(fields)]
-            if self._plan(model).move(*fields, new, True):
+            masks = [self._find_new(k, array, None, True) for k, array in enumerate(fields)]
+            if self._get_plan(model).move(*fields, masks, True):
                 mujoco_tracing.note("p")
         return (*args[:5], states, *args[6:])
 
     # --- the end
 
-    def last_look(self, data: Any) -> None:
+    def note_final_state(self, data: Any) -> None:
         extent = self._extents.get(id(data))
         if extent is None or extent.of() is not data:
             return
@@ -200,10 +200,10 @@ class _Perturbation:
 
 
 class _Plan:
-    """What of a state of a model is moved, and in which direction."""
+    """Which numbers of a model's states are moved, and in which direction."""
 
     def __init__(self, mujoco: Any, numpy: Any, model: Any, run: int) -> None:
-        free, ball = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
+        free_joint, ball_joint = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
         self._numpy = numpy
         tree_of_dof = numpy.array(model.dof_treeid)
         kinds, starts = model.jnt_type, model.jnt_qposadr
@@ -212,11 +212,11 @@ class _Plan:
         self._plain = numpy.ones(int(model.nq), bool)
         """Numbers that are no part of a quaternion."""
         self._quaternions: list[tuple[int, int]] = []
-        """Of each its place in qpos and its tree."""
+        """For each: its place in qpos and its tree."""
         for kind, at, tree in zip(kinds, starts, trees, strict=True):
             kind, at, tree = int(kind), int(at), int(tree)
-            place = at + 3 if kind == free else at
-            if kind in (free, ball):
+            place = at + 3 if kind == free_joint else at
+            if kind in (free_joint, ball_joint):
                 self._plain[place : place + 4] = False
                 self._quaternions.append((place, tree))
                 self._tree_of_qpos[at : place + 4] = tree
@@ -228,31 +228,31 @@ class _Plan:
             for field, size in enumerate((model.nq, model.nv, model.na))
         ]
 
-    def move(self, qpos: Any, qvel: Any, act: Any, new: list[Any], begins: bool) -> bool:
-        """Move what is new, in place; whether anything was."""
+    def move(self, qpos: Any, qvel: Any, act: Any, masks: list[Any], begins: bool) -> bool:
+        """Move the masked numbers in place; return whether any changed."""
         numpy = self._numpy
         before = [array.copy() for array in (qpos, qvel, act)]
-        which = (new[0] & self._plain, *new[1:])
-        for array, signs, these in zip((qpos, qvel, act), self._signs, which, strict=True):
-            array[these] *= 1.0 + SIZE * signs[these]
+        new_parts = (masks[0] & self._plain, *masks[1:])
+        for array, signs, mask in zip((qpos, qvel, act), self._signs, new_parts, strict=True):
+            array[mask] *= 1.0 + SIZE * signs[mask]
         signs = self._signs[0]
         for at, _ in self._quaternions:
             part = slice(at, at + 4)
-            if new[0][part].any():
+            if masks[0][part].any():
                 old = before[0][part]
-                length = numpy.linalg.norm(old)
-                turned = old * (1.0 + SIZE * signs[part])
-                norm = numpy.linalg.norm(turned)
-                qpos[part] = turned * (length / norm) if norm > 0 and (old != 0).sum() > 1 else old
+                new = old * (1.0 + SIZE * signs[part])
+                length, norm = numpy.linalg.norm(old), numpy.linalg.norm(new)
+                is_turned = (old != 0).sum() > 1
+                qpos[part] = new * (length / norm) if norm > 0 and is_turned else old
         if begins:
-            self._move_what_rests(before, qpos, new[0])
+            self._move_resting(before, qpos, masks[0])
         return any(
-            not numpy.array_equal(one, other, equal_nan=True)
-            for one, other in zip(before, (qpos, qvel, act), strict=True)
+            not numpy.array_equal(a, b, equal_nan=True)
+            for a, b in zip(before, (qpos, qvel, act), strict=True)
         )
 
-    def _move_what_rests(self, before: list[Any], qpos: Any, new: Any) -> None:
-        """Move trees that have nothing but zeros, and bodies that are not turned."""
+    def _move_resting(self, before: list[Any], qpos: Any, mask: Any) -> None:
+        """Move coordinates of trees that begin with nothing but zeros, and turn their bodies."""
         numpy, signs = self._numpy, self._signs[0]
         q, v = before[0], before[1]
         resting = set(self._tree_of_qpos.tolist()) - {-1}
@@ -263,28 +263,28 @@ class _Plan:
                 resting.discard(tree)
         if not resting:
             return
-        still = numpy.isin(self._tree_of_qpos, sorted(resting)) & new
+        still = numpy.isin(self._tree_of_qpos, sorted(resting)) & mask
         qpos[still & self._plain] = SIZE * signs[still & self._plain]
         for at, tree in self._quaternions:
-            if tree in resting and new[at : at + 4].all():
+            if tree in resting and mask[at : at + 4].all():
                 qpos[at + 1 : at + 4] = 0.5 * SIZE * signs[at + 1 : at + 4]
 
 
 def _signs(numpy: Any, field: int, size: int, run: int) -> Any:
     """The directions of a field's numbers, by the number of the run.
 
-    The second run of a pair has the opposite ones of the first; each further pair is half as far
-    away, with every second number in the other direction.
+    The second run of a pair has the opposite signs of the first; each further pair moves half as
+    far, with every second number in the other direction.
     """
     pair, second = divmod(run - 1, 2)
-    found = []
+    signs = []
     for i in range(size):
-        mixed = (i * 0x9E3779B1 + field * 0x85EBCA77 + 0x27D4EB2F) & 0xFFFFFFFF
-        mixed = ((mixed ^ (mixed >> 15)) * 0x2C1B3C6D) & 0xFFFFFFFF
-        mixed = ((mixed ^ (mixed >> 12)) * 0x297A2D39) & 0xFFFFFFFF
-        odd = (mixed >> 16) + pair * i
-        found.append(1.0 if odd & 1 else -1.0)
-    return numpy.array(found) * ((-1.0 if second else 1.0) * 0.5**pair)
+        bits = (i * 0x9E3779B1 + field * 0x85EBCA77 + 0x27D4EB2F) & 0xFFFFFFFF
+        bits = ((bits ^ (bits >> 15)) * 0x2C1B3C6D) & 0xFFFFFFFF
+        bits = ((bits ^ (bits >> 12)) * 0x297A2D39) & 0xFFFFFFFF
+        odd = (bits >> 16) + pair * i
+        signs.append(1.0 if odd & 1 else -1.0)
+    return numpy.array(signs) * ((-1.0 if second else 1.0) * 0.5**pair)
 
 
 def _states(data: Any) -> tuple[bytes, ...]:

@@ -19,12 +19,12 @@ from coursebuild.core.run.versions import engine_version, package_version, pytho
 _INFO = Path("/proc/cpuinfo")
 _GOVERNOR = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
 _NAMES = ("model name", "Model", "Hardware", "cpu model", "uarch")
-"""How kernels for different processors call the name, the best one first."""
+"""The keys of the name in kernels for different processors, the best one first."""
 _CAN_PIN = hasattr(os, "sched_setaffinity")
 
 
 def machine(*, pinned: bool = False, place: OtherEnvironment | None = None) -> Machine:
-    """Versions, system and processor; `pinned`: times are taken on one of them alone.
+    """Versions, system and processor; `pinned`: times are taken on one processor alone.
 
     `place` is another interpreter than the one that runs this.
 
@@ -60,11 +60,11 @@ def one_processor() -> Iterator[None]:
 def cpu_name() -> str:
     """What the processor calls itself; empty where it does not say."""
     if platform.system() == "Darwin":
-        return _printed("sysctl", "-n", "machdep.cpu.brand_string")
-    return named(_read(_INFO)) or _tidy(platform.processor())
+        return _run("sysctl", "-n", "machdep.cpu.brand_string")
+    return find_cpu_name(_read(_INFO)) or _tidy(platform.processor())
 
 
-def named(text: str) -> str:
+def find_cpu_name(text: str) -> str:
     """The name in a text such as that of `/proc/cpuinfo`; empty where there is none."""
     fields = [line.partition(":") for line in text.splitlines()]
     for name in _NAMES:
@@ -85,9 +85,9 @@ def _tidy(text: str) -> str:
     return " ".join(text.split())[:100]
 
 
-def _printed(*command: str) -> str:
+def _run(*command: str) -> str:
     try:
-        done = subprocess.run(command, capture_output=True, timeout=10, check=False)
+        process = subprocess.run(command, capture_output=True, timeout=10, check=False)
     except (OSError, subprocess.SubprocessError):
         return ""
-    return _tidy(done.stdout.decode("utf-8", "replace"))
+    return _tidy(process.stdout.decode("utf-8", "replace"))

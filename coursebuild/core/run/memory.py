@@ -1,13 +1,13 @@
-"""Results of scripts, remembered: a script runs again only if something that it depends on changed.
+"""Memory of scripts' results: a script runs again only if something that it depends on changed.
 
 Entry point: `Memory`.
 
-1. `recall`: what is known before a script runs names a group of results; the one all of whose
-   dependencies are as they were is its result. Groups that this machine has not are looked for in
+1. `recall`: what is known before a script runs determines a group of results; the one whose
+   dependencies are all unchanged is its result. Groups that this machine lacks are looked for in
    the shared cache.
-2. `keep`: after a run its needs, as the trace tells them, are looked at, and it is kept with them.
-   What changed while it ran was maybe not what it saw: such a result is not kept.
-3. What became of a script's last run is noted under its path, whether it is remembered or not: for
+2. `keep`: after a run, the state of everything in its trace is read and stored with the result. If
+   something changed while it ran, the script may have seen another state: then nothing is stored.
+3. How a script's last run ended is noted under its path, whether it is remembered or not: for
    `explain`, and for the order in which scripts run.
 """
 
@@ -38,13 +38,13 @@ from coursebuild.core.run.dependencies import (
     Kind,
     Need,
     dependencies_of,
-    forgotten,
     group_key,
     input_changes,
     inputs_of,
     is_perturbed,
+    parse_sought,
+    reason_forgotten,
     result_key,
-    sought,
     state_changes,
 )
 from coursebuild.core.run.packages import InstalledPackages
@@ -53,38 +53,38 @@ from coursebuild.core.run.script_environment import OtherEnvironment, conditions
 
 _RESULTS, _LAST = "scripts", "last"
 _MOST_SHARED = 32
-"""Results of one group that are fetched from the shared cache."""
+"""The most results of one group that are fetched from the shared cache."""
 _FETCHERS = 16
 """Requests to the shared cache at a time."""
 _REASON = "{} changed while it ran"
 
 
 class States:
-    """How things are now, each looked at when it is first asked for and not again."""
+    """The present states of needs, each read once, when it is first asked for."""
 
     def __init__(self, root: Path, store: Memo, place: OtherEnvironment | None = None) -> None:
         self.root = root
         self._inside = f"{str(root).rstrip('/')}/"
         self.places = places(root, os.environ, place)
-        self.around = conditions(os.environ, place)
+        self.conditions = conditions(os.environ, place)
         self._installed = InstalledPackages(store, None if place is None else place.packages)
-        self._known: dict[Need, str] = {}
+        self._states: dict[Need, str] = {}
 
     def __call__(self, need: Need) -> str:
-        """The state of something; the same all the time."""
-        if need not in self._known:
-            self._known[need] = self.now(need)
-        return self._known[need]
+        """The state of a need when it was first asked for."""
+        if need not in self._states:
+            self._states[need] = self.now(need)
+        return self._states[need]
 
     def now(self, need: Need) -> str:
-        """The state of something at this moment."""
+        """The state of a need at this moment."""
         match need.kind:
             case Kind.FILE:
                 return file_state(self._inside + need.name)
             case Kind.LISTING:
                 return folder_state(self._inside + need.name)
             case Kind.SOUGHT:
-                folder, modules = sought(need.name)
+                folder, modules = parse_sought(need.name)
                 return modules_in(self._inside + folder, modules)
             case Kind.OUTSIDE:
                 return file_state(need.name)
@@ -103,44 +103,43 @@ class Memory:
         root: the course folder.
         store: where it is kept.
         fresh: whether all is to be run again.
-        place: another interpreter that runs them. Only for the course's own is it noted what
-            scripts did last.
+        place: another interpreter that runs them. Last runs are noted only for the course's own.
     """
 
     def __init__(
         self, root: Path, store: Memo, *, fresh: bool = False, place: OtherEnvironment | None = None
     ) -> None:
-        self.elsewhere = place is not None and place.name != ""
+        self.is_elsewhere = place is not None and place.name != ""
         self.store = store
         self.fresh = fresh or store.fresh
         """Whether all is to be run, whatever is remembered."""
         self.states = States(root, store, place)
-        self.differing: list[tuple[ScriptRun, ScriptRun]] = []
-        """Of runs made afresh: what was remembered, and what was done now with nothing changed."""
+        self.differing_runs: list[tuple[ScriptRun, ScriptRun]] = []
+        """The remembered and the new run of scripts that differ though nothing changed."""
         self._clock = Clock(store)
         self._started: dict[str, int] = {}
 
     def inputs(self, job: ScriptJob, text: bytes) -> Inputs:
-        """What is known of a script before it runs."""
-        return inputs_of(job, text, self.states.around)
+        """The inputs of a script, which are known before it runs."""
+        return inputs_of(job, text, self.states.conditions)
 
-    def recall(self, wanted: Sequence[Inputs]) -> dict[str, ScriptRun]:
-        """The results, by path, that hold; none where everything is to run."""
+    def recall(self, all_inputs: Sequence[Inputs]) -> dict[str, ScriptRun]:
+        """The results that hold, by path; none where everything is to run."""
         if self.fresh:
             return {}
-        found: dict[str, ScriptRun] = {}
+        runs: dict[str, ScriptRun] = {}
         missing: list[Inputs] = []
-        for inputs in wanted:
-            record = self.remembered(inputs)
+        for inputs in all_inputs:
+            record = self.find_record(inputs)
             if record is None:
                 missing.append(inputs)
             else:
-                found[inputs.path] = record.run(self.states.places)
+                runs[inputs.path] = record.restore(self.states.places)
         for record in self._fetch(missing):
-            found[record.inputs.path] = record.run(self.states.places)
-        return found
+            runs[record.inputs.path] = record.restore(self.states.places)
+        return runs
 
-    def remembered(self, inputs: Inputs) -> RunRecord | None:
+    def find_record(self, inputs: Inputs) -> RunRecord | None:
         """The result kept on this machine that holds now."""
         group = group_key(inputs)
         for key in self.store.group(_RESULTS, group):
@@ -156,8 +155,8 @@ class Memory:
         records = (self.store.peek(_RESULTS, key, from_bytes) for key in keys)
         return [record for record in records if record is not None and _fits(record, inputs)]
 
-    def last(self, path: str) -> RunRecord | None:
-        """What became of the last run of a script, without what it printed."""
+    def last_record(self, path: str) -> RunRecord | None:
+        """The record of a script's last run, without what it printed."""
         record = self.store.peek(
             _LAST, _last_key(path), lambda data: from_bytes(data.partition(b"\n")[2])
         )
@@ -167,14 +166,14 @@ class Memory:
         """Why a result of these inputs is not used."""
         if self.fresh:
             return ["everything is to run again"]
-        last = self.last(inputs.path)
+        last = self.last_record(inputs.path)
         if last is None:
             return ["there is no result of it on this machine"]
-        found = input_changes(last.inputs, inputs)
-        found += state_changes(last.dependencies, self.states)
-        if last.forgotten:
-            found.append(f"its last result is not remembered: {last.forgotten}")
-        return found or ["its result is no longer kept"]
+        clauses = input_changes(last.inputs, inputs)
+        clauses += state_changes(last.dependencies, self.states)
+        if last.reason_forgotten:
+            clauses.append(f"its last result is not remembered: {last.reason_forgotten}")
+        return clauses or ["its result is no longer kept"]
 
     def note_trial(
         self,
@@ -184,35 +183,36 @@ class Memory:
         ok: bool,
         lasting: bool,
         seconds: float,
-        made: int,
+        timestamp: int,
     ) -> None:
         """Note what a trial depends on besides its inputs: files of the course.
 
-        `lasting`: whether its result can be used again. `made`: when, in seconds since 1970.
+        `lasting`: whether its result can be used again. `timestamp`: when it ran, in seconds since
+        1970.
         """
         states = ((path, self.states(Need(Kind.FILE, path))) for path in sorted(files))
-        looked = tuple(Dependency(Kind.FILE, path, state) for path, state in states)
-        why = "" if lasting else "it may end in another way the next time"
+        dependencies = tuple(Dependency(Kind.FILE, path, state) for path, state in states)
+        reason = "" if lasting else "it may end in another way the next time"
         outcome = Outcome.OK if ok else Outcome.FAILED
         run = ScriptRun(inputs.path, outcome, 0, "", "", seconds)
-        self._note(record_of(inputs, looked, made, why, run))
+        self._note(record_of(inputs, dependencies, timestamp, reason, run))
 
-    def started(self, path: str) -> None:
-        """A script is about to run."""
+    def note_start(self, path: str) -> None:
+        """Note that a script is about to run."""
         self._started[path] = self._clock.now()
 
     def begin(self) -> None:
-        """Scripts are about to run: what was written until now was written before."""
+        """Mark the moment before scripts run: any file written until now is older than they."""
         self._clock.tick()
 
     def keep(self, inputs: Inputs, run: ScriptRun) -> None:
         """Remember the result of a run, or why it is not remembered."""
         states = self.states
         dependencies = dependencies_of(run, inputs.requires, states.places, states.now)
-        why = forgotten(run) or self._disturbed(inputs, dependencies)
-        record = record_of(inputs, dependencies, int(time.time()), why, run)
+        reason = reason_forgotten(run) or self._reason_disturbed(inputs, dependencies)
+        record = record_of(inputs, dependencies, int(time.time()), reason, run)
         key = ""
-        if not why:
+        if not reason:
             assert run.outcome in REMEMBERED
             if self.fresh:
                 self._compare(record, run)
@@ -220,23 +220,23 @@ class Memory:
             self.store.put(_RESULTS, key, to_bytes(record, self.states.places), shared=True)
         self._note(record, key)
 
-    def _disturbed(self, inputs: Inputs, looked: Iterable[Dependency]) -> str:
-        """What may have changed between the moment a script saw it and now."""
+    def _reason_disturbed(self, inputs: Inputs, dependencies: Iterable[Dependency]) -> str:
+        """Why the states read now may differ from what the script saw, in words; else empty."""
         if self.states.now(Need(Kind.FILE, inputs.path)) != inputs.text:
             return _REASON.format("its file")
         since = self._started.get(inputs.path)
         if since is None:
             return "nobody knows when it began"
-        for need in looked:
-            match need.kind:
+        for dependency in dependencies:
+            match dependency.kind:
                 case Kind.FILE | Kind.LISTING:
-                    path = str(self.states.root / need.name)
+                    path = str(self.states.root / dependency.name)
                 case Kind.OUTSIDE:
-                    path = need.name
+                    path = dependency.name
                 case Kind.SOUGHT | Kind.MODULE | Kind.PLACE:
                     continue
                 case _:
-                    assert_never(need.kind)
+                    assert_never(dependency.kind)
             if changed_since(path, since):
                 return _REASON.format(path.removeprefix(f"{self.states.root}/"))
         return ""
@@ -245,70 +245,72 @@ class Memory:
         changes = state_changes(record.dependencies, self.states)
         return _fits(record, inputs) and next(changes, None) is None
 
-    def _fetch(self, wanted: Sequence[Inputs]) -> list[RunRecord]:
-        """Results that hold from the shared cache."""
-        if self.store.shared is None or not wanted:
+    def _fetch(self, all_inputs: Sequence[Inputs]) -> list[RunRecord]:
+        """Results from the shared cache that hold."""
+        if self.store.shared is None or not all_inputs:
             return []
 
         def fetch(inputs: Inputs) -> list[tuple[str, RunRecord | None]]:
             group = group_key(inputs)
-            here = set(self.store.group(_RESULTS, group))
-            keys = [key for key in self.store.shared_group(_RESULTS, group) if key not in here]
+            local_keys = set(self.store.group(_RESULTS, group))
+            keys = [
+                key for key in self.store.shared_group(_RESULTS, group) if key not in local_keys
+            ]
             return [
                 (key, self.store.get(_RESULTS, key, from_bytes, shared=True))
                 for key in keys[:_MOST_SHARED]
             ]
 
-        found: list[RunRecord] = []
+        records: list[RunRecord] = []
         from concurrent.futures import ThreadPoolExecutor
 
         with ThreadPoolExecutor(_FETCHERS, "cache") as pool:
-            for inputs, entries in zip(wanted, pool.map(fetch, wanted), strict=True):
+            for inputs, entries in zip(all_inputs, pool.map(fetch, all_inputs), strict=True):
                 for key, record in entries:
                     if record is not None and self._holds(record, inputs):
                         self._note(record, key)
-                        found.append(record)
+                        records.append(record)
                         break
-        return found
+        return records
 
     def _note(self, record: RunRecord, result: str = "") -> None:
-        """Note under the script's path what is known of its last run.
+        """Note a script's last run under its path.
 
         `result` is the key of the result, where it is remembered.
         """
-        if self.elsewhere or is_perturbed(record.inputs):
+        if self.is_elsewhere or is_perturbed(record.inputs):
             return
         key = _last_key(record.inputs.path)
         head = f"{result}\n".encode()
         before = self.store.peek(_LAST, key, bytes)
         if result and before is not None and before.startswith(head):
             return
-        run = replace(record.kept, stdout="", stderr="", trace=None, figures=())
-        data = head + to_bytes(replace(record, kept=run), ())
+        run = replace(record.stored_run, stdout="", stderr="", trace=None, figures=())
+        data = head + to_bytes(replace(record, stored_run=run), ())
         if before != data:
             self.store.put(_LAST, key, data)
 
     def _compare(self, record: RunRecord, run: ScriptRun) -> None:
-        """Hold a run made afresh against what is remembered for the same dependencies."""
+        """Compare a run made afresh with what is remembered for the same dependencies."""
         for before in self.results(record.inputs):
             if before.dependencies == record.dependencies:
-                old = before.run(self.states.places)
+                old = before.restore(self.states.places)
                 if (old.outcome, old.status, old.stdout) != (run.outcome, run.status, run.stdout):
-                    self.differing.append((old, run))
+                    self.differing_runs.append((old, run))
 
 
 def _fits(record: RunRecord, inputs: Inputs) -> bool:
     """Whether a record is a result of these inputs."""
     return (
         record.inputs == inputs
-        and record.kept.path == inputs.path
-        and record.kept.outcome in REMEMBERED
-        and not record.forgotten
+        and record.stored_run.path == inputs.path
+        and record.stored_run.outcome in REMEMBERED
+        and not record.reason_forgotten
     )
 
 
 def longest_first(jobs: Sequence[ScriptJob], seconds: Mapping[str, float]) -> list[ScriptJob]:
-    """The order in which scripts take the least time together; an unknown one may be long."""
+    """Jobs in the order that takes the least time in parallel; an unknown one may be long."""
     return sorted(jobs, key=lambda job: -seconds.get(job.path, math.inf))
 
 

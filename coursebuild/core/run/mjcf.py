@@ -1,11 +1,11 @@
-"""Compiling MJCF with MuJoCo itself, in a child process.
+"""Compile MJCF with MuJoCo itself, in a child process.
 
 Entry points: `compile_all`; `model_files`, what a model is made of; `readable_error`, for people.
 
-1. One child compiles everything; it starts again if a model crashes it or holds it up too long.
+1. One child compiles everything; it starts again if a model crashes it or takes too long.
 2. A text is compiled as if it stood in `models/`, so that its includes and assets are found there.
-3. The messages are MuJoCo's own and whole, but for the paths of this machine; the line is taken out
-   of them where it is one of the compiled text, and not of a file that it includes.
+3. The messages are MuJoCo's own and whole, without the paths of this machine; a line is read from
+   them if it is one of the compiled text, and not of a file that it includes.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from coursebuild.core.run.mujoco_files import ModelFiles
 TIMEOUT = 60.0
 """Seconds that one model may take; large meshes take some."""
 OWN_FAULT = "MuJoCo's compiler "
-"""A message about the process that compiles begins so."""
+"""How messages begin that are about the process that compiles."""
 _NO_MEMORY = re.compile(r"unknown exception|allocate memory|MemoryError|bad_alloc", re.IGNORECASE)
 _TEXT_NAME = ".coursebuild-text.xml"
 TEXT_PATH = f"models/{_TEXT_NAME}"
-"""Where a text would stand; no file has this name."""
+"""Where a text without a file would stand; no file has this name."""
 
 
 def compile_all(
@@ -72,7 +72,7 @@ class _Compiler(JsonChild):
             return CompileResult(f"{OWN_FAULT}{self.death()}")
         error, facts = reply
         if facts is not None:
-            facts |= {"includes": parts(self.root, path, text)}
+            facts |= {"includes": existing_files(self.root, path, text)}
             return CompileResult("", facts=msgspec.convert(facts, ModelFacts))
         message = self._without_paths(error.strip())
         if _NO_MEMORY.search(message):
@@ -98,17 +98,17 @@ def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:
     Returns:
         Paths relative to the root, or absolute where they lie outside, sorted.
     """
-    found: set[str] = set()
-    ModelFiles(found.add).of_text(text, folder=os.path.dirname(root / path))  # noqa: PTH120
-    paths = [Path(os.path.normpath(file)) for file in found]
-    inside = {(p.relative_to(root) if p.is_relative_to(root) else p).as_posix() for p in paths}
-    # MuJoCo puts absolute paths one behind the other; nothing is there, on any machine.
+    names: set[str] = set()
+    ModelFiles(names.add).scan_text(text, folder=os.path.dirname(root / path))  # noqa: PTH120
+    paths = [Path(os.path.normpath(name)) for name in names]
+    files = {(p.relative_to(root) if p.is_relative_to(root) else p).as_posix() for p in paths}
+    # MuJoCo joins an absolute path to another one; nothing is there, on any machine.
     nowhere = f"{root}/".lstrip("/")
-    return tuple(sorted(file for file in inside if file != path and nowhere not in file[1:]))
+    return tuple(sorted(file for file in files if file != path and nowhere not in file[1:]))
 
 
-def parts(root: Path, path: str, text: str) -> tuple[str, ...]:
-    """Those of the `model_files` that are there."""
+def existing_files(root: Path, path: str, text: str) -> tuple[str, ...]:
+    """The `model_files` that exist."""
     return tuple(file for file in model_files(root, path, text) if (root / file).is_file())
 
 
@@ -129,9 +129,9 @@ def error_line(message: str, text: str) -> int | None:
     if not numbers or not 1 <= numbers[-1] <= max(len(lines), 1):
         return None
     line = numbers[-1]
-    named = _NAMED.search(message)
-    if named and "<attach" in text:
-        name = named.group(1)
+    match = _NAMED.search(message)
+    if match and "<attach" in text:
+        name = match.group(1)
         if not name or name not in "\n".join(lines[line - 1 : line + 3]):
             return None
     return line
@@ -149,7 +149,7 @@ _PARSER = re.compile(
 
 def readable_error(error: str) -> str:
     """A message of MuJoCo's as one line in our style: no prefixes, no line numbers."""
-    text = _PARSER.sub(_parser_words, error)
+    text = _PARSER.sub(_describe_parser_error, error)
     while (shorter := _NOISE.sub("", text)) != text:
         text = shorter
     text = _PLACE.sub(lambda m: f" (element `{m.group(1)}`)" if m.group(1) else "", text)
@@ -158,7 +158,7 @@ def readable_error(error: str) -> str:
     return _CAPITAL.sub(lambda m: m.group().lower(), text)
 
 
-def _parser_words(match: re.Match[str]) -> str:
+def _describe_parser_error(match: re.Match[str]) -> str:
     kind = match.group(1).removeprefix("PARSING_").replace("_", " ").lower()
-    where = f" <{match.group(2)}>" if match.group(2) else ""
-    return f"not well-formed XML ({kind}{where})"
+    element = f" <{match.group(2)}>" if match.group(2) else ""
+    return f"not well-formed XML ({kind}{element})"

@@ -1,9 +1,9 @@
-"""Compiled models, remembered: MuJoCo starts only if something that a model is made of changed.
+"""Memory of compiled models: MuJoCo starts only if something that a model is made of changed.
 
-Entry points: `compile_kept`, `model_key`.
+Entry points: `compile_or_recall`, `model_key`.
 
-A result, an error too, is kept under its text, where that stands, and the state of every other file
-that MuJoCo looks for. What changed while it was compiled is not kept.
+A result, also an error, is stored under a hash of the text, its place, and the state of every other
+file that MuJoCo looks for. If one of these changed during the compilation, nothing is stored.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from coursebuild.core.values import fingerprint
 _KIND = "models"
 
 
-def compile_kept(
+def compile_or_recall(
     root: Path,
     store: Memo,
     texts: Sequence[tuple[str, str]],
@@ -34,21 +34,24 @@ def compile_kept(
 ) -> tuple[CompileResult, ...]:
     """A result for each text, see `mjcf.compile_all`.
 
-    `stage` is entered where anything has to be compiled.
+    `stage` is entered only if anything has to be compiled.
     """
-    keys = {each: model_key(root, *each) for each in texts}
-    kept = {each: store.get_value(_KIND, key, CompileResult) for each, key in keys.items()}
-    found = {each: result for each, result in kept.items() if result is not None}
-    left = [each for each in keys if each not in found]
-    if left:
+    keys = {model: model_key(root, *model) for model in texts}
+    entries = {model: store.get_value(_KIND, key, CompileResult) for model, key in keys.items()}
+    results = {model: result for model, result in entries.items() if result is not None}
+    uncompiled = [model for model in keys if model not in results]
+    if uncompiled:
         with stage():
-            made = mjcf.compile_all(root, left, memory=memory)
-        for each, result in zip(left, made, strict=True):
-            found[each] = result
-            if not result.error.startswith(mjcf.OWN_FAULT) and model_key(root, *each) == keys[each]:
+            new_results = mjcf.compile_all(root, uncompiled, memory=memory)
+        for model, result in zip(uncompiled, new_results, strict=True):
+            results[model] = result
+            if (
+                not result.error.startswith(mjcf.OWN_FAULT)
+                and model_key(root, *model) == keys[model]
+            ):
                 with contextlib.suppress(UnicodeEncodeError):  # a name of a file that is no text
-                    store.put_value(_KIND, keys[each], result)
-    return tuple(found[each] for each in texts)
+                    store.put_value(_KIND, keys[model], result)
+    return tuple(results[model] for model in texts)
 
 
 def model_key(root: Path, path: str, text: str) -> str:
@@ -60,6 +63,6 @@ def model_key(root: Path, path: str, text: str) -> str:
 
 @functools.cache
 def _code() -> tuple[bytes, ...]:
-    """How models are compiled, and what is told of them."""
+    """The code that compiles models and reads their facts."""
     files = (mjcf.__file__, mjcf_worker.__file__, mujoco_files.__file__)
     return tuple(Path(file).read_bytes() for file in files)

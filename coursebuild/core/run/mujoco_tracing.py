@@ -1,11 +1,9 @@
-"""MuJoCo's functions that open files, wrapped so that a `Tracer` hears of the files.
+"""Wrap MuJoCo's functions that open files, so that a `Tracer` notes the files.
 
 Entry point: `wrap`, once MuJoCo has been imported; nothing is noted until `tracer` is set.
 
-What a version of MuJoCo does not have is passed over.
-
-A wrapper has the name and the documentation of what it wraps, and takes itself out of the traceback
-of whatever that raises.
+Functions that this version of MuJoCo lacks are skipped. A wrapper has the name and the
+documentation of what it wraps, and removes itself from the traceback of what that raises.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ Before = Callable[[tuple[Any, ...], Mapping[str, Any]], None]
 After = Callable[[tuple[Any, ...], Mapping[str, Any], Any], None]
 
 tracer: Tracer | None = None
-"""Who takes the notes; nobody does before it is set."""
+"""The tracer that takes the notes; there are none before it is set."""
 
 _WRITERS = (
     ("mj_saveModel", 1),
@@ -42,71 +40,73 @@ def wrap(mujoco: ModuleType) -> None:
     """Wrap the functions of an imported MuJoCo."""
     model, spec = getattr(mujoco, "MjModel", None), getattr(mujoco, "MjSpec", None)
 
-    def reader(find: Callable[[ModelFiles, Any], None], *, assets: bool = True) -> Before:
-        """Finds the files of a model, of which the first argument is the path or the text."""
+    def reader(scan: Callable[[ModelFiles, Any], None], *, assets: bool = True) -> Before:
+        """Notes the files of a model whose path or text is the first argument."""
 
-        def read(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-            files = ModelFiles(_read, _given(args, keywords), assets=assets)
-            find(files, _get(args, keywords, 0, "filename", "xml"))
+        def note_files(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+            files = ModelFiles(_note_read, _given_names(args, keywords), assets=assets)
+            scan(files, _get_argument(args, keywords, 0, "filename", "xml"))
 
-        return read
+        return note_files
 
-    def binary(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        name = _text(_get(args, keywords, 0, "filename"))
-        if name not in _given(args, keywords):
-            _read(name)
+    def note_binary(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        name = _decode(_get_argument(args, keywords, 0, "filename"))
+        if name not in _given_names(args, keywords):
+            _note_read(name)
 
-    of_class: tuple[tuple[Any, str, Before], ...] = (
-        (model, "from_xml_path", reader(ModelFiles.of_path)),
-        (model, "from_xml_string", reader(ModelFiles.of_text)),
-        (model, "from_binary_path", binary),
-        (spec, "from_file", reader(ModelFiles.of_path, assets=False)),
-        (spec, "from_string", reader(ModelFiles.of_text, assets=False)),
+    class_readers: tuple[tuple[Any, str, Before], ...] = (
+        (model, "from_xml_path", reader(ModelFiles.scan_path)),
+        (model, "from_xml_string", reader(ModelFiles.scan_text)),
+        (model, "from_binary_path", note_binary),
+        (spec, "from_file", reader(ModelFiles.scan_path, assets=False)),
+        (spec, "from_string", reader(ModelFiles.scan_text, assets=False)),
     )
-    for owner, name, before in of_class:
+    for owner, name, before in class_readers:
         if hasattr(owner, name):
-            setattr(owner, name, staticmethod(wrapped(getattr(owner, name), before)))
+            setattr(owner, name, staticmethod(wrap_function(getattr(owner, name), before)))
     for name, position in (("compile", 0), ("recompile", 0), ("attach", 1)):
         wrap_method(spec, name, _spec_reader(position))
     wrap_method(spec, "to_file", _writer(1))
-    wrap_functions(mujoco, ("mj_loadPluginLibrary", "mj_loadAllPluginLibraries"), _library)
-    wrap_functions(mujoco, ("mju_getXMLDependencies",), reader(ModelFiles.of_path))
+    wrap_functions(mujoco, ("mj_loadPluginLibrary", "mj_loadAllPluginLibraries"), _note_library)
+    wrap_functions(mujoco, ("mju_getXMLDependencies",), reader(ModelFiles.scan_path))
     for name, position in _WRITERS:
         wrap_functions(mujoco, (name,), _writer(position))
 
 
 def _spec_reader(position: int) -> Before:
-    """Finds the files of a specification, which is the argument at a position."""
-    return lambda args, keywords: ModelFiles(_read).of_spec(_get(args, keywords, position, "child"))
+    """Notes the files of the specification that is the argument at `position`."""
+    return lambda args, keywords: ModelFiles(_note_read).scan_spec(
+        _get_argument(args, keywords, position, "child")
+    )
 
 
-def _library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-    at = _text(_get(args, keywords, 0, "path", "directory"))
+def _note_library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+    path = _decode(_get_argument(args, keywords, 0, "path", "directory"))
     if tracer is not None:
-        tracer.library(at)
+        tracer.note_library(path)
 
 
 def _writer(position: int) -> Before:
-    """Notes a file that is written, whose name is at a position."""
+    """Notes a file that is written, whose name is the argument at `position`."""
 
-    def write(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        at = _get(args, keywords, position, "filename")
-        if at is not None and tracer is not None:
-            tracer.write(at)
+    def note_write(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        path = _get_argument(args, keywords, position, "filename")
+        if path is not None and tracer is not None:
+            tracer.note_write(path)
 
-    return write
+    return note_write
 
 
-def wrapped(
+def wrap_function(
     real: Callable[..., Any],
     before: Before | None = None,
     after: After | None = None,
     *,
     like: Callable[..., Any] | None = None,
 ) -> Callable[..., Any]:
-    """A function that does what another does, and something before, and with its result after.
+    """Wrap a function: call `before` with its arguments, and `after` with its result as well.
 
-    `like` is the one whose name it has, where that is another one.
+    The wrapper has the name of `like`, or else of the function itself.
     """
 
     def wrapper(*args: Any, **keywords: Any) -> Any:
@@ -120,7 +120,7 @@ def wrapped(
                 error.__traceback__ = error.__traceback__.tb_next
             raise  # which, unlike naming the error, adds no entry to the traceback
         if after is not None and tracer is not None:
-            with contextlib.suppress(Exception):  # what was asked for has been done
+            with contextlib.suppress(Exception):  # the function itself has succeeded
                 after(args, keywords, result)
         return result
 
@@ -135,22 +135,22 @@ def wrap_functions(
     before: Before | None = None,
     after: After | None = None,
 ) -> None:
-    """Wrap those of MuJoCo's functions that there are, wherever they are found."""
+    """Wrap those of these functions that MuJoCo has, in every module that holds them."""
     for name in names:
         real = getattr(mujoco, name, None)
         if real is not None:
-            replace_function(mujoco, name, wrapped(real, before, after))
+            replace_function(mujoco, name, wrap_function(real, before, after))
 
 
 def wrap_method(owner: Any, name: str, before: Before | None, after: After | None = None) -> None:
-    """Wrap a method of one of MuJoCo's classes, if there is such."""
+    """Wrap a method of one of MuJoCo's classes, if it has this method."""
     real = getattr(owner, "__dict__", {}).get(name)
     if real is not None:
-        setattr(owner, name, wrapped(real.__get__(None, owner), before, after))
+        setattr(owner, name, wrap_function(real.__get__(None, owner), before, after))
 
 
 def replace_function(mujoco: ModuleType, name: str, new: Callable[..., Any]) -> None:
-    """Put a function in the place of one of MuJoCo's, wherever it is found."""
+    """Replace one of MuJoCo's functions in every module that holds it."""
     real = getattr(mujoco, name)
     for module in (mujoco, sys.modules.get(real.__module__ or "")):
         if module is not None and module.__dict__.get(name) is real:
@@ -158,21 +158,21 @@ def replace_function(mujoco: ModuleType, name: str, new: Callable[..., Any]) -> 
 
 
 def replace_rollout(mujoco: Any, new: Callable[[Callable[..., Any]], Callable[..., Any]]) -> None:
-    """Put what `new` makes of it in the place of MuJoCo's rollout, once a script has imported that.
+    """Replace MuJoCo's rollout by `new(rollout)`, once a script has imported it.
 
-    Before a rollout it is asked for the size of a state, or data is made.
+    Before any rollout, a script asks for the size of a state, or makes data: then is the time.
     """
-    replaced = False
+    is_replaced = False
 
-    def look_for(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        nonlocal replaced
+    def replace_once(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        nonlocal is_replaced
         owner: Any = getattr(sys.modules.get("mujoco._rollout"), "Rollout", None)
-        if owner is not None and not replaced:
-            replaced = True
+        if owner is not None and not is_replaced:
+            is_replaced = True
             owner.rollout = new(owner.__dict__["rollout"].__get__(None, owner))
 
-    wrap_functions(mujoco, ("mj_stateSize", "mj_getState"), look_for)
-    wrap_method(mujoco.MjData, "__init__", look_for)
+    wrap_functions(mujoco, ("mj_stateSize", "mj_getState"), replace_once)
+    wrap_method(mujoco.MjData, "__init__", replace_once)
 
 
 def note(record: str) -> None:
@@ -181,22 +181,24 @@ def note(record: str) -> None:
         tracer.note(record)
 
 
-def _read(path: str) -> None:
+def _note_read(path: str) -> None:
     if tracer is not None:
-        tracer.read(path)
+        tracer.note_read(path)
 
 
-def _get(args: tuple[Any, ...], keywords: Mapping[str, Any], position: int, *names: str) -> Any:
+def _get_argument(
+    args: tuple[Any, ...], keywords: Mapping[str, Any], position: int, *names: str
+) -> Any:
     if len(args) > position:
         return args[position]
     return next((keywords[name] for name in names if name in keywords), None)
 
 
-def _given(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the files that are handed over as bytes."""
+def _given_names(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the files that the caller hands over as bytes."""
     tables = [value for value in (*args[1:], *keywords.values()) if hasattr(value, "keys")]
     return tuple(str(name) for table in tables for name in table.keys())  # noqa: SIM118
 
 
-def _text(value: Any) -> str:
+def _decode(value: Any) -> str:
     return value.decode("utf-8", "surrogateescape") if isinstance(value, bytes) else value

@@ -1,17 +1,17 @@
-"""Whether the simulations of a script went well, noticed in its own process.
+"""Watch, in the process of a script, whether its simulations go well.
 
 Entry points: `watch`, once MuJoCo has been imported; `finish`, when the script has ended. Nothing
 is noted until `mujoco_tracing.tracer` is set.
 
-1. MuJoCo warns before it resets a state that is lost, or goes on with one: that is heard (see
-   `mujoco_warnings`), whatever the script resets afterwards, from any thread, and at no cost to a
-   step. MuJoCo turns the clock back in no other case.
-2. Every `MjData` is looked at when it is reset, when the script has let go of it, and at the end:
+1. MuJoCo warns before it resets a lost state, or goes on with one. The warning is noted (see
+   `mujoco_warnings`) from any thread, whatever the script resets afterwards, and without making a
+   step slower. MuJoCo turns the clock back in no other case.
+2. Every `MjData` is checked when it is reset, when the script no longer uses it, and at the end:
    its warning counters, whether its state is finite, and how deep its bodies lie in each other,
    which MuJoCo does not warn of.
 
-To see what the script lets go of, each `MjData` is held here until another is made; while nothing
-but this holds it, it is looked at and let go as well.
+To check what the script no longer uses, each `MjData` is held here until another is made; if
+nothing else refers to it by then, it is checked and released.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from coursebuild.core.run.mujoco_warnings import Warnings
 
 DEEP = 1.0
 """A contact is deep where the smaller of two geoms has sunk in by more than this part of its
-smallest half size: its middle lies in the other one."""
+smallest half size: then its middle lies in the other one."""
 
 _KINDS = (
     (" in QPOS ", "mjWARN_BADQPOS", "positions"),
     (" in QVEL ", "mjWARN_BADQVEL", "velocities"),
     (" in QACC ", "mjWARN_BADQACC", "accelerations"),
 )
-"""What MuJoCo's text says, the counter, and what we call it."""
+"""A part of MuJoCo's message, the counter, and our name for the sign."""
 _NEEDED = ("MjData", "_functions", "mjtGeom", "mjtWarning")
 _UNNAMED = "MuJoCo Model"
-"""What MuJoCo calls a model that its author does not."""
+"""MuJoCo's name for a model that its author has not named."""
 _MOST_NOTES = 16
-_MOST_LOOKS = 5000
-"""Looks at data that is being reset, which a script may do very often."""
+_MOST_CHECKS = 5000
+"""The most checks of data that is being reset, which a script may do very often."""
 _MOST_HELD = 1 << 26
-"""Bytes of data that nobody but this may hold."""
+"""The most bytes of data that are held for checking."""
 
 
 def watch(mujoco: ModuleType) -> None:
-    """Watch the simulations of an imported MuJoCo; of a version that has what this needs."""
+    """Watch the simulations of an imported MuJoCo, if its version has what this needs."""
     global _watch
     if "numpy" not in sys.modules or not all(hasattr(mujoco, name) for name in _NEEDED):
         return
@@ -54,7 +54,7 @@ def watch(mujoco: ModuleType) -> None:
 
 
 def finish() -> None:
-    """Look at every `MjData` that there is: the script has come to its end."""
+    """Check every `MjData` that there is, at the end of the script."""
     if _watch is not None and mujoco_tracing.tracer is not None:
         with contextlib.suppress(Exception):  # the script's own end must not fail for this
             _watch.finish()
@@ -64,7 +64,7 @@ _watch: _Watch | None = None
 
 
 class _Watch:
-    """Hears of warnings, and of data that is made and reset, once it is made."""
+    """Notes warnings, and checks data as it is made and reset."""
 
     def __init__(self, mujoco: ModuleType) -> None:
         self._mujoco = mujoco
@@ -72,32 +72,32 @@ class _Watch:
         types = mujoco.mjtGeom
         self._flat = [int(types.mjGEOM_PLANE), int(types.mjGEOM_HFIELD)]
         """The types of geoms that have no inside to be deep in."""
-        self._held: dict[int, Any] = {}
-        self._enough = 2
-        """How many are held before some are let go."""
+        self._data_by_id: dict[int, Any] = {}
+        self._release_limit = 2
+        """How many are held before unused ones are released."""
         self._notes = 0
-        self._looks = 0
+        self._checks = 0
         self._warned: set[str] = set()
-        self._told: set[tuple[int, str]] = set()
+        self._noted: set[tuple[int, str]] = set()
         data, wrap = mujoco.MjData, mujoco_tracing.wrap_method
         for name in ("__init__", "__setstate__"):
-            wrap(data, name, None, self._made_self)
+            wrap(data, name, None, self._hold_new)
         for name in ("__copy__", "__deepcopy__"):
-            wrap(data, name, None, lambda args, keywords, made: self._made(made))
+            wrap(data, name, None, lambda args, keywords, result: self._hold(result))
         spec = getattr(mujoco, "MjSpec", None)  # there was none before MuJoCo 3.2
-        wrap(spec, "recompile", None, lambda args, keywords, made: self._made(made[1]))
+        wrap(spec, "recompile", None, lambda args, keywords, result: self._hold(result[1]))
         resets = ("mj_resetData", "mj_resetDataKeyframe", "mj_resetDataDebug")
-        mujoco_tracing.wrap_functions(mujoco, resets, self._reset)
-        self._warnings = Warnings(mujoco, self._heard)  # which the library calls as long as it is
+        mujoco_tracing.wrap_functions(mujoco, resets, self._before_reset)
+        self._warnings = Warnings(mujoco, self._note_warning)  # kept for the library to call
         self._warnings.install()
 
     def finish(self) -> None:
-        for key in list(self._held):
-            self._look_last(self._held.pop(key))
+        for key in list(self._data_by_id):
+            self._check_finally(self._data_by_id.pop(key))
 
     # --- warnings
 
-    def _heard(self, message: str) -> None:
+    def _note_warning(self, message: str) -> None:
         if mujoco_tracing.tracer is None:
             return
         try:
@@ -111,41 +111,43 @@ class _Watch:
 
     def _model_at(self, time: str) -> str:
         """The name of the model whose clock shows this time, if there is only one."""
-        names = {_name(data) for data in list(self._held.values()) if f"{data.time:.4f}" == time}
+        names = {
+            _name(data) for data in list(self._data_by_id.values()) if f"{data.time:.4f}" == time
+        }
         return names.pop() if len(names) == 1 else ""
 
-    # --- looks
+    # --- checks
 
-    def _made_self(self, args: tuple[Any, ...], keywords: Mapping[str, Any], made: Any) -> None:
-        self._made(args[0])
+    def _hold_new(self, args: tuple[Any, ...], keywords: Mapping[str, Any], result: Any) -> None:
+        self._hold(args[0])
 
-    def _made(self, data: Any) -> None:
-        self._held[id(data)] = data
-        if len(self._held) > self._enough or self._size() > _MOST_HELD:
-            self._let_go()
-            self._enough = max(2, 2 * len(self._held))
+    def _hold(self, data: Any) -> None:
+        self._data_by_id[id(data)] = data
+        if len(self._data_by_id) > self._release_limit or self._held_bytes() > _MOST_HELD:
+            self._release_unused()
+            self._release_limit = max(2, 2 * len(self._data_by_id))
 
-    def _size(self) -> int:
-        return sum(int(data.nbuffer) for data in list(self._held.values())[:_MOST_NOTES])
+    def _held_bytes(self) -> int:
+        return sum(int(data.nbuffer) for data in list(self._data_by_id.values())[:_MOST_NOTES])
 
-    def _let_go(self) -> None:
-        """Look at data that nobody but this holds, and hold it no longer."""
-        alone = _references({0: object()}, 0)
-        for key in list(self._held):
-            if _references(self._held, key) <= alone:
-                self._look_last(self._held.pop(key))
-                self._told = {told for told in self._told if told[0] != key}
+    def _release_unused(self) -> None:
+        """Check and release data that nothing else refers to."""
+        baseline = _count_references({0: object()}, 0)
+        for key in list(self._data_by_id):
+            if _count_references(self._data_by_id, key) <= baseline:
+                self._check_finally(self._data_by_id.pop(key))
+                self._noted = {entry for entry in self._noted if entry[0] != key}
 
-    def _reset(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        if self._looks < _MOST_LOOKS:
-            self._looks += 1
-            self._look(args[1] if len(args) > 1 else keywords["d"])
+    def _before_reset(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        if self._checks < _MOST_CHECKS:
+            self._checks += 1
+            self._check(args[1] if len(args) > 1 else keywords["d"])
 
-    def _look_last(self, data: Any) -> None:
-        self._look(data)
-        initial_state_perturbation.last_look(data)
+    def _check_finally(self, data: Any) -> None:
+        self._check(data)
+        initial_state_perturbation.note_final_state(data)
 
-    def _look(self, data: Any) -> None:
+    def _check(self, data: Any) -> None:
         """Note what is wrong with a simulation, once for each of them."""
         time = data.time
         if time == 0:
@@ -153,31 +155,31 @@ class _Watch:
         mujoco, finite = self._mujoco, self._numpy.isfinite
         for _, counter, kind in _KINDS:
             count = data.warning[int(getattr(mujoco.mjtWarning, counter))].number
-            if count and kind not in self._warned:  # by a handler that we do not know of
-                self._once(data, kind, "")
+            if count and kind not in self._warned:  # another handler took the warning
+                self._note_once(data, kind, "")
         if not all(finite(values).all() for values in (data.qpos, data.qvel, data.act)):
-            self._once(data, "state", "")
+            self._note_once(data, "state", "")
         elif data.ncon and hasattr(data, "model"):
-            self._contacts(data)
+            self._check_contacts(data)
 
-    def _contacts(self, data: Any) -> None:
+    def _check_contacts(self, data: Any) -> None:
         contact, model, numpy = data.contact, data.model, self._numpy
         distance, pairs = contact.dist, contact.geom
         halves = model.geom_aabb[:, 3:].min(axis=1)
         sizes = numpy.where(numpy.isin(model.geom_type, self._flat), numpy.inf, halves)
-        both = (pairs >= 0).all(axis=1) & (contact.efc_address >= 0)
-        smaller = numpy.where(both, sizes[pairs].min(axis=1), numpy.inf)
+        is_active = (pairs >= 0).all(axis=1) & (contact.efc_address >= 0)
+        smaller = numpy.where(is_active, sizes[pairs].min(axis=1), numpy.inf)
         parts = -distance / smaller
         worst = int(parts.argmax())
         if not parts[worst] > DEEP:
             return
-        names = [_geom(model, int(geom)) for geom in pairs[worst]]
-        self._once(data, "contact", f"{-distance[worst]:.2g}\x1f{names[0]}\x1f{names[1]}")
+        names = [_describe_geom(model, int(geom)) for geom in pairs[worst]]
+        self._note_once(data, "contact", f"{-distance[worst]:.2g}\x1f{names[0]}\x1f{names[1]}")
 
-    def _once(self, data: Any, kind: str, detail: str) -> None:
+    def _note_once(self, data: Any, kind: str, detail: str) -> None:
         key = id(data), kind
-        if key not in self._told:
-            self._told.add(key)
+        if key not in self._noted:
+            self._noted.add(key)
             self._note(kind, detail, f"{data.time:.6g}", _name(data))
 
     # --- notes
@@ -187,15 +189,15 @@ class _Watch:
         tracer = mujoco_tracing.tracer
         if tracer is None or self._notes > _MOST_NOTES:
             return
-        path, line = _script_line(tracer.root)
+        path, line = _find_script_line(tracer.root)
         parts = (kind, detail, time, model, path, str(line))
         fields = (part.replace("\t", " ").replace("\0", "") for part in parts)
         tracer.note("d" + "\t".join(fields))
 
 
-def _references(held: Mapping[int, object], key: int) -> int:
-    """How many hold a value, with those of this function."""
-    value = held[key]
+def _count_references(data_by_id: Mapping[int, object], key: int) -> int:
+    """How many references there are to a value, with those of this function."""
+    value = data_by_id[key]
     return sys.getrefcount(value)
 
 
@@ -207,25 +209,25 @@ def _name(data: Any) -> str:
     return "" if name == _UNNAMED else name
 
 
-def _geom(model: Any, index: int) -> str:
+def _describe_geom(model: Any, index: int) -> str:
     name = model.geom(index).name
     return f"`{name}`" if name else f"geom {index}"
 
 
-def _script_line(root: str) -> tuple[str, int]:
-    """The innermost line of a script that is being executed: its path in the project, its number.
+def _find_script_line(root: str) -> tuple[str, int]:
+    """The path in the project and the number of the innermost line of a script that is executed.
 
-    In a thread of MuJoCo's own there is none: then that of the one thread that has one.
+    A thread of MuJoCo's own has none; then it is that of the only thread that has one.
     """
-    found = _place(sys._getframe(2), root)
-    if found is not None:
-        return found
-    places = [_place(frame, root) for frame in sys._current_frames().values()]
-    known = [place for place in places if place is not None]
-    return known[0] if len(known) == 1 else ("", 0)
+    place = _innermost_place(sys._getframe(2), root)
+    if place is not None:
+        return place
+    places = [_innermost_place(frame, root) for frame in sys._current_frames().values()]
+    known_places = [place for place in places if place is not None]
+    return known_places[0] if len(known_places) == 1 else ("", 0)
 
 
-def _place(frame: FrameType | None, root: str) -> tuple[str, int] | None:
+def _innermost_place(frame: FrameType | None, root: str) -> tuple[str, int] | None:
     while frame is not None:
         path = frame.f_code.co_filename.removeprefix(root)
         if path.startswith("examples/"):

@@ -1,10 +1,10 @@
-"""Which version of what is installed gives a module, without importing anything.
+"""Which installed package, in which version, provides a module; nothing is imported to find out.
 
 Entry points: `InstalledPackages`; `distributions`, `module_files`, for archives of scripts.
 
-Reading what each distribution provides takes a quarter of a second, so the whole map is kept until
-one of the folders with installed packages changes. A module that no distribution names, and one of
-this tool's own, is known by the content of its files.
+Reading what each distribution provides takes a quarter of a second, so the whole map is stored
+until one of the folders with installed packages changes. A module that no distribution names, and
+one of this tool's own, is identified by the content of its files.
 """
 
 from __future__ import annotations
@@ -38,23 +38,23 @@ _FOLDERS = ("site-packages", "dist-packages")
 
 
 def site_folders() -> tuple[str, ...]:
-    """The folders with installed packages that scripts see too."""
+    """The folders with installed packages, which scripts see as well."""
     return tuple(path for path in sys.path if Path(path).name in _FOLDERS)
 
 
 class InstalledPackages:
-    """What is installed for the interpreter that runs the scripts."""
+    """The packages that are installed for the interpreter that runs the scripts."""
 
     def __init__(self, store: Memo, folders: Sequence[str] | None = None) -> None:
         self._folders = site_folders() if folders is None else tuple(folders)
-        self._distributions = functools.cache(lambda: _provided(store, self._folders))
+        self._distributions = functools.cache(lambda: _map_distributions(store, self._folders))
         self.version = functools.cache(self._version)
-        """Of a module, such as `numpy 2.4.6`; empty where there is none."""
+        """The version of a module, such as `numpy 2.4.6`; empty where there is no such module."""
 
     def _version(self, module: str) -> str:
-        named = self._distributions().get(module)
-        if named is not None:
-            return named
+        distribution = self._distributions().get(module)
+        if distribution is not None:
+            return distribution
         spec = _spec(module, self._folders) or _spec(module, [str(_LIBRARY)])
         return ABSENT if spec is None else f"files {_content(spec)}"
 
@@ -80,20 +80,20 @@ def distributions(
     Sorted by module. The standard library, `mjcourse` and what is not installed are left out.
     `folders` are those of another interpreter's packages.
     """
-    wanted = sorted(set(modules))
-    provided = _provided(store, folders or site_folders()) if wanted else {}
-    found = []
-    for module in wanted:
-        name, _, version = provided.get(module, "").split(", ")[0].rpartition(" ")
+    names = sorted(set(modules))
+    by_module = _map_distributions(store, folders or site_folders()) if names else {}
+    rows = []
+    for module in names:
+        name, _, version = by_module.get(module, "").split(", ")[0].rpartition(" ")
         if name:
-            found.append((module, name, version))
-    return tuple(found)
+            rows.append((module, name, version))
+    return tuple(rows)
 
 
 def module_files(name: str, folders: Iterable[Path]) -> tuple[OutputFile, ...]:
-    """The files of the module in the first of these folders that has it; of `mjcourse` else ours.
+    """The files of a module from the first of these folders that has it; their paths are relative.
 
-    By path relative to the folder.
+    `mjcourse`, where none has it, is the one that came with this tool.
     """
     spec = importlib.util.find_spec(name) if name == "mjcourse" else None
     ours = [] if spec is None or spec.origin is None else [Path(spec.origin).parents[1]]
@@ -115,16 +115,16 @@ def _spec(module: str, folders: Sequence[str]) -> ModuleSpec | None:
     return None
 
 
-def _provided(store: Memo, folders: Sequence[str]) -> Mapping[str, str]:
+def _map_distributions(store: Memo, folders: Sequence[str]) -> Mapping[str, str]:
     """The distributions, with versions, of each top-level module in these folders."""
     key = _signature(folders)
-    # It is no result, so that it holds though all is to be made again.
-    found = None if key is None else store.peek("installed", key, _read)
-    if found is None:
-        found = _scan(folders)
+    # It is no result of the course, so that `--no-cache` does not make it again.
+    names = None if key is None else store.peek("installed", key, _read)
+    if names is None:
+        names = _scan(folders)
         if key is not None:
-            store.put_value("installed", key, found)
-    return found
+            store.put_value("installed", key, names)
+    return names
 
 
 def _read(data: bytes) -> dict[str, str]:
@@ -148,25 +148,25 @@ def _signature(folders: Sequence[str]) -> str | None:
 
 
 def _scan(folders: Sequence[str]) -> dict[str, str]:
-    import importlib.metadata  # it takes longer than all else that a run with nothing to do needs
+    import importlib.metadata  # takes longer than the rest of a run that finds nothing to do
 
-    found: dict[str, set[str]] = {}
-    seen: set[str] = set()
+    names_by_module: dict[str, set[str]] = {}
+    seen_names: set[str] = set()
     for distribution in importlib.metadata.distributions(path=list(folders)):
         name = distribution.metadata["Name"] or ""
-        if name in seen or name == _OURS:  # the first on the path counts
+        if name in seen_names or name == _OURS:  # the first on the path counts
             continue
-        seen.add(name)
+        seen_names.add(name)
         for module in _modules(distribution):
-            found.setdefault(module, set()).add(f"{name} {distribution.version}")
-    return {module: ", ".join(sorted(names)) for module, names in found.items()}
+            names_by_module.setdefault(module, set()).add(f"{name} {distribution.version}")
+    return {module: ", ".join(sorted(names)) for module, names in names_by_module.items()}
 
 
 def _modules(distribution: Distribution) -> set[str]:
     """The top-level modules of a distribution."""
-    listed = distribution.read_text("top_level.txt")
-    if listed:
-        return {module.rpartition("/")[2] for module in listed.split()}
+    top_level = distribution.read_text("top_level.txt")
+    if top_level:
+        return {module.rpartition("/")[2] for module in top_level.split()}
     modules = set()
     for file in distribution.files or ():
         first = file.parts[0] if file.parts else ""

@@ -1,9 +1,9 @@
-"""The result of a script as it is kept: what it depends on, and what it did.
+"""The result of a script as it is stored: what it depends on, and what it did.
 
 Entry points: `RunRecord`, `to_bytes`, `from_bytes`.
 
-Paths of the machine in what a script wrote to its error output are taken out before it is kept, and
-those of the machine that reads it are put in.
+In a script's error output, paths of this machine are replaced by marks; when the record is read,
+the marks become the paths of the machine that reads it.
 """
 
 from __future__ import annotations
@@ -24,59 +24,69 @@ Moment: TypeAlias = Annotated[int, Meta(ge=0, lt=1 << 37)]
 """Seconds since 1970, in a year that has a name."""
 REMEMBERED = (Outcome.OK, Outcome.FAILED, Outcome.OUTPUT_LIMIT, Outcome.ENCODING)
 _MARK = "\0"
-_NOTHING = Trace((), (), (), (), "")
+_EMPTY_TRACE = Trace((), (), (), (), "")
 
 
-class RunRecord(Struct, frozen=True):
+class RunRecord(
+    Struct,
+    frozen=True,
+    rename={"timestamp": "made", "reason_forgotten": "forgotten", "stored_run": "kept"},
+):
     """One run of a script."""
 
     inputs: Inputs
     dependencies: tuple[Dependency, ...]
-    made: Moment
-    """When, in seconds since 1970."""
-    forgotten: str
-    """Why it is not remembered, as the end of a sentence; empty where it is."""
-    kept: ScriptRun
+    timestamp: Moment
+    """When it ran, in seconds since 1970."""
+    reason_forgotten: str
+    """Why the result is not remembered, as the end of a sentence; empty where it is."""
+    stored_run: ScriptRun
     """What it did; of its trace only what is no dependency."""
 
-    def run(self, places: Iterable[tuple[str, str]]) -> ScriptRun:
+    def restore(self, places: Iterable[tuple[str, str]]) -> ScriptRun:
         """The run as if it had been made here; see `to_bytes` for the places."""
         names: dict[Kind, list[str]] = {kind: [] for kind in Kind}
-        for one in self.dependencies:
-            names[one.kind].append(one.name)
+        for dependency in self.dependencies:
+            names[dependency.kind].append(dependency.name)
         trace = replace(
-            self.kept.trace or _NOTHING,
+            self.stored_run.trace or _EMPTY_TRACE,
             files=tuple(names[Kind.FILE]),
             folders=tuple(names[Kind.LISTING]),
             outside=tuple(names[Kind.OUTSIDE]),
             modules=tuple(names[Kind.MODULE]),
             sought=tuple(names[Kind.SOUGHT]),
         )
-        stderr = _put_in(self.kept.stderr, places)
-        return replace(self.kept, stderr=stderr, cached=True, trace=trace)
+        stderr = _insert_places(self.stored_run.stderr, places)
+        return replace(self.stored_run, stderr=stderr, cached=True, trace=trace)
 
 
 def record_of(
-    inputs: Inputs, dependencies: tuple[Dependency, ...], made: int, forgotten: str, run: ScriptRun
+    inputs: Inputs,
+    dependencies: tuple[Dependency, ...],
+    timestamp: int,
+    reason_forgotten: str,
+    run: ScriptRun,
 ) -> RunRecord:
     """The record of a run."""
     bare = run.trace and replace(run.trace, files=(), folders=(), outside=(), modules=(), sought=())
-    return RunRecord(inputs, dependencies, made, forgotten, replace(run, trace=bare))
+    return RunRecord(inputs, dependencies, timestamp, reason_forgotten, replace(run, trace=bare))
 
 
 def to_bytes(record: RunRecord, places: Iterable[tuple[str, str]]) -> bytes:
-    """As JSON; `places` are folders of this machine, each with a name, the longer ones first."""
-    run = record.kept
-    run = replace(run, seconds=round(run.seconds, 4), stderr=_take_out(run.stderr, places))
-    # Names of files may hold bytes that are no text; only escapes can carry them.
-    return json.dumps(msgspec.to_builtins(replace(record, kept=run)), ensure_ascii=True).encode()
+    """A record as JSON; `places` are this machine's folders by name, longer ones first."""
+    run = record.stored_run
+    run = replace(run, seconds=round(run.seconds, 4), stderr=_replace_places(run.stderr, places))
+    # Names of files may hold bytes that are no text; JSON can hold those as escapes only.
+    return json.dumps(
+        msgspec.to_builtins(replace(record, stored_run=run)), ensure_ascii=True
+    ).encode()
 
 
 def from_bytes(data: bytes) -> RunRecord:
-    """The record that JSON holds.
+    """Read a record from JSON.
 
     Raises:
-        ValueError: it holds none.
+        ValueError: there is none in it.
     """
     try:
         return msgspec.json.decode(data, type=RunRecord)
@@ -84,7 +94,7 @@ def from_bytes(data: bytes) -> RunRecord:
         return msgspec.convert(json.loads(data), RunRecord)
 
 
-def _take_out(text: str, places: Iterable[tuple[str, str]]) -> str:
+def _replace_places(text: str, places: Iterable[tuple[str, str]]) -> str:
     text = text.replace(_MARK, "\ufffd")
     for name, folder in places:
         pattern = rf"(?<![\w./-]){re.escape(folder.rstrip('/'))}(?=[/\"'\s:,;)\]]|$)"
@@ -92,7 +102,7 @@ def _take_out(text: str, places: Iterable[tuple[str, str]]) -> str:
     return text
 
 
-def _put_in(text: str, places: Iterable[tuple[str, str]]) -> str:
+def _insert_places(text: str, places: Iterable[tuple[str, str]]) -> str:
     for name, folder in places if _MARK in text else ():
         text = text.replace(f"{_MARK}{name}{_MARK}", folder.rstrip("/"))
     return text

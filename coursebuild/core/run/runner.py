@@ -1,16 +1,16 @@
-"""Running the lessons' scripts, each in a process, a session and an environment of its own.
+"""Run the lessons' scripts, each in a process, a session and an environment of its own.
 
 Entry point: `ScriptServer`, which stays warm between runs.
 
-1. `parallel` supervisors are started. They are given one script after another, and run each as a
+1. `parallel` supervisors are started. They are given one script after another, and run each in a
    copy of themselves, or in an interpreter of its own (see `supervisor`); the results are the same.
-2. What they report becomes a `ScriptRun` each: UTF-8 is decoded, CRLF becomes LF.
-3. In a `Sandbox`, a supervisor runs only one script, and nothing that it says is taken for granted.
+2. Each report becomes a `ScriptRun`: UTF-8 is decoded, CRLF becomes LF.
+3. In a `Sandbox`, a supervisor runs only one script, and its report is not trusted.
 4. However this ends, a KeyboardInterrupt included, the supervisors see their input close, kill what
    they run and exit.
 
-A script's environment is made here and says nothing of who runs it, but for what finding programs,
-libraries and graphics needs.
+A script's environment is made here. Of the user's own it has only what it needs to find programs,
+libraries and graphics.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import supervisor
 from coursebuild.core.run.packages import site_folders
-from coursebuild.core.run.sandbox import Sandbox, copied_folders, difference, visible
+from coursebuild.core.run.sandbox import Sandbox, copied_folders, sandbox_difference, visible_places
 from coursebuild.core.run.script_environment import (
     OtherEnvironment,
     clean_environment,
@@ -46,40 +46,40 @@ from coursebuild.core.run.trace_records import read_records
 from coursebuild.core.run.watching import STDERR_KEPT
 from coursebuild.core.run.workers import ChildReport, Enclose, Worker
 
-Started: TypeAlias = Callable[[str], object]
-"""Is told of the path of a script that begins."""
-Finished: TypeAlias = Callable[[ScriptRun], object]
-"""Is told of a script that is through, one way or another."""
+OnStart: TypeAlias = Callable[[str], object]
+"""Called with the path of a script that begins."""
+OnFinish: TypeAlias = Callable[[ScriptRun], object]
+"""Called with the result of a script, however it ended."""
 RunAll: TypeAlias = Callable[..., tuple[ScriptRun, ...]]
 """Runs scripts, as `ScriptServer.run` does."""
 
 
 class RunStoppedError(Exception):
-    """Whoever asked for scripts to be run wants them no more; what ran was ended."""
+    """The caller no longer wants the results; the scripts that ran were ended."""
 
 
-def _ignore(what: object) -> None:
+def _ignore(value: object) -> None:
     pass
 
 
 _PATIENCE = 0.1
-"""Seconds after which it is asked again whether a run is still wanted."""
+"""Seconds between two checks of whether a run is still wanted."""
 _GRACE = 60.0
-"""Seconds after its script's time in which a supervisor in a sandbox has to report."""
+"""Seconds that a supervisor in a sandbox has to report, after its script's time limit."""
 
 _LOG = "MUJOCO_LOG.TXT"
-"""What MuJoCo writes where it runs when it warns, in a process that a script has started."""
+"""The file that MuJoCo's warnings leave in the working folder, in processes of a script's own."""
 
 
 class ScriptServer:
-    """Runs scripts, again and again: what they import stays imported in supervisors.
+    """Runs scripts; between runs, supervisors keep imported what scripts import.
 
-    New ones take their place when they have died, when packages were installed, and when the
-    environment is another one.
+    Supervisors are replaced when they have died, when packages were installed, and when the
+    environment changes.
 
     Args:
-        fork: let scripts be copies of their supervisor, where they can.
-        sandbox: what is to be around each script; then none is left warm.
+        fork: let scripts be copies of their supervisor, where possible.
+        sandbox: the sandbox around each script; then no supervisor is kept warm.
     """
 
     def __init__(self, *, fork: bool = True, sandbox: Sandbox | None = None) -> None:
@@ -87,8 +87,8 @@ class ScriptServer:
         self._sandbox = sandbox
         self._idle: list[Worker] = []
         """Supervisors that wait for the next run."""
-        self._installed: tuple[object, ...] = ()
-        """How the folders with packages were when these were started."""
+        self._package_states: tuple[object, ...] = ()
+        """The state of the folders with packages when these were started."""
 
     def __enter__(self) -> Self:
         return self
@@ -109,10 +109,10 @@ class ScriptServer:
         jobs: Sequence[ScriptJob],
         *,
         parallel: int,
-        started: Started = _ignore,
-        finished: Finished = _ignore,
+        on_start: OnStart = _ignore,
+        on_finish: OnFinish = _ignore,
         place: OtherEnvironment | None = None,
-        unwanted: Callable[[frozenset[str]], bool] | None = None,
+        is_unwanted: Callable[[frozenset[str]], bool] | None = None,
     ) -> tuple[ScriptRun, ...]:
         """Run scripts; only one run at a time.
 
@@ -120,10 +120,10 @@ class ScriptServer:
             root: the course folder, which becomes the working directory.
             jobs: what to run, in the order of their start.
             parallel: how many at a time, at least 1.
-            started: is called in this thread; what it raises ends the run.
-            finished: likewise.
+            on_start: called in this thread; what it raises ends the run.
+            on_finish: likewise.
             place: another interpreter that is to run them.
-            unwanted: is asked now and then whether to stop, with the paths of what runs.
+            is_unwanted: called regularly with the paths of what runs; whether to stop.
 
         Returns:
             What each did, in the order of the jobs.
@@ -135,12 +135,12 @@ class ScriptServer:
         if not jobs:
             return ()
         with temporary_folder() as scratch:
-            work = _Work(root.resolve(), jobs, started, finished, place, self._sandbox, scratch)
-            self._run(work, parallel, unwanted)
+            work = _Work(root.resolve(), jobs, on_start, on_finish, place, self._sandbox, scratch)
+            self._run(work, parallel, is_unwanted)
         return tuple(work.runs[i] for i in range(len(jobs)))
 
     def _run(
-        self, work: _Work, parallel: int, unwanted: Callable[[frozenset[str]], bool] | None
+        self, work: _Work, parallel: int, is_unwanted: Callable[[frozenset[str]], bool] | None
     ) -> None:
         busy: dict[int, Worker] = {}
         """By the descriptors of their reports."""
@@ -149,14 +149,14 @@ class ScriptServer:
         try:
             for _ in range(min(max(parallel, 1), len(work.jobs))):
                 self._start(busy, work)
-            asks = unwanted is not None or self._sandbox is not None
+            is_polling = is_unwanted is not None or self._sandbox is not None
             while busy:
-                for ready in wait(busy, _PATIENCE if asks else None):
-                    self._hear(busy[ready], busy, work)  # type: ignore[index]
+                for ready in wait(busy, _PATIENCE if is_polling else None):
+                    self._handle_report(busy[ready], busy, work)  # type: ignore[index]
                 for worker in busy.values():
                     if time.monotonic() > worker.deadline:
                         worker.kill()
-                if unwanted is not None and unwanted(work.running(busy.values())):
+                if is_unwanted is not None and is_unwanted(work.running(busy.values())):
                     raise RunStoppedError
         finally:
             for worker in busy.values():
@@ -169,28 +169,28 @@ class ScriptServer:
                     log.unlink()
 
     def _start(self, busy: dict[int, Worker], work: _Work) -> None:
-        worker = self._worker(work)
+        worker = self._get_worker(work)
         busy[worker.reports] = worker
-        work.next(worker)
+        work.give_next_job(worker)
 
-    def _hear(self, worker: Worker, busy: dict[int, Worker], work: _Work) -> None:
-        there = work.hear(worker)
-        if there and worker.job is not None:
+    def _handle_report(self, worker: Worker, busy: dict[int, Worker], work: _Work) -> None:
+        is_alive = work.read_report(worker)
+        if is_alive and worker.job is not None:
             return
         del busy[worker.reports]
-        if there and self._sandbox is None:
+        if is_alive and self._sandbox is None:
             self._idle.append(worker)
             return
         worker.close()
-        if work.waiting:
+        if work.pending:
             self._start(busy, work)
 
-    def _worker(self, work: _Work) -> Worker:
-        """A supervisor that waits for a job: one that is left, or a new one."""
-        installed = _installed(work.place)
-        if installed != self._installed:
+    def _get_worker(self, work: _Work) -> Worker:
+        """A supervisor that waits for a job: an idle or a new one."""
+        states = _package_states(work.place)
+        if states != self._package_states:
             self.close()
-            self._installed = installed
+            self._package_states = states
         while self._idle:
             worker = self._idle.pop()
             worker.is_reused = True
@@ -202,22 +202,22 @@ class ScriptServer:
 
 
 class _Work:
-    """What is to be done, and what is done."""
+    """The jobs of one run and their results."""
 
     def __init__(
         self,
         root: Path,
         jobs: Sequence[ScriptJob],
-        started: Started,
-        finished: Finished,
+        on_start: OnStart,
+        on_finish: OnFinish,
         place: OtherEnvironment | None,
         sandbox: Sandbox | None,
         scratch: str,
     ) -> None:
         self.root = root
         self.jobs = jobs
-        self.started = started
-        self.finished = finished
+        self.on_start = on_start
+        self.on_finish = on_finish
         clean = clean_environment(os.environ)
         self.environment = clean if place is None else place.environment(clean)
         self.environment |= dict(jobs[0].environment)
@@ -229,72 +229,77 @@ class _Work:
             self.library = scratch
         self.sandbox = sandbox
         self.enclose: Enclose | None = None
-        self.shown: dict[str, str] = {}
-        self.copied: list[tuple[str, str]] = []
+        self.sources: dict[str, str] = {}
+        self.copies: list[tuple[str, str]] = []
         if sandbox is not None:
-            self.shown = visible(str(root), self.library, place)
-            self.copied = copied_folders(str(root), jobs, scratch)
+            self.sources = visible_places(str(root), self.library, place)
+            self.copies = copied_folders(str(root), jobs, scratch)
             command = sandbox.command
-            self.enclose = functools.partial(command, shown=self.shown, copied=self.copied)
+            self.enclose = functools.partial(command, sources=self.sources, copies=self.copies)
         self.runs: dict[int, ScriptRun] = {}
-        self.waiting = list(range(len(jobs)))
-        self.told: set[int] = set()
-        """The jobs whose start was told."""
+        self.pending = list(range(len(jobs)))
+        self.announced: set[int] = set()
+        """The jobs for which `on_start` was called."""
         folders = {self.root / folder for job in jobs for folder in job.packages}
         files = [file for folder in folders for file in folder.rglob("*.py")]
         files += [self.root / job.path for job in jobs]
         self.packages = wanted_packages(files)
 
-    def next(self, worker: Worker) -> None:
+    def give_next_job(self, worker: Worker) -> None:
         """Hand over the next job, if there is one."""
-        if not self.waiting:
+        if not self.pending:
             return
-        index = self.waiting.pop(0)
-        if index not in self.told:
-            self.told.add(index)
-            self.started(self.jobs[index].path)
+        index = self.pending.pop(0)
+        if index not in self.announced:
+            self.announced.add(index)
+            self.on_start(self.jobs[index].path)
         worker.give(index, self._message(self.jobs[index]))
-        if self.sandbox is not None:  # a script can stop who supervises it
+        if self.sandbox is not None:  # a script can stop its supervisor
             worker.deadline = time.monotonic() + self.jobs[index].timeout + _GRACE
 
-    def hear(self, worker: Worker) -> bool:
-        """Take what a supervisor says; `False` when it is gone."""
+    def read_report(self, worker: Worker) -> bool:
+        """Read from a supervisor and finish its job if the report is complete.
+
+        Return `False` when the supervisor has ended.
+        """
         if not worker.read():
             if worker.job is not None:
                 index, worker.job = worker.job, None
-                if worker.is_reused:  # it may have been as good as gone before it was given the job
-                    self.waiting.insert(0, index)
+                if worker.is_reused:  # it may have been dying before it was given the job
+                    self.pending.insert(0, index)
                     return False
                 if self.place is not None and worker.status() > 0:
                     raise EffectError(f"{self.place.python} cannot run scripts")
                 status = worker.status() if self.sandbox is None else -signal.SIGKILL
-                self._finish(index, _lost(self.jobs[index].path, status))
+                self._finish(index, _lost_run(self.jobs[index].path, status))
             return False
         if worker.job is not None:
             try:
-                self._take(worker, worker.job)
+                self._finish_job(worker, worker.job)
             except ValueError:
                 if self.sandbox is None:
                     raise
-                worker.kill()  # the script has it say anything
+                worker.kill()  # the script has forged the report
         return True
 
-    def _take(self, worker: Worker, index: int) -> None:
-        """Take the report on a job, if it is here."""
+    def _finish_job(self, worker: Worker, index: int) -> None:
+        """Finish a job if its report is complete."""
         report = worker.take_report()
         if report is None:
             return
         run = _script_run(str(self.root), self.jobs[index], report)
         if self.sandbox is not None and run.trace is not None:
-            why = run.trace.opaque or difference(self.jobs[index], run.trace, self.shown)
-            run = replace(run, trace=replace(run.trace, opaque=why))
+            reason = run.trace.opaque or sandbox_difference(
+                self.jobs[index], run.trace, self.sources
+            )
+            run = replace(run, trace=replace(run.trace, opaque=reason))
         worker.job, worker.is_reused = None, False
         self._finish(index, run)
         if self.sandbox is None:
-            self.next(worker)
+            self.give_next_job(worker)
 
     def running(self, busy: Iterable[Worker]) -> frozenset[str]:
-        """The paths of what these supervisors run."""
+        """The paths of the scripts that these supervisors run."""
         return frozenset(self.jobs[w.job].path for w in busy if w.job is not None)
 
     def _message(self, job: ScriptJob) -> bytes:
@@ -310,7 +315,7 @@ class _Work:
             "library": self.library,
             "folders": [f"{self.root}/{folder}" for folder in job.packages],
             "writes": [f"{self.root}/{folder}" for folder in job.writes],
-            "copied": self.copied,
+            "copies": self.copies,
             "figures": list(job.figures),
             "perturbation": job.perturbation,
             "memory": job.memory,
@@ -319,16 +324,16 @@ class _Work:
 
     def _finish(self, index: int, run: ScriptRun) -> None:
         self.runs[index] = run
-        self.finished(run)
+        self.on_finish(run)
 
 
-def _installed(place: OtherEnvironment | None) -> tuple[object, ...]:
-    """The folders with packages, and when something was installed there."""
-    found: list[object] = []
+def _package_states(place: OtherEnvironment | None) -> tuple[object, ...]:
+    """The folders with packages, each with the time of the last installation there."""
+    states: list[object] = []
     for folder in (*site_folders(), *(() if place is None else place.packages)):
         with contextlib.suppress(OSError):
-            found.append((folder, Path(folder).stat().st_mtime_ns))
-    return tuple(found)
+            states.append((folder, Path(folder).stat().st_mtime_ns))
+    return tuple(states)
 
 
 def _script_run(root: str, job: ScriptJob, report: ChildReport) -> ScriptRun:
@@ -342,7 +347,7 @@ def _script_run(root: str, job: ScriptJob, report: ChildReport) -> ScriptRun:
         outcome = Outcome.ENCODING
     if len(err) == STDERR_KEPT:
         err = err[next((i for i in range(4) if err[i] & 0xC0 != 0x80), 0) :]  # a letter cut in two
-    drawn = zip(job.figures, figures, strict=False)
+    named_figures = zip(job.figures, figures, strict=False)
     return ScriptRun(
         job.path,
         outcome,
@@ -352,12 +357,12 @@ def _script_run(root: str, job: ScriptJob, report: ChildReport) -> ScriptRun:
         report.seconds,
         missing=report.missing,
         trace=read_records(trace, root, job.path) if trace else None,
-        figures=tuple((name, data) for name, data in drawn if data is not None),
+        figures=tuple((name, data) for name, data in named_figures if data is not None),
     )
 
 
-def _lost(path: str, status: int) -> ScriptRun:
-    """The result of a script whose supervisor died under it."""
+def _lost_run(path: str, status: int) -> ScriptRun:
+    """The result of a script whose supervisor died."""
     if status >= 0:
         raise RuntimeError(f"the supervisor of {path} failed with status {status}")
     name = signal.Signals(-status).name

@@ -1,7 +1,7 @@
-"""What a process that runs scripts finds around it.
+"""The environment of processes that run scripts.
 
 Entry points: `clean_environment`, `library_folder`, `wanted_packages`; `OtherEnvironment`, another
-interpreter than that of the tool; `conditions` and `places`, on which results depend.
+interpreter than the tool's; `conditions` and `places`, on which results depend.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _SAYS_NOTHING = (
     "VIRTUAL_ENV",
     "CONDA_PREFIX",
 )
-"""Variables that say who runs a script and where programs lie, which its result does not show."""
+"""Variables about the user and the places of programs, which do not change a result."""
 _FIXED = {
     "LC_ALL": "C.UTF-8",
     "LANG": "C.UTF-8",
@@ -52,7 +52,7 @@ _FIXED = {
 
 
 class OtherEnvironment(Struct, frozen=True):
-    """An interpreter and what is installed for it, where scripts run that do not run here."""
+    """Another interpreter that runs scripts, and what is installed for it."""
 
     name: str
     """Empty for the course's own. Results of another one, as `check --against` makes it, are kept
@@ -71,16 +71,16 @@ class OtherEnvironment(Struct, frozen=True):
     """The folders with the packages that are installed there."""
 
     def environment(self, clean: Mapping[str, str]) -> dict[str, str]:
-        """The environment of scripts there, of the one that they have here."""
+        """The environment of scripts there, made from the one that they have here."""
         programs = f"{self.prefix}/bin"
         path = f"{programs}:{clean['PATH']}" if clean.get("PATH") else programs
         return {**clean, "PATH": path, "VIRTUAL_ENV": self.prefix}
 
 
 def clean_environment(outer: Mapping[str, str]) -> dict[str, str]:
-    """The environment of scripts, but for their TMPDIR, given the one that the tool runs in."""
-    passed_on = (*_SAYS_NOTHING, *DECISIVE)
-    return {name: outer[name] for name in passed_on if name in outer} | _FIXED
+    """The environment of scripts except TMPDIR, made from the one that the tool runs in."""
+    names = (*_SAYS_NOTHING, *DECISIVE)
+    return {name: outer[name] for name in names if name in outer} | _FIXED
 
 
 def library_folder() -> str:
@@ -89,9 +89,9 @@ def library_folder() -> str:
 
 
 def wanted_packages(scripts: Iterable[Path]) -> tuple[str, ...]:
-    """Which packages are worth importing once for these scripts: they, or files beside, name them.
+    """The packages to import once for these scripts: those that a file of their folders names.
 
-    A script that imports MuJoCo in yet another way is run as well, but not remembered.
+    A script that imports MuJoCo in another way still runs, but its result is not remembered.
     """
     words: set[bytes] = set()
     for folder in {path.parent for path in scripts}:
@@ -110,23 +110,23 @@ def wanted_packages(scripts: Iterable[Path]) -> tuple[str, ...]:
 def conditions(
     outer: Mapping[str, str], place: OtherEnvironment | None = None
 ) -> tuple[tuple[str, str], ...]:
-    """By name, sorted: what has to be the same for a result to be the same.
+    """The conditions under which results are the same, by name and sorted.
 
     `outer` is the environment of the tool; `place` another interpreter than the one that runs this.
     """
-    told = {f"environment variable {name}": outer[name] for name in DECISIVE if name in outer}
+    values = {f"environment variable {name}": outer[name] for name in DECISIVE if name in outer}
     version = platform.python_version() if place is None else place.version
-    told["Python"] = f"{platform.python_implementation()} {version}"
+    values["Python"] = f"{platform.python_implementation()} {version}"
     if place is not None and place.name:
-        told["environment"] = place.name
-    told["platform"] = f"{sys.platform} {platform.machine()} {_c_library()}".strip()
-    same = json.dumps(_FIXED, sort_keys=True).encode()
-    told["the fixed environment of scripts"] = hashlib.sha256(same).hexdigest()[:12]
-    return tuple(sorted(told.items()))
+        values["environment"] = place.name
+    values["platform"] = f"{sys.platform} {platform.machine()} {_c_library()}".strip()
+    fixed = json.dumps(_FIXED, sort_keys=True).encode()
+    values["the fixed environment of scripts"] = hashlib.sha256(fixed).hexdigest()[:12]
+    return tuple(sorted(values.items()))
 
 
 def _c_library() -> str:
-    """Whose mathematical functions Python's are."""
+    """The C library, whose mathematical functions Python uses."""
     try:
         return os.confstr("CS_GNU_LIBC_VERSION") or ""
     except (OSError, ValueError):
@@ -136,15 +136,15 @@ def _c_library() -> str:
 def places(
     root: Path, outer: Mapping[str, str], place: OtherEnvironment | None = None
 ) -> tuple[tuple[str, str], ...]:
-    """Folders of this machine whose paths may stand in what a script writes, longest first.
+    """Folders of this machine, by name, whose paths a script may print; longest first.
 
     `place` is another interpreter than the one that runs this.
     """
-    found = {
+    folders = {
         "course": str(root),
         "library": library_folder(),
         "prefix": sys.prefix if place is None else place.prefix,
         "base": sys.base_prefix if place is None else place.base,
         "home": outer.get("HOME", ""),
     }
-    return tuple(sorted(found.items(), key=lambda item: (-len(item[1]), item[0])))
+    return tuple(sorted(folders.items(), key=lambda item: (-len(item[1]), item[0])))

@@ -1,10 +1,10 @@
-"""A process becomes a script: it finds what a bare `python examples/x.py` finds, and is watched.
+"""Turn a process into a script that finds what a bare `python examples/x.py` finds, and is traced.
 
 Entry points: `Preloaded`, the packages that are imported once for all scripts; `ScriptProcess`,
-which sets up this process, and is then executed by `worker_main`.
+which sets up this process; `worker_main` then executes the script.
 
-What a script finds differs from a bare Python only in that there is one more frame below its own,
-and that modules of the standard library are in `sys.modules` which it has not imported.
+Only two things differ from a bare Python: there is one more frame below the script's own, and
+`sys.modules` holds modules of the standard library that the script has not imported.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from coursebuild.core.run import (
 from coursebuild.core.run.tracing import Tracer
 
 _IMPORTS = {"numpy": ("numpy", "numpy.random"), "mujoco": ("numpy", "mujoco")}
-"""What is imported for a package. None does anything that a script could see."""
+"""The modules that are imported for a package; importing them has no effect that a script sees."""
 
 
 class Job(TypedDict):
@@ -50,18 +50,18 @@ class Job(TypedDict):
     requires: list[str]
     """Modules without which it is not run."""
     packages: list[str]
-    """Packages that are worth importing before."""
+    """Packages that are worth importing before the script runs."""
     environment: dict[str, str]
     scratch: str
-    """Where the script's temporary folder is made; it goes when the last supervisor does."""
+    """Where the script's temporary folder is made; removed after the last supervisor."""
     library: str
     """A folder to import `mjcourse` from, where it is not installed."""
     folders: list[str]
-    """Folders of the project to import from before."""
+    """Folders of the project to import from, before all other packages."""
     writes: list[str]
     """Folders of the project that the script may write into."""
-    copied: list[tuple[str, str]]
-    """In a sandbox, these folders, and where what they are to hold is to be copied from."""
+    copies: list[tuple[str, str]]
+    """In a sandbox, these folders, each with the folder to copy its content from."""
     figures: list[str]
     """Names of files that it draws, in its working directory."""
     memory: int
@@ -72,16 +72,16 @@ class Job(TypedDict):
 
 
 class Preloaded:
-    """Packages that were imported before a script; a finder that gives them to it.
+    """Packages that were imported before a script, and the finder that gives them to it.
 
-    They are hidden from a script until it imports them, so that what it depends on is seen.
+    They are hidden from the script until it imports them, so that the trace shows what it imports.
     """
 
     def __init__(self) -> None:
         self.broken = False
-        """Whether importing a package fails: then scripts have to fail on their own."""
+        """Whether importing a package fails: then scripts run without this, and fail themselves."""
         self._groups: dict[str, dict[str, ModuleType]] = {}
-        """The modules that importing a package brings, without those of the standard library."""
+        """For each package the modules that importing it loads, without the standard library."""
         self._tracer: Tracer | None = None
 
     def load(self, packages: Sequence[str]) -> None:
@@ -99,56 +99,55 @@ class Preloaded:
             self.broken = self.broken or error.name != package
         except BaseException:
             self.broken = True
-        known = sys.stdlib_module_names | {"coursebuild"}
-        names = [n for n in sys.modules if n not in before and n.partition(".")[0] not in known]
-        new = {name: sys.modules[name] for name in names}
-        needed = self._groups.get("numpy", {}) if package == "mujoco" else {}
-        self._groups[package] = needed | new
+        excluded = sys.stdlib_module_names | {"coursebuild"}
+        names = [n for n in sys.modules if n not in before and n.partition(".")[0] not in excluded]
+        new_modules = {name: sys.modules[name] for name in names}
+        group = self._groups.get("numpy", {}) if package == "mujoco" else {}
+        self._groups[package] = group | new_modules
         if package == "mujoco" and "mujoco" in sys.modules:
             mujoco_tracing.wrap(sys.modules["mujoco"])
             mujoco_watching.watch(sys.modules["mujoco"])
 
     def names(self) -> frozenset[str]:
-        """The top-level modules that are there: they are not looked for in a script's folder."""
-        found = {name.partition(".")[0] for name in sys.modules} - {"__main__", "coursebuild"}
-        return frozenset(found.difference(sys.builtin_module_names))
+        """The top-level modules already loaded, which Python seeks in no folder any more."""
+        names = {name.partition(".")[0] for name in sys.modules} - {"__main__", "coursebuild"}
+        return frozenset(names.difference(sys.builtin_module_names))
 
     def module(self, name: str) -> Any:
-        """A module that was imported; `None` where there is no such."""
+        """A preloaded module; `None` where there is no such."""
         return self._group(name).get(name)
 
     def _group(self, name: str) -> dict[str, ModuleType]:
-        """All that was imported first with a module."""
+        """All modules that were loaded together with one."""
         return next((group for group in self._groups.values() if name in group), {})
 
     def offer(self, tracer: Tracer) -> None:
-        """Hide the packages, and let this process have again what it imports from now on."""
+        """Hide the packages, and give them back to this process as it imports them."""
         self._tracer = tracer
-        everything = {n: m for group in self._groups.values() for n, m in group.items()}
-        for name in everything:
-            sys.modules.pop(name, None)
+        modules = {n: m for group in self._groups.values() for n, m in group.items()}
+        self._hide(modules)
         sys.meta_path.insert(0, self)
-        if (random := everything.get("numpy.random")) is not None:
+        if (random := modules.get("numpy.random")) is not None:
             random.seed()
-        # They are not given back when the script ends, which would take longer than most scripts.
-        atexit.register(self._forget, everything)
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(everything))
+        # They are never freed at the end of the script: that would take longer than most scripts.
+        atexit.register(self._hide, modules)
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(modules))
 
-    def _forget(self, modules: Mapping[str, ModuleType]) -> None:
+    def _hide(self, modules: Mapping[str, ModuleType]) -> None:
         for name in modules:
             sys.modules.pop(name, None)
 
     def find_spec(
         self, name: str, path: object = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """A spec that gives what was imported before, if Python would find the same."""
+        """A spec that gives the preloaded module, if Python would find the same."""
         module = self.module(name) if target is None else None
         if module is None or "." in name:
             return None
-        found = PathFinder.find_spec(name)
-        if found is None or found.origin != getattr(module.__spec__, "origin", None):
+        spec = PathFinder.find_spec(name)
+        if spec is None or spec.origin != getattr(module.__spec__, "origin", None):
             return None
-        return ModuleSpec(name, self, origin=found.origin)  # type: ignore[arg-type]
+        return ModuleSpec(name, self, origin=spec.origin)  # type: ignore[arg-type]
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         """The module itself."""
@@ -157,17 +156,17 @@ class Preloaded:
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        """Give the script all that importing the module brings."""
+        """Give the script all modules that importing this one loads."""
         module.__spec__ = self._spec
         group = self._group(module.__name__)
         sys.modules.update(group)
         for name in group:
             if "." not in name and group[name].__spec__ is not None and self._tracer is not None:
-                self._tracer.imported(name, None)
+                self._tracer.note_import(name, None)
 
 
 class ScriptProcess:
-    """A script that this process is to become."""
+    """The script that this process turns into."""
 
     def __init__(
         self,
@@ -184,8 +183,8 @@ class ScriptProcess:
         self._shared = shared
         self._preloaded = preloaded
 
-    def compiled(self) -> CodeType:
-        """Set up this process, which stands in the script's folder; the code to execute."""
+    def compile_script(self) -> CodeType:
+        """Set up this process, whose working folder is the script's; return the code to execute."""
         job, preloaded = self.job, self._preloaded
         arguments = [job["path"], *job["args"]]
         sys.argv, sys.orig_argv[1:] = arguments, arguments
@@ -215,7 +214,7 @@ class ScriptProcess:
         with open(self.path, "rb") as file:  # noqa: PTH123 (time counts)
             text = file.read()
         if job["figures"]:
-            keep_figures(job, self._environment["TMPDIR"])
+            redirect_figures(job, self._environment["TMPDIR"])
         tracer.install()
         tracer.begin(standard)
         return compile(text, self.path, "exec", dont_inherit=True)
@@ -238,16 +237,16 @@ class ScriptProcess:
 
 
 def _installed_folders() -> list[str]:
-    """The folders of Python's own modules and of installed packages, also as they really are."""
-    found = {os.path.dirname(os.__file__), *site.getsitepackages()}  # noqa: PTH120
-    found.update(f for f in sys.path if f.endswith(("/site-packages", "/dist-packages")))
+    """The folders of Python's own modules and of installed packages, with and without links."""
+    folders = {os.path.dirname(os.__file__), *site.getsitepackages()}  # noqa: PTH120
+    folders.update(f for f in sys.path if f.endswith(("/site-packages", "/dist-packages")))
     if site.ENABLE_USER_SITE:
-        found.add(site.getusersitepackages())
-    return sorted({f for folder in found for f in (folder, os.path.realpath(folder))})
+        folders.add(site.getusersitepackages())
+    return sorted({f for folder in folders for f in (folder, os.path.realpath(folder))})
 
 
 def notes_folder(temporary: str) -> str:
-    """Where notes go for which there is no shared memory, given the script's temporary folder."""
+    """The folder for notes that shared memory cannot hold, given the temporary folder."""
     return f"{temporary}.notes"
 
 
@@ -256,19 +255,19 @@ def figure_path(temporary: str, name: str) -> str:
     return f"{temporary}/figures-of-this-script/{name}"
 
 
-def keep_figures(job: Job, temporary: str) -> None:
-    """From now on, what is written to a figure goes to the script's temporary folder.
+def redirect_figures(job: Job, temporary: str) -> None:
+    """From now on, write figures to the script's temporary folder instead.
 
-    So the project stays as it is, and two runs at once have each its own.
+    So the project stays unchanged, and two runs at the same time do not share files.
     """
     root = job["root"].rstrip("/")
-    drawn = {f"{root}/{name}": figure_path(temporary, name) for name in job["figures"]}
-    os.mkdir(os.path.dirname(next(iter(drawn.values()))))  # noqa: PTH102, PTH120 (time counts)
+    paths = {f"{root}/{name}": figure_path(temporary, name) for name in job["figures"]}
+    os.mkdir(os.path.dirname(next(iter(paths.values()))))  # noqa: PTH102, PTH120 (time counts)
     real_open = builtins.open
 
     def open_figure(file: Any, mode: str = "r", *args: Any, **kwargs: Any) -> Any:
         if isinstance(file, str | os.PathLike):
-            path = drawn.get(os.path.abspath(file))  # noqa: PTH100
+            path = paths.get(os.path.abspath(file))  # noqa: PTH100
             if path is not None and ("r" not in mode or os.path.exists(path)):  # noqa: PTH110
                 file = path
         return real_open(file, mode, *args, **kwargs)
@@ -277,7 +276,7 @@ def keep_figures(job: Job, temporary: str) -> None:
 
 
 def report_error(error: BaseException) -> None:
-    """Say what ended a script as Python says it, without the frame that has executed it."""
+    """Print what ended a script as Python does, without the frame that has executed it."""
     frames = error.__traceback__.tb_next if error.__traceback__ is not None else None
     if frames is not None and frames.tb_frame.f_code.co_filename == __file__:
         frames = None  # it was not even compiled

@@ -1,4 +1,4 @@
-"""The process that runs scripts for `runner` and sees to it that nothing stays behind.
+"""The process that runs scripts for `runner` and cleans up after them.
 
 Entry point: `main`, called by the program `worker_main`.
 
@@ -10,11 +10,11 @@ It runs one script after another, each in a session of its own, so that
 3. when this process dies, the system kills the script (Linux).
 
 Importing NumPy and MuJoCo takes longer than most scripts. So this process imports them once, and
-scripts are copies of it. Where that cannot be, it starts this program anew for each script. It has
-one thread, so that it may fork.
+runs scripts in copies of itself. Where that is impossible, it starts this program anew for each
+script. It has one thread, so that it may fork.
 
-The protocol: JSON objects, each after its length in 4 bytes; from the tool a `Job`, and to it for
-each one a `ChildReport` (see `workers`).
+The protocol: JSON objects, each after its length in 4 bytes; from the tool a `Job`, and back a
+`ChildReport` for each (see `workers`).
 """
 
 from __future__ import annotations
@@ -59,24 +59,24 @@ PROGRAM = str(Path(__file__).with_name("worker_main.py"))
 FIGURE_LIMIT = 4 << 20
 """Bytes that a figure may have."""
 _NOTES_BYTES = 1 << 20
-"""What a script may note of what it looks at, before the rest goes to files."""
+"""The bytes of shared memory for a script's notes; further notes go to files."""
 _OUR_FRAME = re.compile(rb'  File "%s", line \d+ in <module>\n' % re.escape(os.fsencode(PROGRAM)))
-"""What Python's fault handler says of `worker_main`, below the script's own frames."""
+"""The frame of `worker_main` in Python's fault dumps, below the script's own frames."""
 _COUNTER = itertools.count()
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 _PR_SET_CHILD_SUBREAPER = 36
 _SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGCHLD)
 
 
-def main(arguments: Sequence[str], bare: Collection[str]) -> ScriptProcess:
+def main(arguments: Sequence[str], initial_modules: Collection[str]) -> ScriptProcess:
     """Run what the tool asks for until it closes the pipe; only a script's process returns.
 
     The arguments are descriptors: where jobs are read and where reports are written, and whether
     scripts may be copies of this process; or a `Job` as JSON, for which this program is started.
-    `bare` are the modules that every Python has from its start.
+    `initial_modules` are the modules that every Python has from its start.
     """
     if len(arguments) == 1:
-        return _alone(json.loads(arguments[0]), bare)
+        return _make_script(json.loads(arguments[0]), initial_modules)
     jobs, reports, fork = map(int, arguments)
     os.set_inheritable(jobs, False)
     os.set_inheritable(reports, False)
@@ -89,29 +89,29 @@ def main(arguments: Sequence[str], bare: Collection[str]) -> ScriptProcess:
             return script
     except SystemExit as end:
         status = int(end.code or 0)
-    except Exception:  # a bug: the tool shows it as what the script has said
-        _send(reports, _unstartable(traceback.format_exc()))
+    except Exception:  # a bug: the tool shows it as the script's error output
+        _send(reports, _report_unstartable(traceback.format_exc()))
         status = 70
-    # While the tool lives the folder is its own: another supervisor may be about to use it.
+    # While the tool lives it owns the folder: another supervisor may be about to use it.
     if supervisor.scratch and has_ended(tool):
         remove_folder(supervisor.scratch)
     os._exit(status)
 
 
-def _alone(job: Job, bare: Collection[str]) -> ScriptProcess:
+def _make_script(job: Job, initial_modules: Collection[str]) -> ScriptProcess:
     """The script that this process was started for."""
     preloaded = Preloaded()
-    shadowed = _beside(job) & preloaded.names()
+    shadowed = _sibling_names(job) & preloaded.names()
     if not shadowed:
         preloaded.load(job["packages"])
     for name in [name for name in sys.modules if name.partition(".")[0] in shadowed]:
-        if name not in bare:
+        if name not in initial_modules:
             del sys.modules[name]
     return ScriptProcess(job, os.environ, None, preloaded)
 
 
 class _Supervisor:
-    """Where jobs come from, and reports go to."""
+    """Runs the jobs that arrive at one descriptor, and writes reports to another."""
 
     def __init__(self, jobs: int, reports: int, *, may_fork: bool) -> None:
         self.jobs = jobs
@@ -133,7 +133,7 @@ class _Supervisor:
         self.scratch = ""
 
     def work(self) -> ScriptProcess | None:
-        """Serve until the input closes; a script in a process that is to become it."""
+        """Serve until the input closes; in the process of a script, return the script."""
         while (message := _receive(self.jobs)) is not None:
             job: Job = json.loads(message)
             self.scratch = job["scratch"]
@@ -144,14 +144,14 @@ class _Supervisor:
         return None
 
     def _serve(self, job: Job) -> bytes | ScriptProcess:
-        """The report on a script, or the script itself in the process that is to become it."""
+        """The report on a script; in the process of the script, the script itself."""
         folder_of_script = Path(job["root"], job["path"]).parent
         path = [str(folder_of_script), *job["folders"]]
         missing = missing_modules(job["requires"], path, job["library"])
         if missing:
             return _report("skipped", missing=missing)
         if not os.path.isfile(f"{job['root']}/{job['path']}"):  # noqa: PTH113 (here time counts)
-            return _unstartable(f"there is no file {job['path']}\n")
+            return _report_unstartable(f"there is no file {job['path']}\n")
         environment = dict(job["environment"])
         path = job["folders"] if self.has_library else [*job["folders"], job["library"]]
         if path:
@@ -159,31 +159,31 @@ class _Supervisor:
         if self.may_fork:
             self.preloaded.load(job["packages"])
         folder = ""
-        launched: RunningScript | ScriptProcess | None = None
+        script: RunningScript | ScriptProcess | None = None
         try:
             try:
-                for written, place in job["copied"]:
-                    shutil.copytree(place, written, symlinks=True, dirs_exist_ok=True)
-                folder = _temporary(job["scratch"])
+                for writable, content in job["copies"]:
+                    shutil.copytree(content, writable, symlinks=True, dirs_exist_ok=True)
+                folder = _make_temporary_folder(job["scratch"])
                 parent = os.getppid()  # now, since a script may end it as soon as it runs
-                launched = self._launch(job, environment | {"TMPDIR": folder})
+                script = self._launch(job, environment | {"TMPDIR": folder})
             except (OSError, ValueError) as error:  # a ValueError: an argument has a null character
-                return _unstartable(f"the script cannot be started: {error}\n")
-            if isinstance(launched, ScriptProcess):
-                return launched
+                return _report_unstartable(f"the script cannot be started: {error}\n")
+            if isinstance(script, ScriptProcess):
+                return script
             try:
-                launched.watch(self.jobs, parent)
+                script.watch(self.jobs, parent)
             finally:
-                launched.end()
-            trace = _notes(launched.shared, notes_folder(folder))
-            return _finished(launched, trace, _drawn(folder, job["figures"]))
+                script.end()
+            trace = _read_notes(script.shared, notes_folder(folder))
+            return _report_finished(script, trace, _read_figures(folder, job["figures"]))
         finally:
-            if folder and not isinstance(launched, ScriptProcess):
+            if folder and not isinstance(script, ScriptProcess):
                 remove_folder(folder)
                 remove_folder(notes_folder(folder))
 
     def _launch(self, job: Job, environment: dict[str, str]) -> RunningScript | ScriptProcess:
-        """Start a script; the script itself in the process that is to become it."""
+        """Start a script; in its own process, return the script itself."""
         if any(b"\0" in os.fsencode(argument) for argument in job["args"]):
             raise ValueError("embedded null byte")
         (out, stdout), (err, stderr) = os.pipe(), os.pipe()
@@ -193,7 +193,7 @@ class _Supervisor:
                 pid = _spawn(job, environment, prepare)
                 return RunningScript(pid, (out, err), None, job["timeout"], self.awake)
             shared = mmap.mmap(-1, _NOTES_BYTES)
-            gc.freeze()  # a script's collector shall not look at, and so copy, what is here
+            gc.freeze()  # else a script's garbage collector would touch, and so copy, our memory
             pid = os.fork()
             if pid == 0:
                 prepare()
@@ -211,13 +211,13 @@ class _Supervisor:
                 os.close(stderr)
 
     def _can_fork(self, job: Job) -> bool:
-        """Whether a copy of this process would be what a fresh interpreter is to this script."""
+        """Whether this script cannot tell a copy of this process from a fresh interpreter."""
         if not self.may_fork or self.preloaded.broken or _has_threads():
             return False
-        return _beside(job).isdisjoint(self.preloaded.names())
+        return _sibling_names(job).isdisjoint(self.preloaded.names())
 
     def _prepare_script(self, job: Job, stdout: int, stderr: int, parent: int) -> None:
-        """What a script's process does first: a session, pipes, signals and limits of its own."""
+        """Prepare a script's process: its session, pipes, signals and limits."""
         os.setsid()
         if self.libc is not None:  # the system ends it when this process ends
             self.libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
@@ -235,13 +235,13 @@ class _Supervisor:
         os.chdir(job["root"])
 
 
-def _beside(job: Job) -> frozenset[str]:
-    """What stands where the script looks first, as names of modules."""
-    found: set[str] = set()
+def _sibling_names(job: Job) -> frozenset[str]:
+    """The names of files, as modules, in the folders where a script looks first."""
+    names: set[str] = set()
     for folder in (os.path.dirname(f"{job['root']}/{job['path']}"), *job["folders"]):  # noqa: PTH120
         with contextlib.suppress(OSError):
-            found.update(name.partition(".")[0] for name in os.listdir(folder))  # noqa: PTH208
-    return frozenset(found)
+            names.update(name.partition(".")[0] for name in os.listdir(folder))  # noqa: PTH208
+    return frozenset(names)
 
 
 def _spawn(job: Job, environment: Mapping[str, str], prepare: Callable[[], None]) -> int:
@@ -252,12 +252,12 @@ def _spawn(job: Job, environment: Mapping[str, str], prepare: Callable[[], None]
         stdin=subprocess.DEVNULL,
         preexec_fn=prepare,  # safe: there is no other thread
     )
-    process.returncode = 0  # who watches the script reaps it
+    process.returncode = 0  # `RunningScript` reaps it
     return process.pid
 
 
-def _notes(shared: mmap.mmap | None, overflow: str) -> bytes:
-    """What a script has noted, in shared memory and in files of a folder."""
+def _read_notes(shared: mmap.mmap | None, overflow: str) -> bytes:
+    """The notes of a script, from shared memory and from files in the folder `overflow`."""
     parts = []
     if shared is not None:
         end = shared.find(b"\0\0")
@@ -283,30 +283,30 @@ def missing_modules(names: Sequence[str], folders: Sequence[str], library: str) 
         return []
     importlib.invalidate_caches()
     path = [*folders, *sys.path, *([library] if library else [])]
-    return [name for name in names if not _exists(name, path)]
+    return [name for name in names if not _is_importable(name, path)]
 
 
-def _exists(name: str, path: Sequence[str]) -> bool:
-    top, saved = True, sys.path
-    for end in (at for at, c in enumerate(f"{name}.") if c == "."):
-        if not name[:end].rpartition(".")[2].isidentifier():
+def _is_importable(name: str, path: Sequence[str]) -> bool:
+    is_top, original_path = True, sys.path
+    for stop in (at for at, c in enumerate(f"{name}.") if c == "."):
+        if not name[:stop].rpartition(".")[2].isidentifier():
             return False
         spec = None
         try:
-            sys.path = list(path) if top else saved
+            sys.path = list(path) if is_top else original_path
             for finder in sys.meta_path:
-                with contextlib.suppress(Exception):  # that of some package may do anything
-                    spec = spec or finder.find_spec(name[:end], None if top else path)
+                with contextlib.suppress(Exception):  # a package's own finder may do anything
+                    spec = spec or finder.find_spec(name[:stop], None if is_top else path)
         finally:
-            sys.path = saved
+            sys.path = original_path
         if spec is None:
             return False
-        path, top = spec.submodule_search_locations or (), False
+        path, is_top = spec.submodule_search_locations or (), False
     return True
 
 
-def _temporary(scratch: str) -> str:
-    """A fresh folder in `scratch`, which another supervisor may have found empty and removed."""
+def _make_temporary_folder(scratch: str) -> str:
+    """Make a fresh folder in `scratch`, which another supervisor may have removed as empty."""
     while True:
         folder = f"{scratch}/{os.getpid()}-{next(_COUNTER)}"
         try:
@@ -319,12 +319,12 @@ def _temporary(scratch: str) -> str:
                 Path(scratch).mkdir(mode=0o700, parents=True)
 
 
-def _drawn(folder: str, names: Sequence[str]) -> list[bytes | None]:
-    """The figures in a script's temporary folder; `None` for what it did not draw.
+def _read_figures(folder: str, names: Sequence[str]) -> list[bytes | None]:
+    """The figures in a script's temporary folder; `None` for one that it did not draw.
 
-    One that is too large is cut, so that it is none that can be shown.
+    One that is too large is cut off, so that it cannot be shown.
     """
-    found: list[bytes | None] = []
+    figures: list[bytes | None] = []
     for name in names:
         path = Path(figure_path(folder, name))
         data = None
@@ -332,11 +332,11 @@ def _drawn(folder: str, names: Sequence[str]) -> list[bytes | None]:
             if path.is_file():  # to open a pipe may take for ever
                 with path.open("rb") as file:
                     data = file.read(FIGURE_LIMIT + 1)
-        found.append(data)
-    return found
+        figures.append(data)
+    return figures
 
 
-def _finished(run: RunningScript, trace: bytes, figures: Sequence[bytes | None]) -> bytes:
+def _report_finished(run: RunningScript, trace: bytes, figures: Sequence[bytes | None]) -> bytes:
     stdout, stderr = bytes(run.stdout[:STDOUT_LIMIT]), bytes(run.stderr[-STDERR_KEPT:])
     status = run.exit_status()
     outcome = run.limit or ("killed" if status < 0 else "failed" if status else "ok")
@@ -344,7 +344,7 @@ def _finished(run: RunningScript, trace: bytes, figures: Sequence[bytes | None])
     return _report(outcome, abs(status), run.seconds, parts=parts)
 
 
-def _unstartable(text: str) -> bytes:
+def _report_unstartable(text: str) -> bytes:
     return _report("failed", 2, parts=(b"", text.encode(), b""))
 
 
@@ -368,7 +368,7 @@ def _report(
 
 
 def remove_folder(folder: str) -> None:
-    """Remove a script's temporary folder, also where it took away its own permissions."""
+    """Remove a script's temporary folder, even if the script has removed permissions in it."""
     try:
         os.rmdir(folder)  # noqa: PTH106 (mostly it is empty)
         return
@@ -385,7 +385,7 @@ def remove_folder(folder: str) -> None:
 
 
 def _receive(fd: int) -> bytes | None:
-    """The next message, after which no other comes before the report; `None` at the end."""
+    """The next message, `None` at the end; the tool sends no other before the report."""
     with open(fd, "rb", closefd=False) as pipe:
         header = pipe.read(LENGTH.size)
         length = LENGTH.unpack(header)[0] if len(header) == LENGTH.size else -1

@@ -1,31 +1,31 @@
-"""What a script looks at while it runs, noted in its own process as it happens.
+"""Trace, in a script's own process, what the script looks at while it runs.
 
-Entry point: `Tracer`, whose `install` adds an audit hook; `mujoco_tracing` tells it of the files
-that MuJoCo opens without Python's knowing.
+Entry point: `Tracer`, whose `install` adds an audit hook; `mujoco_tracing` reports the files that
+MuJoCo opens, of which Python knows nothing.
 
 1. Events of Python's audit system say which files are opened, folders listed, modules imported and
-   programs started. Whatever lies in Python or an installed package is passed over at once.
-2. The rest becomes short records, each only once, in memory that is shared with the supervisor:
-   they are there however the script ends. A process that the script forks appends its records to a
+   programs started. Whatever lies in Python or an installed package is ignored at once.
+2. The rest becomes short records, each only once, in memory that is shared with the supervisor: so
+   they survive however the script ends. A process that the script forks appends its records to a
    file.
 
-A record is a letter and what it is about, in bytes:
+A record is a letter and a value, in bytes:
 
-- `b`: notes are taken
-- `r` and a path: a file was read, or was to be and was not there
+- `b`: tracing has begun
+- `r` and a path: a file was read, or was sought for reading and not there
 - `l` and a path: a folder was listed
 - `m` and a name: a module was imported that is not Python's own, nor of the project
-- `v`, a folder of the project, a tab and names: modules that were looked for there in vain, or were
-  imported before the script began, which would have found them there first
+- `v`, a folder of the project, a tab and names: modules that were looked for there in vain, or that
+  were imported before the script began, which would have looked for them there first
 - `d` and fields between tabs: a simulation was lost (see `mujoco_watching`)
 - `w` and a path, `c` and an address, each with a file of the project and a line between tabs: the
   line writes outside its temporary folder, or uses the network
 - `p`: an initial state was moved, or a step halved; `s` and numbers: a state at its end (see
   `initial_state_perturbation`)
-- `o` and words: why there may be more
+- `o` and words: why the trace may be incomplete
 
-The handlers of events use `posix` where `os` would raise an event of its own, and as little else as
-they can: a script may have changed anything.
+The handlers of events use `posix` where `os` would raise an event itself, and as little else as
+possible: a script may have changed anything.
 """
 
 from __future__ import annotations
@@ -44,13 +44,15 @@ _WRITING = posix.O_WRONLY | posix.O_RDWR | posix.O_CREAT | posix.O_TRUNC | posix
 _SYSTEM = ("/dev/", "/proc/", "/sys/")
 _BOOTSTRAP = "<frozen importlib._bootstrap>"
 _BOOTSTRAP_EXTERNAL = "<frozen importlib._bootstrap_external>"
-_READS_UNSEEN = frozenset(
+_NATIVE_READERS = frozenset(
     "cv2 duckdb h5py lxml netCDF4 open3d osgeo polars pyarrow pybullet pydrake rasterio soundfile"
     " tables tensorflow torch vtk vtkmodules".split()
 )
-"""Packages that open files in native code, which no audit event tells of."""
-_STARTS = frozenset(("multiprocessing.popen_spawn_posix", "multiprocessing.popen_forkserver"))
-"""Modules that are imported when programs are to be started, which no audit event tells of."""
+"""Packages that open files in native code, which raises no audit event."""
+_PROGRAM_STARTERS = frozenset(
+    ("multiprocessing.popen_spawn_posix", "multiprocessing.popen_forkserver")
+)
+"""Modules that are imported to start programs, which raises no audit event."""
 
 _CHANGES = {
     "mkdir": ((0, 2),),
@@ -64,9 +66,9 @@ _CHANGES = {
     "link": ((1, 3),),
     "rename": ((0, 2), (1, 3)),
 }
-"""Of events that change files, the positions of a path and of the folder that it is relative to."""
+"""For events that change files: the positions of each path and of the folder it is relative to."""
 _RELATIVE_OPENERS = frozenset(("_rmtree_safe_fd", "_rmtree_safe_fd_step", "_fwalk", "fwalk"))
-"""Functions of Python's own that open a folder by its name in another that they have open."""
+"""Functions of Python's that open a folder by its name, relative to another open folder."""
 
 PROGRAMS = "it starts other programs"
 WRITES = "it writes files of the project"
@@ -80,7 +82,7 @@ TOO_MUCH = "it opens too many files to keep track of"
 
 
 class Tracer:
-    """Takes notes for one script.
+    """Notes what one script looks at.
 
     `root` and `temporary` are absolute; `installed` are the folders of Python and its packages.
     Records go to the shared memory; without it, and from processes that the script forks, to files
@@ -100,51 +102,51 @@ class Tracer:
         self.temporary = temporary.rstrip("/") + "/"
         cache = posix.environ.get(b"HOME", b"/nowhere").decode("utf-8", "surrogateescape")
         self._installed = tuple(f"{folder.rstrip('/')}/" for folder in installed)
-        self._inside = tuple(f for f in self._installed if f.startswith(self.root))
-        self._around = tuple(f for f in self._installed if self.root.startswith(f))
+        self._packages_inside = tuple(f for f in self._installed if f.startswith(self.root))
+        self._packages_around = tuple(f for f in self._installed if self.root.startswith(f))
         self._ignored = (
             *_SYSTEM,
             self.temporary,
             overflow,
             f"{cache}/.cache/",
-            *(f for f in self._installed if f not in self._around),
+            *(f for f in self._installed if f not in self._packages_around),
         )
         self.has_mujoco = True
-        """Whether MuJoCo tells of the files that it opens, if it is imported."""
+        """Whether MuJoCo, if the script imports it, reports the files that it opens."""
         self._shared = shared
         self._writable = tuple(f"{folder}/" for folder in writable)
         self._overflow = overflow
         self._pid = posix.getpid()
-        self._busy = False
-        self._seen: set[object] = set()
-        self._written: set[str] = set()
-        self._noted: set[str] = set()
+        self._is_spilling = False
+        self._opened: set[object] = set()
+        self._written_paths: set[str] = set()
+        self._noted_records: set[str] = set()
         self._builtin = frozenset(sys.builtin_module_names)
         self._standard = sys.stdlib_module_names
         self._is_frozen = _imp.is_frozen
 
     def install(self) -> None:
-        """Begin."""
+        """Add the audit hook."""
         handlers: dict[str, Callable[[tuple[object, ...]], None]] = {
-            "open": self._open,
-            "import": self._import,
-            "os.listdir": self._list,
-            "os.scandir": self._list,
-            "os.chdir": lambda args: self._seen.clear(),
-            "ctypes.dlopen": self._load,
-            "sqlite3.connect": self._connect,
-            "socket.connect": self._network,
-            "socket.bind": self._network,
-            "socket.sendto": self._network,
-            "socket.sendmsg": self._network,
-            "socket.getaddrinfo": self._network,
-            "socket.gethostbyname": self._network,
-            "socket.gethostbyaddr": self._network,
+            "open": self._on_open,
+            "import": self._on_import,
+            "os.listdir": self._on_list,
+            "os.scandir": self._on_list,
+            "os.chdir": lambda args: self._opened.clear(),
+            "ctypes.dlopen": self._on_load_library,
+            "sqlite3.connect": self._on_open_database,
+            "socket.connect": self._on_network,
+            "socket.bind": self._on_network,
+            "socket.sendto": self._on_network,
+            "socket.sendmsg": self._on_network,
+            "socket.getaddrinfo": self._on_network,
+            "socket.gethostbyname": self._on_network,
+            "socket.gethostbyaddr": self._on_network,
         }
         for name in ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "pty.spawn"):
-            handlers[name] = self._program
+            handlers[name] = self._on_program
         for name, paths in _CHANGES.items():
-            handlers[f"os.{name}"] = self._changer(paths)
+            handlers[f"os.{name}"] = self._make_change_handler(paths)
         find = handlers.get
 
         def hook(event: str, args: tuple[object, ...]) -> None:
@@ -156,21 +158,21 @@ class Tracer:
         sys.addaudithook(hook)
 
     def begin(self, modules: Iterable[str]) -> None:
-        """Take notes; these modules are there already, and are looked for nowhere."""
+        """Begin to note; `modules` are loaded already, and will not be looked for."""
         folder = self._project_folder(sys.path[0])
         if folder is not None:
             names = sorted(name for name in modules if not self._is_frozen(name))
             self.note(f"v{folder}\t{','.join(names)}")
         self.note("b")
 
-    def read(self, path: object) -> None:
-        """A file was opened for reading, or an attempt was made."""
-        at = self._relevant(path)
-        if at is not None and at not in self._written:
-            self.note(f"r{at}")
+    def note_read(self, path: object) -> None:
+        """Note that a file was opened for reading, or could not be."""
+        full_path = self._relevant_path(path)
+        if full_path is not None and full_path not in self._written_paths:
+            self.note(f"r{full_path}")
 
-    def imported(self, name: str, path: Sequence[object] | None) -> None:
-        """A module was looked for: it depends on what stands, or does not, in earlier folders."""
+    def note_import(self, name: str, path: Sequence[object] | None) -> None:
+        """Note that a module was looked for: in each folder up to the first that has it."""
         top, dot, _ = name.rpartition(".")
         if dot:
             package = sys.modules.get(top)
@@ -181,12 +183,12 @@ class Tracer:
             folders = sys.path if path is None else path
         last = name.rpartition(".")[2]
         for folder in list(folders):
-            at = self._project_folder(folder)
-            if at is None:
+            full_path = self._project_folder(folder)
+            if full_path is None:
                 continue
-            candidates = f"{at}/{last}/__init__.py", f"{at}/{last}.py"
+            candidates = f"{full_path}/{last}/__init__.py", f"{full_path}/{last}.py"
             if last.isidentifier() and not any(map(_exists, candidates)):
-                self.note(f"v{at}\t{last}")
+                self.note(f"v{full_path}\t{last}")
                 continue
             for candidate in candidates:
                 self.note(f"r{candidate}")
@@ -195,47 +197,49 @@ class Tracer:
         if not dot and name not in self._standard:
             self.note(f"m{name}")
             if name == "mujoco" and not self.has_mujoco:
-                self.opaque(UNSEEN_MUJOCO)
-            if name in _READS_UNSEEN and PathFinder.find_spec(name) is not None:
-                self.opaque(f"{name}, which it imports, opens files in native code")
+                self.note_opaque(UNSEEN_MUJOCO)
+            if name in _NATIVE_READERS and PathFinder.find_spec(name) is not None:
+                self.note_opaque(f"{name}, which it imports, opens files in native code")
 
-    def write(self, path: object) -> None:
-        """A file was written, made, changed or removed."""
-        at = self._relevant(path)
-        if at is None:
+    def note_write(self, path: object) -> None:
+        """Note that a file was written, made, changed or removed."""
+        full_path = self._relevant_path(path)
+        if full_path is None:
             return
-        self._written.add(at)
-        if not f"{at}/".startswith(self._writable or ("\0",)):
-            inside = at.startswith(self.root)
-            self._effect("w", at.removeprefix(self.root), WRITES if inside else WRITES_OUTSIDE)
+        self._written_paths.add(full_path)
+        if not f"{full_path}/".startswith(self._writable or ("\0",)):
+            inside = full_path.startswith(self.root)
+            self._note_effect(
+                "w", full_path.removeprefix(self.root), WRITES if inside else WRITES_OUTSIDE
+            )
 
-    def library(self, path: object) -> None:
-        """Native code was loaded from a file, or from all in a folder."""
-        at = self._relevant(path)
-        if at is not None and not self.by_import():
-            self.note(f"r{at}")
-            if at.startswith(self.root):
-                self.opaque(NATIVE)
+    def note_library(self, path: object) -> None:
+        """Note that native code was loaded from a file, or from all files of a folder."""
+        full_path = self._relevant_path(path)
+        if full_path is not None and not self.is_by_import():
+            self.note(f"r{full_path}")
+            if full_path.startswith(self.root):
+                self.note_opaque(NATIVE)
 
-    def opaque(self, why: str) -> None:
-        """There may be more than is noted."""
-        self.note(f"o{why}")
+    def note_opaque(self, reason: str) -> None:
+        """Note why the trace may be incomplete."""
+        self.note(f"o{reason}")
 
-    def _effect(self, kind: str, what: str, why: str) -> None:
-        """Something beyond the script is changed or asked, unless a package does while imported."""
-        line = self._line()
+    def _note_effect(self, kind: str, target: str, reason: str) -> None:
+        """Note an effect beyond the script, unless a package has it while it is imported."""
+        line = self._project_line()
         if line is None:
             return
-        self.opaque(why)
-        if f"{kind}{line}" not in self._noted:  # once for each line
-            self._noted.add(f"{kind}{line}")
-            self.note(f"{kind}{what}\t{line}")
+        self.note_opaque(reason)
+        if f"{kind}{line}" not in self._noted_records:  # once for each line
+            self._noted_records.add(f"{kind}{line}")
+            self.note(f"{kind}{target}\t{line}")
 
-    def by_import(self) -> bool:
-        """Whether what happens is done by a package while it is imported, not by the script."""
-        return self._line() is None
+    def is_by_import(self) -> bool:
+        """Whether a package that is being imported does this, not the script."""
+        return self._project_line() is None
 
-    def _line(self) -> str | None:
+    def _project_line(self) -> str | None:
         """The innermost line of the project that is being executed: its file, a tab, its number.
 
         `None` where a package is being imported.
@@ -247,89 +251,95 @@ class Tracer:
             name = frame.f_code.co_filename
             if name == _BOOTSTRAP:
                 return None
-            if name.startswith(self.root) and not name.startswith(self._inside or ("\0",)):
+            if name.startswith(self.root) and not name.startswith(self._packages_inside or ("\0",)):
                 return f"{name.removeprefix(self.root)}\t{frame.f_lineno}"
             frame = frame.f_back
         return "\t0"
 
     # --- events
 
-    def _open(self, args: tuple[object, ...]) -> None:
+    def _on_open(self, args: tuple[object, ...]) -> None:
         path, mode, flags = args
-        if (path, flags) in self._seen:
+        if (path, flags) in self._opened:
             return
         if mode is None and sys._getframe(2).f_code.co_name in _RELATIVE_OPENERS:
-            return  # relative to a folder that the event does not name; that folder is known
-        self._seen.add((path, flags))
+            return  # relative to a folder that the event does not name, but that was noted before
+        self._opened.add((path, flags))
         if isinstance(flags, int) and flags & _WRITING:
             if flags & posix.O_RDWR and not flags & posix.O_TRUNC:
-                self.read(path)
-            self.write(path)
+                self.note_read(path)
+            self.note_write(path)
         else:
-            self.read(path)
+            self.note_read(path)
 
-    def _import(self, args: tuple[object, ...]) -> None:
+    def _on_import(self, args: tuple[object, ...]) -> None:
         name, file, path = args[:3]
         if file is not None:
-            at = self._relevant(file)
-            if at is not None:
-                self.note(f"r{at}")
-                if at.startswith(self.root):
-                    self.opaque(NATIVE)
+            full_path = self._relevant_path(file)
+            if full_path is not None:
+                self.note(f"r{full_path}")
+                if full_path.startswith(self.root):
+                    self.note_opaque(NATIVE)
         elif isinstance(name, str):
-            if name in _STARTS:
-                self.opaque(PROGRAMS)
-            self.imported(name, path if isinstance(path, list) else None)
+            if name in _PROGRAM_STARTERS:
+                self.note_opaque(PROGRAMS)
+            self.note_import(name, path if isinstance(path, list) else None)
 
-    def _list(self, args: tuple[object, ...]) -> None:
+    def _on_list(self, args: tuple[object, ...]) -> None:
         code = sys._getframe(2).f_code
         if code.co_filename == _BOOTSTRAP_EXTERNAL:
-            return  # it looks for a module
+            return  # Python is looking for a module
         path = args[0] if args[0] is not None else "."
-        at = self._relevant(_of_descriptor(path) if isinstance(path, int) else path)
-        if at is None:
+        full_path = self._relevant_path(_descriptor_path(path) if isinstance(path, int) else path)
+        if full_path is None:
             return
-        if at == self.root[:-1] or at.startswith(self.root):
-            self.note(f"l{at}")
-        elif not self.by_import():
-            self.opaque(LISTS_OUTSIDE)
+        if full_path == self.root[:-1] or full_path.startswith(self.root):
+            self.note(f"l{full_path}")
+        elif not self.is_by_import():
+            self.note_opaque(LISTS_OUTSIDE)
 
-    def _changer(self, paths: tuple[tuple[int, int], ...]) -> Callable[[tuple[object, ...]], None]:
+    def _make_change_handler(
+        self, paths: tuple[tuple[int, int], ...]
+    ) -> Callable[[tuple[object, ...]], None]:
         def change(args: tuple[object, ...]) -> None:
             for path, folder in paths:
-                self.write(_below(args[folder] if folder else -1, args[path]))
+                self.note_write(_join_descriptor(args[folder] if folder else -1, args[path]))
 
         return change
 
-    def _program(self, args: tuple[object, ...]) -> None:
-        if not self.by_import():
-            self.opaque(PROGRAMS)
+    def _on_program(self, args: tuple[object, ...]) -> None:
+        if not self.is_by_import():
+            self.note_opaque(PROGRAMS)
 
-    def _network(self, args: tuple[object, ...]) -> None:
-        named = len(args) < 2 or isinstance(args[0], str | bytes | None)
-        address = args[0] if named else args[1]  # a name that is looked up, or that of a socket
+    def _on_network(self, args: tuple[object, ...]) -> None:
+        # The first argument is a name that is looked up, or a socket; then the address follows.
+        is_lookup = len(args) < 2 or isinstance(args[0], str | bytes | None)
+        address = args[0] if is_lookup else args[1]
         if isinstance(address, bytes):
             address = address.decode("utf-8", "surrogateescape")
-        # A socket in its own folder, or with a name that the system made up, is for its children.
+        # A socket in the temporary folder, or with a name made up by the system, is for children.
         if isinstance(address, str) and address.startswith((self.temporary, "\0")):
             return
         if isinstance(address, tuple):
             address = ":".join(map(str, address[:2]))
-        self._effect("c", str(address or ""), NETWORK)
+        self._note_effect("c", str(address or ""), NETWORK)
 
-    def _load(self, args: tuple[object, ...]) -> None:
+    def _on_load_library(self, args: tuple[object, ...]) -> None:
         name = args[0]
         if isinstance(name, str) and "/" in name:
-            self.library(name)
+            self.note_library(name)
 
-    def _connect(self, args: tuple[object, ...]) -> None:
-        if args[0] not in (":memory:", b":memory:", "") and self._relevant(args[0]) is not None:
-            self.opaque(DATABASE)
+    def _on_open_database(self, args: tuple[object, ...]) -> None:
+        if (
+            args[0] not in (":memory:", b":memory:", "")
+            and self._relevant_path(args[0]) is not None
+        ):
+            self.note_opaque(DATABASE)
 
     # --- paths
 
-    def _relevant(self, path: object) -> str | None:
-        """The absolute path of something whose content may matter; `None` where it does not."""
+    def _relevant_path(self, path: object) -> str | None:
+        """The absolute path of something that may matter to a result; `None` if it cannot."""
         if isinstance(path, bytes):
             path = path.decode("utf-8", "surrogateescape")
         if not isinstance(path, str):
@@ -338,42 +348,46 @@ class Tracer:
             return None
         if not path.startswith("/"):
             path = f"{posix.getcwd()}/{path}"
-        at = _normal(path)
-        if at.startswith(self._ignored) or at == self.temporary[:-1]:
+        full_path = _normalize(path)
+        if full_path.startswith(self._ignored) or full_path == self.temporary[:-1]:
             return None
-        if self._around and not at.startswith(self.root) and at.startswith(self._installed):
+        if (
+            self._packages_around
+            and not full_path.startswith(self.root)
+            and full_path.startswith(self._installed)
+        ):
             return None
-        return at
+        return full_path
 
     def _project_folder(self, folder: object) -> str | None:
         if not isinstance(folder, str):
             return None
-        at = self._relevant(folder or ".")
-        if at is None or not f"{at}/".startswith(self.root):
+        full_path = self._relevant_path(folder or ".")
+        if full_path is None or not f"{full_path}/".startswith(self.root):
             return None
-        # An environment in the folder of the course holds packages, which count by their versions.
-        return None if f"{at}/".startswith(self._inside or ("\0",)) else at
+        # Packages of an environment in the course's folder count by their versions.
+        return None if f"{full_path}/".startswith(self._packages_inside or ("\0",)) else full_path
 
     def note(self, record: str) -> None:
         """Add a record, unless it is there already."""
-        if record in self._noted:
+        if record in self._noted_records:
             return
-        self._noted.add(record)
+        self._noted_records.add(record)
         data = record.encode("utf-8", "surrogateescape") + b"\0"
         if self._shared is not None and posix.getpid() == self._pid:
             try:
                 self._shared.write(data)
             except ValueError:  # there is no more room
-                if TOO_MUCH not in self._noted:
-                    self._noted.add(TOO_MUCH)
+                if TOO_MUCH not in self._noted_records:
+                    self._noted_records.add(TOO_MUCH)
                     self._spill(f"o{TOO_MUCH}\0".encode())
         else:
             self._spill(data)
 
     def _spill(self, data: bytes) -> None:
-        if self._busy:  # this is its own opening of a file, which is an event as well
+        if self._is_spilling:  # opening the file below is an event as well
             return
-        self._busy = True
+        self._is_spilling = True
         try:
             with contextlib.suppress(FileExistsError):
                 posix.mkdir(self._overflow)
@@ -384,25 +398,25 @@ class Tracer:
             finally:
                 posix.close(fd)
         finally:
-            self._busy = False
+            self._is_spilling = False
 
 
-def _normal(path: str) -> str:
+def _normalize(path: str) -> str:
     """An absolute path without `.`, `..` and repeated slashes."""
     return "/" + normpath(path).lstrip("/")
 
 
-def _below(folder: object, path: object) -> object:
+def _join_descriptor(folder: object, path: object) -> object:
     """A path that may be relative to a folder given as a descriptor."""
     if isinstance(path, bytes):
         path = path.decode("utf-8", "surrogateescape")
     if not isinstance(folder, int) or folder < 0 or not isinstance(path, str) or path[:1] == "/":
         return path
-    return f"{_of_descriptor(folder)}/{path}"
+    return f"{_descriptor_path(folder)}/{path}"
 
 
-def _of_descriptor(fd: int) -> str:
-    """The path of a file that is open, where the system tells."""
+def _descriptor_path(fd: int) -> str:
+    """The path of an open file, where the system tells it."""
     try:
         return posix.readlink(f"/proc/self/fd/{fd}")
     except OSError:

@@ -3,12 +3,12 @@
 Entry points: `MathEngine.typeset`; `Isolate`, for other scripts; `start`, before copies of this
 process are made.
 
-1. mini-racer brings V8, which runs scripts in a thread of its own, and tells an event loop when one
-   has ended. Each isolate has such a loop, in one more thread. Both end when it is closed, so that
-   this process can be forked again.
-2. Formulas cross the border many at a time, as JSON (see `typeset.js`).
-3. When a batch hits a limit, its isolate is thrown away, and its formulas go one by one, so that
-   one of them gets the blame.
+1. mini-racer brings V8, which runs scripts in a thread of its own, and notifies an event loop when
+   one has ended. Each isolate has such a loop, in one more thread. Both threads end when the
+   isolate is closed, so that this process can be forked again.
+2. Formulas are typeset many at a time, as JSON (see `typeset.js`).
+3. When a batch exceeds a limit, its isolate is thrown away, and its formulas are typeset one by
+   one, to find the one to blame.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ _FLAGS = (
     "--no-opt",
     "--invocation-count-for-maglev=2000",
 )
-"""V8 has no threads here that would compile hot WebAssembly anew, and would stay with its first,
-several times slower code; so it does that at once, where it is. Of the two compilers for hot
-JavaScript the slower one is left out: typesetting a course would be over before it pays, and takes
-a fifth less without; the code of labs runs as fast with the other. That one compiles a function
-after 2,000 calls: as early as V8 does by itself, it took a quarter of the time of typesetting."""
+"""V8 has no threads here to recompile hot WebAssembly, and would stay with its first code, which is
+several times slower; so it recompiles at once, in the same thread. Of the two compilers for hot
+JavaScript the slower one is off: typesetting a course is over before it pays, and takes a fifth
+less without it; the code of labs runs as fast with the other. That one compiles a function only
+after 2,000 calls: as early as V8 does by default, it took a quarter of the time of typesetting."""
 _MEMORY = 128 << 20
 """Bytes of JavaScript objects."""
 _ADDRESSES = 1 << 40
-"""Bytes of addresses with which V8 starts for certain; it reserves most of them and uses few."""
+"""Bytes of addresses that V8 needs to start; it reserves most of them and uses few."""
 _START_SECONDS = 20.0
 _BATCH = 100
 """Formulas at a time; one takes about 0.3 ms."""
@@ -52,15 +52,15 @@ _BATCH_SECONDS = 20.0
 _SINGLE_SECONDS = 5.0
 _LONGEST_MESSAGE = 160
 _LOOK = 1.0
-"""Seconds between two looks at whether a script gets on."""
+"""Seconds between two checks of a script's progress."""
 _SLOWEST = 10.0
-"""How many times longer than on an idle machine a script may take before it is ended."""
+"""How many times its limit of processor time a script may take in wall time."""
 
 
 class StoppedError(BaseException):
-    """Another thread has asked for the end of what ran.
+    """Another thread has stopped the script.
 
-    Like a `KeyboardInterrupt` it is no failure that anything on its way might deal with.
+    Like `KeyboardInterrupt` it is no `Exception`, so that no handler on the way catches it.
     """
 
 
@@ -73,11 +73,10 @@ class ScriptError(Exception):
 
 
 def start() -> None:
-    """Start V8, where it does not run yet; no thread begins, and copies of this process share it.
+    """Start V8 if it does not run yet; this starts no thread, and copies of this process share it.
 
     Raises:
-        EffectError: it is not there, or would end this process: it reserves addresses, which a
-            limit on them forbids.
+        EffectError: it is not installed, or a limit on addresses would make it end this process.
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < _ADDRESSES:
@@ -95,7 +94,7 @@ def start() -> None:
 
 
 class Heartbeat(NamedTuple):
-    """What shows from outside that a script gets on."""
+    """How others see that a script makes progress."""
 
     beats: memoryview
     """Bytes that it changes."""
@@ -115,14 +114,14 @@ class Isolate:
 
         self._memory = memory
         self._lock = threading.Lock()
-        """Held while the following two are looked at or changed."""
+        """Guards the following two."""
         self._running: Future[Any] | None = None
         self._is_stopped = False
-        self._life = contextlib.ExitStack()
-        self._loop = self._life.enter_context(_event_loop())
-        self._racer = self._life.enter_context(mini_racer(self._loop))
+        self._resources = contextlib.ExitStack()
+        self._loop = self._resources.enter_context(_event_loop())
+        self._racer = self._resources.enter_context(mini_racer(self._loop))
         self._racer.set_hard_memory_limit(memory)
-        self._life.callback(lambda: self._submit(_end_tasks()).result())
+        self._resources.callback(lambda: self._submit(_end_tasks()).result())
         atexit.register(self.close)
         for script in scripts:
             self._evaluate(script, _START_SECONDS)
@@ -132,7 +131,7 @@ class Isolate:
         atexit.unregister(self.close)
         self.stop()
         with self._lock:  # another thread may close it, too
-            self._life.close()
+            self._resources.close()
 
     def stop(self) -> None:
         """From another thread: end what runs, and all that comes after, by a `StoppedError`."""
@@ -157,7 +156,7 @@ class Isolate:
         return result
 
     def buffer(self, name: str) -> memoryview:
-        """The bytes that the scripts' global `buffer(name)` gives, as they are at any time."""
+        """The bytes that the scripts' global `buffer(name)` gives, shared with the scripts."""
         place = self._evaluate(f"buffer({json.dumps(name)})", _START_SECONDS)
         assert isinstance(place, memoryview)
         return place
@@ -174,7 +173,7 @@ class Isolate:
         with self._lock:
             if self._is_stopped:
                 raise StoppedError
-            self._running = running = self._submit(self._in_time(code, seconds, progress))
+            self._running = running = self._submit(self._evaluate_in_time(code, seconds, progress))
         try:
             return running.result()
         except CancelledError:
@@ -190,31 +189,33 @@ class Isolate:
     def _submit(self, work: Coroutine[Any, Any, Any]) -> Future[Any]:
         return asyncio.run_coroutine_threadsafe(work, self._loop)
 
-    async def _in_time(self, code: str, seconds: float, progress: Heartbeat | None) -> object:
-        """The value of a script, in the loop's thread.
+    async def _evaluate_in_time(
+        self, code: str, seconds: float, progress: Heartbeat | None
+    ) -> object:
+        """The value of a script; runs in the loop's thread.
 
-        Processor time is what counts, since other work on this machine must not end a good script;
-        no more of it than has passed, as other threads of this process take some too.
+        The limit is one of processor time, since other work on this machine must not end a good
+        script; but at most the wall time counts, as other threads of this process take some too.
         """
         task = asyncio.ensure_future(self._racer.eval_cancelable(code))
-        began, began_work = time.monotonic(), time.process_time()
+        start_time, start_cpu_time = time.monotonic(), time.process_time()
         try:
-            spent, seen, limit = 0.0, b"", seconds
+            spent, last_beats, limit = 0.0, b"", seconds
             while spent < limit:
-                if progress is not None and seen != (now := bytes(progress.beats)):
-                    seen, limit = now, min(seconds, spent + progress.patience)
+                if progress is not None and last_beats != (now := bytes(progress.beats)):
+                    last_beats, limit = now, min(seconds, spent + progress.patience)
                 left = min(limit - spent, _LOOK if progress is not None else seconds)
                 done, _ = await asyncio.wait((task,), timeout=max(left, 0.01))
                 if done:
                     return task.result()
-                passed = time.monotonic() - began
-                spent = max(min(passed, time.process_time() - began_work), passed / _SLOWEST)
+                elapsed = time.monotonic() - start_time
+                spent = max(min(elapsed, time.process_time() - start_cpu_time), elapsed / _SLOWEST)
         finally:
             task.cancel()
-        # Where the script came to its own end just now, V8 would end the next one in its place.
+        # If the script has just ended by itself, V8 would end the next one instead: run a dummy.
         await asyncio.gather(task, self._racer.eval_cancelable("0"), return_exceptions=True)
-        held = seconds if progress is None else min(seconds, progress.patience)
-        raise LimitError(f"ran for more than {held:g} s")
+        shown_limit = seconds if progress is None else min(seconds, progress.patience)
+        raise LimitError(f"ran for more than {shown_limit:g} s")
 
 
 @contextlib.contextmanager
@@ -232,7 +233,7 @@ def _event_loop() -> Iterator[asyncio.AbstractEventLoop]:
 
 
 async def _end_tasks() -> None:
-    """Cancel what the running loop still does, and wait until it has ended."""
+    """Cancel the other tasks of the running loop, and wait until they have ended."""
     tasks = asyncio.all_tasks() - {asyncio.current_task()}
     for task in tasks:
         task.cancel()
@@ -262,7 +263,7 @@ class MathEngine:
         """The MathML of each formula, or why there is none; no macro outlives its formula.
 
         Raises:
-            EffectError: Temml or V8 is not there.
+            EffectError: Temml or V8 is not installed.
         """
         with self._lock:
             return [

@@ -1,4 +1,4 @@
-"""The versions of what runs the scripts, found without importing any of it.
+"""The versions of Python, MuJoCo and packages that run the scripts, found without importing them.
 
 Entry points: `python_version`, `engine_version`, `package_version`; `version_in`, for the packages
 of another interpreter.
@@ -14,12 +14,12 @@ from coursebuild.core.files.errors import EffectError
 
 
 def python_version() -> str:
-    """Of the interpreter that runs this tool and the scripts, such as `3.11.7`."""
+    """The version of the interpreter that runs this tool and the scripts, such as `3.11.7`."""
     return sys.version.split()[0]
 
 
 def engine_version() -> str:
-    """Of the installed MuJoCo, such as `3.14.0`.
+    """The version of the installed MuJoCo, such as `3.14.0`.
 
     Raises:
         EffectError: there is none.
@@ -33,7 +33,7 @@ def engine_version() -> str:
 
 
 def package_version(name: str, folders: Iterable[str] | None = None) -> str:
-    """Of a distribution that is installed, here or in these folders; `none` where there is none."""
+    """The version of a distribution, here or in these folders; `none` where it is not installed."""
     return (_version(name) if folders is None else version_in(folders, name)) or "none"
 
 
@@ -42,21 +42,21 @@ def version_in(folders: Iterable[str], name: str) -> str | None:
     start = f"{name.replace('-', '_').lower()}-"
     for folder in folders:
         try:
-            found = [e for e in os.listdir(folder or ".") if e.lower().startswith(start)]  # noqa: PTH208
+            entries = [e for e in os.listdir(folder or ".") if e.lower().startswith(start)]  # noqa: PTH208
         except OSError:
             continue
-        for entry in sorted(found):
+        for entry in sorted(entries):
             if entry.endswith(".dist-info"):
                 return entry[len(start) : -len(".dist-info")]
     return None
 
 
 def _version(name: str) -> str | None:
-    """The version of a distribution, by the name of the folder that says what it is."""
-    found = version_in(sys.path, name)
-    if found is not None:
-        return found
-    import importlib.metadata  # which reads more, and takes longer than all else
+    """The version of a distribution, read from the name of its `.dist-info` folder if possible."""
+    version = version_in(sys.path, name)
+    if version is not None:
+        return version
+    import importlib.metadata  # reads more, and is slow to import
 
     try:
         return importlib.metadata.version(name)

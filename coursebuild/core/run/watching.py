@@ -1,7 +1,7 @@
-"""A script that runs: its output, its limits, and the end of everything that it started.
+"""A running script: its output, its limits, and the end of everything that it started.
 
-Entry point: `RunningScript`, used by `supervisor`, whose process has one thread and is the one that
-orphans of the script become children of.
+Entry point: `RunningScript`, used by `supervisor`, whose process has one thread and becomes the
+parent of the script's orphans.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ STDOUT_LIMIT = 1 << 20
 STDERR_KEPT = 1 << 16
 """Bytes of its error output that are kept, from the end."""
 GRACE = 0.5
-"""Seconds between asking a script that ran too long where it is, and killing it."""
+"""Seconds between asking a script at its time limit where it is, and killing it."""
 
 _CHUNK = 1 << 16
 
@@ -32,8 +32,8 @@ _CHUNK = 1 << 16
 def has_ended(parent: int) -> bool:
     """Whether the process that started this one has ended, or is about to.
 
-    One that ends closes its files before its children get another parent: who finds its end of a
-    pipe closed may still find it as its parent. Linux says of such a process that it is exiting.
+    A process that ends closes its files before its children get another parent: they may see a pipe
+    closed and still have it as parent. Linux marks such a process as exiting.
     """
     if os.getppid() != parent:
         return True
@@ -50,10 +50,10 @@ class RunningScript:
 
     Args:
         pid: its process.
-        pipes: the ends that are read here, of its output and of its error output.
-        shared: where it notes what it looks at, if that is shared with this process.
+        pipes: the reading ends of its output and of its error output.
+        shared: the memory for its notes, if that is shared with this process.
         timeout: seconds that it may take.
-        awake: what can be read from when a child has ended.
+        awake: a descriptor that becomes readable when a child has ended.
     """
 
     def __init__(
@@ -65,26 +65,26 @@ class RunningScript:
         self.stdout = bytearray()
         self.stderr = bytearray()
         self.limit: Literal["", "timeout", "output-limit"] = ""
-        """The limit that it has reached."""
+        """The limit that it has exceeded."""
         self.seconds = 0.0
         self.start = time.monotonic()
         self.deadline = self.start + timeout
         self.status: int | None = None
         self.pipes = dict(zip(pipes, (self.stdout, self.stderr), strict=True))
-        self._opened = pipes
+        self._pipe_fds = pipes
         for fd in self.pipes:
             os.set_blocking(fd, False)
 
     def watch(self, tool: int, parent: int) -> None:
-        """Return when the script has ended, or must.
+        """Return when the script has ended, or must be ended.
 
-        Exit when `tool` closes its pipe, and when the parent of this process is no more `parent`,
-        which it was before the script was started.
+        Exit when `tool` closes its pipe, and when `parent`, which was the parent of this process
+        before the script was started, no longer is.
         """
-        while not self._ended():
+        while not self._has_ended():
             now = time.monotonic()
             if now >= self.deadline:
-                self._ask_where()
+                self._request_position()
                 return
             ready = self._wait(min(self.deadline - now, 1.0), [tool])
             if tool in ready or os.getppid() != parent:
@@ -94,7 +94,7 @@ class RunningScript:
                 return
 
     def end(self) -> None:
-        """Kill whatever is left, and take what it had printed."""
+        """Kill all that is left of the script, and read the rest of its output."""
         self.seconds = time.monotonic() - self.start
         with contextlib.suppress(OSError):
             os.killpg(self.pid, signal.SIGKILL)
@@ -104,30 +104,30 @@ class RunningScript:
                 pass
         if not self.limit and len(self.stdout) > STDOUT_LIMIT:
             self.limit = "output-limit"
-        for fd in self._opened:
+        for fd in self._pipe_fds:
             os.close(fd)
 
     def exit_status(self) -> int:
-        """Minus the signal's number where one ended it, which it does where a limit was reached."""
+        """Its exit status; minus a signal's number where one ended it, as at a limit."""
         if self.status is None or self.limit:
             return -signal.SIGKILL
         return self.status
 
-    def _ask_where(self) -> None:
-        """Let the script say where it hangs: Python's fault handler answers SIGABRT."""
+    def _request_position(self) -> None:
+        """Let the script print where it hangs: Python's fault handler answers SIGABRT."""
         self.limit = "timeout"
         with contextlib.suppress(OSError):
             os.kill(self.pid, signal.SIGABRT)
         until = time.monotonic() + GRACE
-        while not self._ended() and (left := until - time.monotonic()) > 0:
+        while not self._has_ended() and (left := until - time.monotonic()) > 0:
             self._wait(left, [])
             if len(self.stdout) > STDOUT_LIMIT:
                 return
 
-    def _wait(self, seconds: float, others: list[int]) -> set[int]:
-        """Wait for a pipe, the end of a child, or one of `others`; returns which of these."""
+    def _wait(self, seconds: float, fds: list[int]) -> set[int]:
+        """Wait for a pipe, the end of a child, or one of `fds`; return which of `fds` are ready."""
         poll = select.poll()
-        for fd in (*self.pipes, self.awake, *others):
+        for fd in (*self.pipes, self.awake, *fds):
             poll.register(fd, select.POLLIN)
         ready = {fd for fd, _ in poll.poll(max(1.0, seconds * 1000.0))}
         if self.awake in ready:
@@ -135,10 +135,10 @@ class RunningScript:
                 os.read(self.awake, _CHUNK)
         for fd in ready & self.pipes.keys():
             self._read(fd)
-        return ready.intersection(others)
+        return ready.intersection(fds)
 
     def _read(self, fd: int) -> bool:
-        """Take what a pipe holds, at most a chunk; whether there may be more."""
+        """Read at most a chunk from a pipe; return whether there may be more."""
         try:
             data = os.read(fd, _CHUNK)
         except BlockingIOError:
@@ -146,14 +146,14 @@ class RunningScript:
         if not data:
             self.pipes.pop(fd, None)
             return False
-        kept = self.pipes[fd]
-        kept += data
-        if kept is self.stderr and len(kept) > 4 * STDERR_KEPT:
-            del kept[:-STDERR_KEPT]
-        return kept is self.stderr or len(kept) <= STDOUT_LIMIT
+        buffer = self.pipes[fd]
+        buffer += data
+        if buffer is self.stderr and len(buffer) > 4 * STDERR_KEPT:
+            del buffer[:-STDERR_KEPT]
+        return buffer is self.stderr or len(buffer) <= STDOUT_LIMIT
 
-    def _ended(self) -> bool:
-        """Reap every child that has ended; whether the script is among them."""
+    def _has_ended(self) -> bool:
+        """Reap every child that has ended; return whether the script has."""
         with contextlib.suppress(ChildProcessError):
             while (child := os.waitpid(-1, os.WNOHANG))[0]:
                 if child[0] == self.pid:
@@ -161,9 +161,9 @@ class RunningScript:
         return self.status is not None
 
     def _kill_descendants(self, until: float) -> None:
-        """Kill every process that the script left: a dying one hands its children on to us."""
+        """Kill every process that the script left: when one dies, its children become ours."""
         while time.monotonic() < until:
-            self._ended()
+            self._has_ended()
             children = list(_children())
             if not children and self.status is not None:
                 return
@@ -180,14 +180,14 @@ def _children() -> Iterator[int]:
     """The children of this process that are alive or not yet reaped, where the system can tell."""
     me = os.getpid()
     try:
-        listed = os.open(f"/proc/self/task/{me}/children", os.O_RDONLY)
+        children_fd = os.open(f"/proc/self/task/{me}/children", os.O_RDONLY)
     except OSError:
         pass
     else:
         try:
-            yield from map(int, os.read(listed, _CHUNK).split())
+            yield from map(int, os.read(children_fd, _CHUNK).split())
         finally:
-            os.close(listed)
+            os.close(children_fd)
         return
     with contextlib.suppress(OSError):
         for entry in Path("/proc").iterdir():

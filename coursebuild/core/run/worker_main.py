@@ -7,15 +7,15 @@ the only one below a script's own.
 import sys
 
 if __name__ == "__main__":
-    BARE = frozenset(sys.modules)
+    INITIAL_MODULES = frozenset(sys.modules)
     ROOT = __file__.rsplit("/", 4)[0]
     sys.path[0] = ROOT  # not this file's folder, whose modules have the names of others
     from coursebuild.core.run import script_process, supervisor
 
     sys.path.remove(ROOT)
-    script = supervisor.main(sys.argv[1:], BARE)
+    script = supervisor.main(sys.argv[1:], INITIAL_MODULES)
     try:
-        exec(script.compiled(), script.names)
+        exec(script.compile_script(), script.names)
     except SystemExit:
         raise
     except BaseException as error:

@@ -19,13 +19,13 @@ from msgspec import Struct
 from coursebuild.core.run import supervisor
 
 Enclose: TypeAlias = Callable[[Sequence[str], Mapping[str, str]], list[str]]
-"""Of a command and an environment, the command that runs that in a sandbox."""
+"""Makes, of a command and an environment, the command that runs it in a sandbox."""
 _MOST = 256 << 20
 """Bytes that a report may have."""
 
 
 class ChildReport(Struct, frozen=True):
-    """What a script did, as its supervisor says it."""
+    """What a script did, as its supervisor reports it."""
 
     outcome: str
     """The value of an `Outcome`."""
@@ -39,16 +39,16 @@ class ChildReport(Struct, frozen=True):
 
 
 class Worker:
-    """A supervisor, started when this is made: it is given jobs and sends reports.
+    """A supervisor process, which gets jobs and sends reports; it starts when this is made.
 
     Args:
-        environment: what scripts find around them.
+        environment: the environment of the scripts.
         python: the interpreter that runs them.
-        fork: whether they may be copies of the supervisor.
-        enclose: gives the command that runs another one in a sandbox.
+        fork: whether they may run in copies of the supervisor.
+        enclose: makes a command that runs in a sandbox.
 
     Raises:
-        OSError: there is no place for another process.
+        OSError: the process cannot be started.
     """
 
     def __init__(
@@ -56,17 +56,17 @@ class Worker:
     ) -> None:
         self.environment = environment
         self.job: int | None = None
-        """What it works on: the index of a job."""
+        """The index of the job that it works on."""
         self.is_reused = False
-        """Whether it is as it was left by an earlier run, and has reported nothing since."""
+        """Whether it comes from an earlier run and has reported nothing in this one."""
         self.deadline = float("inf")
         """When it must have reported, by `time.monotonic`."""
         self._buffer = bytearray()
-        theirs, jobs = os.pipe()
-        self.reports, theirs_too = os.pipe()
-        self.jobs: int | None = jobs
-        command = [python, supervisor.PROGRAM, str(theirs), str(theirs_too), str(int(fork))]
-        if enclose is not None:  # nothing that a course sets is for who makes the sandbox
+        job_reader, job_writer = os.pipe()
+        self.reports, report_writer = os.pipe()
+        self.jobs: int | None = job_writer
+        command = [python, supervisor.PROGRAM, str(job_reader), str(report_writer), str(int(fork))]
+        if enclose is not None:  # what a course sets must not reach the program of the sandbox
             command, environment = enclose(command, environment), {}
         try:
             self._process = subprocess.Popen(
@@ -74,17 +74,17 @@ class Worker:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
-                pass_fds=(theirs, theirs_too),
+                pass_fds=(job_reader, report_writer),
                 env=dict(environment),
                 start_new_session=True,  # Ctrl-C is for this process, which then ends it
             )
         except BaseException:
-            os.close(jobs)
+            os.close(job_writer)
             os.close(self.reports)
             raise
         finally:
-            os.close(theirs)
-            os.close(theirs_too)
+            os.close(job_reader)
+            os.close(report_writer)
         for pipe in (self._process.stdout, self._process.stderr):
             assert pipe is not None
             pipe.close()  # a script's streams are pipes too; the supervisor itself prints nothing
@@ -93,31 +93,31 @@ class Worker:
         """Hand over a job."""
         self.job = index
         assert self.jobs is not None
-        # A pipe that is broken is that of one that died, which reading tells.
+        # The pipe is broken if the supervisor has died, which reading will show.
         with contextlib.suppress(BrokenPipeError), open(self.jobs, "wb", closefd=False) as pipe:
             pipe.write(supervisor.LENGTH.pack(len(message)) + message)
 
     def kill(self) -> None:
-        """End it at once; on Linux, what it runs with it."""
+        """End it at once, on Linux with what it runs."""
         self._process.kill()
 
     def dismiss(self) -> None:
-        """Give it no more jobs; it ends, and kills what it runs."""
+        """Close its input, so that it kills what it runs and ends."""
         if self.jobs is not None:
             os.close(self.jobs)
             self.jobs = None
 
     def read(self) -> bool:
-        """Take what it says; `False` when it is gone."""
+        """Read what it has sent; `False` when it has ended."""
         data = os.read(self.reports, 1 << 16)
         self._buffer += data
         return bool(data)
 
     def take_report(self) -> ChildReport | None:
-        """A whole report, if it is here.
+        """Take the next report if all of it has been read.
 
         Raises:
-            ValueError: it is none.
+            ValueError: it is no report.
         """
         size = supervisor.LENGTH.size
         if len(self._buffer) < size:
@@ -132,11 +132,11 @@ class Worker:
         return report
 
     def status(self) -> int:
-        """What ended it, once it is gone: minus a signal's number, or an exit status."""
+        """Its exit status, or minus the number of the signal that ended it."""
         return self._process.wait()
 
     def close(self) -> None:
-        """Let it kill what it runs, and wait for that."""
+        """Dismiss it and wait until it has killed what it runs."""
         self.dismiss()
         until = time.monotonic() + 10.0
         try:

@@ -150,7 +150,7 @@ class _Attempt(Struct, frozen=True):
         inputs = inputs_of(lab, module)
         try:
             mjb = saved_model(self.context, self.engines.native, self.model)
-            key = fingerprint((inputs.text, inputs.around, mjb))
+            key = fingerprint((inputs.text, inputs.conditions, mjb))
             read = functools.partial(self._read, module, key)
             findings = self.context.memory.store.get("labs", key, read, shared=True)
             cached = findings is not None
@@ -172,7 +172,7 @@ class _Attempt(Struct, frozen=True):
             ok=not found,
             lasting=_is_lasting(reply),
             seconds=reply.seconds,
-            made=reply.made,
+            timestamp=reply.made,
         )
         line = TrialLine(
             name=module.name,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.core.files.errors import UsageError
-from coursebuild.core.run.environments import other_version
+from coursebuild.core.run.environments import check_other_version
 from coursebuild.core.run.versions import engine_version
 
 
@@ -14,7 +14,7 @@ from coursebuild.core.run.versions import engine_version
 )
 def test_what_is_no_version(text: str) -> None:
     with pytest.raises(UsageError) as told:
-        other_version(text)
+        check_other_version(text)
     assert str(told.value) == f"--against: {text!r} is no version of MuJoCo, such as 3.13.0"
 
 
@@ -22,6 +22,6 @@ def test_the_version_of_here_is_no_other_however_it_is_written() -> None:
     here = engine_version()
     for text in (here, f"{here}.0"):
         with pytest.raises(UsageError) as told:
-            other_version(text)
+            check_other_version(text)
         assert str(told.value) == f"--against: MuJoCo {here} is the version installed here"
-    assert other_version("3.99") == "3.99"
+    assert check_other_version("3.99") == "3.99"

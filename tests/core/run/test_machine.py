@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.core.run.machine import cpu_name, machine, named
+from coursebuild.core.run.machine import cpu_name, find_cpu_name, machine
 
 X86 = """\
 processor\t: 0
@@ -30,7 +30,7 @@ ARM = "processor\t: 0\nBogoMIPS\t: 50.00\nCPU implementer\t: 0x41\n\nModel\t\t: 
     ],
 )
 def test_names_of_processors(text: str, name: str) -> None:
-    assert named(text) == name
+    assert find_cpu_name(text) == name
 
 
 def test_this_machine() -> None:

@@ -11,7 +11,7 @@ import pytest
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model.results import CompileResult
 from coursebuild.core.run import mjcf
-from coursebuild.core.run.model_memory import compile_kept
+from coursebuild.core.run.model_memory import compile_or_recall
 from support.model_files import TETRAHEDRON
 
 pytestmark = pytest.mark.site
@@ -37,7 +37,7 @@ class Course:
         found = {path.stem: path.read_text() for path in sorted(self.root.glob("models/*.xml"))}
         given = [(f"models/{name}.xml", text) for name, text in found.items()]
         given += [(mjcf.TEXT_PATH, text) for text in more]
-        results = compile_kept(self.root, Memo(self.root, fresh=fresh), given)
+        results = compile_or_recall(self.root, Memo(self.root, fresh=fresh), given)
         return dict(zip([*found, *more], results, strict=True))
 
     def compiled(self) -> list[str]:

@@ -99,7 +99,7 @@ def test_script_that_lacks_a_module_is_skipped(server: ScriptServer, root: Path)
     told: list[object] = []
     lacking = ["no_such_module", "json", "json.no_such", "no_such_module.sub"]
     jobs = [job(requires=lacking)]
-    (skipped,) = server.run(root, jobs, parallel=4, started=told.append, finished=told.append)
+    (skipped,) = server.run(root, jobs, parallel=4, on_start=told.append, on_finish=told.append)
     assert skipped.outcome is Outcome.SKIPPED
     assert skipped.missing == ("no_such_module", "json.no_such", "no_such_module.sub")
 

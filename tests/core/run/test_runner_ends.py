@@ -126,9 +126,9 @@ def test_run_that_is_wanted_no_more_is_stopped(root: Path) -> None:
     jobs = [job("examples/x.py"), job("examples/y.py")]
     with ScriptServer() as server:
         with pytest.raises(RunStoppedError):
-            server.run(root, jobs, parallel=2, unwanted=unwanted)
+            server.run(root, jobs, parallel=2, is_unwanted=unwanted)
         assert gone(wait_for(root / "examples/me"))
-        (after,) = server.run(root, jobs[1:], parallel=2, unwanted=lambda running: False)
+        (after,) = server.run(root, jobs[1:], parallel=2, is_unwanted=lambda running: False)
         assert after.stdout == "y\n"
 
 
@@ -142,7 +142,7 @@ def test_failure_of_who_listens_ends_the_run(server: ScriptServer, root: Path) -
         raise RuntimeError("listener")
 
     with pytest.raises(RuntimeError, match="listener"):
-        server.run(root, [job(), job("examples/y.py")], parallel=2, finished=listen)
+        server.run(root, [job(), job("examples/y.py")], parallel=2, on_finish=listen)
     assert not alive(wait_for(root / "examples/me"))
 
 
@@ -160,7 +160,7 @@ def test_results_come_in_order_and_events_tell(server: ScriptServer, root: Path)
     started: list[str] = []
     finished: list[ScriptRun] = []
     jobs = [job(f"examples/{i}.py") for i in range(4)]
-    runs = server.run(root, jobs, parallel=2, started=started.append, finished=finished.append)
+    runs = server.run(root, jobs, parallel=2, on_start=started.append, on_finish=finished.append)
     assert [r.stdout for r in runs] == ["0\n", "1\n", "2\n", "3\n"]
     assert started == [j.path for j in jobs]
     assert sorted(finished, key=lambda r: r.path) == list(runs)
@@ -181,6 +181,6 @@ def test_so_many_at_a_time_and_no_more(server: ScriptServer, root: Path) -> None
     def ends(_: ScriptRun) -> None:
         running.append(running[-1] - 1)
 
-    runs = server.run(root, [job(args=["3"])] * 6, parallel=3, started=begins, finished=ends)
+    runs = server.run(root, [job(args=["3"])] * 6, parallel=3, on_start=begins, on_finish=ends)
     assert {run.outcome for run in runs} == {Outcome.OK}
     assert max(running) == 3

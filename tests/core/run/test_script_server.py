@@ -30,7 +30,7 @@ def test_supervisors_stay_and_one_that_died_is_replaced(root: Path) -> None:
             os.kill(dead, number)
             assert gone(dead)
             events: list[str] = []
-            after = server.run(root, [job()], parallel=1, started=events.append)
+            after = server.run(root, [job()], parallel=1, on_start=events.append)
             assert supervisor_of(after[0]) != dead
             assert events == ["examples/x.py"], "it began once, whoever was to run it"
 

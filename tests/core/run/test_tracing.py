@@ -191,7 +191,7 @@ def test_an_environment_in_the_course_s_folder(tmp_path: Path) -> None:
     (packages / "thing").mkdir(parents=True)
     (packages / "thing/__init__.py").write_text("")
     tracer, records = noting(str(tmp_path), packages)
-    tracer.imported("thing", [str(packages)])
+    tracer.note_import("thing", [str(packages)])
     assert bytes(records) == b"mthing\0"
 
 
@@ -200,11 +200,11 @@ def test_a_package_writes_as_it_is_imported_where_the_tool_lies_in_the_course(
 ) -> None:
     tracer, records = noting(str(Path(tracing.__file__).parents[3]), tmp_path)
     (tmp_path / "begins.py").write_text("import sys; sys.write_of_test('/home/me/folder')")
-    monkeypatch.setattr(sys, "write_of_test", tracer.write, raising=False)
+    monkeypatch.setattr(sys, "write_of_test", tracer.note_write, raising=False)
     monkeypatch.syspath_prepend(tmp_path)
     importlib.import_module("begins")
     assert not records
-    tracer.write("/home/me/other")
+    tracer.note_write("/home/me/other")
     assert records
 
 

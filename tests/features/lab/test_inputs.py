@@ -55,6 +55,6 @@ def test_an_edit_counts_exactly_where_a_trial_depends_on_it() -> None:
     before = inputs_of(text)
     changed = [edit for edit in (*NEUTRAL, *EDITS) if inputs_of(text.replace(*edit, 1)) != before]
     assert changed == EDITS
-    around = dict(before.around)
+    around = dict(before.conditions)
     assert around["MuJoCo"] == engine_version()
     assert engine_digest().startswith(around["the browser's engine and its trial"])

@@ -163,14 +163,14 @@ def with_card(
     Raises:
         EffectError: an engine cannot be loaded.
     """
-    from coursebuild.core.run.mjcf import parts
+    from coursebuild.core.run.mjcf import existing_files
 
     source = scene.model.source
     with silent():  # what it warns of, it would write into the working directory
         model = _compiled(root, scene)
         found = scenes(model, scene.declared)
         touched = {pair for one in found for pair in watch(model, one).touching_pairs}
-    files = (root / path for path in parts(root, source.path, source.text))
+    files = (root / path for path in existing_files(root, source.path, source.text))
     card = SceneCard(
         bodies=int(model.nbody) - 1,
         geoms=int(model.ngeom),
