@@ -1,6 +1,6 @@
-"""Bodies and curves in space, drawn on paper: what the figures of several lessons share.
+"""Bodies and curves in space, drawn on paper, for the figures of several lessons.
 
-Entry points: `View`, which says from where one looks; `draw_curve`, `draw_box` and `draw_arrow`.
+Entry points: `View`, the camera; `draw_curve`, `draw_box` and `draw_arrow`.
 """
 
 import numpy as np
@@ -35,8 +35,8 @@ def draw_curve(ax: Axes, view: View, points: ArrayLike, color: str, width: float
     """Draw a curve on a ball about the origin; behind the ball it is faint."""
     x, y, depth = view.components(points).T
     for hidden, alpha in ((depth < 0, 0.25), (depth >= 0, 1.0)):
-        shown = [np.where(hidden, values, np.nan) for values in (x, y)]
-        ax.plot(*shown, color=color, linewidth=width, alpha=alpha, solid_capstyle="round")
+        visible = [np.where(hidden, values, np.nan) for values in (x, y)]
+        ax.plot(*visible, color=color, linewidth=width, alpha=alpha, solid_capstyle="round")
 
 
 def draw_box(
@@ -65,5 +65,5 @@ def draw_arrow(
     style = {"arrowstyle": "-|>", "color": color, "shrinkA": 0, "shrinkB": 0, "linewidth": 1.6}
     ax.annotate("", (x1, y1), (x0, y0), arrowprops=style)
     if label:
-        beyond = np.array([x1, y1]) + 0.3 * np.array([x1 - x0, y1 - y0])
-        ax.text(*beyond, label, color=color, ha="center", va="center")
+        label_place = np.array([x1, y1]) + 0.3 * np.array([x1 - x0, y1 - y0])
+        ax.text(*label_place, label, color=color, ha="center", va="center")

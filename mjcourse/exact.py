@@ -1,8 +1,8 @@
-"""The exact motion that a file beside a model knows: `exact.py FILE`, with a request on one line.
+"""Evaluate the exact motion that a course gives for a model: `exact.py FILE REQUEST`.
 
-`models/NAME.exact.py` defines `motion(time, qpos, qvel)`: the positions at a time in s, from those
-and the velocities at the beginning; with the velocities, too, if it can, as a pair. What is asked
-is JSON in the last argument, what is answered JSON on standard output.
+`models/NAME.exact.py` defines `motion(time, qpos, qvel)`: the positions at a time in s, from the
+positions and velocities at the beginning; or a pair of positions and velocities. The request is
+JSON in the last argument, the answer JSON on standard output.
 """
 
 import contextlib
@@ -14,15 +14,15 @@ import numpy as np
 
 
 def main(file: str, request: str) -> None:
-    """Answer a request: the states at its `times`, begun in its `qpos` and `qvel`."""
-    asked = json.loads(request)
-    begin = [np.array(asked[name]) for name in ("qpos", "qvel")]
+    """Answer a request: the states at its `times`, from its initial `qpos` and `qvel`."""
+    query = json.loads(request)
+    begin = [np.array(query[name]) for name in ("qpos", "qvel")]
     states = []
     with contextlib.redirect_stdout(sys.stderr):  # what the file prints is no part of the answer
         motion = runpy.run_path(file)["motion"]
-        for time in asked["times"]:
-            found = motion(time, *(values.copy() for values in begin))
-            parts = found if isinstance(found, tuple) else (found,)
+        for time in query["times"]:
+            result = motion(time, *(values.copy() for values in begin))
+            parts = result if isinstance(result, tuple) else (result,)
             states.append([np.asarray(part, dtype=float).ravel().tolist() for part in parts])
     json.dump(states, sys.stdout)
 

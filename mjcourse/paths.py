@@ -1,7 +1,7 @@
 """Find the model files of the course that a script belongs to.
 
-Entry point: `model_path`. Steps: see which script is calling, walk up from it to the course's root,
-check the name, and return the file under `models/` or say which names are near.
+Entry point: `model_path`. Steps: find the calling script, walk up from it to the course's root,
+check the name, and return the file under `models/` or propose similar names.
 
 A course root is the nearest folder above the script that holds `content/course.toml`. Above a
 script of a downloaded course, which comes without `content/`, it is the nearest folder that holds
@@ -17,10 +17,10 @@ from pathlib import Path, PurePosixPath
 from types import FrameType
 
 _SUFFIX = ".xml"
-_LISTED = 8
-"""How many names an error lists at most."""
-_NEAR = 0.6
-"""How alike names must be, from 0 to 1, to be proposed."""
+_MOST_LISTED = 8
+"""The most names that an error lists."""
+_LIKENESS = 0.6
+"""How similar a name must be, from 0 to 1, to be proposed."""
 
 
 class ModelNotFoundError(FileNotFoundError):
@@ -32,7 +32,7 @@ class _Start:
     """A place to walk up from."""
 
     folders: tuple[Path, ...]
-    """The folder as it was named, then as it is with links followed; each is tried."""
+    """The folder as it was named, then with links resolved; each is tried."""
     text: str
     """How an error names the place."""
 
@@ -58,17 +58,19 @@ def model_path(name: str) -> Path:
     """
     parts = _parts(name)
     starts = tuple(_starts(sys._getframe(1)))
-    root = next(filter(None, map(_root_above, starts)), None)
+    root = next(filter(None, map(_find_root, starts)), None)
     if root is None:
-        looked = " or ".join(start.text for start in starts) or "the current folder, which is gone"
+        places = " or ".join(start.text for start in starts) or "the current folder, which is gone"
         raise ModelNotFoundError(
-            f"no course for model {name!r}: no folder at or above {looked} "
+            f"no course for model {name!r}: no folder at or above {places} "
             "has content/course.toml, nor models/ beside examples/"
         )
     models = root / "models"
     path = models.joinpath(*parts)
     if not _is_file(path):
-        raise ModelNotFoundError(_missing(name, "/".join(parts).removesuffix(_SUFFIX), models))
+        raise ModelNotFoundError(
+            _describe_missing(name, "/".join(parts).removesuffix(_SUFFIX), models)
+        )
     if not path.resolve().is_relative_to(models.resolve()):
         raise ValueError(f"model {name!r} is a link that leads out of {models}")
     return path
@@ -91,41 +93,41 @@ def _parts(name: object) -> tuple[str, ...]:
 
 
 def _starts(frame: FrameType | None) -> Iterator[_Start]:
-    """Where to look for a course: the code that called, outwards to the script that was started."""
-    seen: set[str] = set()
+    """The places to look for a course from: the calling code, outwards to the script itself."""
+    visited: set[str] = set()
     main = False
     while frame is not None and not main:
         main = frame.f_globals.get("__name__") == "__main__"
-        yield from _script(frame.f_globals.get("__file__"), seen)
+        yield from _start_at(frame.f_globals.get("__file__"), visited)
         frame = frame.f_back
-    if main and seen:
+    if main and visited:
         return
     # A thread that was handed `model_path` itself has no frame of the script. At a prompt argv[0]
     # is the shell that was started, unless a script was run before.
-    started = sys.argv[0] if sys.argv else ""
-    if started.endswith(".py") or not hasattr(sys, "ps1"):
-        yield from _script(started, seen)
-    yield from _script(getattr(sys.modules.get("__main__"), "__file__", None), seen)
-    if not seen:
-        yield from (_Start((here,), str(here)) for here in _working_folders()[:1])
+    command = sys.argv[0] if sys.argv else ""
+    if command.endswith(".py") or not hasattr(sys, "ps1"):
+        yield from _start_at(command, visited)
+    yield from _start_at(getattr(sys.modules.get("__main__"), "__file__", None), visited)
+    if not visited:
+        yield from (_Start((folder,), str(folder)) for folder in _working_folders()[:1])
 
 
-def _script(file: object, seen: set[str]) -> Iterator[_Start]:
-    """The start that a `__file__` stands for, unless it was seen before or is a library's."""
-    if not isinstance(file, str) or file in seen:
+def _start_at(file: object, visited: set[str]) -> Iterator[_Start]:
+    """The place of a `__file__`, unless it was visited before or belongs to a library."""
+    if not isinstance(file, str) or file in visited:
         return
     path = Path(file)
     if not path.is_absolute():
         path = next((base / path for base in _working_folders() if _is_file(base / path)), path)
     if not path.is_absolute() or _is_library(path):
         return
-    seen.add(file)
-    yield _Start((Path(os.path.normpath(path)).parent, _resolved(path).parent), str(path))
+    visited.add(file)
+    yield _Start((Path(os.path.normpath(path)).parent, _resolve_links(path).parent), str(path))
 
 
 def _working_folders() -> tuple[Path, ...]:
-    """What a relative `__file__` may be relative to; a script can change folder as it runs."""
-    folders = (_current_folder(), _IMPORTED_IN)
+    """The folders that a `__file__` may be relative to; a script can change folder as it runs."""
+    folders = (_current_folder(), _IMPORT_FOLDER)
     return tuple(folder for folder in folders if folder is not None)
 
 
@@ -136,7 +138,7 @@ def _is_library(path: Path) -> bool:
     )
 
 
-def _root_above(start: _Start) -> Path | None:
+def _find_root(start: _Start) -> Path | None:
     """The course root at or above a place: one with a map wins over one without."""
     folders = [folder for base in start.folders for folder in (base, *base.parents)]
     for is_root in (_has_map, _is_download):
@@ -154,44 +156,44 @@ def _is_download(folder: Path) -> bool:
     return _is_folder(folder / "models") and _is_folder(folder / "examples")
 
 
-def _missing(name: str, wanted: str, models: Path) -> str:
-    """What to say about a model that is not there."""
+def _describe_missing(name: str, stem: str, models: Path) -> str:
+    """The message about a missing model."""
     if not _is_folder(models):
         return f"no model {name!r}: there is no folder {models}"
     names = sorted(_model_names(models))
     if not names:
         return f"no model {name!r}: {models} holds no {_SUFFIX} file"
-    near = _near(wanted, names)
-    if near:
-        return f"no model {name!r} in {models}; did you mean {_either(near)}?"
-    shown = ", ".join(map(repr, names[:_LISTED]))
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    return f"no model {name!r} in {models}, which has {shown}{more}"
+    suggestions = _find_similar(stem, names)
+    if suggestions:
+        return f"no model {name!r} in {models}; did you mean {_join_with_or(suggestions)}?"
+    listing = ", ".join(map(repr, names[:_MOST_LISTED]))
+    remainder = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
+    return f"no model {name!r} in {models}, which has {listing}{remainder}"
 
 
 def _model_names(models: Path) -> Iterator[str]:
     for folder, _, files in os.walk(models):
-        below = PurePosixPath(Path(folder).relative_to(models).as_posix())
+        subfolder = PurePosixPath(Path(folder).relative_to(models).as_posix())
         yield from (
-            str(below / file.removesuffix(_SUFFIX)) for file in files if file.endswith(_SUFFIX)
+            str(subfolder / file.removesuffix(_SUFFIX)) for file in files if file.endswith(_SUFFIX)
         )
 
 
-def _near(wanted: str, names: Iterable[str]) -> tuple[str, ...]:
-    """The names most like the one wanted, best first, compared whole and by their last parts."""
-    whole = wanted.casefold()
+def _find_similar(stem: str, names: Iterable[str]) -> tuple[str, ...]:
+    """The names most similar to `stem`, best first, compared whole and by their last parts."""
+    whole = stem.casefold()
 
     def likeness(name: str) -> float:
         folded = name.casefold()
         pairs = ((whole, folded), (whole.rpartition("/")[2], folded.rpartition("/")[2]))
         ratio = max(difflib.SequenceMatcher(None, a, b).ratio() for a, b in pairs)
-        return max(ratio, _NEAR) if len(whole) > 2 and whole in folded else ratio
+        return max(ratio, _LIKENESS) if len(whole) > 2 and whole in folded else ratio
 
     scored = sorted((-likeness(name), name) for name in names)
-    return tuple(name for score, name in scored[:3] if -score >= _NEAR)
+    return tuple(name for score, name in scored[:3] if -score >= _LIKENESS)
 
 
-def _either(names: tuple[str, ...]) -> str:
+def _join_with_or(names: tuple[str, ...]) -> str:
     *first, last = map(repr, names)
     return f"{', '.join(first)} or {last}" if first else last
 
@@ -210,7 +212,7 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def _resolved(path: Path) -> Path:
+def _resolve_links(path: Path) -> Path:
     try:
         return path.resolve()
     except (OSError, RuntimeError):
@@ -224,5 +226,5 @@ def _current_folder() -> Path | None:
         return None
 
 
-_IMPORTED_IN = _current_folder()
+_IMPORT_FOLDER = _current_folder()
 _STANDARD_LIBRARY = Path(os.__file__).parent

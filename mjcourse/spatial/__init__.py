@@ -3,7 +3,7 @@
 Entry points: every name below. By topic: `quaternions` (order w, x, y, z), `rotvecs`, `rotations`
 (matrices), `euler`, `transforms` (6-D, rotation first), `inertia`, `principal`, `solids`.
 
-What holds throughout:
+Conventions of all routines:
 
 - Shapes are written `(..., n)`. Leading axes are free and broadcast; a bad shape is a ValueError
   that says what was expected and what came. Anything that NumPy reads as real numbers is taken, and

@@ -1,7 +1,7 @@
-"""Arrays in, arrays out: what every routine of `spatial` shares.
+"""Array helpers that all routines of `spatial` share.
 
-Entry points: `array` and `same_leading`, which check shapes; `scaled` and `norm`, which neither
-overflow nor underflow; `dot2`, a dot product with the accuracy of twice the working precision.
+Entry points: `array` and `same_leading`, which check shapes; `split_exponent` and `norm`, which
+neither overflow nor underflow; `dot2`, a dot product with twice the working precision.
 
 Vectors and matrices lie in the last one or two axes; every axis before them is leading, and leading
 axes broadcast.
@@ -59,18 +59,18 @@ def same_leading(*arguments: tuple[str, FloatArray, int]) -> tuple[int, ...]:
         return np.broadcast_shapes(*shapes)
     except ValueError:
         pairs = zip(arguments, shapes, strict=True)
-        each = ", ".join(f"{name} {shape}" for (name, _, _), shape in pairs)
-        raise ValueError(f"leading shapes do not broadcast: {each}") from None
+        shapes_text = ", ".join(f"{name} {shape}" for (name, _, _), shape in pairs)
+        raise ValueError(f"leading shapes do not broadcast: {shapes_text}") from None
 
 
-def reject(bad: BoolArray | np.bool_, what: str, why: str) -> None:
-    """Raise a ValueError that names the first entry that is bad, if one is."""
+def reject(bad: BoolArray | np.bool_, subject: str, complaint: str) -> None:
+    """Raise a ValueError that names the first bad entry, if there is one."""
     if np.any(bad):
-        where = f" at index {tuple(map(int, np.argwhere(bad)[0]))}" if np.ndim(bad) else ""
-        raise ValueError(f"{what}{where} {why}")
+        place = f" at index {tuple(map(int, np.argwhere(bad)[0]))}" if np.ndim(bad) else ""
+        raise ValueError(f"{subject}{place} {complaint}")
 
 
-def scaled(value: FloatArray, axes: int = 1) -> tuple[FloatArray, IntArray]:
+def split_exponent(value: FloatArray, axes: int = 1) -> tuple[FloatArray, IntArray]:
     """Split a vector or matrix into a part of size about 1 and a power of two.
 
     value = part · 2^exponent, where the largest entry of the part is in [0.5, 1). Exact, but for
@@ -103,7 +103,7 @@ def square_sum(value: FloatArray) -> FloatArray:
 
 def norm(value: FloatArray) -> FloatArray:
     """The Euclidean norm over the last axis, to 2.5 ulp over the whole range of doubles."""
-    part, exponent = scaled(value)
+    part, exponent = split_exponent(value)
     return np.ldexp(np.sqrt(square_sum(part)), exponent)
 
 

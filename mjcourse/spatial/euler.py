@@ -69,10 +69,10 @@ def quat_to_euler(quat: ArrayLike, seq: str = "xyz") -> FloatArray:
 
 
 def _axes(seq: str) -> tuple[int, int, int]:
-    found = tuple("xyz".find(letter) for letter in seq.lower())
-    one_case = seq.islower() or seq.isupper()
-    match found:
-        case (i, j, k) if min(found) >= 0 and i != j != k and one_case:
+    axes = tuple("xyz".find(letter) for letter in seq.lower())
+    has_one_case = seq.islower() or seq.isupper()
+    match axes:
+        case (i, j, k) if min(axes) >= 0 and i != j != k and has_one_case:
             return i, j, k
     raise ValueError(
         f"seq must be three of x, y, z or of X, Y, Z, no two neighbours the same, got {seq!r}"
@@ -88,10 +88,10 @@ def _intrinsic(m: FloatArray, axes: tuple[int, int, int]) -> FloatArray:
     sine, cosine = (
         (m[..., j, i], -s * m[..., k, i]) if last == i else (-s * m[..., j, k], m[..., k, k])
     )
-    across = norm(np.stack((sine, cosine), axis=-1))
-    first = np.where(across <= _LOCKED_WITHIN, 0.0, np.arctan2(sine + 0.0, cosine))
+    radius = norm(np.stack((sine, cosine), axis=-1))
+    first = np.where(radius <= _LOCKED_WITHIN, 0.0, np.arctan2(sine + 0.0, cosine))
     if last == i:
-        second = np.arctan2(across, m[..., i, i])
+        second = np.arctan2(radius, m[..., i, i])
     else:
         second = np.arctan2(s * m[..., i, k], norm(m[..., i, [i, j]]))
     # Row j of R_j(second) R_last(third) is row j of R_last(third).

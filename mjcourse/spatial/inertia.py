@@ -89,8 +89,8 @@ def compose_inertia(
     from_origin = com - origin
     centre = (mass[..., None] * from_origin).sum(axis=-2) / total[..., None]
     from_centre = from_origin - centre[..., None, :]
-    about = (inertia + _point_inertia(mass, from_centre)).sum(axis=-3)
-    return total, origin[..., 0, :] + centre, about
+    tensor = (inertia + _point_inertia(mass, from_centre)).sum(axis=-3)
+    return total, origin[..., 0, :] + centre, tensor
 
 
 def rotate_inertia(inertia: ArrayLike, rot: ArrayLike) -> FloatArray:
@@ -156,9 +156,9 @@ def spatial_inertia(mass: ArrayLike, com: ArrayLike, inertia: ArrayLike) -> Floa
     inertia = array("inertia", inertia, (3, 3))
     lead = same_leading(("mass", mass, 0), ("com", com, 1), ("inertia", inertia, 2))
     first = np.broadcast_to(skew(mass[..., None] * com), (*lead, 3, 3))
-    about = np.broadcast_to(inertia + _point_inertia(mass, com), (*lead, 3, 3))
+    angular = np.broadcast_to(inertia + _point_inertia(mass, com), (*lead, 3, 3))
     linear = np.broadcast_to(mass[..., None, None] * np.eye(3), (*lead, 3, 3))
-    return np.block([[about, first], [np.swapaxes(first, -1, -2), linear]])
+    return np.block([[angular, first], [np.swapaxes(first, -1, -2), linear]])
 
 
 def split_spatial_inertia(

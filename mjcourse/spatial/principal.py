@@ -19,7 +19,7 @@ from mjcourse.spatial._arrays import (
     array,
     components,
     reject,
-    scaled,
+    split_exponent,
     symmetric,
 )
 from mjcourse.spatial.rotations import quat_to_mat
@@ -43,8 +43,8 @@ class _State:
 
     diagonal: tuple[FloatArray, ...]
     """a_kk."""
-    across: tuple[FloatArray, ...]
-    """a_pq, listed by the axis k that it lies across: p = k + 1, q = k + 2 (mod 3)."""
+    off_diagonal: tuple[FloatArray, ...]
+    """a_pq, listed by the axis k that is neither p nor q: p = k + 1, q = k + 2 (mod 3)."""
     quat: tuple[FloatArray, ...]
     """The rotation gathered so far: w, x, y, z."""
 
@@ -71,7 +71,7 @@ def principal_axes(inertia: ArrayLike) -> tuple[FloatArray, FloatArray]:
         ValueError: a shape that is not (..., 3, 3), or a tensor that is not symmetric.
     """
     matrix = array("inertia", inertia, (3, 3))
-    part, exponent = scaled(matrix, axes=2)
+    part, exponent = split_exponent(matrix, axes=2)
     finite = np.isfinite(part).all(axis=(-1, -2), keepdims=True)
     part = np.where(finite, part, np.nan)
     uneven = np.abs(part - np.swapaxes(part, -1, -2)).max(axis=(-1, -2)) > SYMMETRIC_WITHIN
@@ -107,7 +107,7 @@ def is_physical_inertia(inertia: ArrayLike, *, rtol: float = 1e-12) -> BoolArray
         ValueError: a shape that is not (..., 3, 3), or a tensor that is not symmetric.
     """
     moments, _ = principal_axes(inertia)
-    part, _ = scaled(moments)
+    part, _ = split_exponent(moments)
     a, b, c = components(part)
     slack = rtol * np.abs(c)
     return np.asarray((a >= -slack) & (a + b >= c - slack))[()]
@@ -115,29 +115,29 @@ def is_physical_inertia(inertia: ArrayLike, *, rtol: float = 1e-12) -> BoolArray
 
 def _diagonalize(matrix: FloatArray) -> _State:
     """Jacobi's method: turn in the three planes in turn until nothing is left off the diagonal."""
-    one = np.where(np.isnan(matrix[..., 0, 0]), np.nan, 1.0)
-    zero = np.zeros_like(one)
+    ones = np.where(np.isnan(matrix[..., 0, 0]), np.nan, 1.0)
+    zero = np.zeros_like(ones)
     state = _State(
         diagonal=tuple(matrix[..., k, k] for k in range(3)),
-        across=tuple(matrix[..., (k + 1) % 3, (k + 2) % 3] for k in range(3)),
-        quat=(one, zero, zero, zero),
+        off_diagonal=tuple(matrix[..., (k + 1) % 3, (k + 2) % 3] for k in range(3)),
+        quat=(ones, zero, zero, zero),
     )
     for _ in range(_SWEEPS):
-        if not any(np.any(np.abs(entry) > 0) for entry in state.across):
+        if not any(np.any(np.abs(entry) > 0) for entry in state.off_diagonal):
             break
         for k in range(3):
-            state = _turned(state, k)
+            state = _rotate_out(state, k)
     return state
 
 
-def _turned(state: _State, k: int) -> _State:
+def _rotate_out(state: _State, k: int) -> _State:
     """Turn about axis k so that a_pq becomes zero.
 
     Source: Golub and Van Loan, "Matrix Computations", 4th edition, section 8.5.
     """
     p, q = (k + 1) % 3, (k + 2) % 3
-    app, aqq, apq = state.diagonal[p], state.diagonal[q], state.across[k]
-    akp, akq = state.across[q], state.across[p]
+    app, aqq, apq = state.diagonal[p], state.diagonal[q], state.off_diagonal[k]
+    akp, akq = state.off_diagonal[q], state.off_diagonal[p]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         tau = (aqq - app) / (2.0 * apq)
         tangent = np.copysign(1.0, tau) / (np.abs(tau) + np.sqrt(1.0 + tau * tau))
@@ -146,18 +146,22 @@ def _turned(state: _State, k: int) -> _State:
     sine = tangent * cosine
     half_cosine = np.sqrt(0.5 * (1.0 + cosine))
     half_sine = -0.5 * sine / half_cosine
-    w, along, one, two = (state.quat[n] for n in (0, 1 + k, 1 + p, 1 + q))
+    w, qk, qp, qq = (state.quat[n] for n in (0, 1 + k, 1 + p, 1 + q))
     diagonal = {k: state.diagonal[k], p: app - tangent * apq, q: aqq + tangent * apq}
-    across = {k: np.zeros_like(apq), q: cosine * akp - sine * akq, p: sine * akp + cosine * akq}
+    off_diagonal = {
+        k: np.zeros_like(apq),
+        q: cosine * akp - sine * akq,
+        p: sine * akp + cosine * akq,
+    }
     vector = {
-        k: along * half_cosine + w * half_sine,
-        p: one * half_cosine + two * half_sine,
-        q: two * half_cosine - one * half_sine,
+        k: qk * half_cosine + w * half_sine,
+        p: qp * half_cosine + qq * half_sine,
+        q: qq * half_cosine - qp * half_sine,
     }
     return _State(
         diagonal=tuple(diagonal[n] for n in range(3)),
-        across=tuple(across[n] for n in range(3)),
-        quat=(w * half_cosine - along * half_sine, *(vector[n] for n in range(3))),
+        off_diagonal=tuple(off_diagonal[n] for n in range(3)),
+        quat=(w * half_cosine - qk * half_sine, *(vector[n] for n in range(3))),
     )
 
 

@@ -23,7 +23,7 @@ from mjcourse.spatial._arrays import (
     cross,
     reject,
     same_leading,
-    scaled,
+    split_exponent,
     square_sum,
 )
 
@@ -110,7 +110,7 @@ def quat_rotate(quat: ArrayLike, vector: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, leading shapes that do not broadcast, or a zero quaternion.
     """
-    part = directed("quat", array("quat", quat, (4,)))
+    part = scale_to_one("quat", array("quat", quat, (4,)))
     vector = array("vector", vector, (3,))
     same_leading(("quat", part, 1), ("vector", vector, 1))
     axis = part[..., 1:]
@@ -142,7 +142,7 @@ def axis_angle_to_quat(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
         return join(np.cos(half), vector)
 
 
-def directed(name: str, value: FloatArray) -> FloatArray:
+def scale_to_one(name: str, value: FloatArray) -> FloatArray:
     """A vector scaled by a power of two so that its largest entry is in [0.5, 1).
 
     NaN where it is not finite.
@@ -151,7 +151,7 @@ def directed(name: str, value: FloatArray) -> FloatArray:
         ValueError: a zero vector, which has no direction.
     """
     reject(~value.any(axis=-1), name, "is zero and has no direction")
-    part, _ = scaled(value)
+    part, _ = split_exponent(value)
     finite = np.isfinite(part).all(axis=-1, keepdims=True)
     return part if np.all(finite) else np.where(finite, part, np.nan)
 
@@ -162,7 +162,7 @@ def unit(name: str, value: FloatArray) -> FloatArray:
     Raises:
         ValueError: a zero vector, which has no direction.
     """
-    part = directed(name, value)
+    part = scale_to_one(name, value)
     return part / np.sqrt(square_sum(part))[..., None]
 
 

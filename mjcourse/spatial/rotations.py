@@ -22,7 +22,7 @@ from mjcourse.spatial._arrays import (
     reject,
     square_sum,
 )
-from mjcourse.spatial.quaternions import directed
+from mjcourse.spatial.quaternions import scale_to_one
 from mjcourse.spatial.rotvecs import quat_to_rotvec, rotvec_to_quat
 
 ORTHONORMAL_WITHIN = 1e-5
@@ -42,7 +42,7 @@ def quat_to_mat(quat: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a shape that is not (..., 4), or a zero quaternion.
     """
-    part = directed("quat", array("quat", quat, (4,)))
+    part = scale_to_one("quat", array("quat", quat, (4,)))
     w, x, y, z = components(part)
     ww, xx, yy, zz = components(part * part)
     rows = (

@@ -14,10 +14,10 @@ from mjcourse.spatial._arrays import (
     dot2,
     norm,
     same_leading,
-    scaled,
+    split_exponent,
     square_sum,
 )
-from mjcourse.spatial.quaternions import TINY_ANGLE, directed, join, quat_mul, unit
+from mjcourse.spatial.quaternions import TINY_ANGLE, join, quat_mul, scale_to_one, unit
 
 # Rows give the components w, x, y, z of conj(a) b as sums of ±a_i b_j: the signs, every i, every j.
 # Terms that cancel where a = b stand side by side, so that they cancel to exactly zero.
@@ -41,7 +41,7 @@ def rotvec_to_quat(rotvec: ArrayLike) -> FloatArray:
         ValueError: a shape that is not (..., 3).
     """
     rotvec = array("rotvec", rotvec, (3,))
-    part, exponent = scaled(rotvec)
+    part, exponent = split_exponent(rotvec)
     length = np.sqrt(square_sum(part))
     with np.errstate(invalid="ignore", divide="ignore"):
         half = np.ldexp(length, exponent - 1)
@@ -76,7 +76,7 @@ def quat_to_rotvec(quat: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a shape that is not (..., 4), or a zero quaternion.
     """
-    part = directed("quat", array("quat", quat, (4,)))
+    part = scale_to_one("quat", array("quat", quat, (4,)))
     return _log(part[..., 0], part[..., 1:])
 
 
@@ -170,7 +170,7 @@ def quat_integrate(quat: ArrayLike, angvel: ArrayLike, dt: ArrayLike) -> FloatAr
 
 
 def _length_error(part: FloatArray, length: FloatArray) -> FloatArray:
-    """What to add to the rounded length of a vector to have it in twice the working precision."""
+    """The correction that gives the rounded length of a vector twice the working precision."""
     left = np.concatenate((part, -length[..., None]), axis=-1)
     right = np.concatenate((part, length[..., None]), axis=-1)
     return dot2(left, right) / (2.0 * length)
@@ -182,7 +182,7 @@ def _relative(
     """Scalar and vector part of a positive multiple of conj(a) ⊗ b, summed by `dot2`."""
     (a_name, a), (b_name, b) = ((name, array(name, value, (4,))) for name, value in (first, second))
     same_leading((a_name, a, 1), (b_name, b, 1))
-    a, b = directed(a_name, a), directed(b_name, b)
+    a, b = scale_to_one(a_name, a), scale_to_one(b_name, b)
     product = dot2(_SIGNS * a[..., _FROM_A], b[..., _FROM_B])
     return product[..., 0], product[..., 1:]
 

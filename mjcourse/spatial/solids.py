@@ -59,7 +59,7 @@ def sphere_inertia(mass: ArrayLike, radius: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, leading shapes that do not broadcast, or a negative radius.
     """
-    m, (r,) = _sized(mass, ("radius", radius))
+    m, (r,) = _read_sizes(mass, ("radius", radius))
     moment = 0.4 * m * r * r
     return _diagonal(moment, moment, moment)
 
@@ -78,9 +78,9 @@ def cylinder_inertia(mass: ArrayLike, radius: ArrayLike, half_length: ArrayLike)
     Raises:
         ValueError: a bad shape, leading shapes that do not broadcast, or a negative size.
     """
-    m, (r, h) = _sized(mass, ("radius", radius), ("half_length", half_length))
-    across, along = _cylinder(m, r, h)
-    return _diagonal(across, across, along)
+    m, (r, h) = _read_sizes(mass, ("radius", radius), ("half_length", half_length))
+    transverse, axial = _cylinder(m, r, h)
+    return _diagonal(transverse, transverse, axial)
 
 
 def capsule_inertia(mass: ArrayLike, radius: ArrayLike, half_length: ArrayLike) -> FloatArray:
@@ -100,16 +100,16 @@ def capsule_inertia(mass: ArrayLike, radius: ArrayLike, half_length: ArrayLike) 
     Raises:
         ValueError: a bad shape, leading shapes that do not broadcast, or a negative size.
     """
-    m, (r, h) = _sized(mass, ("radius", radius), ("half_length", half_length))
+    m, (r, h) = _read_sizes(mass, ("radius", radius), ("half_length", half_length))
     # Volumes over 2 π r². A capsule without any extent has no moments, whatever the shares.
     caps = r * (2.0 / 3.0)
-    both = h + caps
-    both = both + (both == 0)
-    ends, middle = m * (caps / both), m * (h / both)
-    across, along = _cylinder(middle, r, h)
-    end_along = 0.4 * ends * r * r
-    across = across + (end_along + ends * h * h + 0.75 * ends * h * r)
-    return _diagonal(across, across, along + end_along)
+    extent = h + caps
+    extent = extent + (extent == 0)
+    ends, middle = m * (caps / extent), m * (h / extent)
+    transverse, axial = _cylinder(middle, r, h)
+    end_axial = 0.4 * ends * r * r
+    transverse = transverse + (end_axial + ends * h * h + 0.75 * ends * h * r)
+    return _diagonal(transverse, transverse, axial + end_axial)
 
 
 def _three_axes(mass: ArrayLike, name: str, value: ArrayLike, share: float) -> FloatArray:
@@ -126,7 +126,7 @@ def _cylinder(m: FloatArray, r: FloatArray, h: FloatArray) -> tuple[FloatArray, 
     return 0.25 * m * r * r + m / 3.0 * h * h, 0.5 * m * r * r
 
 
-def _sized(
+def _read_sizes(
     mass: ArrayLike, *sizes: tuple[str, ArrayLike]
 ) -> tuple[FloatArray, tuple[FloatArray, ...]]:
     """The mass and the sizes, each of shape (...)."""

@@ -83,8 +83,8 @@ def motion_transform(rot: ArrayLike, pos: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, or leading shapes that do not broadcast.
     """
-    rotation, moved, zero = _blocks(rot, pos)
-    return np.block([[rotation, zero], [moved, rotation]])
+    rotation, coupling, zero = _blocks(rot, pos)
+    return np.block([[rotation, zero], [coupling, rotation]])
 
 
 def force_transform(rot: ArrayLike, pos: ArrayLike) -> FloatArray:
@@ -102,8 +102,8 @@ def force_transform(rot: ArrayLike, pos: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, or leading shapes that do not broadcast.
     """
-    rotation, moved, zero = _blocks(rot, pos)
-    return np.block([[rotation, moved], [zero, rotation]])
+    rotation, coupling, zero = _blocks(rot, pos)
+    return np.block([[rotation, coupling], [zero, rotation]])
 
 
 def cross_motion(velocity: ArrayLike, motion: ArrayLike) -> FloatArray:
@@ -156,8 +156,8 @@ def _blocks(rot: ArrayLike, pos: ArrayLike) -> tuple[FloatArray, FloatArray, Flo
     """R, [p]× R and a zero matrix, in their common shape."""
     rot, pos = array("rot", rot, (3, 3)), array("pos", pos, (3,))
     same_leading(("rot", rot, 2), ("pos", pos, 1))
-    moved = skew(pos) @ rot
-    return np.broadcast_to(rot, moved.shape), moved, np.zeros_like(moved)
+    coupling = skew(pos) @ rot
+    return np.broadcast_to(rot, coupling.shape), coupling, np.zeros_like(coupling)
 
 
 def _spread(value: FloatArray, shape: tuple[int, ...]) -> FloatArray:

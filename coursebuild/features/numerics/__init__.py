@@ -1,6 +1,6 @@
-"""The page of the hard cases: what was measured on MuJoCo, beside what theory says.
+"""The page of the hard cases: measurements of MuJoCo beside theory.
 
-There is such a page where hard cases are recorded.
+The page exists where hard cases are recorded.
 """
 
 from coursebuild.core.features import Command, Feature, PageKind

@@ -1,4 +1,4 @@
-"""What the page of the hard cases shows.
+"""The values for the page of the hard cases.
 
 Entry points: `numerics_values(library)`; `case_view`, of one case.
 """
@@ -47,7 +47,7 @@ from coursebuild.numerics.reports.records import STABILITY
 from coursebuild.numerics.reports.text import INTEGRATORS, Quantity, seconds_text, status_text
 
 _RIGHT = 1e-3
-"""m or rad: the error that costs are compared at."""
+"""m or rad: the error at which costs are compared."""
 _DIGITS = 3
 _BOUNDARY = (
     *STABLE,
@@ -59,7 +59,7 @@ _BOUNDARY = (
 )
 _FIGURE = ("numerics.measured", "numerics.spread", "numerics.exact", "measured.difference")
 _Rows = list[tuple[str, Cells]]
-"""Integrators, and what is said of each."""
+"""Integrators, each with its cells."""
 
 
 class CaseView(Struct, frozen=True):
@@ -69,15 +69,15 @@ class CaseView(Struct, frozen=True):
     """Its id."""
     title: str
     matrix: tuple[tuple[str, ...], ...]
-    """In the table of all cases: orders, largest stable timesteps, and costs, by integrator."""
-    about: tuple[str, ...]
-    """What the plots say, and what the case is, a sentence each."""
+    """Cells in the table of all cases: orders, largest stable timesteps, costs, by integrator."""
+    sentences: tuple[str, ...]
+    """What the plots say, and a note on the case."""
     plots: tuple[Markup, ...]
     grids: tuple[Grid, ...]
     notes: tuple[str, ...]
     command: str
     page: str
-    """The address of the model, of a case of the course's own; else empty."""
+    """The address of the model's page, for a case of the course's own; else empty."""
 
 
 class CaseGroup(Struct, frozen=True):
@@ -90,18 +90,18 @@ class CaseGroup(Struct, frozen=True):
 
 
 def numerics_values(library: Library) -> dict[str, object]:
-    """What the page of the hard cases shows."""
+    """The values for the template of the page."""
     words, place = library.words, urls.Place(urls.NUMERICS)
     scenes = library.reports.scenes
-    own = [one for name in sorted(scenes) for one in course_cases(scenes[name])]
-    cases = [*sorted(library.reports.cases, key=attrgetter("case")), *own]
+    course_reports = [report for name in sorted(scenes) for report in course_cases(scenes[name])]
+    cases = [*sorted(library.reports.cases, key=attrgetter("case")), *course_reports]
     return {
         "groups": tuple(
-            _group(words, place, number, tuple(found))
-            for number, found in groupby(cases, key=attrgetter("case"))
+            _group(words, place, number, tuple(group))
+            for number, group in groupby(cases, key=attrgetter("case"))
         ),
         "integrators": INTEGRATORS,
-        "where": dict.fromkeys(where(words, one.machine) for one in cases),
+        "where": dict.fromkeys(where(words, report.machine) for report in cases),
         "file": place.href(urls.file_path(STABILITY.path())),
         "command": STABILITY.command(),
     }
@@ -113,19 +113,19 @@ def _group(
     key = f"numerics.case_{number}"
     several = not number or len(cases) > 1
     title = words(key) if several and words.has(key) else cases[0].title
-    return CaseGroup(number, title, tuple(case_view(words, place, one) for one in cases))
+    return CaseGroup(number, title, tuple(case_view(words, place, report) for report in cases))
 
 
 def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[str, ...], ...]:
-    shown = next(iter(case_quantities(report)), None)
-    part = None if shown is None or shown.name == "energy_drift" else shown.name
-    fits = {one.integrator: getattr(one, part) for one in report.orders} if part else {}
-    limits = {one.integrator: one for one in report.boundaries}
-    orders = (fits.get(one) for one in INTEGRATORS)
-    costs = (report.cost_to(one, _RIGHT) for one in INTEGRATORS)
+    quantity = next(iter(case_quantities(report)), None)
+    part = None if quantity is None or quantity.name == "energy_drift" else quantity.name
+    fits = {row.integrator: getattr(row, part) for row in report.orders} if part else {}
+    limits = {line.integrator: line for line in report.boundaries}
+    orders = (fits.get(integrator) for integrator in INTEGRATORS)
+    costs = (report.cost_to(integrator, _RIGHT) for integrator in INTEGRATORS)
     return (
         tuple("" if fit is None else f"{fit.value:.2f}" for fit in orders),
-        tuple(_limit(words, limits.get(one)) for one in INTEGRATORS),
+        tuple(_limit(words, limits.get(integrator)) for integrator in INTEGRATORS),
         tuple("" if cost is None else seconds_text(cost, _DIGITS) for cost in costs),
     )
 
@@ -139,35 +139,39 @@ def _limit(words: Strings, line: BoundaryLine | None) -> str:
 
 
 def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
-    """What the page shows of a case."""
+    """A case as the page shows it."""
     model = "" if report.case else report.name.rpartition("/")[0]
     grids = (_boundaries(words, report), _figures(words, report), _orders(words, report))
-    shown = case_quantities(report)
+    quantities = case_quantities(report)
     name = urls.encode(report.name)
     return CaseView(
         name,
         report.title,
         _matrix(words, report),
-        tuple(_about(words, report, shown)),
-        tuple(Markup(case_svg(report, one, f"{name}-{one.name}")) for one in shown),
-        tuple(one for one in grids if one is not None),
+        tuple(_describe(words, report, quantities)),
+        tuple(
+            Markup(case_svg(report, quantity, f"{name}-{quantity.name}")) for quantity in quantities
+        ),
+        tuple(grid for grid in grids if grid is not None),
         tuple(_notes(words, report)),
         f"coursebuild {shlex.join(('bench', model) if model else ('stability', report.name))}",
         place.href(urls.model_page_path(model)) if model else "",
     )
 
 
-def _about(words: Strings, report: CaseReport, shown: Sequence[Quantity]) -> Iterator[str]:
+def _describe(words: Strings, report: CaseReport, quantities: Sequence[Quantity]) -> Iterator[str]:
     costs = [
-        (cost, one) for one in INTEGRATORS if (cost := report.cost_to(one, _RIGHT)) is not None
+        (cost, integrator)
+        for integrator in INTEGRATORS
+        if (cost := report.cost_to(integrator, _RIGHT)) is not None
     ]
     if costs:
         (least, best), (most, worst) = min(costs), max(costs)
         key = "cheapest" if most > 1.05 * least else "alike"
         key = f"numerics.{key if len(costs) > 1 else 'only'}"
-        told, ratio = seconds_text(least, _DIGITS), f"{most / least:.3g}"
-        yield words(key, best=best, cost=told, worst=worst, factor=ratio)
-    elif shown:
+        cheapest, ratio = seconds_text(least, _DIGITS), f"{most / least:.3g}"
+        yield words(key, best=best, cost=cheapest, worst=worst, factor=ratio)
+    elif quantities:
         yield words("numerics.out_of_reach")
     if report.note:
         yield sentence(report.note)
@@ -178,9 +182,9 @@ def _grid(
 ) -> Grid | None:
     if not rows:
         return None
-    found = merge_rows(rows)
-    columns = [(words("measured.integrator"), list(found.values()))]
-    columns += [(title, [row[n] for row in found]) for n, title in enumerate(titles)]
+    merged_rows = merge_rows(rows)
+    columns = [(words("measured.integrator"), list(merged_rows.values()))]
+    columns += [(title, [row[n] for row in merged_rows]) for n, title in enumerate(titles)]
     return grid(label, columns, words=(left,))
 
 
@@ -217,7 +221,10 @@ def _figures(words: Strings, report: CaseReport) -> Grid | None:
         rows = merge_rows((line.integrator, _figure(words, line)) for line in lines)
         names += rows.values()
         cells += rows
-        unit, sources = lines[0].unit, dict.fromkeys(one.source for one in lines if one.source)
+        unit, sources = (
+            lines[0].unit,
+            dict.fromkeys(figure.source for figure in lines if figure.source),
+        )
         title = sentence(f"{name} ({unit})" if unit else name).removesuffix(".")
         parts.append(FigurePart(title, "; ".join(sources), len(rows)))
     columns = [(words("measured.integrator"), names)]
@@ -238,19 +245,22 @@ def _figure(words: Strings, line: FigureLine) -> tuple[str, ...]:
 
 def _orders(words: Strings, report: CaseReport) -> Grid | None:
     rows: _Rows = []
-    for one in report.orders:
-        fits = (one.position, one.attitude, one.velocity)
-        if one.has_orders:
-            rows.append((one.integrator, tuple("" if fit is None else fit.text for fit in fits)))
+    for row in report.orders:
+        fits = (row.position, row.attitude, row.velocity)
+        if row.has_orders:
+            rows.append((row.integrator, tuple("" if fit is None else fit.text for fit in fits)))
     titles = [words(key) for _, key in ORDERS]
     return _grid(words, words("numerics.orders", title=report.title), titles, rows)
 
 
 def _notes(words: Strings, report: CaseReport) -> list[str]:
-    known = report.reference
-    place, speed = (power(one, 1) for one in (max(known.position, known.attitude), known.velocity))
+    reference = report.reference
+    place, speed = (
+        power(error, 1)
+        for error in (max(reference.position, reference.attitude), reference.velocity)
+    )
     notes: list[str] = [
-        words("numerics.references", first=known.source, second=known.second),
+        words("numerics.references", first=reference.source, second=reference.second),
         said(words, "numerics.known", place=place, speed=speed),
     ]
     formulas = dict.fromkeys(line.formula for line in report.boundaries if line.formula)
@@ -260,5 +270,5 @@ def _notes(words: Strings, report: CaseReport) -> list[str]:
     if softened:
         times = ", ".join(seconds_text(step) for step in softened)
         notes.append(words("measured.refsafe", settings=times))
-    runs = ((f"{one.integrator} at {seconds_text(one.timestep)}", one) for one in report.errors)
+    runs = ((f"{run.integrator} at {seconds_text(run.timestep)}", run) for run in report.errors)
     return [*notes, *lost_runs(runs)]

@@ -21,7 +21,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments."""
     add_quiet(parser)
     parser.add_argument(
         "problems",
@@ -35,7 +35,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure, or measure again."""
+    """Measure, or check by measuring again."""
     names = tuple(arguments.problems)
 
     def measure(options: Options) -> Measurement[Any]:
@@ -43,9 +43,11 @@ def run(arguments: argparse.Namespace) -> int:
             return check_stability(options, names)
         return stability(options, names, record=arguments.record)
 
-    found = measured(arguments, measure)
-    if arguments.format == "json" and found.ok and not (arguments.record or arguments.check):
-        return write(json_text(found.reports), CLEAN)
-    shown = () if arguments.check else found.reports
-    values = {"cases": found.reports}
-    return write_measured(arguments, found, lambda style: stability_text(shown, style), values)
+    measurement = measured(arguments, measure)
+    if arguments.format == "json" and measurement.ok and not (arguments.record or arguments.check):
+        return write(json_text(measurement.reports), CLEAN)
+    printed_reports = () if arguments.check else measurement.reports
+    values = {"cases": measurement.reports}
+    return write_measured(
+        arguments, measurement, lambda style: stability_text(printed_reports, style), values
+    )

@@ -2,11 +2,11 @@
 
 Entry points: `stability(options, names)`, `check_stability`.
 
-1. Names mean problems, or families of them (`damped-spring` is all of its damping ratios).
-2. What was measured is kept under the machine, its versions and the code that measures; what is
-   kept is not measured again, but where it is held against a record.
+1. A name means a problem, or a family of them (`damped-spring` is all of its damping ratios).
+2. Measurements are cached by the machine, its versions and the code that measures. `--check`
+   measures again.
 3. All problems are recorded in one file. Where some are named, recording them leaves the others as
-   they are, and checking them says nothing of the others.
+   they are, and checking them ignores the others.
 4. Where the two references of a case are further apart than they may be, it is an error, and
    nothing is recorded.
 """
@@ -30,61 +30,62 @@ from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.shown_reports import read_record
 
 _CODE = ("coursebuild/numerics", "mjcourse/spatial")
-"""What measures and says what was measured."""
+"""The code that measurements depend on."""
 
 
 def stability(
     options: Options, names: tuple[str, ...] = (), *, record: bool = False
 ) -> Measurement[CaseReport]:
-    """What was measured on the cases that the names mean; on all where there are none.
+    """Measure the cases of these names, or all without names.
 
-    `record`: it is also written into the course.
+    `record`: also write the measurements into the course.
 
     Raises:
         UsageError: no case is called so.
     """
-    found = _CaseRun(options).all(_chosen(names))
-    if record and not found.failures:
-        found = _recorded(options, found, whole=not names)
-    return found
+    measurement = _CaseRun(options).all(_select_problems(names))
+    if record and not measurement.failures:
+        measurement = _record(options, measurement, whole=not names)
+    return measurement
 
 
-def _recorded(
-    options: Options, found: Measurement[CaseReport], *, whole: bool
+def _record(
+    options: Options, measurement: Measurement[CaseReport], *, whole: bool
 ) -> Measurement[CaseReport]:
-    others: list[CaseReport] = []
+    unchanged: list[CaseReport] = []
     if not whole and (options.root / STABILITY.path()).exists():
         old = read_record(options.root, STABILITY)
         if isinstance(old, ReportFailure):
-            return replace(found, failures=(old,))
-        new = {case.name for case in found.reports}
-        others = [case for case in old if case.name in _known() and case.name not in new]
-    cases = sorted([*others, *found.reports], key=lambda case: (case.case, case.name))
+            return replace(measurement, failures=(old,))
+        new = {case.name for case in measurement.reports}
+        unchanged = [case for case in old if case.name in _problem_names() and case.name not in new]
+    cases = sorted([*unchanged, *measurement.reports], key=lambda case: (case.case, case.name))
     records = [(STABILITY.path(), STABILITY.encode(tuple(cases)))]
-    return with_records(options.root, found, records)
+    return with_records(options.root, measurement, records)
 
 
 def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
-    """Measure again, and hold it against what is recorded.
-
-    Nothing is measured where there is no record to hold it against.
+    """Measure again, and compare with the record; without a record nothing is measured.
 
     Raises:
         UsageError: no case is called so.
     """
-    problems = _chosen(names)
+    problems = _select_problems(names)
     recorded = read_record(options.root, STABILITY)
     if isinstance(recorded, ReportFailure):
         return Measurement((), failures=(recorded,))
-    found = _CaseRun(options, again=True).all(problems)
-    new = {case.name for case in found.reports}
+    measurement = _CaseRun(options, again=True).all(problems)
+    new = {case.name for case in measurement.reports}
     old = [case for case in recorded if not names or case.name in new]
-    here = engine_version()
-    others = sorted({case.machine.engine for case in old} - {here})
-    remarks = tuple(f"recorded with MuJoCo {one}, measured with {here}" for one in others)
-    departures = case_departures(old, found.reports)
+    engine = engine_version()
+    other_engines = sorted({case.machine.engine for case in old} - {engine})
+    remarks = tuple(
+        f"recorded with MuJoCo {engine_then}, measured with {engine}"
+        for engine_then in other_engines
+    )
+    departures = case_departures(old, measurement.reports)
     return replace(
-        found, checked=(RecordCheck("stability", STABILITY.path(), departures, remarks),)
+        measurement, checked=(RecordCheck("stability", STABILITY.path(), departures, remarks),)
     )
 
 
@@ -92,43 +93,47 @@ class _CaseRun(MeasuringRun):
     """Measures hard cases one after the other."""
 
     def all(self, problems: list[str]) -> Measurement[CaseReport]:
-        """Those of these names."""
+        """Measure the problems of these names."""
         self.here, self.code = machine(pinned=True), code_digest(*_CODE)
         with one_processor():
-            return self.each(problems, self._one)
+            return self.each(problems, self._measure_once)
 
-    def _one(self, name: str) -> CaseReport | None:
+    def _measure_once(self, name: str) -> CaseReport | None:
         parts = (name, self.code, self.here)
-        return self.once(name, "stability", parts, CaseReport, lambda: self._measured(name))
+        return self.once(name, "stability", parts, CaseReport, lambda: self._measure(name))
 
-    def _measured(self, name: str) -> CaseReport | None:
+    def _measure(self, name: str) -> CaseReport | None:
         from coursebuild.numerics.cases import DisagreementError, measure_case
         from coursebuild.numerics.problems import all_problems
 
         try:
             return measure_case(all_problems()[name], self.here, time.thread_time_ns)
         except DisagreementError as error:
-            why = "neither can be told to be right: no error against them means anything"
-            self.failures.append(ReportFailure(str(error), why))
+            help = "neither can be told to be right: no error against them means anything"
+            self.failures.append(ReportFailure(str(error), help))
             return None
 
 
-def _known() -> tuple[str, ...]:
+def _problem_names() -> tuple[str, ...]:
     from coursebuild.numerics.problems import all_problems
 
     return tuple(all_problems())
 
 
-def _chosen(names: tuple[str, ...]) -> list[str]:
-    """The problems that names mean; all where there are none."""
-    known = _known()
-    wanted = set() if names else set(known)
+def _select_problems(names: tuple[str, ...]) -> list[str]:
+    """The names of all problems that these names mean; of all problems without names."""
+    problem_names = _problem_names()
+    selection = set() if names else set(problem_names)
     for name in names:
-        found = {one for one in known if one == name or one.startswith(f"{name}-")}
-        if not found:
-            near = nearest(name, known)
-            all_of_them = "known: " + ", ".join(known)
-            help = all_of_them if near is None else f"did you mean `{near}`?"
+        matches = {
+            problem
+            for problem in problem_names
+            if problem == name or problem.startswith(f"{name}-")
+        }
+        if not matches:
+            suggestion = nearest(name, problem_names)
+            all_of_them = "known: " + ", ".join(problem_names)
+            help = all_of_them if suggestion is None else f"did you mean `{suggestion}`?"
             raise UsageError(f"no hard case is called `{name}`", help=help)
-        wanted |= found
-    return [one for one in known if one in wanted]
+        selection |= matches
+    return [problem for problem in problem_names if problem in selection]

@@ -1,4 +1,4 @@
-"""What `stability` prints of the hard cases: what their page says, and the errors of its plots.
+"""The text that `stability` prints: what the page of a case says, and the errors of its plots.
 
 Entry point: `stability_text`.
 """
@@ -17,7 +17,7 @@ from coursebuild.report.terminal import BOLD, Column, Style, table
 
 
 def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
-    """As text, a blank line between cases."""
+    """The reports as text, with a blank line between cases."""
     return "\n".join(_case(report, style) for report in reports)
 
 
@@ -25,7 +25,7 @@ def _case(report: CaseReport, style: Style) -> str:
     view = case_view(english(), urls.Place(urls.NUMERICS), report)
     number = f"case {report.case}: " if report.case else ""
     lines = [style.paint(report.name, BOLD) + f"  {number}{report.title}"]
-    for text in (*view.about, *view.notes):
+    for text in (*view.sentences, *view.notes):
         lines += style.wrap(plain_text(text), "  ")
     for block in (*(grid_lines(grid, style) for grid in view.grids), _errors(report)):
         lines += ["", *(f"  {line}".rstrip() for line in block)] if block else []
@@ -34,19 +34,19 @@ def _case(report: CaseReport, style: Style) -> str:
 
 def _errors(report: CaseReport) -> list[str]:
     """The largest error of each run, by timestep and integrator."""
-    shown = next(iter(case_quantities(report)), None)
-    if shown is None:
+    quantity = next(iter(case_quantities(report)), None)
+    if quantity is None:
         return []
-    runs = {(one.timestep, one.integrator): one for one in report.errors}
+    runs = {(line.timestep, line.integrator): line for line in report.errors}
     steps = sorted({step for step, _ in runs}, reverse=True)
 
     def cell(run: ErrorLine | None) -> str:
-        error = None if run is None else shown.value_of(run)
+        error = None if run is None else quantity.value_of(run)
         if run is None or error is None:
             return "" if run is None else status_text(run.status)
-        return f"<{shown.least:.1e}" if error <= shown.least * (1 + 1e-9) else f"{error:.2e}"
+        return f"<{quantity.least:.1e}" if error <= quantity.least * (1 + 1e-9) else f"{error:.2e}"
 
-    columns = [Column(shown.label, tuple(seconds_text(one, 4) for one in steps), left=True)]
+    columns = [Column(quantity.label, tuple(seconds_text(h, 4) for h in steps), left=True)]
     for name in dict.fromkeys(name for _, name in runs):
         columns.append(Column(name, tuple(cell(runs.get((step, name))) for step in steps)))
     return table(columns)
