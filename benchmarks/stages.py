@@ -30,7 +30,7 @@ from coursebuild.core.model.results import Formula, MathError, Results
 from coursebuild.core.model.summary import without_prose
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.draw import draw
-from coursebuild.core.pages.folding import fold, imported
+from coursebuild.core.pages.folding import find_imports, fold
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_list
@@ -189,8 +189,8 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
         return [draw(inputs, document, tools)[:2] for inputs, document in drawn]
 
     def modules() -> list[frozenset[str]]:
-        imported.cache_clear()
-        return [imported(script) for script in scripts]
+        find_imports.cache_clear()
+        return [find_imports(script) for script in scripts]
 
     def parses() -> list[object]:
         script._compile_error.cache_clear()

@@ -90,7 +90,7 @@ def prepare(folder: Path, cuts: Path) -> None:
         data = source.read_bytes()
         source.unlink()
         with TTFont(io.BytesIO(data)) as whole:
-            face["measure"] = font_files.measured(whole)
+            face["measure"] = font_files.measure_font(whole)
         weights = WEIGHTS.get(face["family"])
         face["weight"] = weights or face["weight"]
         with ready(data, weights) as font:

@@ -22,7 +22,7 @@ from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls, zips
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.dark import dark_colours, dark_drawing
-from coursebuild.core.pages.folding import imported
+from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.library import Library
 from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.packages import distributions, module_files
@@ -112,7 +112,7 @@ def _imports(library: Library, documents: Documents) -> Callable[[str], frozense
 
     def imports(text: str) -> frozenset[str]:
         if text not in found:
-            found[text] = imported(text)
+            found[text] = find_imports(text)
         return found[text]
 
     return imports

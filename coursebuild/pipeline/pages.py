@@ -205,7 +205,7 @@ class Pages:
 def framed(page: DrawnPage, frame: PageFrame) -> bytes:
     """A page as it is published."""
     record = page.record
-    return frame.around(record.head, record.parts, page.body.decode()).encode()
+    return frame.render(record.head, record.parts, page.body.decode()).encode()
 
 
 def text_of(entry: PageEntry, library: Library) -> SourceText | None:

@@ -31,7 +31,7 @@ from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.summary import without_prose
 from coursebuild.core.pages.assets import strings_for
 from coursebuild.core.pages.equations import equations_of
-from coursebuild.core.pages.folding import imported
+from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.renderer import Renderer, known_mathml
@@ -230,7 +230,7 @@ class PageReader:
             bare = replace(bare, equations=equations, summaries={})
             wrong = (*whole.diagnostics, *found, *known.diagnostics)
             scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
-            imports = tuple((s.path, tuple(sorted(imported(s.code.text)))) for s in scripts)
+            imports = tuple((s.path, tuple(sorted(find_imports(s.code.text)))) for s in scripts)
             summary = DocumentSummary(
                 bare,
                 wrong,

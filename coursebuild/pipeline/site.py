@@ -105,7 +105,7 @@ class SiteMaker:
         pages = Pages(self.library, self.documents, self.store, entries, last_good)
         self.documents.rest()
         names, shared = self._shared(None if whole_fonts else pages.facts)
-        own = self.library.feature_files
+        own = self.library.trial_files
         downloads = Downloads.of(self.library, self.assets, self.documents, self.root, self.store)
         files: list[SiteFile] = [*shared, *own, *self._copies(own), *downloads.files]
         context = functools.partial(self._context, pages, names, downloads)

@@ -68,13 +68,13 @@ class Files:
         """Keys of pages as they are in the site that was made last, by site path."""
         self._frame: PageFrame | None = None
         self._sites: list[tuple[Site, Mapping[str, SiteFile]]] = []
-        self._feature_files: Mapping[str, OutputFile] = {}
+        self._trial_files: Mapping[str, OutputFile] = {}
         """Files of features that pages already show, though no site was made with them yet."""
 
     def show(self, library: Library) -> None:
         """Draw pages of this course from now on."""
         self._library = library
-        self._feature_files = {file.path: file for file in library.feature_files}
+        self._trial_files = {file.path: file for file in library.trial_files}
         self._entries = {entry.path: entry for entry in page_list(library)}
         self._pages = {path: one for path, one in self._pages.items() if path in self._entries}
         self._last_good = {p: key for p, key in self._last_good.items() if p in self._entries}
@@ -139,8 +139,8 @@ class Files:
         """A file of the site, if there is one and it can be had."""
         if path in self._entries:
             return self._page(path)
-        if path in self._feature_files:
-            return self._feature_files[path].data
+        if path in self._trial_files:
+            return self._trial_files[path].data
         for site, files in reversed(self._sites):
             # A browser may ask for what an older page shares with others.
             newest = site is self._sites[-1][0]

@@ -1,7 +1,7 @@
-"""Files that features make of a course and its pages: for its site, and when it is exported.
+"""Files that features add to a site, and what exports are made from.
 
-Entry points: `SiteContext` and `ExportContext`, what they are made from; `added_files`;
-`page_notes`, what features have to know of a page for it, noted when the page is drawn.
+Entry points: `SiteContext` and `ExportContext`, what features make files from; `added_files`;
+`page_notes`, what features note of a page when it is drawn, in order to make files later.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from coursebuild.core.registry import features
 
 
 class NotedPage(Struct, frozen=True):
-    """A page of which a feature has noted something."""
+    """A page that a feature has made a note of."""
 
     path: str
     """Its site path."""
     kind: str
     """See `PageHead`."""
     id: str
-    """Of its lesson, level, model or page."""
+    """The id of its lesson, level, model or page."""
     title: str
     digest: str
-    """Of the note."""
+    """The digest of the note."""
 
 
 class SiteContext(Struct, frozen=True):
@@ -41,29 +41,29 @@ class SiteContext(Struct, frozen=True):
     library: Library
     assets: Assets
     names: Names
-    """Of the files that all pages share."""
+    """The names of the files that all pages share."""
     pages: tuple[NotedPage, ...]
-    """Those of which the feature has noted something, in the order of the site."""
+    """The pages with a note of this feature, in the order of the site."""
     note: Callable[[str], bytes]
-    """Gives what it noted, by the page's site path."""
+    """Returns the note of a page, by its site path."""
     get_or_create: Callable[[str, Callable[[], bytes]], bytes]
-    """Gives what was made under a key before, or makes it."""
+    """Returns what was made under a key before, or makes it."""
     archives: Mapping[str, Archive]
     """Archives of scripts by site path."""
     imports: Callable[[str], frozenset[str]]
-    """Says what a Python text imports."""
+    """Returns the modules that a Python text imports."""
 
 
 class ExportContext(Struct, frozen=True):
-    """A course in which nothing is wrong, and what can be made of it."""
+    """A course without errors, and what an export can be made from."""
 
     library: Library
     """The course with its results, words and templates. Its documents are summaries."""
     assets: Assets
     site: Callable[[], Mapping[str, SiteFile]]
-    """The files of its site by path; they are put together when this is called first."""
+    """The files of its site by path, collected on the first call."""
     page: Callable[[Document], PageContext]
-    """A document with all its text, on its page, ready to be drawn."""
+    """A document with its whole text on its page, ready to be drawn."""
     read: Callable[[str], bytes]
     """A file of the course, by its path."""
 
@@ -74,12 +74,12 @@ class ExportContext(Struct, frozen=True):
 
 
 def page_notes(inputs: PageInputs, page: PageContext | None, body: str) -> dict[str, bytes]:
-    """What features note of a page that was drawn, by the feature's name.
+    """The notes that features make of a drawn page, by the feature's name.
 
-    `page` is the document on it, if it has one, `body` its HTML as published.
+    `page` is the document on it, if any, `body` its HTML as published.
     """
-    made = {f.name: f.note(inputs, page, body) for f in features() if f.note is not None}
-    return {name: note for name, note in made.items() if note}
+    notes = {f.name: f.note(inputs, page, body) for f in features() if f.note is not None}
+    return {name: note for name, note in notes.items() if note}
 
 
 def added_files(
@@ -87,14 +87,14 @@ def added_files(
 ) -> tuple[list[SiteFile], FileList | None]:
     """The files of all features, and the list of all files, if one makes it.
 
-    `contexts` gives what a feature sees, by its name.
+    `contexts` returns the context of a feature by its name.
     """
     files: list[SiteFile] = []
-    listed: FileList | None = None
+    file_list: FileList | None = None
     for feature in features():
         for file in feature.files(contexts(feature.name)) if feature.files is not None else ():
             if isinstance(file, FileList):
-                listed = file
+                file_list = file
             else:
                 files.append(file)
-    return files, listed
+    return files, file_list

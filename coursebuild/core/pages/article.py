@@ -1,4 +1,4 @@
-"""The text of a document on its page, and the list of its contents.
+"""The text of a document on its page, and its table of contents.
 
 Entry points: `article`, `contents`.
 """
@@ -29,7 +29,7 @@ from coursebuild.core.registry import kind_of_block
 
 
 class ContentsEntry(Struct, frozen=True):
-    """An entry of the contents list."""
+    """An entry of the table of contents."""
 
     anchor: str
     title: Markup
@@ -38,7 +38,7 @@ class ContentsEntry(Struct, frozen=True):
 
 
 def article(page: PageContext, document: Document) -> Markup:
-    """The text of a document. A docked block stands beside the paragraphs around it.
+    """The text of a document. A docked block is placed beside the paragraphs around it.
 
     A section that goes further is folded under its heading.
     """
@@ -63,7 +63,7 @@ def _text(page: PageContext, blocks: tuple[Block, ...]) -> Iterator[Markup]:
 
 
 class _Group(Struct, frozen=True):
-    """Blocks that follow each other; with a docked one, those before and after it."""
+    """Consecutive blocks; with a docked one, those before and after it."""
 
     before: tuple[Block, ...]
     docked: FeatureBlock | None = None
@@ -74,7 +74,7 @@ _WIDE = (Script, Recording, Mjcf, Table, HtmlBlock)
 
 
 def _is_wide(block: Block) -> bool:
-    """Whether a block takes the whole width, so that nothing can stand beside it."""
+    """Whether a block takes the whole width, so that nothing can be beside it."""
     if isinstance(block, FeatureBlock):
         return kind_of_block(block).wide
     return isinstance(block, _WIDE)
@@ -85,9 +85,9 @@ def _docked(block: Block) -> FeatureBlock | None:
 
 
 def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
-    """Cut the text around its docked blocks.
+    """Group the blocks of a text around its docked blocks.
 
-    Each takes what lies between it and the next heading or wide block, on both sides.
+    Each of those takes the blocks up to the next heading or wide block on both sides.
     """
     groups: list[_Group] = []
     rest = blocks
@@ -108,7 +108,7 @@ def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
 
 
 def contents(page: PageContext, document: Document) -> tuple[ContentsEntry, ...]:
-    """The contents list: headings of levels 2 and 3, the latter under the former."""
+    """The table of contents: headings of level 2, with those of level 3 below them."""
     entries: list[ContentsEntry] = []
     for block in document.blocks:
         if not isinstance(block, Heading) or block.level > 3:

@@ -1,11 +1,11 @@
-"""The tool's own files: templates, interface texts, and the browser's half as it was bundled.
+"""The tool's own files: templates, interface texts, and the bundled files for browsers.
 
-Entry points: `Assets`, a value that whoever reads the disk makes; `strings_for`; `hashed_name`.
+Entry points: `Assets`, a value made by who reads the disk; `strings_for`; `hashed_name`.
 
 1. `templates` holds every file of `templates/` as text, `dist` every file of the bundle as bytes,
    by path relative to their folder.
-2. A file that a page refers to is published under a name that has a hash of its content in it, so
-   that a browser may keep it for ever.
+2. A file that a page refers to is published under a name with a hash of its content, so that a
+   browser may keep it for ever.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SCRIPTS = {
     "reader.js": "js/reader-page.js",
     "search.js": "js/search.js",
 }
-"""What plain scripts of pages are published as, and the bundled modules that they are."""
+"""The published names of plain scripts of pages, with the bundled modules."""
 
 
 class Assets(Struct, frozen=True):
@@ -38,9 +38,9 @@ class Assets(Struct, frozen=True):
     """Path relative to `templates/`, and text."""
     dist: Mapping[str, bytes]
     """Path relative to the bundle (`css/site.css`, `js/site.js`, `fonts/fonts.json`, …), and
-    bytes, which may be read when they are asked for."""
-    compiled: Path | None = None
-    """Where the templates lie compiled, see `templates_of`."""
+    bytes, perhaps read on access."""
+    compiled_templates: Path | None = None
+    """The folder of the compiled templates; see `templates_of`."""
 
     def template(self, path: str) -> str:
         """The text of a file of `templates/` (`KeyError` where there is none)."""
@@ -66,26 +66,31 @@ def hashed_name(path: str, data: bytes) -> str:
 def page_script(code: bytes) -> bytes:
     """A bundled module without imports or exports as a plain script in a scope of its own.
 
-    Browsers refuse to load modules from a disk, and plain scripts of one page share their top-level
-    names.
+    Browsers refuse to load modules from a disk, and plain scripts of a page share top-level names.
     """
     return b'"use strict";(()=>{' + code.rstrip() + b"\n})();\n"
 
 
 def strings_for(templates: tuple[tuple[str, str], ...], language: str) -> Strings:
-    """The interface texts of a language (`pt-BR`): its own over those of `pt` over English ones."""
-    added = (feature.texts.items() for feature in features())
-    return _strings_for(templates, tuple(text for texts in added for text in texts), language)
+    """The interface texts of a language: for `pt-BR` its own, then those of `pt`, then English."""
+    feature_texts = (feature.texts.items() for feature in features())
+    return _strings_for(
+        templates, tuple(text for texts in feature_texts for text in texts), language
+    )
 
 
 @functools.lru_cache(maxsize=8)
 def _strings_for(
-    templates: tuple[tuple[str, str], ...], added: tuple[tuple[str, str], ...], language: str
+    templates: tuple[tuple[str, str], ...],
+    feature_texts: tuple[tuple[str, str], ...],
+    language: str,
 ) -> Strings:
     files = [(path, text) for path, text in templates if path.startswith("strings/")]
     texts = [(path[len("strings/") :].removesuffix(".toml"), text) for path, text in files]
     strings = Strings({}, language)
     for name in dict.fromkeys((DEFAULT_LANGUAGE, language.split("-")[0].lower(), language)):
-        for text in (text for of, text in (*texts, *added) if of == name):
+        for text in (
+            text for file_language, text in (*texts, *feature_texts) if file_language == name
+        ):
             strings = parse_strings(text, strings, language)
     return strings

@@ -1,7 +1,7 @@
-"""The blocks that carry code and what the build knows of it; figures and callouts.
+"""Drawing the blocks with code and its results, figures and callouts.
 
-Entry points: one function for each block, from the page's context and the block to HTML. What is
-shown is worked out here as values; templates in `blocks/` say how it looks.
+Entry points: one function for each block, from the page's context and the block to HTML. They make
+values, which templates in `blocks/` turn into HTML.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ class CodePart(Struct, frozen=True):
     """The number of its first line."""
     folded: bool
     label: str
-    """What a fold holds, in words."""
+    """What is in a fold, in words."""
 
 
 class Receipt(Struct, frozen=True):
-    """What the build can say for an output or a script."""
+    """A line that says how an output or a script was verified."""
 
     kind: str
-    """`verified`, `volatile`, `unverified`: also a class of the style sheet."""
+    """`verified`, `volatile` or `unverified`; also a class of the style sheet."""
     text: str
 
 
@@ -77,7 +77,7 @@ def script(page: PageContext, block: Script, recordings: tuple[Recording, ...]) 
 
 
 def recording(page: PageContext, block: Recording) -> Markup:
-    """A recorded output that stands apart from its script."""
+    """A recorded output apart from its script."""
     return page.template("blocks/recording.html", output=_output(page, block))
 
 
@@ -87,25 +87,25 @@ def code(page: PageContext, language: str, text: str) -> Markup:
 
 
 def plain_code(page: PageContext, block: PlainCode) -> Markup:
-    """Python that is shown and not run."""
-    shown = code(page, "python", block.code.text)
+    """Python code that is shown, not run."""
+    code_html = code(page, "python", block.code.text)
     if block.source is None:
-        return shown
-    return page.template("blocks/source_part.html", path=block.source.path, code=shown)
+        return code_html
+    return page.template("blocks/source_part.html", path=block.source.path, code=code_html)
 
 
 def figure(page: PageContext, image: Image, caption: Markup) -> Markup:
-    """An image with its caption; of one that a script draws the script and the data are linked."""
+    """An image with its caption; a script's figure links to the script and its data."""
     files = [file for file in recorded_figures(page.document) if file.span == image.url_span]
-    drawn, data = (*files, None, None)[:2]
+    recorded, data = (*files, None, None)[:2]
     return page.template(
         "blocks/figure.html",
         image=image,
         caption=caption,
         href=page.url(image.url),
-        drawn=drawn,
-        dark=drawn and drawn.has_dark and page.place.href(urls.dark_path(drawn.path)),
-        anchor=drawn and listing_anchor(drawn.script),
+        figure=recorded,
+        dark=recorded and recorded.has_dark and page.place.href(urls.dark_path(recorded.path)),
+        anchor=recorded and listing_anchor(recorded.script),
         data=data and page.place.href(urls.file_path(data.path)),
     )
 
@@ -122,7 +122,7 @@ def callout(page: PageContext, block: Callout) -> Markup:
 
 
 def mjcf(page: PageContext, block: Mjcf) -> Markup:
-    """A model or a fragment, and that it compiles, or the message it fails with."""
+    """A model or fragment, with a note that it compiles, or the message it fails with."""
     return page.template(
         "blocks/mjcf.html",
         mjcf=block,
@@ -132,7 +132,7 @@ def mjcf(page: PageContext, block: Mjcf) -> Markup:
 
 
 def binding(page: PageContext, node: NumberBinding) -> Markup:
-    """A number that a script printed; the mark names the script."""
+    """A number that a script printed, marked with the script's name."""
     text = re.sub(r"(?<!\w)-(?=\d)", "\u2212", node.text)
     return page.template("blocks/binding.html", text=text, path=node.script, source=node.source)
 
@@ -140,21 +140,21 @@ def binding(page: PageContext, node: NumberBinding) -> Markup:
 # --- outputs
 
 
-class ShownOutput(Struct, frozen=True):
+class OutputView(Struct, frozen=True):
     """A recorded output, ready for its template."""
 
     caption: Markup
     path: str
     anchor: str
-    """Empty where it is not known whose output it is."""
+    """Empty if the script is not known."""
     text: str | None
-    """The recorded text; `None` where it is a table."""
+    """The recorded text; `None` if it is a table."""
     table: Markup | None
     receipt: Receipt
 
 
-def _output(page: PageContext, block: Recording) -> ShownOutput:
-    return ShownOutput(
+def _output(page: PageContext, block: Recording) -> OutputView:
+    return OutputView(
         caption=page.inlines(block.caption),
         path=block.script or "",
         anchor=output_anchor(block.script, page.outputs[block.span.start]) if block.script else "",
@@ -165,18 +165,18 @@ def _output(page: PageContext, block: Recording) -> ShownOutput:
 
 
 def output_receipt(page: PageContext, block: Recording) -> Receipt:
-    """What can be said for a recorded output."""
-    words, shown = page.words, page.inputs
-    verdict, run = shown.verdicts.get(block.span.start), shown.runs.get(block.script or "")
-    versions = {"engine": shown.engine, "python": shown.python}
+    """The receipt of a recorded output."""
+    words, inputs = page.words, page.inputs
+    verdict, run = inputs.verdicts.get(block.span.start), inputs.runs.get(block.script or "")
+    versions = {"engine": inputs.engine, "python": inputs.python}
     if verdict is None or verdict.status == "unchecked":
         return _not_run(words, run)
     match verdict.status:
         case "verified":
-            ran = words("receipt.verified", **versions)
+            text = words("receipt.verified", **versions)
             if run is not None and run.recorded:
-                ran = words("receipt.once", when=run.recorded)
-            return Receipt("verified", f"{ran} {compared(words, verdict.comparison)}.")
+                text = words("receipt.once", when=run.recorded)
+            return Receipt("verified", f"{text} {_describe_comparison(words, verdict.comparison)}.")
         case "volatile":
             return Receipt("volatile", words("receipt.volatile", **versions))
         case "drift":
@@ -185,22 +185,22 @@ def output_receipt(page: PageContext, block: Recording) -> Receipt:
             assert_never(verdict.status)
 
 
-def compared(words: Strings, comparison: Comparison) -> str:
+def _describe_comparison(words: Strings, comparison: Comparison) -> str:
     """How an output was compared, in words."""
     match comparison.mode:
         case Mode.EXACT | Mode.VOLATILE:
-            how = words("receipt.exact")
+            text = words("receipt.exact")
         case Mode.DIGITS:
-            how = words("receipt.digits")
+            text = words("receipt.digits")
         case Mode.TOLERANCE:
-            how = _tolerance(words, comparison.rtol, comparison.atol)
+            text = _tolerance(words, comparison.rtol, comparison.atol)
         case _:
             assert_never(comparison.mode)
     if comparison.ellipsis:
-        how += f"; {words('receipt.ellipsis')}"
+        text += f"; {words('receipt.ellipsis')}"
     if comparison.volatile:
-        how += f"; {words('receipt.varies', pattern=comparison.volatile)}"
-    return how
+        text += f"; {words('receipt.varies', pattern=comparison.volatile)}"
+    return text
 
 
 def _tolerance(words: Strings, rtol: Decimal, atol: Decimal) -> str:
@@ -211,19 +211,19 @@ def _tolerance(words: Strings, rtol: Decimal, atol: Decimal) -> str:
 
 
 def short(value: Decimal) -> str:
-    """A tolerance as a reader writes it: `1e-6`, `0.05`."""
+    """A tolerance as a person writes it: `1e-6`, `0.05`."""
     value = value.normalize()
     return f"{value:f}" if -4 < value.adjusted() < 6 else f"{value:e}"
 
 
 def script_receipt(page: PageContext, block: Script) -> Receipt:
-    """What can be said for a script without a recorded output."""
-    words, shown = page.words, page.inputs
-    run = shown.runs.get(block.path)
+    """The receipt of a script without a recorded output."""
+    words, inputs = page.words, page.inputs
+    run = inputs.runs.get(block.path)
     if run is not None and run.recorded:
         return Receipt("verified", words("receipt.once_ran", when=run.recorded))
     if run is not None and run.outcome is Outcome.OK:
-        text = words("receipt.ran", engine=shown.engine, python=shown.python)
+        text = words("receipt.ran", engine=inputs.engine, python=inputs.python)
         return Receipt("verified", text)
     return _not_run(words, run)
 
@@ -240,7 +240,7 @@ def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
 
 
 def _parts(page: PageContext, block: Script) -> tuple[CodePart, ...]:
-    """The code as it is shown; what draws is folded whole, since its figure tells the story."""
+    """The parts of a script; one that draws is folded whole, since its figure says enough."""
     text = block.code.text.rstrip("\n")
     lines = highlight_lines("python", text)
     parts = (Part(1, len(lines), folded=True),) if block.figures else fold(text)
@@ -256,10 +256,10 @@ def _parts(page: PageContext, block: Script) -> tuple[CodePart, ...]:
 
 
 def numbered_lines(lines: Iterable[Markup], path: str, first: int = 1) -> Markup:
-    """Lines of the file at a path, from its line `first` on, each of which can be linked to.
+    """Number lines of a file, from its line `first` on, so that each can be linked to.
 
-    No highlighted token reaches over the end of a line, so that each can be an element. Its number
-    is in its anchor and nowhere in the text, so that it is neither copied nor read out.
+    No highlighted token crosses the end of a line, so each line can be an element. Its number is in
+    its anchor only, not in the text, so that it is neither copied nor read out.
     """
     start, _, _ = line_anchor(path, first).rpartition(str(first))
     before = f'<span id="{escape(start)}'
@@ -267,10 +267,10 @@ def numbered_lines(lines: Iterable[Markup], path: str, first: int = 1) -> Markup
 
 
 def _fold_label(words: Strings, part: Part) -> str:
-    where = words(
+    lines = words(
         "code.lines" if part.first < part.last else "code.line", first=part.first, last=part.last
     )
     holds = [words("code.docstring")] if part.docstring else []
     holds += [words("code.imports")] if part.imports else []
     holds += part.names
-    return f"{where}: {', '.join(holds)}" if holds else where
+    return f"{lines}: {', '.join(holds)}" if holds else lines

@@ -1,6 +1,6 @@
-"""Lessons and pages as cards: what a list of them shows beside their titles.
+"""Lessons and pages as cards with pictures, for lists of them.
 
-Entry points: `pictures_of(library, place, owner)`; `lesson_cards`, `galleries`.
+Entry points: `pictures_of(library, place, owner)`; `lesson_cards`, `list_galleries`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from coursebuild.core.registry import kind_of_block
 
 
 class PictureLink(Struct, frozen=True):
-    """A picture of something in a document, and where that stands."""
+    """A picture of a block, with a link to the block."""
 
     src: str
     width: int
@@ -25,7 +25,7 @@ class PictureLink(Struct, frozen=True):
 
 
 class LessonCard(Struct, frozen=True):
-    """A lesson that can be read."""
+    """A written lesson as a card."""
 
     link: LessonLink
     level: str
@@ -33,7 +33,7 @@ class LessonCard(Struct, frozen=True):
 
 
 class Gallery(Struct, frozen=True):
-    """A page that is looked at rather than read."""
+    """A page with several pictures."""
 
     title: str
     href: str
@@ -41,24 +41,26 @@ class Gallery(Struct, frozen=True):
 
 
 def pictures_of(library: Library, place: urls.Place, owner: Owner) -> tuple[PictureLink, ...]:
-    """Pictures of what stands in a document, in its order, as seen from a place."""
-    found = []
+    """The pictures of a document's blocks in order, with addresses relative to a place."""
+    links = []
     for block in document_blocks(owner.document) if owner.document is not None else ():
         if not isinstance(block, FeatureBlock):
             continue
-        shown = library.tried.get((block.span.path, block.span.start))
-        picture = kind_of_block(block).picture(block, shown)
+        value = library.trial_values.get((block.span.path, block.span.start))
+        picture = kind_of_block(block).picture(block, value)
         if picture is not None:
             src = place.href(picture.path)
             href = place.href(urls.owner_path(owner), picture.anchor)
-            found.append(PictureLink(src, picture.width, picture.height, picture.title, href))
-    return tuple(found)
+            links.append(PictureLink(src, picture.width, picture.height, picture.title, href))
+    return tuple(links)
 
 
 def lesson_cards(library: Library, place: urls.Place) -> tuple[LessonCard, ...]:
-    """The lessons that are written, in the order of the course."""
+    """The cards of the written lessons, in the order of the course."""
     return tuple(
-        _lesson_card(library, place, one) for one in library.order if one.document is not None
+        _lesson_card(library, place, lesson)
+        for lesson in library.order
+        if lesson.document is not None
     )
 
 
@@ -69,11 +71,11 @@ def _lesson_card(library: Library, place: urls.Place, lesson: Lesson) -> LessonC
     return LessonCard(link, level, pictures[0] if pictures else None)
 
 
-def galleries(library: Library, place: urls.Place) -> tuple[Gallery, ...]:
+def list_galleries(library: Library, place: urls.Place) -> tuple[Gallery, ...]:
     """The pages in the menu that have more than one picture."""
-    found = []
+    galleries = []
     for page in library.menu:
         pictures = pictures_of(library, place, page)
         if len(pictures) > 1:
-            found.append(Gallery(page.title, place.href(urls.page_path(page)), pictures))
-    return tuple(found)
+            galleries.append(Gallery(page.title, place.href(urls.page_path(page)), pictures))
+    return tuple(galleries)

@@ -1,7 +1,6 @@
 """Characters that HTML forbids, made visible.
 
-Entry point: `visible(text)`. Control characters and non-characters are shown as the symbols that
-stand for them.
+Entry point: `visible(text)`, which replaces control characters and non-characters by symbols.
 """
 
 from __future__ import annotations
@@ -11,12 +10,12 @@ import re
 _FORBIDDEN = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff\U0001fffe-\U0010ffff]"
 )
-"""And, past U+1FFFF, some that are allowed: to list only the last two of each plane takes long."""
+"""Past U+1FFFF also allowed ones: listing only the last two of each plane would be slow."""
 
 
 def visible(text: str) -> str:
-    """The text with what HTML forbids replaced: a control by its picture, the rest by U+FFFD."""
-    return _FORBIDDEN.sub(_picture, str(text))  # and no markup
+    """The text without what HTML forbids: a symbol for each control, U+FFFD for the rest."""
+    return _FORBIDDEN.sub(_picture, str(text))  # `str`, as `Markup` would escape
 
 
 def _picture(match: re.Match[str]) -> str:

@@ -1,11 +1,11 @@
 """The files that every page refers to: fonts, the style sheet, the page's script, the icon.
 
-Entry points: `page_characters(html)` and `common_characters(library)`, by which they depend on the
-pages; `common_files`, which makes them, with `needed_fonts`.
+Entry points: `common_files`, with `needed_fonts`; `page_characters(html)` and
+`common_characters(library)`, the characters that fonts must have.
 
 The fonts are cut down to the characters that the pages use, and the style sheet holds the fonts'
-names and the styles that were written in single elements: a page that changes touches these files
-only where it brings a character or a style that no page has, or takes the last one away.
+names and the styles taken out of single elements. A changed page therefore changes these files only
+if it is the first or the last one with some character or style.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from coursebuild.core.registry import features
 
 
 class PageFacts(Struct, frozen=True):
-    """What the shared files must know of a page."""
+    """What the shared files depend on in a page."""
 
     text: frozenset[str]
-    """Characters of its text, but those that every font has."""
+    """Characters of its text, without those that every font has."""
     mathematics: frozenset[str]
-    """Characters of its formulas, but those of ASCII; a blank where there is a formula."""
+    """Characters of its formulas outside ASCII; and a blank if it has a formula."""
     declarations: frozenset[str]
-    """Styles that were written in its elements."""
+    """Styles taken out of its elements."""
 
 
 _FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
@@ -44,13 +44,13 @@ _SIGN = re.compile(
     r"(?:[\x00-%'-;=-\x7f]++|<[^>]*+>)*+"
     r"([^\x00-\x7f]|&(?:#[0-9]+;?|#[xX][0-9a-fA-F]+;?|[^\t\n\f <&#;]{1,32};?)|[<&])?"
 )
-"""What is not ASCII, or may be a character reference, as in `html.unescape`; tags are passed over.
-A match goes on to the next of these, or to the end: no place is looked at twice.
+"""A character outside ASCII, or what may be a character reference, as in `html.unescape`. The match
+includes everything before it, tags skipped, so that no place is scanned twice.
 """
 
 
 def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:
-    """The characters of a page's text, but most of those of ASCII, and those of its formulas."""
+    """The characters of a page's text, without most of ASCII, and those of its formulas."""
     parts = _FORMULA.split(html)
     text = _characters("".join(parts[::2]))
     mathematics = {c for c in _characters("\n".join(parts[1::2])) if not c.isascii()}
@@ -60,7 +60,7 @@ def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:
 
 
 def _characters(html: str) -> set[str]:
-    """The characters of the text of a piece of HTML, but most of those of ASCII."""
+    """The characters of the text of a piece of HTML, without most of ASCII."""
     return set[str]().union(*map(unescape, set(_SIGN.findall(html))))
 
 
@@ -74,11 +74,11 @@ def common_characters(library: Library) -> frozenset[str]:
 
 
 def needed_fonts(assets: Assets, facts: PageFacts, theme: Theme) -> tuple[fonts.FontJob, ...]:
-    """The fonts that pages with these facts, taken together, need, to be cut."""
+    """The fonts to cut for pages with these facts, merged."""
     faces = fonts.read_faces(assets.file("fonts/fonts.json"))
-    given = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
+    fonts_with_data = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
     text, mathematics = "".join(sorted(facts.text)), "".join(sorted(facts.mathematics))
-    return fonts.font_jobs(given, text, mathematics, theme_faces(theme))
+    return fonts.font_jobs(fonts_with_data, text, mathematics, theme_faces(theme))
 
 
 def common_files(
@@ -87,9 +87,9 @@ def common_files(
     facts: PageFacts,
     theme: Theme,
 ) -> tuple[tuple[SiteFile, ...], Names]:
-    """The files for pages with these facts, taken together, and their names.
+    """The files for pages with these facts, merged, and their names.
 
-    Without a function that cuts them, fonts are whole.
+    Without a function `cut`, fonts are published whole.
     """
     files: list[SiteFile] = []
 
@@ -102,7 +102,7 @@ def common_files(
     def script(name: str) -> str:
         return publish(name, page_script(assets.file(SCRIPTS.get(name, f"js/{name}"))))
 
-    def own_script(feature: Feature, part: PagePart) -> str:
+    def feature_script(feature: Feature, part: PagePart) -> str:
         return publish(f"{feature.name}.js", page_script(part.code.encode()))
 
     def font(job: fonts.FontJob) -> str:
@@ -110,7 +110,7 @@ def common_files(
         if cut is None:
             ending = "woff2" if job.data.startswith(b"wOF2") else ending
             return publish(f"fonts/{stem}.{ending}", job.data)
-        # Named by what it is cut from, and cut while the pages are written.
+        # The name comes from the input, so that it can be cut while pages are written.
         key = job.key
         name = f"assets/fonts/{stem}.{key[:8]}.woff2"
         files.append(CachedFile(name, key, functools.partial(cut, job)))
@@ -119,12 +119,12 @@ def common_files(
     def picture(name: str, file: ThemeFile | None) -> str:
         return "" if file is None else publish(f"{name}.{file.ending}", file.data)
 
-    fonts_made = [(job, font(job)) for job in needed_fonts(assets, facts, theme)]
-    rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in fonts_made)
-    own = styles.style_rules(facts.declarations) + "".join(f.style for f in features())
-    own += theme_style(theme)
+    cut_fonts = [(job, font(job)) for job in needed_fonts(assets, facts, theme)]
+    rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in cut_fonts)
+    style = styles.style_rules(facts.declarations) + "".join(f.style for f in features())
+    style += theme_style(theme)
     scripts = [
-        (part.mark, script(part.bundled) if part.bundled else own_script(feature, part))
+        (part.mark, script(part.bundled) if part.bundled else feature_script(feature, part))
         for feature in features()
         for part in feature.parts
         if part.bundled or part.code
@@ -136,7 +136,7 @@ def common_files(
         icon = picture("icon", theme.icon or theme.touch_icon)
         touch_icon = picture("icon-touch", theme.touch_icon)
     names = Names(
-        style=publish("site.css", rules.encode() + assets.file("css/site.css") + own.encode()),
+        style=publish("site.css", rules.encode() + assets.file("css/site.css") + style.encode()),
         theme_script=script("theme.js"),
         script=script("site.js"),
         icon=icon,
@@ -157,12 +157,12 @@ def _logo_width(logo: ThemeFile | None) -> int:
 
 def _licences(assets: Assets, theme: Theme) -> bytes:
     """The licences of fonts and libraries that the site ships."""
-    named = [
+    licences = [
         (path.removeprefix("licences/").removesuffix(".txt"), data.decode())
         for path, data in assets.files("licences")
     ]
     for family in theme.fonts:
         files = (file.path.rpartition("/")[2] for file in family.files)
-        named.append((", ".join(files), family.licence.text))
-    parts = [f"{name}\n{'=' * len(name)}\n\n{text.strip()}\n" for name, text in named]
+        licences.append((", ".join(files), family.licence.text))
+    parts = [f"{name}\n{'=' * len(name)}\n\n{text.strip()}\n" for name, text in licences]
     return "\n\n".join(parts).encode()

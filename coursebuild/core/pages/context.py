@@ -1,9 +1,9 @@
-"""What the Markdown renderer asks about a page: addresses, formulas, code, our own blocks.
+"""What the writer of HTML needs to know about a page: addresses, formulas, code, special blocks.
 
 Entry point: `PageContext`, the `Context` of one document on one page.
 
-A recorded output that directly follows its script is drawn as one object with it; `joined` says
-which recordings those are, and such a recording gives nothing where it stands by itself.
+Recorded outputs that directly follow their script are drawn as one object with it:
+`script_outputs`. Nothing is drawn in their own place.
 """
 
 from __future__ import annotations
@@ -54,13 +54,13 @@ class PageContext(Context, Struct, frozen=True, dict=True):
     document: Document
 
     @cached_property
-    def joined(self) -> Mapping[int, tuple[Recording, ...]]:
-        """The recordings drawn with a script, by the offset at which the script begins."""
-        return dict(_joined(self.document))
+    def script_outputs(self) -> Mapping[int, tuple[Recording, ...]]:
+        """The recordings drawn together with a script, by the script's offset."""
+        return dict(_outputs_of_scripts(self.document))
 
     @cached_property
     def outputs(self) -> Mapping[int, int]:
-        """Which output of its script a recording is, from 1, by the offset at which it begins."""
+        """The number of each recording among the outputs of its script, from 1, by offset."""
         counts: dict[str, int] = {}
         numbers: dict[int, int] = {}
         for block in document_blocks(self.document):
@@ -70,19 +70,19 @@ class PageContext(Context, Struct, frozen=True, dict=True):
 
     @cached_property
     def equations(self) -> Mapping[int, Equation]:
-        """Formulas on lines of their own, by their offset."""
+        """Formulas on lines of their own, by offset."""
         return number_equations(self.document, self.renderer.mathml)
 
-    # what the Markdown renderer asks
+    # what the writer of HTML needs
 
     @property
     def words(self) -> Strings:
-        """The interface's words."""
+        """The interface texts."""
         return self.renderer.words
 
     @property
     def direction(self) -> Literal["ltr", "rtl"]:
-        """Which way the course's language runs."""
+        """The direction of the course's language."""
         return direction(self.words.language)
 
     def href(self, target: Target) -> str:
@@ -90,7 +90,7 @@ class PageContext(Context, Struct, frozen=True, dict=True):
         return self.inputs.hrefs[target]
 
     def url(self, url: str) -> str:
-        """An address as written, but a file of the course becomes its place in the site."""
+        """An address as written; that of a file of the course becomes its place in the site."""
         return file_address(self.place, self.document.source.path, url)
 
     def figure(self, image: Image, caption: Markup) -> Markup:
@@ -100,33 +100,33 @@ class PageContext(Context, Struct, frozen=True, dict=True):
     def math(self, tex: str) -> Markup:
         """A formula in a line of text."""
         label = self.words("markup.formula")
-        return Markup(formulas.in_line(str(self.renderer.mathml(tex, False)), label))
+        return Markup(formulas.inline_formula(str(self.renderer.mathml(tex, False)), label))
 
     def display(self, tex: str, start: int) -> Markup:
-        """A formula on a line of its own, which scrolls inside itself where it is too wide."""
+        """A formula on a line of its own, which scrolls if it is too wide."""
         mathml = self.renderer.mathml(tex, True)
-        known = self.equations.get(start)
-        return self.template("blocks/formula.html", mathml=mathml, known=known)
+        equation = self.equations.get(start)
+        return self.template("blocks/formula.html", mathml=mathml, equation=equation)
 
     def reference(self, target: Target) -> str:
-        """What a link without a text says: the number of the formula that it leads to."""
+        """The text of a link without one: the number of the formula that it leads to."""
         if isinstance(target, UrlTarget) and target.url.startswith("#"):
             name = unquote(target.url[1:])
-            here = (known.number for known in self.equations.values() if known.id == name)
-            number = next(here, "")
+            numbers = (e.number for e in self.equations.values() if e.id == name)
+            number = next(numbers, "")
             return f"({number})" if number else ""
         return self.inputs.equations.get(target, "")
 
     def code(self, language: str, text: str) -> Markup:
-        """A code block that is only shown."""
+        """A code block that is only shown, not run."""
         return blocks.code(self, language, text.rstrip("\n")) + Markup("\n")
 
     def binding(self, binding: NumberBinding) -> Markup:
-        """A number that the build has compared with what a script printed."""
+        """A number that was compared with the output of a script."""
         return blocks.binding(self, binding)
 
     def block(self, block: OwnBlock) -> Markup:
-        """A block that is ours, with its line end."""
+        """A special block, with its line end."""
         html = self._block(block)
         return html + Markup("\n") if html else html
 
@@ -135,10 +135,10 @@ class PageContext(Context, Struct, frozen=True, dict=True):
             case Callout():
                 return blocks.callout(self, block)
             case Script():
-                return blocks.script(self, block, self.joined.get(block.span.start, ()))
+                return blocks.script(self, block, self.script_outputs.get(block.span.start, ()))
             case Recording():
-                joined = any(block in recordings for recordings in self.joined.values())
-                return Markup() if joined else blocks.recording(self, block)
+                follows_script = any(block in group for group in self.script_outputs.values())
+                return Markup() if follows_script else blocks.recording(self, block)
             case Mjcf():
                 return blocks.mjcf(self, block)
             case PlainCode():
@@ -148,7 +148,7 @@ class PageContext(Context, Struct, frozen=True, dict=True):
             case _:
                 assert_never(block)
 
-    # what the blocks ask
+    # what blocks need
 
     def blocks(self, content: tuple[Block, ...]) -> Markup:
         """Blocks as HTML, without the last line end."""
@@ -163,7 +163,7 @@ class PageContext(Context, Struct, frozen=True, dict=True):
         return markup.render_footnotes(self.document.footnotes, self)
 
     def highlight(self, language: str, text: str) -> Markup:
-        """Code with its tokens marked."""
+        """Code with its syntax highlighted."""
         return self.renderer.highlight(language, text)
 
     def template(self, name: str, **values: object) -> Markup:
@@ -171,8 +171,8 @@ class PageContext(Context, Struct, frozen=True, dict=True):
         return self.renderer.render(name, **values)
 
 
-def _joined(document: Document) -> Iterator[tuple[int, tuple[Recording, ...]]]:
-    """Where each script begins, and the recordings that follow it at once."""
+def _outputs_of_scripts(document: Document) -> Iterator[tuple[int, tuple[Recording, ...]]]:
+    """The offset of each script, and the recordings that directly follow it."""
     for siblings in sibling_groups(document):
         for number, block in enumerate(siblings):
             if not isinstance(block, Script):

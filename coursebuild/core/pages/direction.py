@@ -1,13 +1,13 @@
-"""Which way the text of a language runs.
+"""The direction in which a language is written.
 
 Entry point: `direction(language)`.
 
-1. A tag may name its script (`az-Arab`, `ur-Latn`): that decides.
-2. Else its language and region do, where people write that language in another script than
-   elsewhere (`pa-PK`), and else the language alone.
+1. If the tag names a script (`az-Arab`, `ur-Latn`), that decides.
+2. Otherwise language and region decide if the region writes the language in another script than
+   others do (`pa-PK`), and else the language alone.
 
-Sources: the scripts of the Unicode Standard that run from the right (chapters 9, 10, 14 and
-19), and the likely scripts of languages in CLDR.
+Sources: the right-to-left scripts of the Unicode Standard (chapters 9, 10, 14 and 19), and the
+likely scripts of languages in CLDR.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _LANGUAGES = frozenset(
     # of others
     " arc aii syr syc tru dv div nqo rhg".split()
 )
-"""Languages whose tags name no script, where that runs from the right."""
+"""Languages that are written from the right unless their tag names a script."""
 
 _REGIONS = {
     "az": "ir iq",
@@ -48,7 +48,7 @@ _REGIONS = {
     "tt": "cn",
     "uz": "af cn",
 }
-"""Regions in which a language is written from the right, though elsewhere it is not."""
+"""Regions that write a language from the right, though others do not."""
 
 
 @functools.lru_cache(maxsize=16)

@@ -21,21 +21,26 @@ from coursebuild.core.registry import kind_of_block
 def document_inputs(
     library: Library, place: urls.Place, document: model.Document
 ) -> DocumentInputs:
-    """All that the document's page shows besides what stands in the document.
+    """Everything that the document's page shows besides the document itself.
 
-    The summary of a document does as well as the document.
+    The summary of the document is enough.
     """
     path = document.source.path
     blocks = tuple(model.document_blocks(document))
-    ours = [block for block in blocks if isinstance(block, model.FeatureBlock)]
+    feature_blocks = [block for block in blocks if isinstance(block, model.FeatureBlock)]
     recordings = [block for block in blocks if isinstance(block, model.Recording)]
-    models = dict.fromkeys(name for block in ours for name in block.models())
-    linked = (one.target for one in model.document_inlines(document) if isinstance(one, model.Link))
-    targets = dict.fromkeys((*linked, *map(model.ModelTarget, models)))
+    models = dict.fromkeys(name for block in feature_blocks for name in block.models())
+    link_targets = (
+        link.target for link in model.document_inlines(document) if isinstance(link, model.Link)
+    )
+    targets = dict.fromkeys((*link_targets, *map(model.ModelTarget, models)))
     names = {target: equation_name(library, path, target) for target in targets}
     verdicts = ((block.span.start, library.verdict(block)) for block in recordings)
-    trials = ((b.span.start, library.tried.get((b.span.path, b.span.start))) for b in ours)
-    values = ((block, kind_of_block(block).values) for block in ours)
+    trials = (
+        (b.span.start, library.trial_values.get((b.span.path, b.span.start)))
+        for b in feature_blocks
+    )
+    values = ((block, kind_of_block(block).values) for block in feature_blocks)
     return DocumentInputs(
         engine=library.results.engine,
         python=library.results.python,
@@ -48,7 +53,7 @@ def document_inputs(
             if path in library.runs
         },
         verdicts={start: ShownVerdict(v.status, v.comparison) for start, v in verdicts if v},
-        trials={start: tried for start, tried in trials if tried is not None},
+        trials={start: value for start, value in trials if value is not None},
         blocks={b.span.start: make(library, place, b) for b, make in values if make is not None},
         keyframes={n: library.facts[n].keyframes for n in models if n in library.facts},
         address=urls.absolute(library.course, place.path),
@@ -56,32 +61,32 @@ def document_inputs(
 
 
 def _quoted_lines(blocks: tuple[model.Block, ...]) -> dict[str, set[int]]:
-    """The paths of scripts that a document has or names, each with the lines that it quotes."""
-    found: dict[str, set[int]] = {}
+    """The paths of the scripts in a document or named there, with the lines it quotes of each."""
+    lines_by_script: dict[str, set[int]] = {}
     for block in blocks:
         if isinstance(block, model.Script):
-            found.setdefault(block.path, set())
+            lines_by_script.setdefault(block.path, set())
         elif isinstance(block, model.Recording) and block.script is not None:
-            found.setdefault(block.script, set())
+            lines_by_script.setdefault(block.script, set())
         elif isinstance(block, model.FeatureBlock):
             for script, line in block.quoted_lines():
-                found.setdefault(script, set()).add(line)
-    return found
+                lines_by_script.setdefault(script, set()).add(line)
+    return lines_by_script
 
 
 def _shown_run(run: ScriptRun, numbers: set[int]) -> ShownRun:
     if run.outcome is not Outcome.OK or not numbers:
         return ShownRun(run.outcome, run.missing, recorded=run.recorded)
     lines = run.stdout.split("\n")
-    asked = (
+    quoted = (
         (n, visible(lines[n - 1].rstrip()) if 1 <= n <= len(lines) else None)
         for n in sorted(numbers)
     )
-    return ShownRun(run.outcome, run.missing, tuple(asked), run.recorded)
+    return ShownRun(run.outcome, run.missing, tuple(quoted), run.recorded)
 
 
 def address(library: Library, place: urls.Place, path: str, target: model.Target) -> str:
-    """The address of a link's target, from a place, in the document with a path."""
+    """The address of a link's target, relative to a place; `path` is that of the document."""
     target = model.resolve(target, library.course, path)
     match target:
         case model.LessonTarget():
@@ -95,9 +100,9 @@ def address(library: Library, place: urls.Place, path: str, target: model.Target
         case model.ExampleTarget():
             return place.href(target.path)
         case model.TermTarget():
-            found = library.terms.get(target.id)
-            # In a preview the text that defined it may have changed just now.
-            path = place.path if found is None else urls.owner_path(found)
+            owner = library.terms.get(target.id)
+            # In a preview the definition may just have been removed.
+            path = place.path if owner is None else urls.owner_path(owner)
             return place.href(path, f"term:{target.id}")
         case model.UrlTarget():
             return file_address(place, path, target.url)
@@ -106,7 +111,7 @@ def address(library: Library, place: urls.Place, path: str, target: model.Target
 
 
 def equation_name(library: Library, path: str, target: model.Target) -> str:
-    """How another page calls a formula with a number; empty where a target is none."""
+    """The name of a numbered formula on another page; empty for other targets."""
     target = model.resolve(target, library.course, path)
     if not isinstance(target, model.LessonTarget | model.PageTarget) or not target.anchor:
         return ""
@@ -128,7 +133,7 @@ def equation_name(library: Library, path: str, target: model.Target) -> str:
 
 
 def file_address(place: urls.Place, path: str, url: str) -> str:
-    """An address as written, but a file of the course becomes its place in the site."""
+    """An address as written; that of a file of the course becomes its place in the site."""
     parts = urlsplit(url)
     if parts.scheme or parts.netloc or not parts.path:
         return url

@@ -29,12 +29,12 @@ from coursebuild.core.registry import model_parts, page_kind
 def draw(
     inputs: PageInputs, document: Document | None, renderer: Renderer
 ) -> tuple[PageHead, Markup, PageContext | None]:
-    """The head of the page, its body, and the context of its document.
+    """Draw a page: return its head, its body and the context of its document.
 
     The same values give the same page.
     """
     page: PageContext | None = None
-    values = {name: _drawn(value, renderer) for name, value in inputs.values.items()}
+    values = {name: _draw_value(value, renderer) for name, value in inputs.values.items()}
     head = inputs.head
     if document is not None and inputs.document_inputs is not None:
         page = PageContext(renderer, inputs.document_inputs, urls.Place(head.path), document)
@@ -49,7 +49,7 @@ def draw(
     return head, renderer.render(inputs.template, **values), page
 
 
-def _drawn(value: object, renderer: Renderer) -> object:
+def _draw_value(value: object, renderer: Renderer) -> object:
     match value:
         case HighlightedFile():
             return numbered_lines(highlight_lines(value.language, value.text), value.path)
@@ -57,14 +57,14 @@ def _drawn(value: object, renderer: Renderer) -> object:
             return drawings(value, renderer.words)
         case AddedParts():
             parts = model_parts()
-            drawn = (parts[name].draw(renderer, shown) for name, shown in value.values.items())
-            return Markup("").join(drawn)
+            html = (parts[name].draw(renderer, values) for name, values in value.values.items())
+            return Markup("").join(html)
         case _:
             return value
 
 
 def _first_sentences(document: Document) -> str:
-    """The first paragraph, cut at a word: what search engines show."""
+    """The first paragraph, cut at a word, for search engines."""
     first = next((b for b in document.blocks if isinstance(b, Paragraph)), None)
     text = " ".join(plain_text(first.children).split()) if first is not None else ""
     return text if len(text) <= 200 else text[:200].rsplit(" ", 1)[0] + " …"

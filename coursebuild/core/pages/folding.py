@@ -1,12 +1,12 @@
-"""Which parts of a long script a reader sees at first, and which are folded.
+"""Folding long scripts: which parts a reader sees at first.
 
-Entry points: `fold(code)`; `imported(code)`, the modules that it imports.
+Entry points: `fold(code)`; `find_imports(code)`, the modules that it imports.
 
-1. The code is cut at its top-level statements: a fold never begins or ends inside one.
-2. The head (docstring, imports, constants) is folded when it is long: the page around the script
-   has said what it is for.
-3. Of the rest as much is shown as fits `SHOWN` lines, from its start; what follows is folded, but
-   the `__main__` guard at the end is kept in sight, because it tells the story.
+1. A fold begins and ends between top-level statements.
+2. The head (docstring, imports, constants) is folded if it is long: the page around the script has
+   said what it is for.
+3. The rest is shown up to `SHOWN` lines and then folded, except for the `__main__` guard at the
+   end, which says what the script does.
 """
 
 from __future__ import annotations
@@ -18,14 +18,13 @@ import warnings
 from msgspec import Struct
 
 LONG = 48
-"""Lines; a script up to this length is shown whole."""
+"""Lines; a script up to this length is not folded."""
 HEAD = 8
 """Lines; a head shorter than this is not worth folding."""
 SHOWN = 44
-"""Lines of the rest that are shown, about."""
+"""About how many lines of the rest are shown."""
 TAIL = 12
-"""Lines; a `__main__` guard up to this length stays in sight, and a fold shorter than this is not
-made."""
+"""Lines; a `__main__` guard up to this length is not folded, and no fold is shorter than this."""
 
 _DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
@@ -41,30 +40,30 @@ class Part(Struct, frozen=True):
     imports: bool = False
     """Whether it holds imports."""
     names: tuple[str, ...] = ()
-    """Names that are defined in it."""
+    """Names that it defines."""
 
 
 def fold(code: str) -> tuple[Part, ...]:
-    """The parts of a script; a short one, and one that does not parse, is one part in sight."""
-    return _read(code)[0]
+    """The parts of a script; a short one, or one that does not parse, is a single part."""
+    return _analyse(code)[0]
 
 
-def imported(code: str) -> frozenset[str]:
-    """Top-level modules that a Python text imports by name; none where it does not parse."""
-    return _read(code.rstrip("\n"))[1]  # as it is drawn
+def find_imports(code: str) -> frozenset[str]:
+    """The top-level modules that a Python text imports; none if it does not parse."""
+    return _analyse(code.rstrip("\n"))[1]  # so that drawing it finds it in the cache
 
 
 @functools.lru_cache(maxsize=1024)
-def _read(code: str) -> tuple[tuple[Part, ...], frozenset[str]]:
-    """The parts and the modules: when a lesson is read and when it is drawn, each is asked for."""
+def _analyse(code: str) -> tuple[tuple[Part, ...], frozenset[str]]:
+    """The parts and the modules; both are needed, as a lesson is read and as it is drawn."""
     body = _statements(code)
     lines = code.removesuffix("\n").split("\n")
-    parts = _cut(body, lines) if len(lines) > LONG else (Part(1, len(lines), folded=False),)
+    parts = _fold_long(body, lines) if len(lines) > LONG else (Part(1, len(lines), folded=False),)
     return parts, _modules(body)
 
 
 def _statements(code: str) -> list[ast.stmt]:
-    """The statements of a text; none where it does not parse."""
+    """The statements of a text; none if it does not parse."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -74,61 +73,64 @@ def _statements(code: str) -> list[ast.stmt]:
 
 
 def _modules(body: list[ast.stmt]) -> frozenset[str]:
-    """Top-level modules that statements import by name."""
-    found: set[str] = set()
-    waiting: list[ast.AST] = [*body]
-    while waiting:
-        node = waiting.pop()
+    """The top-level modules that statements import by name."""
+    modules: set[str] = set()
+    stack: list[ast.AST] = [*body]
+    while stack:
+        node = stack.pop()
         if isinstance(node, ast.Import):
-            found.update(alias.name.partition(".")[0] for alias in node.names)
+            modules.update(alias.name.partition(".")[0] for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             if node.module and not node.level:
-                found.add(node.module.partition(".")[0])
+                modules.add(node.module.partition(".")[0])
         else:
             for name in ("body", "orelse", "finalbody", "handlers", "cases"):
-                waiting += getattr(node, name, None) or ()
-    return frozenset(found)
+                stack += getattr(node, name, None) or ()
+    return frozenset(modules)
 
 
-def _cut(body: list[ast.stmt], lines: list[str]) -> tuple[Part, ...]:
+def _fold_long(body: list[ast.stmt], lines: list[str]) -> tuple[Part, ...]:
     """The parts of a long script."""
-    whole = (Part(1, len(lines), folded=False),)
+    unfolded = (Part(1, len(lines), folded=False),)
     starts = [_start(statement) for statement in body]
     if not body or len(set(starts)) != len(starts):
-        return whole
+        return unfolded
     cuts = [*(_with_comments(lines, start) for start in starts), len(lines) + 1]
     head = _head_length(body)
     if head == len(body) or cuts[head] - 1 < HEAD:
-        return _rest(body, [1, *cuts[1:]], lines)
-    return (_folded(1, cuts[head] - 1, body[:head]), *_rest(body[head:], cuts[head:], lines))
+        return _fold_rest(body, [1, *cuts[1:]], lines)
+    return (
+        _folded_part(1, cuts[head] - 1, body[:head]),
+        *_fold_rest(body[head:], cuts[head:], lines),
+    )
 
 
-def _rest(body: list[ast.stmt], cuts: list[int], lines: list[str]) -> tuple[Part, ...]:
-    """The parts after the head: shown, perhaps folded, perhaps the guard.
+def _fold_rest(body: list[ast.stmt], cuts: list[int], lines: list[str]) -> tuple[Part, ...]:
+    """The parts after the head: a visible one, perhaps a folded one, perhaps the guard.
 
     Statement `i` has the lines from `cuts[i]` to before `cuts[i + 1]`. Blank lines at the border of
     a fold belong to the fold.
     """
     first, total = cuts[0], len(lines)
-    shown = 1
-    while shown < len(body) and cuts[shown + 1] - first <= SHOWN:
-        shown += 1
-    guarded = shown < len(body) and _is_guard(body[-1]) and total - cuts[-2] < TAIL
-    stop = len(body) - 1 if guarded else len(body)
-    end = cuts[shown] - 1
+    shown_count = 1
+    while shown_count < len(body) and cuts[shown_count + 1] - first <= SHOWN:
+        shown_count += 1
+    has_guard = shown_count < len(body) and _is_guard(body[-1]) and total - cuts[-2] < TAIL
+    stop = len(body) - 1 if has_guard else len(body)
+    end = cuts[shown_count] - 1
     while end > first and not lines[end - 1].strip():
         end -= 1
     if cuts[stop] - 1 - end < TAIL:
         return (Part(first, total, folded=False),)
-    guard = (Part(cuts[stop], total, folded=False),) if guarded else ()
+    guard = (Part(cuts[stop], total, folded=False),) if has_guard else ()
     return (
         Part(first, end, folded=False),
-        _folded(end + 1, cuts[stop] - 1, body[shown:stop]),
+        _folded_part(end + 1, cuts[stop] - 1, body[shown_count:stop]),
         *guard,
     )
 
 
-def _folded(first: int, last: int, body: list[ast.stmt]) -> Part:
+def _folded_part(first: int, last: int, body: list[ast.stmt]) -> Part:
     docstring = _is_docstring(body[0]) if first == 1 else False
     imports = any(isinstance(statement, ast.Import | ast.ImportFrom) for statement in body)
     return Part(first, last, True, docstring, imports, _names(body))
@@ -142,16 +144,16 @@ def _start(statement: ast.stmt) -> int:
 
 
 def _with_comments(lines: list[str], start: int) -> int:
-    """The line from which a statement's own comments begin."""
+    """The line where the comments above a statement begin."""
     while start > 1 and lines[start - 2].startswith("#"):
         start -= 1
     return start
 
 
 def _head_length(body: list[ast.stmt]) -> int:
-    """How many statements stand before the script's own: docstring, imports, constants.
+    """How many statements the head has: docstring, imports, constants.
 
-    Assignments are constants where they stand before the first definition and nothing is done yet.
+    Assignments are constants if only assignments come before the first definition.
     """
     count = int(_is_docstring(body[0]))
     while count < len(body) and isinstance(body[count], ast.Import | ast.ImportFrom):

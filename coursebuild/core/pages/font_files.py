@@ -1,6 +1,6 @@
-"""What a font file says of itself.
+"""Reading font files.
 
-Entry points: `course_face`, a font of the course's own; `measured`.
+Entry points: `course_face`, for a font of the course's own; `measure_font`.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ if TYPE_CHECKING:
 
 PER_MILLE = "183 103 75 65 62 57 57 53 50 50 33 33 23 22 20 20 17 16 15 14 13 8 6 1 1 1 1"
 FREQUENCY = dict(zip(" etaoinsrhldcumfwgpybvkxjqz", map(int, PER_MILLE.split()), strict=True))
-"""How often characters stand in English text, per thousand."""
+"""The frequency of characters in English text, per thousand."""
 
 
 @functools.lru_cache(maxsize=16)
 def course_face(use: str, name: str, data: bytes) -> tuple[Face, bytes] | str:
-    """The face of a font file, and its bytes uncompressed; why there is none, in words."""
+    """The face of a font file and its uncompressed bytes, or words for what is wrong."""
     from fontTools.ttLib import TTFont
 
     try:
         with TTFont(io.BytesIO(data), recalcTimestamp=False) as font:
-            measure, characters = measured(font), unicode_range("".join(map(chr, _codes(font))))
+            measure, characters = measure_font(font), unicode_range("".join(map(chr, _codes(font))))
             italic = bool(font["OS/2"].fsSelection & 1 or font["post"].italicAngle)
             weight = _weights(font)
             font.flavor = None
             whole = io.BytesIO()
             font.save(whole)
-    except Exception as error:  # whatever fontTools raises for what is no font, or a damaged one
+    except Exception as error:  # fontTools raises many kinds for damaged files
         return f"cannot be read as a font: {error or type(error).__name__}"
     subset, style = "latin" if measure else "other", "italic" if italic else "normal"
     face = Face(COURSE[use], subset, name, style, weight, characters, characters, measure)
@@ -44,7 +44,7 @@ def _codes(font: TTFont) -> list[int]:
 
 
 def _weights(font: TTFont) -> tuple[int, int]:
-    """The lightest and the boldest."""
+    """The least and the greatest weight."""
     for axis in font["fvar"].axes if "fvar" in font else ():
         if axis.axisTag == "wght":
             return round(axis.minValue), round(axis.maxValue)
@@ -52,10 +52,10 @@ def _weights(font: TTFont) -> tuple[int, int]:
     return weight, weight
 
 
-def measured(font: TTFont) -> tuple[float, float, float, float] | None:
+def measure_font(font: TTFont) -> tuple[float, float, float, float] | None:
     """Mean advance width, weighted by `FREQUENCY`, ascent, descent and line gap of a font, in em.
 
-    Nothing for a font without the letters of `FREQUENCY`.
+    `None` for a font without the letters of `FREQUENCY`.
     """
     names, advances = font.getBestCmap(), font["hmtx"]
     if not all(ord(c) in names for c in FREQUENCY):

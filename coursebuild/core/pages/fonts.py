@@ -1,20 +1,19 @@
-"""Fonts cut down to the characters that a site uses, and fallbacks of the same measure.
+"""Fonts cut down to the characters that a site uses, and fallbacks with the same metrics.
 
-Entry points: `read_faces`, `font_jobs` (which files to make, from which characters), `subset_font`
-(one job, bytes to bytes), `face_rules` (the `@font-face` rules).
+Entry points: `read_faces`; `font_jobs`, which fonts to cut to which characters; `subset_font`,
+which does one job, bytes to bytes; `face_rules`, the `@font-face` rules.
 
 1. A face is a font of the bundle with its family, style, range of weights and characters.
-   `site/prepare_fonts.py` has done what does not depend on a course: of a font only the weights are
-   there that the style sheet asks for, and it is not compressed.
-2. A job keeps of a face what the pages use; a face of which they use nothing is left out. HarfBuzz
-   chooses the glyphs, of a font for mathematics with all variants and pieces of brackets; fontTools
+   `site/prepare_fonts.py` has done what does not depend on a course: it has left only the weights
+   that the style sheet uses, and decompressed the font.
+2. A job keeps the characters of a face that the pages use; an unused face is left out. HarfBuzz
+   chooses the glyphs (for mathematics with all variants and pieces of brackets), and fontTools
    compresses them.
-3. While a font loads, text is set in a local one, scaled so that lines break and stand as they
-   will: see `FALLBACKS`.
+3. While a font loads, text is set in a local one, scaled so that lines break in the same places:
+   see `FALLBACKS`.
+4. The course's own fonts come first: the tool's are used only for the characters that they lack.
 
-4. Fonts of the course's own come first: of the tool's only the characters are used that they lack.
-
-A job's `key` names its result: who calls may keep results by it.
+A job's `key` identifies its result, so that callers can keep results by it.
 """
 
 from __future__ import annotations
@@ -28,17 +27,17 @@ import msgspec
 from msgspec import Struct
 
 TEXT, CODE, MATH = "Source Serif 4 Variable", "Source Code Pro Variable", "STIX Two Math"
-"""Families, as the bundle names them."""
+"""Families, by their names in the bundle."""
 COURSE = {"text": "Course Text", "interface": "Course Interface", "code": "Course Code"}
-"""The families of a course's own fonts in the style sheet, by what is set in them."""
+"""The families of a course's own fonts in the style sheet, by use."""
 _OWN = {TEXT: COURSE["text"], CODE: COURSE["code"]}
-"""Those that come before families of the bundle."""
+"""The course's families that come before families of the bundle."""
 
 BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·¹½×éöü–—‘’“”…•−")
 """Characters that are always kept, so that few edits change a font."""
 
 _VERSION = 6
-"""Part of a job's key: to be raised when the way of cutting changes."""
+"""Part of a job's key; increase it when the way of cutting changes."""
 
 
 class Face(Struct, frozen=True):
@@ -50,12 +49,12 @@ class Face(Struct, frozen=True):
     style: str
     weight: tuple[int, int]
     unicode_range: str | None
-    """CSS syntax; `None`: the whole font."""
+    """In CSS syntax; `None` for the whole font."""
     characters: str
-    """Those that it has a glyph for, as a `unicode-range`."""
+    """The characters that it has glyphs for, as a `unicode-range`."""
     measure: tuple[float, float, float, float] | None = None
-    """Mean advance width of English text, ascent, descent and line gap, in em; nothing for a font
-    without the letters."""
+    """Mean advance width of English text, ascent, descent and line gap, in em; `None` for a font
+    without Latin letters."""
 
 
 class FontJob(Struct, frozen=True):
@@ -68,7 +67,7 @@ class FontJob(Struct, frozen=True):
 
     @property
     def key(self) -> str:
-        """A name for the result: the same key, the same bytes."""
+        """The key of the result: the same key means the same bytes."""
         digest = hashlib.sha256(self.data)
         digest.update(f"{_VERSION}/{self.characters}".encode())
         return digest.hexdigest()
@@ -83,7 +82,7 @@ def font_jobs(
     faces: Iterable[tuple[Face, bytes]],
     text: str,
     mathematics: str,
-    own: Iterable[tuple[Face, bytes]] = (),
+    course_faces: Iterable[tuple[Face, bytes]] = (),
 ) -> tuple[FontJob, ...]:
     """What to cut for pages that use the characters of `text`, and of `mathematics` in formulas.
 
@@ -91,35 +90,35 @@ def font_jobs(
     """
     jobs: list[FontJob] = []
     letters = BASE | set(text)
-    theirs: dict[str, set[str]] = {}
-    for face, data in own:
-        shown = letters & characters_in(face.characters)
-        jobs.append(FontJob(face, data, "".join(sorted(shown))))
-        theirs.setdefault(face.family, set()).update(shown)
-    given: dict[tuple[str, str], set[str]] = {}
+    course_characters: dict[str, set[str]] = {}
+    for face, data in course_faces:
+        used = letters & characters_in(face.characters)
+        jobs.append(FontJob(face, data, "".join(sorted(used))))
+        course_characters.setdefault(face.family, set()).update(used)
+    assigned: dict[tuple[str, str], set[str]] = {}
     for face, data in faces:
-        lacking = letters - theirs.get(_OWN.get(face.family, ""), set())
-        wanted = lacking if face.family != MATH else _mathematical(mathematics)
-        taken = given.setdefault((face.family, face.style), set())
-        kept = (wanted & characters_in(face.characters)) - taken
+        missing = letters - course_characters.get(_OWN.get(face.family, ""), set())
+        needed = missing if face.family != MATH else _mathematical(mathematics)
+        assigned_characters = assigned.setdefault((face.family, face.style), set())
+        characters = (needed & characters_in(face.characters)) - assigned_characters
         if face.unicode_range is not None:
-            kept &= characters_in(face.unicode_range)
-        if kept and (mathematics or face.family != MATH):
-            taken |= kept
-            jobs.append(FontJob(face, data, "".join(sorted(kept))))
+            characters &= characters_in(face.unicode_range)
+        if characters and (mathematics or face.family != MATH):
+            assigned_characters |= characters
+            jobs.append(FontJob(face, data, "".join(sorted(characters))))
     return tuple(jobs)
 
 
 @functools.lru_cache(maxsize=64)
 def characters_in(unicode_range: str) -> frozenset[str]:
     """The characters of a CSS `unicode-range`."""
-    found: set[str] = set()
+    characters: set[str] = set()
     for part in unicode_range.split(","):
         first, _, last = part.strip().upper().removeprefix("U+").partition("-")
         start = int(first.replace("?", "0"), 16)
         end = int(last or first.replace("?", "F"), 16)
-        found.update(map(chr, range(start, end + 1)))
-    return frozenset(found)
+        characters.update(map(chr, range(start, end + 1)))
+    return frozenset(characters)
 
 
 def unicode_range(characters: str) -> str:
@@ -134,13 +133,13 @@ def unicode_range(characters: str) -> str:
 
 
 def _mathematical(characters: str) -> set[str]:
-    """Characters of formulas with the italics that a browser makes of single letters."""
-    wanted = {*characters, *map(chr, range(0x20, 0x7F)), RADICAL}
-    return wanted | {italic for c in wanted if (italic := italic_letter(c))}
+    """Characters of formulas, with the italics that a browser replaces single letters by."""
+    characters_ = {*characters, *map(chr, range(0x20, 0x7F)), RADICAL}
+    return characters_ | {italic for c in characters_ if (italic := italic_letter(c))}
 
 
 def italic_letter(character: str) -> str:
-    """The italic that `<mi>` sets a letter in, or nothing (MathML Core, appendix C)."""
+    """The italic that `<mi>` replaces a letter by; empty if none (MathML Core, appendix C)."""
     code = ord(character)
     if character == "h":
         return "\u210e"
@@ -156,7 +155,7 @@ def italic_letter(character: str) -> str:
 
 
 RADICAL = "√"
-"""Drawn for roots without standing in their text."""
+"""The sign of roots, which is drawn though it is not in their text."""
 
 _ITALIC_SYMBOLS = {
     "ı": "\U0001d6a4",
@@ -175,20 +174,20 @@ _ITALIC_SYMBOLS = {
 
 def subset_font(job: FontJob) -> bytes:
     """The font with the job's characters only, as WOFF2. The same job gives the same bytes."""
-    import uharfbuzz  # which a run without a new font does not need
+    import uharfbuzz  # needed only by a run with a new font
     from fontTools.ttLib import TTFont
 
-    wanted = uharfbuzz.SubsetInput()
-    wanted.flags = uharfbuzz.SubsetFlags.NO_HINTING | uharfbuzz.SubsetFlags.NOTDEF_OUTLINE
-    wanted.unicode_set.update(map(ord, job.characters))
-    for everything in (
-        wanted.layout_feature_tag_set,
-        wanted.name_id_set,
-        wanted.name_lang_id_set,
+    subset = uharfbuzz.SubsetInput()
+    subset.flags = uharfbuzz.SubsetFlags.NO_HINTING | uharfbuzz.SubsetFlags.NOTDEF_OUTLINE
+    subset.unicode_set.update(map(ord, job.characters))
+    for tags in (
+        subset.layout_feature_tag_set,
+        subset.name_id_set,
+        subset.name_lang_id_set,
     ):
-        everything.clear()
-        everything.invert()
-    part = wanted.subset(uharfbuzz.Face(job.data)).blob.data
+        tags.clear()
+        tags.invert()
+    part = subset.subset(uharfbuzz.Face(job.data)).blob.data
     out = io.BytesIO()
     with TTFont(io.BytesIO(part), recalcTimestamp=False) as font:
         font.flavor = "woff2"
@@ -200,7 +199,7 @@ def subset_font(job: FontJob) -> bytes:
 
 
 class Fallback(Struct, frozen=True):
-    """Local fonts, alike in their advance widths, that stand in for a face until it is there."""
+    """Local fonts of equal widths that stand in for a face until it has loaded."""
 
     family: str
     """The web font."""
@@ -224,15 +223,15 @@ FALLBACKS = (
     ),
     Fallback(CODE, "normal", ("Courier New", "Liberation Mono", "Cousine"), 0.60010),
 )
-"""Of several for one face the last that a machine has is taken: browsers try later rules first.
+"""If several exist on a machine for one face, the last is used: browsers try later rules first.
 
 The widths are measured as `site/prepare_fonts.py` measures those of the web fonts; Liberation Serif
-and Liberation Mono are made to match the others beside them.
+and Liberation Mono have the widths of the fonts listed with them.
 """
 
 
 def face_rules(files: Iterable[tuple[FontJob, str]]) -> str:
-    """The `@font-face` rules of cut fonts, each with its address, and of their fallbacks."""
+    """The `@font-face` rules of fonts with their addresses, and of their fallbacks."""
     rules: list[str] = []
     files = tuple(files)
     for job, url in files:
@@ -251,7 +250,7 @@ def face_rules(files: Iterable[tuple[FontJob, str]]) -> str:
 
 
 def _fallback_rules(fallback: Fallback, files: Iterable[tuple[FontJob, str]]) -> tuple[str, ...]:
-    """The rule of a fallback, scaled to the face with the Latin letters, where that is used."""
+    """The rule of a fallback, scaled to the face with the Latin letters, if that is used."""
     families = fallback.family, _OWN[fallback.family]
     for job, _ in files:
         face = job.face

@@ -1,18 +1,16 @@
-"""Formulas in a line of text: where the line may break, and where it must not.
+"""Inline formulas: where a line may break, and where it must not.
 
-Entry points: `in_line(mathml, label)`, of which `breakable` and `contained` are the steps, for a
-formula by itself; `glue(html)` for a whole page.
+Entry points: `inline_formula(mathml, label)`, for a single formula, with its steps `split_formula`
+and `wrap_wide_pieces`; `glue_formulas(html)`, for a whole page.
 
-A browser takes a `math` element for one unbreakable box that the line may break on either side of.
-So
+A browser never breaks a line inside a `math` element, but may do so on either side. Therefore
 
-1. a long formula is cut into several elements where TeX would break it too: after the relations and
-   the binary operators of its outermost level;
-2. a piece that may be wider than a narrow window scrolls inside itself;
-3. a formula is held together with the punctuation that touches it, and with a unit behind a space
-   that does not break;
-4. an operator at an end of a formula, next to a space of the text, brings no space of its own, as
-   in TeX.
+1. a long formula is split into several elements where TeX would break it too: after the relations
+   and binary operators of its outermost level;
+2. a piece that may be wider than a narrow window scrolls inside a box;
+3. a formula is kept together with adjacent punctuation, and with a unit after a no-break space;
+4. an operator at an end of a formula, next to a space of the text, gets no space of its own, as in
+   TeX.
 """
 
 from __future__ import annotations
@@ -23,12 +21,12 @@ from collections.abc import Iterator
 from html import escape, unescape
 
 LONG = 20
-"""Characters; a shorter formula stays whole."""
+"""Characters; a shorter formula is not split."""
 WIDE = 22
-"""Characters; a shorter piece fits the narrowest window."""
+"""Characters; a shorter piece fits into the narrowest window."""
 
 _REMEMBERED = 256
-"""Formulas: a text says the same ones again and again."""
+"""How many formulas are remembered: texts repeat them."""
 
 _ROW = re.compile(r"<(/?)mrow\b[^>]*>")
 _WHOLE = re.compile(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.DOTALL)
@@ -36,7 +34,7 @@ _ANNOTATION = re.compile(r"<annotation\b.*?</annotation>", re.DOTALL)
 _TAG = re.compile(r"<[^>]*>")
 _PIECE = re.compile(r"<math>.*?</math>", re.DOTALL)
 _OPENING = frozenset("([“‘\"'")
-_HOLD, _LOOSE = '<span class="held">', "</span>"
+_GLUE_START, _GLUE_END = '<span class="held">', "</span>"
 _TOUCHING = re.compile(
     r"""((?:<math>.*?</math>)+)((?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*)""", re.DOTALL
 )
@@ -54,13 +52,13 @@ _OPEN, _CLOSE, _BAR = frozenset("([{⟨⌊⌈"), frozenset(")]}⟩⌋⌉"), froz
 
 
 @functools.lru_cache(maxsize=_REMEMBERED)
-def in_line(mathml: str, label: str) -> str:
-    """An inline formula as it stands in its line: see 1 and 2."""
-    return contained(breakable(mathml), label)
+def inline_formula(mathml: str, label: str) -> str:
+    """An inline formula, split and with wide pieces in boxes (steps 1 and 2)."""
+    return wrap_wide_pieces(split_formula(mathml), label)
 
 
-def breakable(mathml: str) -> str:
-    """An inline formula that may break at its outermost level, if it is long; else as it is."""
+def split_formula(mathml: str) -> str:
+    """An inline formula, split at its outermost level if it is long (step 1)."""
     whole = _WHOLE.fullmatch(mathml)
     if whole is None or _length(mathml) < LONG:
         return mathml
@@ -90,7 +88,7 @@ def _outer_rows(text: str) -> list[str]:
 
 
 def _pieces(row: str) -> list[str]:
-    """The inside of a row, cut after relations and binary operators that no brackets enclose."""
+    """The inside of a row, split after relations and binary operators outside brackets."""
     pieces: list[str] = []
     start = depth = 0
     bars = False
@@ -112,7 +110,7 @@ def _pieces(row: str) -> list[str]:
 
 
 def _elements(row: str) -> Iterator[tuple[int, str]]:
-    """The elements next to each other in a row, each with the offset of its end."""
+    """The outermost elements in a row, each with the offset of its end."""
     start = depth = 0
     for tag in _TAG.finditer(row):
         if tag[0].startswith("</"):
@@ -124,8 +122,8 @@ def _elements(row: str) -> Iterator[tuple[int, str]]:
             start = tag.end()
 
 
-def contained(html: str, label: str) -> str:
-    """The pieces of an inline formula, the wide ones in boxes that scroll and have this label."""
+def wrap_wide_pieces(html: str, label: str) -> str:
+    """Put wide pieces of an inline formula into scrolling boxes with this label (step 2)."""
     start = f'<span class="formula-inline" tabindex="0" role="group" aria-label="{escape(label)}">'
 
     def boxed(piece: re.Match[str]) -> str:
@@ -134,51 +132,51 @@ def contained(html: str, label: str) -> str:
     return html if _length(html) < WIDE else _PIECE.sub(boxed, html)
 
 
-def glue(html: str) -> str:
-    """The page with each inline formula set to what stands beside it: see 3 and 4."""
-    html = _tight(html)
+def glue_formulas(html: str) -> str:
+    """Glue each inline formula of a page to its punctuation and unit (steps 3 and 4)."""
+    html = _remove_outer_space(html)
     parts: list[str] = []
-    at = 0
+    position = 0
     start = html.find("<math>")
     while start >= 0:
-        found = _TOUCHING.match(html, start)
-        if found is None:
+        match = _TOUCHING.match(html, start)
+        if match is None:
             break
         before = start
-        while before > at and html[before - 1] in _OPENING:
+        while before > position and html[before - 1] in _OPENING:
             before -= 1
-        if before < start or found[2]:
-            parts += (html[at:before], _held(html[before:start], found[1], found[2]))
-            at = found.end()
-        start = html.find("<math>", found.end())
-    return "".join((*parts, html[at:]))
+        if before < start or match[2]:
+            parts += (html[position:before], _glue_formula(html[before:start], match[1], match[2]))
+            position = match.end()
+        start = html.find("<math>", match.end())
+    return "".join((*parts, html[position:]))
 
 
-def _tight(html: str) -> str:
-    """The page without the spaces of operators at the ends of formulas, next to a space: see 4."""
+def _remove_outer_space(html: str) -> str:
+    """Remove the space of operators at the ends of formulas, next to a space (step 4)."""
     html = _FIRST.sub(r'\g<0> lspace="0em"', html)
     parts: list[str] = []
-    at = before = 0
+    position = previous_end = 0
     for end in _END.finditer(html):
-        # No other than the last operator before it; one before an earlier end is not its own.
-        start = html.rfind("<mo", before, end.start())
-        found = _LAST.match(html, start) if start >= 0 else None
-        before = end.end()
-        if found is not None:
-            parts += (html[at : found.end()], ' rspace="0em"')
-            at = found.end()
-    return "".join((*parts, html[at:]))
+        # The last operator before this end, unless it belongs to an earlier formula.
+        start = html.rfind("<mo", previous_end, end.start())
+        match = _LAST.match(html, start) if start >= 0 else None
+        previous_end = end.end()
+        if match is not None:
+            parts += (html[position : match.end()], ' rspace="0em"')
+            position = match.end()
+    return "".join((*parts, html[position:]))
 
 
-def _held(before: str, formula: str, after: str) -> str:
+def _glue_formula(before: str, formula: str, after: str) -> str:
     first, last = formula.find("</math><math>"), formula.rfind("</math><math>")
     if first < 0:
-        return _hold(before + formula + after)
+        return _glued(before + formula + after)
     head, tail = first + len("</math>"), last + len("</math>")
-    start = _hold(before + formula[:head]) if before else formula[:head]
-    end = _hold(formula[tail:] + after) if after else formula[tail:]
+    start = _glued(before + formula[:head]) if before else formula[:head]
+    end = _glued(formula[tail:] + after) if after else formula[tail:]
     return start + formula[head:tail] + end
 
 
-def _hold(html: str) -> str:
-    return f"{_HOLD}{html}{_LOOSE}"
+def _glued(html: str) -> str:
+    return f"{_GLUE_START}{html}{_GLUE_END}"

@@ -1,9 +1,9 @@
-"""A page without its frame, and the frame: head, site navigation, foot.
+"""The frame of pages: head, site navigation, foot.
 
-Entry point: `PageFrame`, what stands around the body of each page.
+Entry point: `PageFrame`, whose `render` puts the frame around the body of a page.
 
-Pages are drawn in two steps because a page's head names the style sheet by its content, and the
-style sheet holds the fonts' names, which depend on every character of every page.
+Pages are drawn in two steps because a page's head refers to the style sheet by a hash of its
+content, and the style sheet names the fonts, which depend on the characters of all pages.
 """
 
 from __future__ import annotations
@@ -54,25 +54,24 @@ class Names(Struct, frozen=True):
     credits: str
     touch_icon: str
     scripts: tuple[tuple[str, str], ...] = ()
-    """Of the parts of pages, by the mark of each (`PagePart`)."""
+    """The scripts of parts of pages, each after its mark (`PagePart`)."""
     logo: str = ""
     logo_dark: str = ""
     logo_width: int = 0
-    """In pixels, where it is `LOGO_HEIGHT` high."""
+    """In pixels, at the height `LOGO_HEIGHT`."""
 
     def paths(self) -> frozenset[str]:
-        """The site paths alone."""
-        named = (getattr(self, field) for field in self.__struct_fields__)
-        single = (path for path in named if isinstance(path, str) and path)
+        """All site paths."""
+        values = (getattr(self, field) for field in self.__struct_fields__)
+        single = (path for path in values if isinstance(path, str) and path)
         return frozenset((*single, *(path for _, path in self.scripts)))
 
 
 def policy(json_ld: str, *, form: bool = False) -> str:
-    """The Content-Security-Policy of a page: nothing from elsewhere, no code or style in the page.
+    """The Content-Security-Policy of a page: nothing from other hosts, no inline code or style.
 
-    Only a page with a `form` may send one, and only to this site.
-
-    Structured data is no code, but is named by its hash, since checkers take it for some.
+    Only a page with a `form` may send one, and only to this site. Structured data is not code, but
+    its hash is listed because checkers take it for code.
     """
     digest = base64.b64encode(hashlib.sha256(json_ld.encode()).digest()).decode()
     data = f" 'sha256-{digest}'" if json_ld else ""
@@ -103,35 +102,35 @@ def place_of(library: Library, path: str) -> urls.Place:
     return urls.Place(path, urls.base_path(library.course) if path == urls.NOT_FOUND else None)
 
 
-def known_parts() -> dict[str, PagePart]:
-    """What scripts bring to life, by its mark."""
+def parts_by_mark() -> dict[str, PagePart]:
+    """The parts that features add to pages, by mark."""
     return {part.mark: part for feature in features() for part in feature.parts}
 
 
 def parts_of(body: str, kind: str) -> tuple[str, ...]:
-    """The marks of the parts with scripts that a page of a kind has: `data-quiz=`."""
+    """The marks, such as `data-quiz=`, of the parts on a page of this kind."""
     return tuple(
         mark
-        for mark, part in known_parts().items()
+        for mark, part in parts_by_mark().items()
         if mark in body and (not part.kinds or kind in part.kinds)
     )
 
 
 class PageFrame(Struct, frozen=True):
-    """What stands around every page of a site."""
+    """The frame around every page of a site."""
 
     library: Library
     names: Names
 
-    def around(self, head: PageHead, parts: tuple[str, ...], body: str) -> str:
-        """The text of a page that has this body, and these parts; see `parts_of`."""
+    def render(self, head: PageHead, parts: tuple[str, ...], body: str) -> str:
+        """The whole page around a body that has these parts; see `parts_of`."""
         library, names = self.library, self.names
-        course, known = library.course, page_kind(head.kind)
+        course, kind = library.course, page_kind(head.kind)
         language, place = course.language or "en", place_of(library, head.path)
         html = library.render(
             "base.html",
             body=Markup(body),
-            policy=policy(head.json_ld, form=known is not None and known.form),
+            policy=policy(head.json_ld, form=kind is not None and kind.form),
             head_title=meta.head_title(course, head.title, head.kind),
             description=head.description,
             social=meta.social(course, head),
@@ -166,7 +165,7 @@ class PageFrame(Struct, frozen=True):
 
 
 def _logos(place: urls.Place, names: Names) -> tuple[tuple[str, str], ...]:
-    """Addresses of the logo, each with its class: two where dark pages have one of their own."""
+    """The address of the logo with its class, or two if dark pages have their own."""
     if names.logo and names.logo_dark:
         light, dark = place.href(names.logo), place.href(names.logo_dark)
         return (light, "figure-light"), (dark, "figure-dark")
@@ -175,34 +174,34 @@ def _logos(place: urls.Place, names: Names) -> tuple[tuple[str, str], ...]:
 
 
 def _copies(page: str) -> tuple[tuple[str, str], ...]:
-    """Media types and addresses of the copies that every page has."""
-    every = (copy for copy in page_copies() if not copy.lessons and urls.has_copies(page))
+    """The media types and addresses of a page's copies, without those of lessons only."""
+    copies = (copy for copy in page_copies() if not copy.lessons and urls.has_copies(page))
     place = urls.Place(page)
-    return tuple((copy.type, place.href(urls.copy_path(page, copy.ending))) for copy in every)
+    return tuple((copy.type, place.href(urls.copy_path(page, copy.ending))) for copy in copies)
 
 
 def _part_scripts(
     place: urls.Place, names: Names, parts: tuple[str, ...]
 ) -> tuple[tuple[str, str], ...]:
-    """The addresses of the scripts of parts, each after its name where it is loaded late."""
-    known, found = known_parts(), dict[str, str]()
+    """The addresses of the scripts of parts, each after its name if it is loaded late."""
+    known_parts, name_by_href = parts_by_mark(), dict[str, str]()
     for mark, path in names.scripts:
         if mark in parts:
-            part = known[mark]
-            found[place.href(path)] = part.bundled.removesuffix(".js") if part.late else ""
-    return tuple((name, href) for href, name in found.items())
+            part = known_parts[mark]
+            name_by_href[place.href(path)] = part.bundled.removesuffix(".js") if part.late else ""
+    return tuple((name, href) for href, name in name_by_href.items())
 
 
 def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:
-    """Keys of the texts that the page carries for its scripts."""
+    """The keys of the interface texts that the page carries for its scripts."""
     keys = library.words.texts
-    known = known_parts()
-    needed = [key for part in parts for key in known[part].texts]
-    begun = tuple(key for key in needed if key.endswith("."))
-    found = sorted(key for key in keys if begun and key.startswith(begun))
-    return (*PAGE_WORDS, *found, *(key for key in needed if key in keys))
+    known_parts = parts_by_mark()
+    used = [key for mark in parts for key in known_parts[mark].texts]
+    prefixes = tuple(key for key in used if key.endswith("."))
+    prefixed = sorted(key for key in keys if prefixes and key.startswith(prefixes))
+    return (*PAGE_WORDS, *prefixed, *(key for key in used if key in keys))
 
 
 def _links(place: urls.Place, pages: Iterable[tuple[str, str]]) -> tuple[NavLink, ...]:
-    """Links to pages by their paths, each with its title."""
+    """Links to pages, given by path and title."""
     return tuple(NavLink(place.href(path), title, path == place.path) for path, title in pages)

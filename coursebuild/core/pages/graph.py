@@ -1,11 +1,11 @@
-"""Which lessons build on which, as a small drawing: nodes are links, arrows lead on.
+"""Graphs of lessons that build on each other, as small drawings whose nodes are links.
 
-Entry points: `neighbourhood(library, place, lesson)`, the lessons around one; `of_level`, the
-lessons of a level with what they need from elsewhere; `drawings(graph, words)`, two of each, for
-wide and for narrow screens.
+Entry points: `neighbourhood(library, place, lesson)`, the lessons around one; `level_graph`, the
+lessons of a level with their prerequisites; `drawings(graph, words)`, one for wide and one for
+narrow screens.
 
-A drawing is never the only place that says it: the page lists the same lessons with their titles.
-Arrows that say no more than a longer way does are left out, and so are nodes that are too many.
+A drawing is never the only source: the page also lists the lessons with their titles. Arrows that a
+longer path implies are left out, and so are nodes beyond a limit.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import GraphNode, LessonGraph
 from coursebuild.core.pages.strings import Strings
 
-_BESIDE = 5
-"""Lessons that are shown of those that one needs, and of those that it leads to."""
-_AROUND = 12
-"""Lessons that a neighbourhood has at most, if those at one step are not more."""
-_IN_LEVEL = 40
-"""Lessons of a level that are drawn, and with those from elsewhere as many again."""
+_MOST_LINKED = 5
+"""The most prerequisites that are shown of a lesson, and the most lessons it leads to."""
+_MOST_NEIGHBOURS = 12
+"""The most lessons in a neighbourhood, unless direct neighbours alone are more."""
+_MOST_IN_LEVEL = 40
+"""The most lessons of a level in a drawing; as many again may be of other levels."""
 
 
 class _Look(Struct, frozen=True):
@@ -47,51 +47,53 @@ class _Look(Struct, frozen=True):
 _WIDE = _Look(132, 56, 12, 92, True)
 _NARROW = _Look(50, 30, 5, 58, False)
 _SIZE = 12.0
-"""Of letters."""
+"""The font size."""
 _LINE = 15.0
 _PASSING = 0.2
-"""Room for an arrow that passes a layer, in widths of nodes."""
+"""Room for an arrow that crosses a layer, in widths of nodes."""
 _EDGE = 2.0
 """Room for the lines around nodes at the edge of a drawing."""
 
 
 def neighbourhood(library: Library, place: urls.Place, lesson: Lesson) -> LessonGraph | None:
-    """What a lesson needs and leads to, and what comes before that; `None` for next to nothing."""
-    # The last few in the order of the course: what comes right before counts most.
-    needs = sorted(lesson.prerequisites, key=library.positions.__getitem__)[-_BESIDE:]
-    leads = [other.id for other in library.leads[lesson.id]][:_BESIDE]
-    shown = dict.fromkeys([lesson.id, *needs, *leads])
+    """The prerequisites of a lesson, theirs, and what it leads to; `None` if too few."""
+    # The last ones in the course, since the nearest prerequisites matter most.
+    needs = sorted(lesson.prerequisites, key=library.positions.__getitem__)[-_MOST_LINKED:]
+    leads = [follower.id for follower in library.leads[lesson.id]][:_MOST_LINKED]
+    ids = dict.fromkeys([lesson.id, *needs, *leads])
     for need in needs:
         for further in library.lessons[need].prerequisites:
-            if len(shown) < _AROUND:
-                shown.setdefault(further)
-    return _graph(library, place, shown, current=lesson.id) if len(shown) > 2 else None
+            if len(ids) < _MOST_NEIGHBOURS:
+                ids.setdefault(further)
+    return _graph(library, place, ids, current=lesson.id) if len(ids) > 2 else None
 
 
-def of_level(library: Library, place: urls.Place, level: Level) -> LessonGraph | None:
-    """The lessons of a level, and those of other levels that they need."""
-    own = dict.fromkeys(lesson.id for lesson in level.lessons)
-    if not 2 < len(own) <= _IN_LEVEL:
+def level_graph(library: Library, place: urls.Place, level: Level) -> LessonGraph | None:
+    """The lessons of a level, with their prerequisites of other levels."""
+    own_ids = dict.fromkeys(lesson.id for lesson in level.lessons)
+    if not 2 < len(own_ids) <= _MOST_IN_LEVEL:
         return None
-    others = dict.fromkeys(
-        need for lesson in level.lessons for need in lesson.prerequisites if need not in own
+    needed_ids = dict.fromkeys(
+        need for lesson in level.lessons for need in lesson.prerequisites if need not in own_ids
     )
-    shown = own | others if len(others) <= _IN_LEVEL else own
-    graph = _graph(library, place, shown, level=level.id)
+    ids = own_ids | needed_ids if len(needed_ids) <= _MOST_IN_LEVEL else own_ids
+    graph = _graph(library, place, ids, level=level.id)
     return graph if graph.edges else None
 
 
 def _graph(
     library: Library,
     place: urls.Place,
-    shown: Iterable[str],
+    wanted_ids: Iterable[str],
     *,
     current: str = "",
     level: str | None = None,
 ) -> LessonGraph:
-    lessons = [library.lessons[id] for id in sorted(shown, key=library.positions.__getitem__)]
+    lessons = [library.lessons[id] for id in sorted(wanted_ids, key=library.positions.__getitem__)]
     ids = [lesson.id for lesson in lessons]
-    edges = transitive_reduction(ids, ((n, one.id) for one in lessons for n in one.prerequisites))
+    edges = transitive_reduction(
+        ids, ((n, dependent.id) for dependent in lessons for n in dependent.prerequisites)
+    )
     return LessonGraph(
         tuple(
             GraphNode(
@@ -112,7 +114,7 @@ def _graph(
 
 
 def drawings(graph: LessonGraph, words: Strings) -> tuple[Markup, Markup]:
-    """The drawing with titles, and the one without; what is where is the same in both."""
+    """The drawing with titles and the one without, both with the same layout."""
     places = {node.id: str(number) for number, node in enumerate(graph.nodes)}
     layout = _layout(len(places), tuple((places[a], places[b]) for a, b in graph.edges))
     return _drawing(graph, layout, words, _WIDE), _drawing(graph, layout, words, _NARROW)
@@ -120,7 +122,7 @@ def drawings(graph: LessonGraph, words: Strings) -> tuple[Markup, Markup]:
 
 @functools.lru_cache(maxsize=256)
 def _layout(count: int, edges: tuple[tuple[str, str], ...]) -> Layout:
-    """The layout of a graph whose nodes are called by their numbers: many lessons stand alike."""
+    """The layout of a graph with numbered nodes, kept because many graphs are alike."""
     return layered_layout([str(number) for number in range(count)], edges, 1.0, 0.0, _PASSING)
 
 
@@ -136,8 +138,8 @@ def _drawing(graph: LessonGraph, layout: Layout, words: Strings, look: _Look) ->
         f' aria-label="{escape(words("graph.label"))}">',
         *_edges(layout, look, unit),
     ]
-    for node, placed in zip(graph.nodes, layout.nodes, strict=True):
-        x, top = _x(placed.x, unit, look), _EDGE + placed.layer * look.step
+    for node, placed_node in zip(graph.nodes, layout.nodes, strict=True):
+        x, top = _x(placed_node.x, unit, look), _EDGE + placed_node.layer * look.step
         parts.append(_node(node, _Box(x, top, wide, look.height), words, look))
     return Markup("".join((*parts, "</svg>")))
 
@@ -155,7 +157,7 @@ class _Box(Struct, frozen=True):
 
 
 def _edges(layout: Layout, look: _Look, unit: float) -> Iterator[str]:
-    """Lines from box to box, and their heads."""
+    """Lines from box to box, and arrowheads."""
     layer = {node.id: node.layer for node in layout.nodes}
     lines, heads = [], []
     for edge in layout.edges:
@@ -181,7 +183,7 @@ def _node(node: GraphNode, box: _Box, words: Strings, look: _Look) -> str:
     texts = _lines(node, box) if look.titles else []
     first = middle + 4.3 - len(texts) * _LINE / 2
     x, mark = box.x, (left + 10, box.top + 10)
-    if not look.titles:  # the mark stands on the line of the number
+    if not look.titles:  # the mark is on the line of the number
         x += 5.5
         mark = (x - text_width(node.id, _SIZE) / 2 - 7, middle)
     inner = [
@@ -197,14 +199,14 @@ def _node(node: GraphNode, box: _Box, words: Strings, look: _Look) -> str:
     if node.current:
         return f'<g class="{kinds} node-current">{content}</g>'
     name = ""
-    if not look.titles:  # else the texts say it
+    if not look.titles:  # otherwise the texts name it
         status = words(f"status.{node.status}")
         name = f' aria-label="{markup_text(f"{node.id} {node.title} ({status})")}"'
     return f'<a class="{kinds}" href="{escape(node.href)}"{name}>{content}</a>'
 
 
 def _mark(status: str, x: float, y: float) -> Iterator[str]:
-    """How far a lesson is, by a shape: full, half, or a ring."""
+    """The status of a lesson as a shape: a full or half disc, or a ring."""
     yield f'<circle class="ring" cx="{x:.1f}" cy="{y:.1f}" r="3.5"/>'
     if status == "complete":
         yield f'<circle class="done" cx="{x:.1f}" cy="{y:.1f}" r="3.5"/>'
@@ -213,7 +215,7 @@ def _mark(status: str, x: float, y: float) -> Iterator[str]:
 
 
 def _lines(node: GraphNode, box: _Box) -> list[str]:
-    """The title in two lines at most."""
+    """The title in at most two lines."""
     room = box.width - 12
     words = node.title.split()
     first = ""

@@ -1,4 +1,4 @@
-"""The page of a lesson: where it stands, what it needs and gives, its text, and the way on.
+"""The page of a lesson: its place in the course, prerequisites, text, and neighbours.
 
 Entry points: `lesson_inputs`, and for a planned lesson `stub_inputs`.
 """
@@ -19,7 +19,7 @@ from coursebuild.core.registry import page_copies
 
 
 class LessonLink(Struct, frozen=True):
-    """A lesson as other pages name it, and as its own does."""
+    """A lesson as pages show it, its own page included."""
 
     id: str
     title: str
@@ -32,7 +32,7 @@ class LessonLink(Struct, frozen=True):
     objectives: tuple[str, ...] = ()
     aliases: tuple[str, ...] = ()
     """Other names, which no page shows."""
-    asked: str = ""
+    quiz_index: str = ""
     """Its questions; see `quiz_index`."""
 
 
@@ -44,13 +44,13 @@ class LevelView(Struct, frozen=True):
     summary: str
     href: str
     lessons: tuple[LessonLink, ...]
-    written: int
+    written_count: int
 
 
 def lesson_link(
     library: Library, place: urls.Place, lesson: Lesson, *, whole: bool = False
 ) -> LessonLink:
-    """A lesson as a link from a place; with `whole`, all that is known of it."""
+    """A lesson as a link from a place; with `whole`, with all its details."""
     link = LessonLink(
         lesson.id,
         lesson.title,
@@ -67,14 +67,14 @@ def lesson_link(
         needs=tuple(lesson_link(library, place, library.lessons[n]) for n in lesson.prerequisites),
         objectives=lesson.objectives,
         aliases=lesson.aliases,
-        asked=library.asked.get(lesson.path, ""),
+        quiz_index=library.quiz_index.get(lesson.path, ""),
     )
 
 
 def level_view(
     library: Library, place: urls.Place, level: Level, *, whole: bool = False
 ) -> LevelView:
-    """A level with its lessons, as seen from a place; `whole` as in `lesson_link`."""
+    """A level with its lessons, linked from a place; `whole` as in `lesson_link`."""
     return LevelView(
         level.id,
         level.title,
@@ -86,7 +86,7 @@ def level_view(
 
 
 def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageInputs:
-    """What the page of a written lesson shows; its document's summary is enough."""
+    """The inputs of the page of a written lesson; its document's summary is enough."""
     place = urls.Place(urls.lesson_path(lesson))
     scripts = tuple((script.path, place.href(script.path)) for script in document_scripts(document))
     values = {
@@ -110,47 +110,54 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
 
 
 def stub_inputs(library: Library, lesson: Lesson) -> PageInputs:
-    """What the page of a planned lesson shows: that it is planned, and what can be read now."""
+    """The inputs of the page of a planned lesson, with the lessons to read meanwhile."""
     place = urls.Place(urls.lesson_path(lesson))
-    written = [need for need in _ancestors(library, lesson) if need.document is not None]
-    readable = tuple(lesson_link(library, place, need) for need in written)
+    readable = tuple(
+        lesson_link(library, place, need)
+        for need in _ancestors(library, lesson)
+        if need.document is not None
+    )
     values = {**_common(library, place, lesson), "readable": readable}
     head = PageHead(place.path, "stub", lesson.title, lesson.summary, indexed=False)
     return PageInputs(head, "stub.html", values)
 
 
 def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, object]:
-    """What a lesson's page says whether it is written or not."""
-    order, at = library.order, library.positions[lesson.id]
+    """The values that the pages of written and planned lessons share."""
+    order, position = library.order, library.positions[lesson.id]
     return {
         "lesson": lesson_link(library, place, lesson, whole=True),
         "level": level_view(library, place, library.levels[lesson.level]),
         "home": place.href(urls.HOME),
-        "leads": tuple(lesson_link(library, place, other) for other in library.leads[lesson.id]),
+        "leads": tuple(
+            lesson_link(library, place, follower) for follower in library.leads[lesson.id]
+        ),
         "graph": neighbourhood(library, place, lesson),
         "referrers": owner_links(library, place, library.referrers.get(lesson.id, ())),
-        "previous": lesson_link(library, place, order[at - 1]) if at else None,
-        "following": lesson_link(library, place, order[at + 1]) if at + 1 < len(order) else None,
+        "previous": lesson_link(library, place, order[position - 1]) if position else None,
+        "following": lesson_link(library, place, order[position + 1])
+        if position + 1 < len(order)
+        else None,
     }
 
 
 def _ancestors(library: Library, lesson: Lesson) -> tuple[Lesson, ...]:
-    """Everything that a lesson builds on, in the order of the course."""
-    found: set[str] = set()
-    waiting = list(lesson.prerequisites)
-    while waiting:
-        need = waiting.pop()
-        if need not in found:
-            found.add(need)
-            waiting += library.lessons[need].prerequisites
-    return tuple(other for other in library.order if other.id in found)
+    """All lessons that a lesson builds on, in the order of the course."""
+    ids: set[str] = set()
+    stack = list(lesson.prerequisites)
+    while stack:
+        need = stack.pop()
+        if need not in ids:
+            ids.add(need)
+            stack += library.lessons[need].prerequisites
+    return tuple(ancestor for ancestor in library.order if ancestor.id in ids)
 
 
 def edit_address(library: Library, path: str) -> str | None:
-    """Where a file of the course can be edited.
+    """The address where a file of the course can be edited.
 
-    `{path}` in the repository's address stands for the file; without it the address is that of a
-    repository on a host that keeps to the usual paths.
+    `{path}` in the repository's address stands for the file; without it, the address is that of a
+    repository on a host with the usual paths.
     """
     repository = library.course.repository
     if not repository:

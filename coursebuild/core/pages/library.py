@@ -1,7 +1,6 @@
-"""What a page may have to look up: the course by id, its results, words and templates.
+"""The library: a course, its results, words and templates, arranged for pages to look up.
 
-Entry point: `Library.of(course, results, assets)`. It is made once for a site and only read
-afterwards.
+Entry point: `Library.of(course, results, assets)`, made once for a site and only read afterwards.
 """
 
 from __future__ import annotations
@@ -60,7 +59,7 @@ from coursebuild.numerics.reports import Reports
 _OURS = {kind.name: kind for kind in CALLOUTS}
 
 BY_LAB, BY_SCRIPT, BY_LINK = WAYS = "model.by_lab", "model.by_script", "model.by_link"
-"""How a document uses a model: keys of interface texts, in the order in which a page says them."""
+"""How a document uses a model: keys of interface texts, in the order of pages."""
 
 
 class ModelUse(Struct, frozen=True):
@@ -68,11 +67,11 @@ class ModelUse(Struct, frozen=True):
 
     owner: Owner
     ways: tuple[str, ...]
-    """Of `WAYS`."""
+    """Some of `WAYS`."""
 
 
 class Library(Struct, frozen=True, dict=True):
-    """A course and its results, by name."""
+    """A course and its results, arranged by name."""
 
     course: Course
     results: Results
@@ -83,33 +82,33 @@ class Library(Struct, frozen=True, dict=True):
     pages: Mapping[str, Page]
     callouts: Mapping[str, CalloutKind]
     facts: Mapping[str, ModelFacts]
-    """What the models hold that compile, by name."""
+    """Facts about the models that compile, by name."""
     scripts: Mapping[str, tuple[Script, Owner]]
     """By path, in the order of the course."""
     runs: Mapping[str, ScriptRun]
     order: tuple[Lesson, ...]
     """All lessons in the order of the course."""
     positions: Mapping[str, int]
-    """Where a lesson stands in the order of the course, by id, from 0."""
+    """The position of a lesson in the course, by id, from 0."""
     leads: Mapping[str, tuple[Lesson, ...]]
-    """The lessons that need a lesson, by its id."""
+    """The lessons that build on a lesson, by its id."""
     uses: Mapping[str, tuple[ModelUse, ...]]
-    """Where a model is used, by its name, in the order of the course."""
+    """The documents that use a model, by its name, in the order of the course."""
     referrers: Mapping[str, tuple[Owner, ...]]
-    """Who links to a lesson, by its id, in the order of the course."""
+    """The lessons and pages that link to a lesson, by its id, in the order of the course."""
     terms: Mapping[str, Owner]
-    """Where a term is defined, by its id."""
-    asked: Mapping[str, str]
-    """The questions of documents that ask any, by their path; see `quiz_index`."""
-    tried: Mapping[tuple[str, int], Struct]
-    """What features show of what was tried, by path and offset of the block."""
-    feature_files: tuple[OutputFile, ...]
-    """What of that is files of the site."""
+    """The lesson or page that defines a term, by its id."""
+    quiz_index: Mapping[str, str]
+    """The questions of documents that have any, by path; see `quiz_index`."""
+    trial_values: Mapping[tuple[str, int], Struct]
+    """The values that features publish of trials, by path and offset of the block."""
+    trial_files: tuple[OutputFile, ...]
+    """The files that features publish of trials."""
     _formulas: Mapping[Formula, str | MathError]
     verdicts: Mapping[tuple[str, int], Verdict]
     """By path and offset of the recording."""
     reports: Reports
-    """What was measured on models and hard cases, as far as it fits the course."""
+    """The reports on models and hard cases that fit the course."""
 
     @classmethod
     def of(
@@ -121,19 +120,19 @@ class Library(Struct, frozen=True, dict=True):
         *,
         trials: PublishedTrials | None = None,
     ) -> Library:
-        """Look everything over once.
+        """Make the library of a course.
 
-        `trials` is what a site needs of what was tried, where it is known.
+        `trials` are the published results of trials, if they are known already.
         """
         questions: dict[str, str] = {}
         terms: dict[str, Owner] = {}
         referrers: dict[str, list[Owner]] = {}
         for owner, document in course.owned_documents:
-            text = quiz_index(document)  # while its blocks are at hand
+            text = quiz_index(document)  # now, while its blocks are in memory
             if text:
                 questions[document.source.path] = text
-            linked = links(course, document)
-            for id in {target.id for target in linked if isinstance(target, LessonTarget)}:
+            targets = links(course, document)
+            for id in {target.id for target in targets if isinstance(target, LessonTarget)}:
                 if not (isinstance(owner, Lesson) and owner.id == id):
                     referrers.setdefault(id, []).append(owner)
             for inline in document_inlines(document):
@@ -145,7 +144,9 @@ class Library(Struct, frozen=True, dict=True):
             course=course,
             results=results,
             words=strings_for(assets.templates, course.language),
-            templates=templates_of(assets.templates, assets.compiled, course.theme.template_texts),
+            templates=templates_of(
+                assets.templates, assets.compiled_templates, course.theme.template_texts
+            ),
             lessons={lesson.id: lesson for lesson in course.lessons},
             levels={level.id: level for level in course.levels},
             pages={page.id: page for page in course.pages},
@@ -154,14 +155,14 @@ class Library(Struct, frozen=True, dict=True):
             scripts=course_scripts(course),
             runs={run.path: run for run in results.runs},
             order=course.lessons,
-            positions={lesson.id: at for at, lesson in enumerate(course.lessons)},
+            positions={lesson.id: position for position, lesson in enumerate(course.lessons)},
             leads=_leads(course),
             uses=_uses(course),
-            referrers={id: tuple(found) for id, found in referrers.items()},
+            referrers={id: tuple(owners) for id, owners in referrers.items()},
             terms=terms,
-            asked=questions,
-            tried=_placed(course, trials),
-            feature_files=trials.files,
+            quiz_index=questions,
+            trial_values=_trial_values(course, trials),
+            trial_files=trials.files,
             _formulas=dict(results.formulas),
             verdicts={(v.recording.span.path, v.recording.span.start): v for v in results.verdicts},
             reports=reports or Reports(),
@@ -174,31 +175,31 @@ class Library(Struct, frozen=True, dict=True):
 
     @property
     def menu(self) -> tuple[Page, ...]:
-        """The pages in the menu of every page, beside the home page."""
+        """The pages in the menu of every page, besides the home page."""
         return tuple(page for page in self.course.pages if page.menu and not page.is_home)
 
     @property
     def gallery(self) -> str:
-        """The site path of the page of all models; empty where there are none, or one `index`."""
+        """The site path of the page of all models; empty without models, or with one `index`."""
         names = {model.name for model in self.course.models}
         return urls.MODELS if names and "index" not in names else ""
 
     def mathml(self, tex: str, display: bool) -> str:
-        """A formula; empty for one that cannot be set."""
+        """A formula as MathML; empty for one with an error."""
         return known_mathml(self._formulas)(tex, display)
 
     def summaries(self, feature: str) -> Iterator[tuple[Owner, Any]]:
-        """What a feature has of documents (`Feature.summary`), in the order of the course."""
+        """A feature's summaries of documents (`Feature.summary`), in the order of the course."""
         for owner, document in self.course.owned_documents:
-            known = document.summaries
-            if known is None:
-                known = summarize(document, self.mathml).value
-            if feature in known:
-                yield owner, known[feature]
+            values = document.summaries
+            if values is None:
+                values = summarize(document, self.mathml).value
+            if feature in values:
+                yield owner, values[feature]
 
     @property
     def renderer(self) -> Renderer:
-        """What pages are drawn with."""
+        """The renderer of pages."""
         return Renderer(self.words, self.templates, self._formulas)
 
     def render(self, template: str, **values: object) -> Markup:
@@ -206,11 +207,11 @@ class Library(Struct, frozen=True, dict=True):
         return self.renderer.render(template, **values)
 
     def verdict(self, recording: Recording) -> Verdict | None:
-        """How a recorded output compared with the run; `None` where nobody compared it."""
+        """The verdict on a recorded output; `None` if it was not compared."""
         return self.verdicts.get((recording.span.path, recording.span.start))
 
     def callout(self, name: str) -> CalloutKind:
-        """A kind of callout, in the course's own words where it has some."""
+        """A kind of callout, with the course's own label and promise if it has any."""
         ours, theirs = _OURS.get(name), self.callouts.get(name)
         label, promise = name.capitalize(), ""
         if ours is not None:
@@ -224,15 +225,19 @@ class Library(Struct, frozen=True, dict=True):
         return CalloutKind(name, label, promise)
 
 
-def _placed(course: Course, trials: PublishedTrials) -> dict[tuple[str, int], Struct]:
-    """What is shown of trials, by the places of their blocks: one that moved stays the same."""
-    found = feature_trials(course) if trials.values else {}
-    spans = {name: trial.block.span for name, (_, trial) in found.items() if name in trials.values}
+def _trial_values(course: Course, trials: PublishedTrials) -> dict[tuple[str, int], Struct]:
+    """The published values of trials, by the places of their blocks."""
+    trials_by_name = feature_trials(course) if trials.values else {}
+    spans = {
+        name: trial.block.span
+        for name, (_, trial) in trials_by_name.items()
+        if name in trials.values
+    }
     return {(span.path, span.start): trials.values[name] for name, span in spans.items()}
 
 
 def links(course: Course, document: Document) -> Iterator[Target]:
-    """Where the links of a document lead."""
+    """The targets of the links in a document."""
     for inline in document_inlines(document):
         if isinstance(inline, Link):
             yield resolve(inline.target, course, document.source.path)
@@ -245,20 +250,20 @@ _MODEL_NAMED = re.compile(
 
 
 def models_named(script: Script) -> frozenset[str]:
-    """What may be models in a script.
+    """The names in a script that may be models.
 
-    What it asks `model_path` for, files that it names, and words that stand in quotes by
-    themselves, which a function of its own may hand on to `model_path`.
+    They are arguments of `model_path`, names of files, and single words in quotes, which a function
+    of the script may pass on to `model_path`.
     """
-    found: set[str] = set()
+    names: set[str] = set()
     for match in _MODEL_NAMED.finditer(script.code.text):
         name = (match["name"] or match["file"] or match["word"]).removesuffix(".xml")
-        found.add(name.removeprefix("models/"))
-    return frozenset(found)
+        names.add(name.removeprefix("models/"))
+    return frozenset(names)
 
 
 def _named_models(document: Document) -> dict[str, set[str]]:
-    """What a document names that may be models, each with the ways in which it uses them."""
+    """The names in a document that may be models, with the ways in which it uses them."""
 
     def collect() -> dict[str, set[str]]:
         ways_by_name: dict[str, set[str]] = {}
@@ -282,27 +287,29 @@ def _model_names(document: Document) -> Iterator[tuple[str, str]]:
 
 
 def course_scripts(course: Course) -> dict[str, tuple[Script, Owner]]:
-    """The scripts of a course by path, in order; of two with one path, the first."""
-    found: dict[str, tuple[Script, Owner]] = {}
+    """The scripts of a course by path, in order; of two with the same path, the first."""
+    scripts: dict[str, tuple[Script, Owner]] = {}
     for owner, document in course.owned_documents:
         for script in document_scripts(document):
-            found.setdefault(script.path, (script, owner))
-    return found
+            scripts.setdefault(script.path, (script, owner))
+    return scripts
 
 
 def _leads(course: Course) -> dict[str, tuple[Lesson, ...]]:
-    found: dict[str, list[Lesson]] = {lesson.id: [] for lesson in course.lessons}
+    lessons_by_need: dict[str, list[Lesson]] = {lesson.id: [] for lesson in course.lessons}
     for lesson in course.lessons:
         for need in lesson.prerequisites:
-            found[need].append(lesson)
-    return {id: tuple(lessons) for id, lessons in found.items()}
+            lessons_by_need[need].append(lesson)
+    return {id: tuple(lessons) for id, lessons in lessons_by_need.items()}
 
 
 def _uses(course: Course) -> dict[str, tuple[ModelUse, ...]]:
-    """Where each model is used."""
-    found: dict[str, list[ModelUse]] = {model.name: [] for model in course.models}
-    for owner, document in course.owned_documents if found else ():
+    """The uses of each model."""
+    uses_by_model: dict[str, list[ModelUse]] = {model.name: [] for model in course.models}
+    for owner, document in course.owned_documents if uses_by_model else ():
         for name, ways in _named_models(document).items():
-            if name in found:
-                found[name].append(ModelUse(owner, tuple(way for way in WAYS if way in ways)))
-    return {name: tuple(uses) for name, uses in found.items()}
+            if name in uses_by_model:
+                uses_by_model[name].append(
+                    ModelUse(owner, tuple(way for way in WAYS if way in ways))
+                )
+    return {name: tuple(uses) for name, uses in uses_by_model.items()}

@@ -1,7 +1,6 @@
-"""The pages around the lessons: home, levels, models, other pages, and that of missing addresses.
+"""The inputs of all pages but lessons: home, levels, models, further pages, missing addresses.
 
-Entry points: `home_inputs`, `level_inputs`, `model_inputs`, `page_inputs`, `not_found_inputs`, what
-each shows.
+Entry points: `home_inputs`, `level_inputs`, `model_inputs`, `page_inputs`, `not_found_inputs`.
 """
 
 from __future__ import annotations
@@ -14,10 +13,10 @@ from coursebuild.core.features import ModelPart
 from coursebuild.core.model import Document, Lesson, Level, MjcfModel, Page, listing_anchor
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.pages import meta, urls
-from coursebuild.core.pages.cards import PictureLink, galleries, lesson_cards
+from coursebuild.core.pages.cards import PictureLink, lesson_cards, list_galleries
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.frame import place_of
-from coursebuild.core.pages.graph import of_level
+from coursebuild.core.pages.graph import level_graph
 from coursebuild.core.pages.lesson import LessonLink, edit_address, lesson_link, level_view
 from coursebuild.core.pages.library import Library, ModelUse
 from coursebuild.core.pages.page_inputs import AddedParts, HighlightedFile, PageHead, PageInputs
@@ -25,8 +24,8 @@ from coursebuild.core.pages.quantities import number
 from coursebuild.core.registry import model_parts
 
 
-class Named(Struct, frozen=True):
-    """A link with its text, and a remark on it."""
+class NamedLink(Struct, frozen=True):
+    """A link with its text and a remark."""
 
     href: str
     text: str
@@ -37,7 +36,7 @@ class ModelCard(Struct, frozen=True):
     """A model in the gallery."""
 
     name: str
-    about: str
+    description: str
     href: str
     picture: PictureLink | None
     lessons: tuple[LessonLink, ...]
@@ -45,22 +44,22 @@ class ModelCard(Struct, frozen=True):
 
 
 def home_inputs(library: Library, document: Document | None) -> PageInputs:
-    """What the home page shows: what can be read, and the whole plan.
+    """The inputs of the home page: what can be read, and the whole plan.
 
     The document of the page `home` opens it, if there is one; its summary is enough.
     """
     course = library.course
     place = urls.Place(urls.HOME)
-    written = [lesson for lesson in library.order if lesson.document is not None]
+    written_lessons = [lesson for lesson in library.order if lesson.document is not None]
     values = {
         "title": course.title,
         "summary": course.summary,
         "cards": lesson_cards(library, place),
-        "galleries": galleries(library, place),
+        "galleries": list_galleries(library, place),
         "levels": tuple(level_view(library, place, level, whole=True) for level in course.levels),
-        "start": lesson_link(library, place, written[0]) if written else None,
+        "start": lesson_link(library, place, written_lessons[0]) if written_lessons else None,
         "total": len(library.order),
-        "written": len(written),
+        "written": len(written_lessons),
         "models": len(course.models),
         "gallery": place.href(library.gallery) if library.gallery else "",
         "numerics": place.href(urls.NUMERICS) if library.reports.cases else "",
@@ -70,34 +69,36 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
     head = PageHead(urls.HOME, "home", course.title, course.summary, meta.course_data(library))
     if document is None:
         return PageInputs(head, "home.html", {**values, "article": ""})
-    shown = document_inputs(library, place, document)
-    return PageInputs(head, "home.html", values, document.source.path, shown)
+    inputs = document_inputs(library, place, document)
+    return PageInputs(head, "home.html", values, document.source.path, inputs)
 
 
 def level_inputs(library: Library, level: Level) -> PageInputs:
-    """What the page of a level shows."""
+    """The inputs of the page of a level."""
     place = urls.Place(urls.level_path(level))
     levels = library.course.levels
-    at = next(i for i, other in enumerate(levels) if other.id == level.id)
+    position = next(i for i, candidate in enumerate(levels) if candidate.id == level.id)
     values = {
         "home": place.href(urls.HOME),
         "level": level_view(library, place, level, whole=True),
-        "graph": of_level(library, place, level),
-        "previous": _level_link(library, place, levels[at - 1]) if at else None,
-        "following": _level_link(library, place, levels[at + 1]) if at + 1 < len(levels) else None,
+        "graph": level_graph(library, place, level),
+        "previous": _level_link(library, place, levels[position - 1]) if position else None,
+        "following": _level_link(library, place, levels[position + 1])
+        if position + 1 < len(levels)
+        else None,
     }
     title = f"{library.words('level.label', id=level.id)}: {level.title}"
     head = PageHead(place.path, "level", title, level.summary)
     return PageInputs(head, "level.html", values)
 
 
-def _level_link(library: Library, place: urls.Place, level: Level) -> Named:
+def _level_link(library: Library, place: urls.Place, level: Level) -> NamedLink:
     label = library.words("level.label", id=level.id)
-    return Named(place.href(urls.level_path(level)), level.title, label)
+    return NamedLink(place.href(urls.level_path(level)), level.title, label)
 
 
 def gallery_inputs(library: Library) -> PageInputs:
-    """What the page of all models shows."""
+    """The inputs of the page of all models."""
     place = urls.Place(library.gallery)
     values = {
         "home": place.href(urls.HOME),
@@ -110,24 +111,26 @@ def gallery_inputs(library: Library) -> PageInputs:
 def _model_card(library: Library, place: urls.Place, model: MjcfModel) -> ModelCard:
     href = place.href(urls.model_page_path(model.name))
     pictures = (part.picture(library, model) for part in model_parts().values())
-    found = next(filter(None, pictures), None)
+    view = next(filter(None, pictures), None)
     picture = None
-    if found is not None:
-        src = place.href(found.path)
-        picture = PictureLink(src, found.width, found.height, model.name, href)
+    if view is not None:
+        src = place.href(view.path)
+        picture = PictureLink(src, view.width, view.height, model.name, href)
     owners = [use.owner for use in library.uses[model.name]]
-    lessons = tuple(lesson_link(library, place, one) for one in owners if isinstance(one, Lesson))
+    lessons = tuple(
+        lesson_link(library, place, owner) for owner in owners if isinstance(owner, Lesson)
+    )
     return ModelCard(model.name, model.description, href, picture, lessons)
 
 
 def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
-    """What the page of a model shows: what it is, where it is used, what it holds, its text."""
+    """The inputs of the page of a model: description, facts, uses, text."""
     place = urls.Place(urls.model_page_path(model.name))
     title = library.words("model.title", name=model.name)
     facts = library.facts.get(model.name)
     parts = {} if facts is None else model_parts()
-    more = [fact for part in parts.values() for fact in part.facts(library, model)]
-    shown = {name: part.values(library, place, model) for name, part in parts.items()}
+    further_facts = [fact for part in parts.values() for fact in part.facts(library, model)]
+    values_by_part = {name: part.values(library, place, model) for name, part in parts.items()}
     values = {
         "home": place.href(urls.HOME),
         "gallery": place.href(library.gallery) if library.gallery else "",
@@ -136,25 +139,25 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
         "anchor": listing_anchor(model.source.path),
         "title": title,
         "href": place.href(urls.model_file_path(model.name)),
-        "facts": () if facts is None else (*_facts(library, facts), *more),
+        "facts": () if facts is None else (*_facts(library, facts), *further_facts),
         "code": HighlightedFile("xml", model.source.text.rstrip(), model.source.path),
         "about": model.description,
-        "opening": _added(parts, shown, opens=True),
-        "added": _added(parts, shown, opens=False),
+        "opening": _added_parts(parts, values_by_part, opens=True),
+        "added": _added_parts(parts, values_by_part, opens=False),
         "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
     }
     return PageInputs(PageHead(place.path, "model", title, model.description), "model.html", values)
 
 
-def _added(
-    parts: Mapping[str, ModelPart], shown: Mapping[str, Struct | None], *, opens: bool
+def _added_parts(
+    parts: Mapping[str, ModelPart], values: Mapping[str, Struct | None], *, opens: bool
 ) -> AddedParts:
-    chosen = ((name, shown[name]) for name, part in parts.items() if part.opens is opens)
-    return AddedParts({name: value for name, value in chosen if value is not None})
+    pairs = ((name, values[name]) for name, part in parts.items() if part.opens is opens)
+    return AddedParts({name: value for name, value in pairs if value is not None})
 
 
 def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
-    """What a compiled model holds, as pairs of words."""
+    """The facts about a compiled model, as pairs of label and value."""
     words = library.words
     unnamed = words("model.unnamed")
     rows = (
@@ -174,16 +177,16 @@ def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
     return tuple((label, value) for label, value in rows if value)
 
 
-def _use_link(library: Library, place: urls.Place, use: ModelUse) -> Named:
+def _use_link(library: Library, place: urls.Place, use: ModelUse) -> NamedLink:
     words, owner = library.words, use.owner
     text = owner.title
     if isinstance(owner, Lesson):
         text = f"{words('lesson.label', id=owner.id)}: {owner.title}"
-    return Named(place.href(urls.owner_path(owner)), text, ", ".join(map(words, use.ways)))
+    return NamedLink(place.href(urls.owner_path(owner)), text, ", ".join(map(words, use.ways)))
 
 
 def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
-    """What a page that is no lesson shows; its document's summary is enough."""
+    """The inputs of a page that is not a lesson; its document's summary is enough."""
     place = urls.Place(urls.page_path(page))
     return PageInputs(
         PageHead(place.path, "page", page.title, ""),
@@ -195,7 +198,7 @@ def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
 
 
 def not_found_inputs(library: Library) -> PageInputs:
-    """What the page for missing addresses shows."""
+    """The inputs of the page for missing addresses."""
     place = place_of(library, urls.NOT_FOUND)
     values = {"home": place.href(urls.HOME)}
     title = library.words("notfound.title")

@@ -41,7 +41,7 @@ class PageRecord(Struct, frozen=True):
 def record(head: PageHead, body: str, base_url: str) -> tuple[PageRecord, str]:
     """The record of a page that was just drawn, and its body as it will be published."""
     # Text: what is put into `Markup` would be escaped.
-    html, declarations = styles.hoist(formulas.glue(str(body)))
+    html, declarations = styles.hoist(formulas.glue_formulas(str(body)))
     text, mathematics = page_characters(html)
     html = visible(html)
     ids, addresses = ids_and_addresses(html)

@@ -22,7 +22,7 @@ from msgspec import Struct
 from coursebuild.core.model import Course, Script, document_scripts
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.folding import imported
+from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.library import Library, course_scripts, models_named
 from coursebuild.core.text.source import Excerpt
 
@@ -52,7 +52,7 @@ class Surroundings(Struct, frozen=True):
     root."""
     style: tuple[OutputFile, ...] = ()
     """The course's `matplotlibrc`, if it has one: the style of all figures."""
-    imports: Callable[[str], frozenset[str]] = imported
+    imports: Callable[[str], frozenset[str]] = find_imports
     """What a Python text imports: whoever calls may know it already."""
 
 

@@ -74,7 +74,7 @@ class _Excerpt(Context):
 
     def math(self, tex: str) -> Markup:
         found = self._mathml(tex, False)
-        return Markup(formulas.breakable(found)) if found else super().math(tex)
+        return Markup(formulas.split_formula(found)) if found else super().math(tex)
 
     def display(self, tex: str, start: int) -> Markup:
         return Markup(self._mathml(tex, True)) or super().display(tex, start)

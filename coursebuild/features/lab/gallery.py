@@ -55,7 +55,7 @@ def _find(library: Library, model: MjcfModel) -> tuple[Lab, ShownLab | None]:
     documents = (use.owner.document for use in library.uses[model.name] if BY_LAB in use.ways)
     labs = (_labs_by_model(one).get(model.name) for one in documents if one is not None)
     lab = next(filter(None, labs), None) or _own_lab(model)
-    shown = library.tried.get((lab.span.path, lab.span.start))
+    shown = library.trial_values.get((lab.span.path, lab.span.start))
     return lab, shown if isinstance(shown, ShownLab) else None
 
 

@@ -68,7 +68,7 @@ class DocumentWriter(BlockWriter):
             case model.Script():
                 return self._script(block)
             case model.Recording():
-                joined = any(block in some for some in self.page.joined.values())
+                joined = any(block in some for some in self.page.script_outputs.values())
                 return "" if joined else self.recording(block)
             case model.Mjcf():
                 return self._mjcf(block)
@@ -118,7 +118,7 @@ class DocumentWriter(BlockWriter):
         if block.requires:
             run += f" ({self.words('code.requires', modules=', '.join(block.requires))})"
         parts = [f"{name}:", fence("python", block.code.text), run]
-        recordings = self.page.joined.get(block.span.start, ())
+        recordings = self.page.script_outputs.get(block.span.start, ())
         parts += [self.recording(recording) for recording in recordings]
         if not recordings:
             receipt = script_receipt(self.page, block)

@@ -99,7 +99,7 @@ def _cells(writer: DocumentWriter, blocks: Iterable[Block]) -> Iterator[Cell]:
     """The cells of blocks, whose ids are not numbered yet."""
     section = "start"
     waiting: list[Block] = []
-    joined = writer.page.joined
+    joined = writer.page.script_outputs
     done = {id(one) for some in joined.values() for one in some}
 
     def written() -> Iterator[Cell]:
@@ -145,7 +145,7 @@ def _footnotes(writer: DocumentWriter) -> Iterator[Cell]:
 
 def _script_cells(writer: DocumentWriter, section: str, block: Script) -> Iterator[Cell]:
     """A script, and what is to be said of its outputs."""
-    recordings = writer.page.joined.get(block.span.start, ())
+    recordings = writer.page.script_outputs.get(block.span.start, ())
     run = writer.page.inputs.runs.get(block.path)
     ran = run is not None and run.outcome is Outcome.OK
     output = None

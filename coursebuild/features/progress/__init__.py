@@ -28,7 +28,7 @@ class Asking(Struct, frozen=True):
     """Of a lesson; empty for another page."""
     title: str
     href: str
-    asked: str
+    quiz_index: str
     """See `quiz_index`."""
     questions: int
 
@@ -41,7 +41,7 @@ def progress_values(library: Library) -> dict[str, object]:
             level_view(library, place, level, whole=True) for level in library.course.levels
         ),
         "pages": tuple(one for one in _asking(library, place) if not one.id),
-        "review": place.href(_REVIEW) if library.asked else "",
+        "review": place.href(_REVIEW) if library.quiz_index else "",
         "name": KEPT_AS + library.course.key,
     }
 
@@ -56,7 +56,7 @@ def _asking(library: Library, place: urls.Place) -> tuple[Asking, ...]:
     """Everything with questions, in the order of the course."""
     found = []
     for owner in library.course.owners:
-        text = library.asked.get(owner.path, "")
+        text = library.quiz_index.get(owner.path, "")
         if text:
             id = owner.id if isinstance(owner, Lesson) else ""
             href = place.href(urls.owner_path(owner))
@@ -72,7 +72,7 @@ FEATURE = Feature(
         PageKind(
             name="review",
             values=review_values,
-            exists=lambda library: bool(library.asked),
+            exists=lambda library: bool(library.quiz_index),
             order=60,
             indexed=False,
         ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.core.pages.formulas import breakable, glue
+from coursebuild.core.pages.formulas import glue_formulas, split_formula
 
 ROW = "<mrow><mi>alpha</mi><mrow><mi>beta</mi></mrow><mo>=</mo></mrow>"
 END = "<mrow><mi>gamma</mi><mo>+</mo><mn>123456</mn></mrow>"
@@ -13,7 +13,7 @@ END = "<mrow><mi>gamma</mi><mo>+</mo><mn>123456</mn></mrow>"
 @pytest.mark.parametrize("between", ["", "<mspace/>"])
 def test_a_long_formula_is_cut_between_its_outermost_rows(between: str) -> None:
     cut = f"<math>{ROW}</math><math>{between}{END}</math>"
-    assert breakable(f"<math>{ROW}{between}{END}</math>") == cut
+    assert split_formula(f"<math>{ROW}{between}{END}</math>") == cut
 
 
 @pytest.mark.parametrize(
@@ -26,7 +26,7 @@ def test_a_long_formula_is_cut_between_its_outermost_rows(between: str) -> None:
     ],
 )
 def test_short_displayed_and_open_formulas_stay_whole(mathml: str) -> None:
-    assert breakable(mathml) == mathml
+    assert split_formula(mathml) == mathml
 
 
 X = "<math><mi>x</mi></math>"
@@ -51,7 +51,7 @@ Y = "<math><mi>y</mi></math>"
     ],
 )  # fmt: skip
 def test_punctuation_stays_on_the_line_of_its_formula(html: str, expected: str) -> None:
-    assert glue(html) == expected
+    assert glue_formulas(html) == expected
 
 
 START, TWO = "of <math><mrow>", "<mn>2</mn>"
@@ -74,4 +74,4 @@ NOTE = '<annotation encoding="application/x-tex">=2</annotation></semantics></ma
     ],
 )  # fmt: skip
 def test_an_operator_beside_a_space_of_the_text_has_none(html: str, expected: str) -> None:
-    assert glue(html) == expected
+    assert glue_formulas(html) == expected

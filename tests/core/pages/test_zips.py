@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import MjcfModel
 from coursebuild.core.model.results import CompileResult, ModelFacts, OutputFile
-from coursebuild.core.pages.folding import imported
+from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.zips import Package, Surroundings
 from coursebuild.core.pages.zips import archives as zip_archives
@@ -100,8 +100,8 @@ def test_the_course_archive_has_scripts_models_library_and_requirements(made: An
     readme = archive.read("bodies-axes/README.md").decode()
     assert readme.startswith("# Bodies & <axes>: scripts\n")
     assert "python examples/one.py\n" in readme
-    assert imported("from . import x\nfrom a.b import c\nimport d.e as f\n") == {"a", "d"}
-    assert imported("import (\n") == frozenset()
+    assert find_imports("from . import x\nfrom a.b import c\nimport d.e as f\n") == {"a", "d"}
+    assert find_imports("import (\n") == frozenset()
 
 
 def test_a_lesson_archive_has_what_its_scripts_import(made: Any) -> None:
