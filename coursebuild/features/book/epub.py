@@ -2,13 +2,13 @@
 
 Entry point: `epub_files(context)`, the files of the archive.
 
-1. Each lesson is a chapter of XHTML, drawn as on its page: formulas are MathML, folds are open,
-   labs are their recorded pictures. Links between lessons lead to chapters; others lead to the site
-   where the course has an address, and are plain text where it has none.
-2. Of the course's theme it has the accent, where the reading system says whether its pages are
-   light or dark, and the fonts, with their licences.
-3. EPUB wants a date of last change. The same course gives the same bytes, so it is always the same,
-   and says nothing.
+1. Each lesson is a chapter of XHTML, as on its page: formulas are MathML, folds are open, labs are
+   their recorded pictures. Links between lessons lead to chapters; others lead to the site, and are
+   plain text where the course has no address.
+2. It has the fonts of the course's theme with their licences, and the accent, where the reading
+   system says whether its pages are light or dark.
+3. EPUB requires a date of last change. It is a constant, so that the same course gives the same
+   bytes.
 
 Sources: W3C, EPUB 3.3; EPUB Accessibility 1.1.
 """
@@ -37,17 +37,17 @@ from coursebuild.core.pages.html_tree import to_xml
 from coursebuild.core.pages.theme import accents
 from coursebuild.features.book.lessons import (
     PICTURES,
-    ending,
-    facts,
-    lesson_text,
-    levels,
+    extension,
+    levels_with_lessons,
+    render_lesson,
     site_address,
     style_path,
+    summary_line,
 )
-from coursebuild.features.book.rewrite import Rules
+from coursebuild.features.book.rewrite import RewriteRules
 
 _MODIFIED = "2000-01-01T00:00:00Z"
-"""See the module."""
+"""A constant, see the module."""
 _CONTAINER = """\
 <?xml version="1.0" encoding="utf-8"?>
 <container xmlns="urn:oasis:names:tc:opendocument:xmlns:container" version="1.0">
@@ -59,18 +59,18 @@ _CONTAINER = """\
 _XHTML = "application/xhtml+xml"
 _FEATURES = ("structuralNavigation", "tableOfContents", "displayTransformability")
 _STYLE_RULE = re.compile(r"\.s[0-9a-f]{7}\{[^{}]*\}")
-"""A rule of the site's style sheet that stands for a style in an element, see `styles`."""
-_FACE = re.compile(rf'@font-face{{font-family:"(?:{"|".join(COURSE.values())})"[^}}]*}}')
-"""A font of the course's own in the site's style sheet."""
+"""A rule of the site's style sheet that replaces a style attribute, see `styles`."""
+_FONT_FACE = re.compile(rf'@font-face{{font-family:"(?:{"|".join(COURSE.values())})"[^}}]*}}')
+"""The rule for one of the course's own fonts in the site's style sheet."""
 _FONT = re.compile(r'url\("(fonts/[^"]+)"\)')
-_SET_IN = {
+_FONT_RULES = {
     "text": "body{{font-family:{},serif}}",
     "interface": ".bar,.label,.receipt,figcaption{{font-family:{},sans-serif}}",
     "code": "pre,code,samp{{font-family:{},monospace}}",
 }
-"""What is set in a font of the course's own, by its use."""
+"""The rule that applies one of the course's own fonts, by its use."""
 _COVER_SIZES, _COVER_LINES, _COVER_WIDTH = (120, 100, 84, 68, 54), 6, 1020
-"""Of type on the cover; the largest is taken in which the title has few lines of so many pixels."""
+"""Font sizes, maximum of lines, and width in pixels: the title has the largest size that fits."""
 
 
 class EpubItem(Struct, frozen=True):
@@ -81,11 +81,11 @@ class EpubItem(Struct, frozen=True):
     type: str
     properties: str = ""
     linear: bool = False
-    """Whether it is a page, which is read in its place."""
+    """Whether it is a page of the reading order."""
 
 
 def epub_files(context: ExportContext) -> Iterator[SiteFile]:
-    """The files of the archive."""
+    """Yield the files of the archive."""
     return _Epub(context).files()
 
 
@@ -95,7 +95,7 @@ class _Epub:
         self._course = context.course
         self._library = context.library
         self._language = context.course.language or "en"
-        self._levels = levels(context)
+        self._levels = levels_with_lessons(context)
         self._chapters = {
             urls.lesson_path(lesson): _lesson_name(lesson)
             for _, lessons in self._levels
@@ -117,7 +117,7 @@ class _Epub:
         yield OutputFile("EPUB/style.css", style.encode())
         folder = posixpath.dirname(style_path(self._context))
         for name in _FONT.findall(style):
-            items.append(EpubItem(f"f-{xml_id(name)}", name, f"font/{ending(name)}"))
+            items.append(EpubItem(f"f-{xml_id(name)}", name, f"font/{extension(name)}"))
             yield CachedFile(f"EPUB/{name}", "", self._context.site()[f"{folder}/{name}"].make)
         for number, family in enumerate(self._course.theme.fonts, 1):
             name = f"fonts/licence-{number}.txt"
@@ -135,33 +135,33 @@ class _Epub:
                 items.append(_chapter_item(_lesson_name(lesson), chapter))
                 yield OutputFile(f"EPUB/{_lesson_name(lesson)}", chapter)
         for path, name in self._pictures.items():
-            items.append(EpubItem(f"i-{xml_id(name)}", name, PICTURES[ending(path)]))
+            items.append(EpubItem(f"i-{xml_id(name)}", name, PICTURES[extension(path)]))
             yield CachedFile(f"EPUB/{name}", "", self._context.site()[path].make)
         yield OutputFile("EPUB/package.opf", self._package(items))
 
     def _style(self) -> str:
-        """The e-book's style sheet, with the theme's and the site's rules for single elements."""
+        """Return the style sheet, with rules of the theme, and of the site for single elements."""
         theme = self._course.theme
         site = self._context.site()[style_path(self._context)].make().decode()
-        own = self._context.assets.template("book/epub.css")
+        style = self._context.assets.template("book/epub.css")
         for scheme, accent in zip(("light", "dark"), accents(theme), strict=True):
             if theme.accent or theme.accent_dark:
                 rule = f"a{{color:{accent}}}.objectives,.callout{{border-color:{accent}}}"
-                own += f"@media (prefers-color-scheme:{scheme}){{{rule}}}\n"
-        uses = (_SET_IN[font.use].format(f'"{COURSE[font.use]}"') for font in theme.fonts)
-        return "\n".join((own, *_FACE.findall(site), *uses, *_STYLE_RULE.findall(site), ""))
+                style += f"@media (prefers-color-scheme:{scheme}){{{rule}}}\n"
+        uses = (_FONT_RULES[font.use].format(f'"{COURSE[font.use]}"') for font in theme.fonts)
+        return "\n".join((style, *_FONT_FACE.findall(site), *uses, *_STYLE_RULE.findall(site), ""))
 
     # --- pages
 
     def _chapter(self, lesson: Lesson) -> bytes:
-        rules = Rules(urls.lesson_path(lesson), self._address, self._picture, xml_id)
-        text = lesson_text(self._context, lesson, rules, to_xml, "_top")
+        rules = RewriteRules(urls.lesson_path(lesson), self._address, self._picture, xml_id)
+        text = render_lesson(self._context, lesson, rules, to_xml, "_top")
         return self._page(f"{lesson.id} {lesson.title}", text, "bodymatter")
 
     def _page(self, title: str, body: Markup, kind: str) -> bytes:
-        return self._drawn("epub-page", title=title, body=body, kind=kind)
+        return self._render("epub-page", title=title, body=body, kind=kind)
 
-    def _drawn(self, template: str, **values: object) -> bytes:
+    def _render(self, template: str, **values: object) -> bytes:
         text = self._library.render(
             f"book/{template}.html",
             language=self._language,
@@ -175,7 +175,7 @@ class _Epub:
         return self._page(f"{level.id} {level.title}", body, "bodymatter")
 
     def _cover(self) -> bytes:
-        """The title of the course as a picture, with a bar in the accent."""
+        """Draw the title of the course as a picture, with a bar in the accent colour."""
         title = " ".join(self._course.title.split())
         for size in _COVER_SIZES:
             lines = textwrap.wrap(title, int(_COVER_WIDTH / size / _mean_width(title))) or [""]
@@ -183,14 +183,14 @@ class _Epub:
                 break
         accent, _ = accents(self._course.theme)
         lines = lines[: 2 * _COVER_LINES]
-        return self._drawn("cover.svg", title=title, lines=lines, size=size, accent=accent)
+        return self._render("cover.svg", title=title, lines=lines, size=size, accent=accent)
 
     def _title(self) -> bytes:
         body = self._library.render(
             "book/epub-title.html",
             title=self._course.title,
             summary=self._course.summary,
-            facts=facts(self._context),
+            facts=summary_line(self._context),
             licence=self._course.licence,
             address=self._course.base_url,
         )
@@ -211,7 +211,7 @@ class _Epub:
         features = list(_FEATURES)
         features += ["MathML"] if any("mathml" in item.properties for item in items) else []
         features += ["alternativeText"] if self._pictures else []
-        return self._drawn(
+        return self._render(
             "package.opf",
             uuid=uuid.uuid5(uuid.NAMESPACE_URL, course.base_url or f"course:{course.key}"),
             title=course.title,
@@ -227,18 +227,18 @@ class _Epub:
     # --- links
 
     def _address(self, path: str, anchor: str) -> str:
-        """Where a link of a chapter leads; empty for nowhere."""
+        """Return the address for a link of a chapter; empty if it has no target here."""
         name = self._chapters.get(path)
         if name is None:
             return site_address(self._context, path, anchor)
         return f"{name}#{urls.quoted(xml_id(anchor))}" if anchor else name
 
     def _picture(self, path: str) -> str:
-        """Where a picture is, which is now part of the package; empty where it cannot be."""
-        if ending(path) not in PICTURES or path not in self._context.site():
+        """Add a picture to the package and return its address; empty if that is impossible."""
+        if extension(path) not in PICTURES or path not in self._context.site():
             return ""
         digest = hashlib.sha256(path.encode()).hexdigest()[:12]
-        return self._pictures.setdefault(path, f"images/{digest}.{ending(path)}")
+        return self._pictures.setdefault(path, f"images/{digest}.{extension(path)}")
 
 
 def _chapter_item(name: str, chapter: bytes) -> EpubItem:
@@ -247,7 +247,7 @@ def _chapter_item(name: str, chapter: bytes) -> EpubItem:
 
 
 def _mean_width(title: str) -> float:
-    """The width of a character of the title, in ems, so far as it is known without a font."""
+    """Estimate the mean width of the title's characters, in ems, without a font."""
     widths = [
         1.0 if unicodedata.east_asian_width(c) in "WF" else 0.7 if c.isupper() else 0.52
         for c in title
@@ -256,7 +256,7 @@ def _mean_width(title: str) -> float:
 
 
 def xml_id(id: str) -> str:
-    """An id as a name of XML: characters that no name has are written as their numbers."""
+    """Turn an id into a name of XML: other characters are written as their numbers."""
     name = re.sub(r"[^A-Za-z0-9_.-]", lambda match: f"_{ord(match[0]):x}_", id)
     return f"_{name}" if not name or name[0] in "0123456789.-" else name
 
@@ -270,7 +270,7 @@ def _level_name(level: Level) -> str:
 
 
 def _file_name(name: str) -> str:
-    """A file name of ASCII, which every reading system takes."""
+    """Return a file name in ASCII, which every reading system accepts."""
     if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
         return f"{name}.xhtml"
     return f"x{hashlib.sha256(name.encode()).hexdigest()[:16]}.xhtml"

@@ -1,6 +1,6 @@
-"""The written lessons of a course, out of the pages of its site.
+"""Takes the lessons of a course from the pages of its site.
 
-Entry points: `levels`, which lessons there are; `lesson_text`, one of them for another place.
+Entry points: `levels_with_lessons`; `render_lesson`, one of them for use elsewhere.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from coursebuild.core.model import Lesson, Level
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.html_tree import HtmlContent, parse_html
-from coursebuild.features.book.rewrite import Rules, rewritten
+from coursebuild.features.book.rewrite import RewriteRules, rewrite
 
 PICTURES = {
     "gif": "image/gif",
@@ -23,57 +23,60 @@ PICTURES = {
     "svg": "image/svg+xml",
     "webp": "image/webp",
 }
-"""Of the pictures that every reading system shows, by ending."""
+"""Media types of the pictures that every reading system shows, by extension."""
 _BEFORE, _AFTER = '<div class="prose">\n', '\n</div>\n<div class="lesson-end"'
-"""What stands around the text of a lesson, see `templates/lesson.html`."""
+"""What surrounds the text of a lesson, see `templates/lesson.html`."""
 
 
-def levels(context: ExportContext) -> list[tuple[Level, list[Lesson]]]:
-    """The levels that have written lessons, with these."""
-    found = ((one, [x for x in one.lessons if x.document]) for one in context.course.levels)
-    return [(level, lessons) for level, lessons in found if lessons]
+def levels_with_lessons(context: ExportContext) -> list[tuple[Level, list[Lesson]]]:
+    """Return the levels that have written lessons, with these lessons."""
+    pairs = (
+        (level, [lesson for lesson in level.lessons if lesson.document])
+        for level in context.course.levels
+    )
+    return [(level, lessons) for level, lessons in pairs if lessons]
 
 
-def facts(context: ExportContext) -> str:
-    """How many lessons there are, and with what they were verified."""
+def summary_line(context: ExportContext) -> str:
+    """Return the number of lessons, and the versions that they were verified with."""
     words, results = context.library.words, context.library.results
     verified = words("site.verified", engine=results.engine, python=results.python)
-    count = sum(len(lessons) for _, lessons in levels(context))
+    count = sum(len(lessons) for _, lessons in levels_with_lessons(context))
     return f"{words('exports.lessons', n=count)}. {verified}."
 
 
-def lesson_text(
+def render_lesson(
     context: ExportContext,
     lesson: Lesson,
-    rules: Rules,
+    rules: RewriteRules,
     write: Callable[[list[HtmlContent]], str],
     top: str,
 ) -> Markup:
-    """A lesson for another place; `write` writes its tree, `top` is its own id there."""
+    """Render a lesson for use elsewhere; `write` writes its tree, `top` is its own id there."""
     page = context.site()[rules.path].make().decode()
     text = page.partition(_BEFORE)[2].rpartition(_AFTER)[0]
     return context.library.render(
         "book/lesson.html",
         lesson=lesson,
         draft=lesson.status == "draft",
-        article=Markup(write(list(rewritten(parse_html(text), rules)))),
+        article=Markup(write(list(rewrite(parse_html(text), rules)))),
         top=top,
-        heading=1 + rules.lowered,
+        heading=1 + rules.heading_shift,
     )
 
 
 def site_address(context: ExportContext, path: str, anchor: str) -> str:
-    """Where something is on the site; empty where the course has no address."""
+    """Return the address of a page on the site; empty if the course has none."""
     address = urls.absolute(context.course, path)
     return f"{address}#{urls.quoted(anchor)}" if address and anchor else address
 
 
 def style_path(context: ExportContext) -> str:
-    """The style sheet of the site's pages."""
+    """Return the path of the style sheet of the site's pages."""
     paths = (path for path in context.site() if path.startswith("assets/site."))
     return next(path for path in paths if path.endswith(".css"))
 
 
-def ending(path: str) -> str:
-    """By which the kind of a file is known."""
+def extension(path: str) -> str:
+    """Return the extension of a file in lower case."""
     return path.lower().rpartition(".")[2]

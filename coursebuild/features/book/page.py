@@ -1,7 +1,7 @@
 """The whole course on one page, to be read without a network and to be printed.
 
-Entry point: `page_file(context)`. The page needs no other file: its style sheet, fonts and pictures
-are in it. It loads nothing and runs nothing, as its policy says.
+Entry point: `page_file(context)`. The page contains its style sheet, fonts and pictures. It loads
+nothing and runs nothing, as its security policy says.
 """
 
 from __future__ import annotations
@@ -22,43 +22,43 @@ from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.html_tree import to_html
 from coursebuild.features.book.lessons import (
     PICTURES,
-    ending,
-    facts,
-    lesson_text,
-    levels,
+    extension,
+    levels_with_lessons,
+    render_lesson,
     site_address,
     style_path,
+    summary_line,
 )
-from coursebuild.features.book.rewrite import Rules
+from coursebuild.features.book.rewrite import RewriteRules
 
-_LOWERED = 2
-"""Levels that headings go down: the course is the first heading, its levels are the second."""
+_HEADING_SHIFT = 2
+"""Levels that headings move down: the course is the first heading, its levels are the second."""
 _ANSWERS = frozenset(("answer", "hint"))
 _TYPES = {**PICTURES, "avif": "image/avif", "woff2": "font/woff2"}
 
 
 def page_file(context: ExportContext) -> OutputFile:
-    """The page."""
-    course, found = context.course, levels(context)
-    place = {urls.lesson_path(lesson): lesson.id for _, lessons in found for lesson in lessons}
+    """Return the page."""
+    course, levels = context.course, levels_with_lessons(context)
+    ids = {urls.lesson_path(lesson): lesson.id for _, lessons in levels for lesson in lessons}
     picture = functools.cache(functools.partial(_data_address, context))
 
     def address(path: str, anchor: str) -> str:
-        if path in place:
-            return f"#{urls.quoted(_anchor(place[path], anchor))}"
+        if path in ids:
+            return f"#{urls.quoted(_anchor(ids[path], anchor))}"
         return site_address(context, path, anchor)
 
     def text(lesson: Lesson) -> Markup:
-        rules = Rules(
+        rules = RewriteRules(
             urls.lesson_path(lesson),
             address,
             picture,
             functools.partial(_anchor, lesson.id),
-            lowered=_LOWERED,
-            closed=_ANSWERS,
+            heading_shift=_HEADING_SHIFT,
+            closed_classes=_ANSWERS,
             section=lesson.id,
         )
-        return lesson_text(context, lesson, rules, to_html, _anchor(lesson.id))
+        return render_lesson(context, lesson, rules, to_html, _anchor(lesson.id))
 
     def level_anchor(level: Level) -> str:
         return _anchor("level", level.id)
@@ -68,13 +68,13 @@ def page_file(context: ExportContext) -> OutputFile:
         "book/page.html",
         language=language,
         direction=direction(language),
-        style=Markup(_style(context)),
+        style=Markup(_embed_fonts(context)),
         head_title=context.library.words("exports.book_title", title=course.title),
         title=course.title,
         summary=course.summary,
-        facts=facts(context),
+        facts=summary_line(context),
         licence=course.licence,
-        levels=found,
+        levels=levels,
         level_anchor=level_anchor,
         lesson_anchor=lambda lesson: _anchor(lesson.id),
         quoted=urls.quoted,
@@ -84,28 +84,28 @@ def page_file(context: ExportContext) -> OutputFile:
 
 
 def _anchor(lesson: str, id: str = "_top") -> str:
-    """The id on the page of what has an id in a lesson; of the lesson.
+    """Return the id on this page for an id in a lesson, or for the lesson.
 
-    In a drawing an id must be a name of XML, which does not begin with a digit.
+    It does not begin with a digit, since in a drawing it must be a name of XML.
     """
     return f"_{lesson}--{id or '_top'}"
 
 
-def _style(context: ExportContext) -> str:
-    """The style sheet, with the fonts in it. Nothing in it ends the element that it stands in."""
+def _embed_fonts(context: ExportContext) -> str:
+    """Return the style sheet with its fonts, and without `</`, which could end the element."""
     path = style_path(context)
     folder = posixpath.dirname(path)
 
-    def inside(match: re.Match[str]) -> str:
+    def embed(match: re.Match[str]) -> str:
         return f'url("{_data_address(context, posixpath.join(folder, match[1]))}")'
 
     text = context.site()[path].make().decode()
-    return re.sub(r'url\("([^"():]+)"\)', inside, text).replace("</", "<\\/")
+    return re.sub(r'url\("([^"():]+)"\)', embed, text).replace("</", "<\\/")
 
 
 def _data_address(context: ExportContext, path: str) -> str:
-    """A file as an address that holds it; empty where it cannot be shown."""
-    kind, file = _TYPES.get(ending(path)), context.site().get(path)
+    """Return a file as a `data:` address; empty if it cannot be shown."""
+    kind, file = _TYPES.get(extension(path)), context.site().get(path)
     if kind is None or file is None:
         return ""
     return f"data:{kind};base64,{base64.b64encode(file.make()).decode()}"

@@ -1,6 +1,6 @@
-"""The HTML of a lesson made fit for another place: other ids, other links, nothing for scripts.
+"""Rewrites the HTML of a lesson for use elsewhere: other ids, other links, nothing for scripts.
 
-Entry point: `rewritten(content, rules)`.
+Entry point: `rewrite(content, rules)`.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ _DROPPED = frozenset(
     " noembed noframes".split()
 )
 _WITHOUT_MARKUP = frozenset(("plaintext", "xmp"))
-"""Elements in which all is text; the first has no end, and would take what follows into it."""
+"""Elements whose content is text; the first has no end tag, and would swallow the rest."""
 _NOT_PRINTED = frozenset(("anchor", "bar-tools", "plot-wide", "figure-dark", "qr"))
-"""Classes of what is left out: links of headings to themselves, downloads, QR codes; of two
-drawings of a plot the one that small screens cannot show, or that is for dark pages."""
+"""Classes of elements that are left out: links of headings to themselves, downloads, QR codes, and
+the drawings of a plot for large screens or dark pages."""
 _FOR_SCRIPTS = frozenset(
     "style download loading srcset sizes tabindex xmlns usemap autofocus".split()
 )
@@ -36,58 +36,60 @@ _ADDRESSES = frozenset(("href", "xlink:href", "src"))
 _IN_SVG = re.compile(r"url\(#([^)]+)\)")
 
 
-class Rules(Struct, frozen=True):
-    """What is to become of a lesson."""
+class RewriteRules(Struct, frozen=True):
+    """How a lesson is rewritten."""
 
     path: str
     """The site path of its page."""
     address: Callable[[str, str], str]
-    """Where a link to a site path and an anchor leads; empty for nowhere."""
+    """Return the address for a site path and an anchor; empty if the link has no target."""
     picture: Callable[[str], str]
-    """Where the picture at a site path is; empty where it cannot be shown."""
+    """Return the address for a picture at a site path; empty if it cannot be shown."""
     id: Callable[[str], str]
-    """What becomes of an id."""
-    lowered: int = 0
-    """Levels that headings go down."""
-    closed: frozenset[str] = frozenset()
+    """Return the new id for an old one."""
+    heading_shift: int = 0
+    """Levels that headings move down."""
+    closed_classes: frozenset[str] = frozenset()
     """Classes of the folds that stay closed."""
     section: str = ""
-    """What is added to the names of sections, which are to be unlike those of other lessons."""
+    """A suffix for the labels of sections, to tell them from those of other lessons."""
 
 
-def rewritten(content: Iterable[HtmlContent], rules: Rules) -> Iterator[HtmlContent]:
-    """Content of a lesson's page for another place."""
+def rewrite(content: Iterable[HtmlContent], rules: RewriteRules) -> Iterator[HtmlContent]:
+    """Yield the content of a lesson's page, rewritten."""
     for child in content:
         if isinstance(child, str):
             yield child
         elif child.name not in _DROPPED and not child.classes & _NOT_PRINTED:
-            yield _element(child, rules)
+            yield _rewrite_element(child, rules)
 
 
-def _element(element: HtmlElement, rules: Rules) -> HtmlContent:
-    name, given = element.name, element.attributes
+def _rewrite_element(element: HtmlElement, rules: RewriteRules) -> HtmlContent:
+    name, old_attributes = element.name, element.attributes
     if name == "img":
-        path, _ = site_target(rules.path, given.get("src", ""))
-        shown = rules.picture(path) if path is not None else ""
-        if not shown:  # what it shows is said in its place
-            return given.get("alt", "")
-        given = given | {"src": shown}
+        path, _ = site_target(rules.path, old_attributes.get("src", ""))
+        address = rules.picture(path) if path is not None else ""
+        if not address:
+            return old_attributes.get("alt", "")
+        old_attributes = old_attributes | {"src": address}
     attributes = {
-        key: found
-        for key, value in given.items()
-        if (found := _attribute(element, key, value, rules)) is not None
+        key: new_value
+        for key, value in old_attributes.items()
+        if (new_value := _rewrite_attribute(element, key, value, rules)) is not None
     }
-    if name == "details" and not element.classes & rules.closed:
+    if name == "details" and not element.classes & rules.closed_classes:
         attributes["open"] = ""
     if name in _WITHOUT_MARKUP:
         name = "pre"
     if len(name) == 2 and name[0] == "h" and name[1] in "123456":
-        name = f"h{min(int(name[1]) + rules.lowered, 6)}"
-    return HtmlElement(name, attributes, list(rewritten(element.children, rules)))
+        name = f"h{min(int(name[1]) + rules.heading_shift, 6)}"
+    return HtmlElement(name, attributes, list(rewrite(element.children, rules)))
 
 
-def _attribute(element: HtmlElement, name: str, value: str, rules: Rules) -> str | None:
-    """What becomes of the value of an attribute; `None` where the attribute goes."""
+def _rewrite_attribute(
+    element: HtmlElement, name: str, value: str, rules: RewriteRules
+) -> str | None:
+    """Return the new value of an attribute; `None` if it is left out."""
     if name in _FOR_SCRIPTS or name.startswith(("on", "data-")):
         return None
     if name == "id" or (name == "name" and element.name == "a"):
@@ -99,14 +101,14 @@ def _attribute(element: HtmlElement, name: str, value: str, rules: Rules) -> str
     if name == "src" and element.name == "img":
         return value
     if name in _ADDRESSES:
-        # A picture inside a drawing is no part of the lesson.
-        return None if element.name == "image" else _address(value, rules)
+        # A picture inside a drawing is not part of the lesson.
+        return None if element.name == "image" else _rewrite_address(value, rules)
     if "url(#" in value:
         return _IN_SVG.sub(lambda match: f"url(#{rules.id(match[1])})", value)
     return value
 
 
-def _address(url: str, rules: Rules) -> str | None:
+def _rewrite_address(url: str, rules: RewriteRules) -> str | None:
     if url.startswith("#"):
         return f"#{urls.quoted(rules.id(unquote(url[1:])))}" if len(url) > 1 else "#"
     path, anchor = site_target(rules.path, url)
@@ -114,7 +116,7 @@ def _address(url: str, rules: Rules) -> str | None:
 
 
 def site_target(page: str, url: str) -> tuple[str | None, str]:
-    """The site path and the anchor of an address on a page; `None` where it leads elsewhere."""
+    """Return the site path and anchor of an address on a page; `None` if it leads elsewhere."""
     try:
         parts = urlsplit(url)
     except ValueError:  # it is no address

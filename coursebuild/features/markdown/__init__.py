@@ -1,8 +1,8 @@
 """Every page as Markdown, and a list of them for language models.
 
-1. `blocks` writes a document as Markdown that needs no course; `writer` adds the blocks that are
-   ours, and says where links lead.
-2. `copies` is a page as Markdown: from its document, or from its HTML where it has none
+1. `blocks` writes a document as Markdown that needs no course; `writer` adds the course's own
+   blocks, and the addresses of links.
+2. `copies` writes a page as Markdown: from its document, or from its HTML where it has none
    (`from_html`). `llms` lists these copies.
 """
 

@@ -1,10 +1,10 @@
-"""A page as plain Markdown: for people, feeds and language models.
+"""Writes pages as plain Markdown: for people, feeds and language models.
 
 Entry points: `note_markdown`, the text of a page; `markdown_files`, the files of all pages; `head`
 and `markdown_href`, parts of them.
 
-A lesson or page of the course is written from its document. Every other page (home, levels,
-models, measured figures) is written from its HTML, so that it says what the page says.
+A lesson or page of the course is written from its document. All other pages (home, levels, models,
+measured figures) are written from their HTML, so that both say the same.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from coursebuild.core.pages.lesson import LessonLink, LevelView
 from coursebuild.core.pages.marks import code_span, escaped_line, guarded, link
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.strings import Strings
-from coursebuild.features.markdown.from_html import markdown_of
+from coursebuild.features.markdown.from_html import html_to_markdown
 from coursebuild.features.markdown.llms import PATH as LLMS
-from coursebuild.features.markdown.llms import llms
+from coursebuild.features.markdown.llms import write_llms
 from coursebuild.features.markdown.writer import DocumentWriter
 
 Locate: TypeAlias = Callable[[str], str]
@@ -34,29 +34,29 @@ _ENDING = ".md"
 
 
 def markdown_files(site: SiteContext) -> Iterator[SiteFile]:
-    """The copies of all pages, and the list of them; an author's file of that name stays."""
-    taken = {urls.file_path(path) for path in site.library.course.files}
+    """Yield the copies of all pages, unless the author has a file of that name, and their list."""
+    author_paths = {urls.file_path(path) for path in site.library.course.files}
     for page in site.pages:
         path = urls.copy_path(page.path, _ENDING)
-        if path not in taken:
+        if path not in author_paths:
             yield CachedFile(path, page.digest, functools.partial(site.note, page.path))
-    yield OutputFile(LLMS, llms(site.library))
+    yield OutputFile(LLMS, write_llms(site.library))
 
 
 def note_markdown(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
-    """The text of a page; nothing where it has no copy."""
+    """Return the text of a page; empty if it has no copy."""
     if not urls.has_copies(inputs.head.path):
         return b""
     if page is not None and inputs.head.kind != "home":
         text = _document_copy(inputs, page)
     else:
         place = urls.Place(inputs.head.path)
-        text = markdown_of(body, lambda href: markdown_href(place, href))
+        text = html_to_markdown(body, lambda href: markdown_href(place, href))
     return visible(f"{text}\n").encode()
 
 
 def markdown_href(place: urls.Place, href: str) -> str:
-    """An address on a page as its copy has it: that of the other page's copy."""
+    """Return the address for a link in a page's copy: links to pages lead to their copies."""
     try:
         parts = urlsplit(href)
     except ValueError:  # it is no address
@@ -72,8 +72,8 @@ def markdown_href(place: urls.Place, href: str) -> str:
 
 def _document_copy(inputs: PageInputs, page: PageContext) -> str:
     place, words, document = page.place, page.renderer.words, page.document
-    here = place.href(place.path)
-    writer = DocumentWriter(page, lambda href: markdown_href(place, href), here)
+    page_href = place.href(place.path)
+    writer = DocumentWriter(page, lambda href: markdown_href(place, href), page_href)
     parts = (
         *head(inputs, words, writer.locate),
         writer.blocks(document.blocks),
@@ -84,7 +84,7 @@ def _document_copy(inputs: PageInputs, page: PageContext) -> str:
 
 
 def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
-    """Title, summary, facts and objectives; of a page that is no lesson, its title."""
+    """Return the title, summary, facts and objectives of a lesson; of other pages the title."""
     lesson = inputs.values.get("lesson")
     if not isinstance(lesson, LessonLink):
         return [f"# {escaped_line(inputs.head.title)}"]
@@ -93,7 +93,7 @@ def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
         parts.append(guarded(escaped_line(lesson.summary)))
     parts.append(" · ".join(_facts(inputs, lesson, words, locate)))
     if lesson.objectives:
-        items = "\n".join(f"- {guarded(escaped_line(one))}" for one in lesson.objectives)
+        items = "\n".join(f"- {guarded(escaped_line(text))}" for text in lesson.objectives)
         parts.append(f"{escaped_line(words('lesson.objectives'))}\n\n{items}")
     return parts
 
@@ -115,23 +115,23 @@ def _facts(inputs: PageInputs, lesson: LessonLink, words: Strings, locate: Locat
     return facts
 
 
-def lesson_links(found: object, locate: Locate) -> list[str]:
-    """Links to the lessons that a value of a page's inputs is, or holds."""
-    lessons = found if isinstance(found, tuple) else (found,)
+def lesson_links(value: object, locate: Locate) -> list[str]:
+    """Return links to the lessons in a value of a page's inputs: one, or a tuple of them."""
+    lessons = value if isinstance(value, tuple) else (value,)
     return [
-        link(escaped_line(f"{one.id} {one.title}"), locate(one.href))
-        for one in lessons
-        if isinstance(one, LessonLink)
+        link(escaped_line(f"{lesson.id} {lesson.title}"), locate(lesson.href))
+        for lesson in lessons
+        if isinstance(lesson, LessonLink)
     ]
 
 
 def _foot(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
-    """Where to go from here."""
+    """Return links to scripts and further lessons."""
     rows = []
     scripts = inputs.values.get("scripts")
     if isinstance(scripts, tuple) and scripts:
-        named = (link(code_span(path), href) for path, href in scripts)
-        rows.append(f"{escaped_line(words('lesson.scripts'))}: {', '.join(named)}")
+        script_links = (link(code_span(path), href) for path, href in scripts)
+        rows.append(f"{escaped_line(words('lesson.scripts'))}: {', '.join(script_links)}")
     for name, key in (
         ("leads", "lesson.leads"),
         ("previous", "lesson.previous"),

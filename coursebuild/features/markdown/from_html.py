@@ -1,11 +1,11 @@
-"""HTML of our own templates as Markdown: the map of the course, levels, models, figures.
+"""Converts HTML of our own templates to Markdown: the course map, levels, models, figures.
 
-Entry point: `markdown_of(html, locate)`.
+Entry point: `html_to_markdown(html, locate)`.
 
-1. The HTML becomes a tree of blocks and lines, as its tags say.
-2. What only serves the page is left out: ways through the site, buttons, drawings.
-3. Headings, lists, tables, terms with their meanings, code and links become Markdown; what has no
-   form there becomes its text.
+1. The HTML becomes a tree of blocks and lines, by its tags.
+2. What only serves the page is left out: navigation, buttons, drawings.
+3. Headings, lists, tables, definition lists, code and links become Markdown; of other elements
+   their text remains.
 """
 
 from __future__ import annotations
@@ -35,18 +35,18 @@ _BLOCKS = frozenset(
 _HEADINGS = frozenset("h1 h2 h3 h4 h5 h6".split())
 
 
-def markdown_of(html: str, locate: Callable[[str], str]) -> str:
-    """The text of a page; `locate` says what becomes of an address."""
-    return "\n\n".join(_Blocks(locate).of(parse_html(html)))
+def html_to_markdown(html: str, locate: Callable[[str], str]) -> str:
+    """Return the Markdown of some HTML; `locate` converts addresses."""
+    return "\n\n".join(_Converter(locate).blocks(parse_html(html)))
 
 
-class _Blocks:
+class _Converter:
     def __init__(self, locate: Callable[[str], str]) -> None:
         self.locate = locate
 
-    def of(self, content: list[HtmlContent]) -> list[str]:
-        """The blocks in an element; what stands there in line is a paragraph."""
-        found: list[str] = []
+    def blocks(self, content: list[HtmlContent]) -> list[str]:
+        """Convert the blocks in an element; a run of inline content is a paragraph."""
+        blocks: list[str] = []
         line: list[HtmlContent] = []
         for child in (*content, None):
             if child is not None and (isinstance(child, str) or child.name not in _BLOCKS):
@@ -55,10 +55,10 @@ class _Blocks:
                 continue
             text = guarded(self._line(line))
             line = []
-            found += [text] if text else []
+            blocks += [text] if text else []
             if isinstance(child, HtmlElement):
-                found += filter(None, self._block(child))
-        return found
+                blocks += filter(None, self._block(child))
+        return blocks
 
     def _block(self, node: HtmlElement) -> Iterator[str]:
         name = node.name
@@ -74,32 +74,32 @@ class _Blocks:
         elif name == "dl":
             yield self._terms(node)
         elif name == "blockquote":
-            yield quoted("\n\n".join(self.of(node.children)))
+            yield quoted("\n\n".join(self.blocks(node.children)))
         elif name == "hr":
             yield "___"
         elif name in ("summary", "figcaption", "caption"):
             text = self._line(node.children)
             yield f"**{text}**" if text else ""
         else:
-            yield from self.of(node.children)
+            yield from self.blocks(node.children)
 
     def _list(self, node: HtmlElement) -> str:
         items = [child for child in node.children if isinstance(child, HtmlElement)]
         number = int(node.attributes.get("start") or 1)
-        written: list[str] = []
+        texts: list[str] = []
         for item in items:
             value = item.attributes.get("value")
             number = int(value) if value and value.isdigit() else number
             mark = "- " if node.name == "ul" else f"{number}. "
             number += 1
-            written.append(hang(mark, "\n\n".join(self.of(item.children))))
-        loose = any("\n\n" in one for one in written)
-        return ("\n\n" if loose else "\n").join(written)
+            texts.append(hang(mark, "\n\n".join(self.blocks(item.children))))
+        is_loose = any("\n\n" in text for text in texts)
+        return ("\n\n" if is_loose else "\n").join(texts)
 
     def _terms(self, node: HtmlElement) -> str:
         rows: list[str] = []
         for child in node.nearest("dt", "dd"):
-            text = " ".join(" ".join(self.of(child.children)).split())
+            text = " ".join(" ".join(self.blocks(child.children)).split())
             if child.name == "dt":
                 rows.append(f"- {text}:")
             elif rows:
@@ -107,21 +107,18 @@ class _Blocks:
         return "\n".join(rows)
 
     def _table(self, node: HtmlElement) -> str:
-        rows = [
-            (any(c.name == "td" for c in cells), cells)
-            for row in node.nearest("tr")
-            if (cells := list(row.nearest("th", "td")))
-        ]
+        rows = [cells for row in node.nearest("tr") if (cells := list(row.nearest("th", "td")))]
         if not rows:
             return ""
-        width = max(len(cells) for _, cells in rows)
-        written = [[self._cell(cell) for cell in cells] for _, cells in rows]
-        written = [[*row, *[""] * (width - len(row))] for row in written]
-        head = written.pop(0) if not rows[0][0] else [""] * width
-        return table(head, written)
+        width = max(map(len, rows))
+        texts = [[self._cell(cell) for cell in cells] for cells in rows]
+        texts = [[*row, *[""] * (width - len(row))] for row in texts]
+        has_head = not any(cell.name == "td" for cell in rows[0])
+        head = texts.pop(0) if has_head else [""] * width
+        return table(head, texts)
 
     def _cell(self, node: HtmlElement) -> str:
-        return " ".join(" ".join(self.of(node.children)).split())
+        return " ".join(" ".join(self.blocks(node.children)).split())
 
     # --- lines
 
@@ -156,7 +153,7 @@ class _Blocks:
             case "br":
                 return " "
             case "math":
-                tex = next((one.text for one in node.nearest("annotation")), "")
+                tex = next((annotation.text for annotation in node.nearest("annotation")), "")
                 return f"${tex.strip()}$" if tex else escaped(node.text)
             case "span" if node.attributes.get("class") == "sep":
                 return f" {inner} "

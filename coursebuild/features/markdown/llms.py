@@ -1,10 +1,10 @@
 """`llms.txt`: the course in one Markdown file of links, for language models.
 
-Entry point: `llms(library)`. Format: <https://llmstxt.org>.
+Entry point: `write_llms(library)`. Format: <https://llmstxt.org>.
 
-There is no `llms-full.txt`: of a course of thousands of lessons it would have tens of megabytes,
-more than any model reads, and every edit would write it again. The links lead to pages in Markdown,
-one for each lesson.
+There is no `llms-full.txt`: for thousands of lessons it would have tens of megabytes, more than any
+model reads, and every edit would write it again. The links lead to pages in Markdown, one for each
+lesson.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from coursebuild.core.pages.marks import escaped_line, link
 PATH = "llms.txt"
 
 
-def llms(library: Library) -> bytes:
-    """The file."""
+def write_llms(library: Library) -> bytes:
+    """Return the content of the file."""
     course, words = library.course, library.words
     parts = [f"# {escaped_line(course.title)}"]
     if course.summary:
@@ -27,20 +27,22 @@ def llms(library: Library) -> bytes:
     parts.append(words("exports.llms"))
     for level in course.levels:
         label = f"{words('level.label', id=level.id)}: {level.title}"
-        rows = [_lesson(library, one) for one in level.lessons if one.document is not None]
+        rows = [
+            _lesson_row(library, lesson) for lesson in level.lessons if lesson.document is not None
+        ]
         if rows:
             parts.append("\n".join((f"## {escaped_line(label)}", "", *rows)))
-    parts += _others(library)
+    parts += _optional_part(library)
     return visible("\n\n".join(parts) + "\n").encode()
 
 
-def _lesson(library: Library, lesson: Lesson) -> str:
+def _lesson_row(library: Library, lesson: Lesson) -> str:
     path = urls.lesson_path(lesson)
     return _row(library, path, f"{lesson.id} {lesson.title}", lesson.summary)
 
 
-def _others(library: Library) -> list[str]:
-    """What may be left out where there is little room."""
+def _optional_part(library: Library) -> list[str]:
+    """Return the list of pages that can be left out where there is little room."""
     course, words = library.course, library.words
     rows = [_row(library, urls.HOME, words("site.map"), "")]
     rows += [_row(library, urls.page_path(page), page.title, "") for page in course.pages]

@@ -1,9 +1,9 @@
-"""The blocks that are ours as plain Markdown: scripts, outputs, labs, quizzes, callouts.
+"""Writes the course's own blocks as plain Markdown: scripts, outputs, labs, quizzes, callouts.
 
 Entry point: `DocumentWriter`, for one document on one page.
 
-What a page shows with templates is said here in Markdown: a script is a fence under its name, a lab
-is its recorded picture and what it showed, a quiz is a list with its answers.
+A script is a fence below its name, a lab its recorded picture and values, a quiz a list with its
+answers.
 """
 
 from __future__ import annotations
@@ -22,44 +22,44 @@ from coursebuild.core.pages.html_context import OwnBlock
 from coursebuild.core.pages.marks import code_span, escaped, fence, link, quoted
 from coursebuild.core.registry import kind_of_block
 from coursebuild.features.markdown.blocks import BlockWriter
-from coursebuild.features.markdown.from_html import markdown_of
+from coursebuild.features.markdown.from_html import html_to_markdown
 
 
 @dataclass(frozen=True)
 class DocumentWriter(BlockWriter):
-    """A document as plain Markdown."""
+    """Writes a document as plain Markdown."""
 
     page: PageContext
     locate: Callable[[str], str]
-    """An address as the page has it, as the Markdown has it."""
+    """Convert an address on the page to one in the Markdown."""
     live: str
-    """The address of the page with its labs."""
+    """The address of the page, where labs run."""
     notebook: bool = False
-    """Whether scripts stand in cells of their own, answers are folded, and footnotes are a list."""
+    """Whether scripts have cells of their own, answers are folded, and footnotes are a list."""
 
     def href(self, target: model.Target) -> str:
-        """The address of a link."""
+        """Return the address of a link."""
         return self.locate(self.page.href(target))
 
     def url(self, url: str) -> str:
-        """The address of a picture."""
+        """Return the address of a picture."""
         return self.locate(self.page.url(url))
 
     def reference(self, note: int) -> str:
-        """A reference to a footnote."""
+        """Return a reference to a footnote."""
         return f"<sup>{note}</sup>" if self.notebook else f"[^{note}]"
 
-    def named(self, target: model.Target) -> str:
-        """What a link without a text says."""
+    def link_text(self, target: model.Target) -> str:
+        """Return the text for a link without one."""
         return self.page.reference(target)
 
-    def number(self, start: int) -> str:
-        """The number beside a formula that does not show one itself."""
-        known = self.page.equations.get(start)
-        return known.number if known is not None and known.has_margin_number else ""
+    def formula_number(self, start: int) -> str:
+        """Return the number of a formula that does not show one itself."""
+        equation = self.page.equations.get(start)
+        return equation.number if equation is not None and equation.has_margin_number else ""
 
-    def own(self, block: OwnBlock) -> str:
-        """A block of ours."""
+    def own_block(self, block: OwnBlock) -> str:
+        """Write one of the course's own blocks."""
         match block:
             case model.Callout():
                 return self._callout(block)
@@ -68,8 +68,8 @@ class DocumentWriter(BlockWriter):
             case model.Script():
                 return self._script(block)
             case model.Recording():
-                joined = any(block in some for some in self.page.script_outputs.values())
-                return "" if joined else self.recording(block)
+                is_joined = any(block in outputs for outputs in self.page.script_outputs.values())
+                return "" if is_joined else self.recording(block)
             case model.Mjcf():
                 return self._mjcf(block)
             case model.FeatureBlock():
@@ -78,11 +78,11 @@ class DocumentWriter(BlockWriter):
                 assert_never(block)
 
     def html(self, html: Markup) -> str:
-        """HTML of a template as Markdown."""
-        return markdown_of(str(html), self.locate)
+        """Convert HTML of a template to Markdown."""
+        return html_to_markdown(str(html), self.locate)
 
     def words(self, key: str, **values: str | int | float) -> str:
-        """A text of the interface, as Markdown."""
+        """Return a text of the interface as Markdown."""
         return escaped(self.page.renderer.words(key, **values))
 
     # --- callouts, io, MJCF
@@ -95,15 +95,15 @@ class DocumentWriter(BlockWriter):
         return quoted(f"{head}\n\n{inner}" if inner else head)
 
     def _mjcf(self, block: model.Mjcf) -> str:
-        shown = self.page.inputs
+        engine = self.page.inputs.engine
         label = (
             self.words("mjcf.fragment", element=block.fragment)
             if block.fragment
             else self.words("mjcf.label")
         )
-        receipt = f"*{self.words('mjcf.compiles', engine=shown.engine)}*"
+        receipt = f"*{self.words('mjcf.compiles', engine=engine)}*"
         if block.error is not None:
-            receipt = f"*{self.words('mjcf.fails', engine=shown.engine)}* {code_span(block.error)}"
+            receipt = f"*{self.words('mjcf.fails', engine=engine)}* {code_span(block.error)}"
         return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{receipt}"
 
     # --- scripts and outputs
@@ -126,7 +126,7 @@ class DocumentWriter(BlockWriter):
         return "\n\n".join(parts)
 
     def recording(self, block: model.Recording) -> str:
-        """An output with its caption and what can be said for it."""
+        """Write an output with its caption and its receipt."""
         if isinstance(block.body, model.Table):
             body = self.blocks((block.body,))
         else:
@@ -134,11 +134,11 @@ class DocumentWriter(BlockWriter):
         return f"{self.inlines(block.caption)}\n\n{body}\n\n{self.receipt(block)}"
 
     def receipt(self, block: model.Recording) -> str:
-        """What can be said for an output."""
+        """Write the receipt of an output: how it was verified."""
         return f"*{escaped(output_receipt(self.page, block).text)}*"
 
     def folded(self, label: str, text: str) -> str:
-        """A text behind its label, which a notebook shows on demand."""
+        """Write a text with its label; in a notebook it is folded."""
         if self.notebook:
             return f"<details>\n<summary>{label}</summary>\n\n{text}\n\n</details>"
         begins_block = text.startswith(("```", "- ", "1. ", "$$", "> ", "| ", "<"))

@@ -16,10 +16,10 @@ from support.scratch_course import Folder, Make
 pytestmark = pytest.mark.site
 
 
-def exported(folder: Folder, kind: str) -> Path:
+def export(folder: Folder, kind: str) -> Path:
     """The course as one file."""
-    done = folder.main("export", kind, "--quiet")
-    assert done.status == 0, done.out
+    process = folder.main("export", kind, "--quiet")
+    assert process.status == 0, process.out
     return folder.root / {"epub": "course.epub", "page": "course.html"}[kind]
 
 
@@ -60,11 +60,11 @@ def wild_chapter(book: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def everything(tmp_path_factory: pytest.TempPathFactory, built_courses: BuiltCourses) -> Folder:
+def full_course(tmp_path_factory: pytest.TempPathFactory, built_courses: BuiltCourses) -> Folder:
     """The course of every construct in Arabic, with hostile titles and a lesson of wild HTML."""
     folder = Folder(tmp_path_factory.mktemp("everything") / "course")
-    built = built_courses["full"].root
-    shutil.copytree(built, folder.root, symlinks=True, ignore=shutil.ignore_patterns("public"))
+    root = built_courses["full"].root
+    shutil.copytree(root, folder.root, symlinks=True, ignore=shutil.ignore_patterns("public"))
     folder.tmp.mkdir()
     folder.write("content/lessons/1.9-wild.md", WILD)
     folder.write("content/lessons/dot.png", DOT)
@@ -77,25 +77,25 @@ def everything(tmp_path_factory: pytest.TempPathFactory, built_courses: BuiltCou
     return folder
 
 
-def test_ebook_of_every_construct_and_of_wild_html_is_valid(everything: Folder) -> None:
-    book = exported(everything, "epub")
+def test_ebook_of_every_construct_and_of_wild_html_is_valid(full_course: Folder) -> None:
+    book = export(full_course, "epub")
     assert book.read_bytes()[30:58] == b"mimetypeapplication/epub+zip"
     assert told(book) == []
     with zipfile.ZipFile(book) as archive:
-        assert {one.date_time for one in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        assert {info.date_time for info in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
         assert 'page-progression-direction="rtl"' in archive.read("EPUB/package.opf").decode()
     chapter = wild_chapter(book)
     assert 'href="1.9-wild.xhtml"' in chapter and 'href="1.1-text.xhtml"' in chapter
     assert 'href="https://example.org/a%20b/files/lessons/data.csv"' in chapter
     assert "onclick" not in chapter and "press" not in chapter
-    everything.replace(MAP, SITE, "")
-    chapter = wild_chapter(exported(everything, "epub"))
+    full_course.replace(MAP, SITE, "")
+    chapter = wild_chapter(export(full_course, "epub"))
     assert 'href="1.1-text.xhtml"' in chapter and "data.csv" not in chapter
-    everything.replace(MAP, "[course]\n", f"[course]\n{SITE}")
+    full_course.replace(MAP, "[course]\n", f"[course]\n{SITE}")
 
 
-def test_page_of_every_construct_and_of_wild_html_needs_no_other_file(everything: Folder) -> None:
-    page = exported(everything, "page").read_text("utf-8")
+def test_page_of_every_construct_and_of_wild_html_needs_no_other_file(full_course: Folder) -> None:
+    page = export(full_course, "page").read_text("utf-8")
     ids = re.findall(r' id="([^"]*)"', page)
     assert len(ids) == len(set(ids)) and page.count("<h1") == 1
     assert set(re.findall(r'href="#([^"]*)"', page)) <= set(ids)
@@ -110,19 +110,19 @@ def test_page_of_every_construct_and_of_wild_html_needs_no_other_file(everything
 @pytest.mark.parametrize("name", ["unicode", "real"])
 def test_ebook_of_course_is_valid(built_courses: BuiltCourses, name: str, tmp_path: Path) -> None:
     book = tmp_path / "course.epub"
-    done = built_courses[name].main("export", "epub", "--quiet", "--out", str(book))
-    assert done.status == 0, done.out
+    process = built_courses[name].main("export", "epub", "--quiet", "--out", str(book))
+    assert process.status == 0, process.out
     assert told(book) == []
 
 
 def test_export_follows_edits_and_can_be_offered_by_a_link(make_course: Make) -> None:
     folder = make_course("## One\n\n![a dot](dot.png)\n\nText.\n")
     folder.write("content/lessons/dot.png", DOT)
-    first = {kind: exported(folder, kind).read_bytes() for kind in ("epub", "page")}
+    first = {kind: export(folder, kind).read_bytes() for kind in ("epub", "page")}
     folder.write("content/lessons/dot.png", DOT + b"more")
-    assert [kind for kind in first if exported(folder, kind).read_bytes() == first[kind]] == []
+    assert [kind for kind in first if export(folder, kind).read_bytes() == first[kind]] == []
     folder.write("content/lessons/dot.png", DOT)
-    assert {kind: exported(folder, kind).read_bytes() for kind in first} == first
+    assert {kind: export(folder, kind).read_bytes() for kind in first} == first
     assert folder.main("export", "epub", "--out", "content/files/course.epub").status == 0
     folder.write(folder.lesson(1), "[The book](../files/course.epub).\n")
     assert folder.main("build", "--quiet").status == 0

@@ -15,7 +15,7 @@ from coursebuild.core.pages.html_tree import (
     to_xml,
 )
 from coursebuild.features.book.epub import xml_id
-from coursebuild.features.book.rewrite import Rules, rewritten
+from coursebuild.features.book.rewrite import RewriteRules, rewrite
 from support.hostile_html import PAGES
 
 PAGE = "lessons/1.1-one.html"
@@ -29,24 +29,30 @@ def link(path: str, anchor: str) -> str:
     return f"to:{path}#{anchor}" if path.startswith("lessons/") else ""
 
 
-BOOK = Rules(PAGE, link, picture, xml_id)
-WHOLE = Rules(
-    PAGE, link, picture, "1.1--{}".format, lowered=2, closed=frozenset({"answer"}), section="1.1"
+BOOK = RewriteRules(PAGE, link, picture, xml_id)
+WHOLE = RewriteRules(
+    PAGE,
+    link,
+    picture,
+    "1.1--{}".format,
+    heading_shift=2,
+    closed_classes=frozenset({"answer"}),
+    section="1.1",
 )
 
 
 def xml(html: str) -> str:
-    return to_xml(rewritten(parse_html(html), BOOK))
+    return to_xml(rewrite(parse_html(html), BOOK))
 
 
-def moved(html: str) -> str:
-    return to_html(rewritten(parse_html(html), WHOLE))
+def html_for_page(html: str) -> str:
+    return to_html(rewrite(parse_html(html), WHOLE))
 
 
 @given(PAGES)
 def test_any_html_becomes_well_formed_and_runs_nothing(html: str) -> None:
     ElementTree.fromstring(f"<body>{xml(html)}</body>".encode())
-    for element in walk(parse_html(moved(html))):
+    for element in walk(parse_html(html_for_page(html))):
         assert element.name not in ("script", "button")
         assert not any(name.startswith("on") for name in element.attributes)
 
@@ -85,7 +91,7 @@ def test_what_becomes_of_html() -> None:
         ('<b data-x="1" onclick="e()" tabindex="0" style="a">b</b>', "<b>b</b>"),
         ('<a class="anchor" href="#a">#</a><button>b</button>c', "c"),
     ]  # fmt: skip
-    assert [moved(html) for html, _ in cases] == [expected for _, expected in cases]
+    assert [html_for_page(html) for html, _ in cases] == [expected for _, expected in cases]
 
 
 def test_what_becomes_of_html_as_xml() -> None:

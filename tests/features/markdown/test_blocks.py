@@ -42,13 +42,13 @@ class Context(BlockWriter):
     def reference(self, note: int) -> str:
         return f"[^{note}]"
 
-    def named(self, target: Target) -> str:
+    def link_text(self, target: Target) -> str:
         return ""
 
-    def number(self, start: int) -> str:
+    def formula_number(self, start: int) -> str:
         return ""
 
-    def own(self, block: OwnBlock) -> str:
+    def own_block(self, block: OwnBlock) -> str:
         if isinstance(block, Callout):
             title = guarded(self.inlines(block.title))
             return quoted("\n\n".join(filter(None, (title, self.blocks(block.blocks)))))
@@ -60,7 +60,7 @@ def read(markdown: str) -> Document:
     return parse_document(Source("a.md", markdown), frozenset({"note"}), lesson=True).value
 
 
-def written(markdown: str) -> str:
+def rewrite(markdown: str) -> str:
     document = read(markdown)
     blocks = Context().blocks(document.blocks)
     notes = Context().footnotes(document.footnotes)
@@ -75,12 +75,12 @@ def meaning(markdown: str) -> str:
 def test_the_examples_of_commonmark_mean_the_same() -> None:
     examples = EXAMPLE.findall(SPECIFICATION.read_text(encoding="utf-8").replace("→", "\t"))
     assert len(examples) == 652
-    wrong = [
-        f"{number}: {text!r} became {written(text)!r}"
+    failures = [
+        f"{number}: {text!r} became {rewrite(text)!r}"
         for number, (text, _) in enumerate(examples, 1)
-        if (meaning(text) != meaning(written(text))) is not (number in DIFFERENT)
+        if (meaning(text) != meaning(rewrite(text))) is not (number in DIFFERENT)
     ]
-    assert not wrong, "\n".join(wrong)
+    assert not failures, "\n".join(failures)
 
 
 PIECES = st.sampled_from(
@@ -93,7 +93,7 @@ PIECES = st.sampled_from(
 @settings(max_examples=120, deadline=None)
 @given(st.lists(PIECES, max_size=10).map("".join))
 def test_any_text_means_the_same(text: str) -> None:
-    assert plainly(text) == plainly(written(text)), written(text)
+    assert plainly(text) == plainly(rewrite(text)), rewrite(text)
 
 
 def plainly(markdown: str) -> str:
@@ -124,7 +124,7 @@ def test_markdown_of_constructs() -> None:
         ("1986\\. A year\n", "1986\\. A year\n"),
         ("&lt;b&gt; &amp;amp; \\*\n", "\\<b> \\&amp; \\*\n"),
     ]
-    assert [written(markdown) for markdown, _ in cases] == [expected for _, expected in cases]
+    assert [rewrite(markdown) for markdown, _ in cases] == [expected for _, expected in cases]
 
 
 def test_lines_that_would_begin_another_block_are_escaped() -> None:
