@@ -52,8 +52,11 @@ class BenchTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = 0.05
 
 
-class Observable(Struct, frozen=True):
-    """A quantity measured besides coordinates: a position, or the reading of a sensor."""
+class Measured(Struct, frozen=True):
+    """A quantity measured besides coordinates: a position, or the reading of a sensor.
+
+    Recorded reports hold a digest of its `repr`: its name stays.
+    """
 
     kind: Literal["body", "site", "sensor"]
     name: str
@@ -114,11 +117,11 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = ()
 
     @property
-    def observable(self) -> Observable | None:
+    def observable(self) -> Measured | None:
         """The quantity that `measure` names."""
         match (self.measure or "").split(":", 1):
             case ["body" | "site" | "sensor" as kind, name]:
-                return Observable(kind, name)
+                return Measured(kind, name)
             case _:
                 return None
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.core.model import Declarations, Observable
+from coursebuild.core.model import Declarations, Measured
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source
@@ -72,7 +72,7 @@ def test_everything_that_a_file_can_say(newline: str) -> None:
     assert (first.qpos, first.qvel) == ((0.0, 1.5), (0.5, 0.0))
     assert (first.duration, first.sample, first.hold) == (2.0, 0.1, 0.5)
     assert first.controls == ((0.5, 0.3), (-0.5, 1.0), (0.0, 0.0))
-    assert first.observable == Observable("site", "tip of it")
+    assert first.observable == Measured("site", "tip of it")
     assert (first.reference, first.closed_form, first.conserved) == ("ode", "", ())
     assert first.timesteps == (0.001, 0.05)
     assert first.place("keyframe").text == '"home"'
