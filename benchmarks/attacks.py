@@ -1,4 +1,4 @@
-"""What odd machines, kills and poisoned entries do to a build: what was tried and survived.
+"""Attack builds with odd machines, kills and poisoned entries, and count what they survive.
 
 Run: python benchmarks/attacks.py [--kills 500] [--entries 500] [--seed 21]
 
@@ -70,11 +70,11 @@ MACHINES: dict[str, str] = {
 
 
 Try: TypeAlias = tuple[str, Callable[[], tuple[int, str]], bool]
-"""Its name, what does it, and whether what it leaves may be believed."""
+"""Its name, the function that does it, and whether the site that it leaves may show its data."""
 
 
 class Attack:
-    """A course to attack, and what must be true afterwards."""
+    """A course to attack, and the checks afterwards."""
 
     def __init__(self, top: Path) -> None:
         self.template = Folder(top / "template")
@@ -87,12 +87,12 @@ class Attack:
         self.folder = Folder(top / "victim")
         self.outcome = ""
         self.deaths = 0
-        """How many builds were killed: some got through before, as they made fewer calls."""
-        self.again()
+        """How many builds were killed; some ended first, as they made fewer calls."""
+        self.restore()
         self.build(self.folder)
         self.new = site(self.folder)
 
-    def again(self) -> None:
+    def restore(self) -> None:
         for path in (self.folder.root, self.folder.tmp):
             subprocess.run(["chmod", "-R", "u+rwx", path], stderr=subprocess.DEVNULL)
             shutil.rmtree(path, ignore_errors=True)
@@ -100,23 +100,23 @@ class Attack:
         self.folder.tmp.mkdir()
 
     def build(self, folder: Folder) -> None:
-        done = folder.run("build", "-q")
-        if done.status != 0:
-            raise SystemExit(done.out + done.err)
+        command = folder.run("build", "-q")
+        if command.status != 0:
+            raise SystemExit(command.out + command.err)
 
-    def wrong(self, run: Callable[[], tuple[int, str]], *, believed: bool = False) -> str:
-        """What an attack did that it must not; empty where it was survived.
+    def find_violation(self, run: Callable[[], tuple[int, str]], *, trusted: bool = False) -> str:
+        """The violation that an attack caused; empty where the build survived.
 
-        An entry of this machine with a true seal may be `believed`, and shown.
+        An entry of this machine with a true seal may be `trusted`, and shown.
         """
-        status, said = run()
-        first = (said.strip() or "-").splitlines()[0]
+        status, output = run()
+        first = (output.strip() or "-").splitlines()[0]
         self.outcome = "built" if status == 0 else f"told: {first[:70]}"
-        if "Traceback" in said or status not in (0, 1):
-            return f"status {status}: {said[-400:]}"
+        if "Traceback" in output or status not in (0, 1):
+            return f"status {status}: {output[-400:]}"
         if self.folder.text(self.folder.lesson()) != CHANGED:
             return "the lesson changed"
-        if believed:
+        if trusted:
             return ""
         if site(self.folder) not in (self.old, self.new):
             return "the site is torn"
@@ -125,13 +125,13 @@ class Attack:
             return f"the next build: status {after.status}: {after.out[-300:]}{after.err[-300:]}"
         return ""
 
-    def machine(self, oddity: str) -> tuple[int, str]:
-        self.again()
+    def build_on(self, oddity: str) -> tuple[int, str]:
+        self.restore()
         words = [sys.executable if word == "python" else word for word in command("build", "-q")]
         shell = f'{oddity} "$@"' if oddity.endswith("-i") else f'{oddity} || exit 77; exec "$@"'
-        alone = ["unshare", "--mount"] if "mount" in oddity else []
-        done = subprocess.run(
-            [*alone, "bash", "-c", shell, "bash", *words],
+        namespace = ["unshare", "--mount"] if "mount" in oddity else []
+        process = subprocess.run(
+            [*namespace, "bash", "-c", shell, "bash", *words],
             cwd=self.folder.root,
             env=self.folder.environment(),
             stdin=subprocess.DEVNULL,
@@ -139,36 +139,36 @@ class Attack:
             text=True,
             errors="replace",
         )
-        return done.returncode, done.stdout + done.stderr
+        return process.returncode, process.stdout + process.stderr
 
-    def entry(self, path: str, data: bytes) -> tuple[int, str]:
-        self.again()
+    def build_with(self, path: str, data: bytes) -> tuple[int, str]:
+        self.restore()
         self.folder.write(path, data)
         try:
-            done = self.folder.main("build", "-q")
+            result = self.folder.main("build", "-q")
         except Exception:
             return 70, traceback.format_exc()
-        return done.status, done.out + done.err
+        return result.status, result.out + result.err
 
     def calls(self, mortals: Mortals, count: int) -> Iterator[tuple[str, bool, int]]:
         """Calls at which to kill a build, spread over all.
 
         With and without an exchange of two folders in one step.
         """
-        found = []
+        calls = []
         for mortals.exchanges in (True, False):
-            self.again()
+            self.restore()
             _, names = mortals.run(self.folder, "build", "-q")
-            found += [
+            calls += [
                 (f"{name}, call {number}", mortals.exchanges, number)
                 for number, name in enumerate(names, 1)
             ]
-        print(f"a build can be killed at {len(found)} calls", flush=True)
-        count = min(count, len(found))
-        return (found[len(found) * number // count] for number in range(count))
+        print(f"a build can be killed at {len(calls)} calls", flush=True)
+        count = min(count, len(calls))
+        return (calls[len(calls) * number // count] for number in range(count))
 
-    def killed(self, mortals: Mortals, exchanges: bool, fatal: int) -> tuple[int, str]:
-        self.again()
+    def kill(self, mortals: Mortals, exchanges: bool, fatal: int) -> tuple[int, str]:
+        self.restore()
         mortals.exchanges = exchanges
         status, _ = mortals.run(self.folder, "build", "-q", fatal=fatal)
         wait_until_alone(self.folder)
@@ -178,13 +178,13 @@ class Attack:
     def entries(self, count: int, seed: int) -> Iterator[tuple[str, bytes, bool]]:
         """Entries of each kind in turn: with a bit wrong, cut, or with a seal and wrong data.
 
-        With each it is said whether its seal is true.
+        Each comes with whether its seal is true.
         """
         chance = random.Random(seed)
         kinds: dict[str, list[str]] = {}
-        for path in sorted((self.template.root / ".coursebuild").rglob("*")):
-            if HASH.fullmatch(path.name) and path.is_file():
-                name = path.relative_to(self.template.root).as_posix()
+        for file in sorted((self.template.root / ".coursebuild").rglob("*")):
+            if HASH.fullmatch(file.name) and file.is_file():
+                name = file.relative_to(self.template.root).as_posix()
                 kinds.setdefault(name.split("/")[1], []).append(name)
         for number, kind in zip(range(count), itertools.cycle(kinds), strict=False):
             path = chance.choice(kinds[kind])
@@ -199,11 +199,11 @@ class Attack:
             elif damage < 0.2:
                 yield path, whole[:at], False
             else:
-                yield path, sealed(name, poisoned(data, chance)), True
+                yield path, sealed(name, poison(data, chance)), True
 
 
-def poisoned(data: bytes, chance: random.Random) -> bytes:
-    """Data that still looks like what it is: one value in it is another, often of another type."""
+def poison(data: bytes, chance: random.Random) -> bytes:
+    """Data of the same form with one value changed, often to another type."""
     for decode, encode in (
         (json.loads, lambda value: json.dumps(value).encode()),
         (msgspec.msgpack.decode, msgspec.msgpack.encode),
@@ -217,30 +217,30 @@ def poisoned(data: bytes, chance: random.Random) -> bytes:
 
 
 def site(folder: Folder) -> dict[str, bytes]:
-    """What is published; between two renames it is what the next build puts back."""
+    """The published site; between two renames, the one that the next build puts back."""
     return folder.tree("public") or folder.tree(".public.coursebuild-old")
 
 
 class Table:
-    """What was tried, and what was not survived."""
+    """Prints results, and collects violations."""
 
     def __init__(self, attack: Attack) -> None:
         self.attack = attack
-        self.failed: list[str] = []
+        self.violations: list[str] = []
 
-    def row(self, what: str, attacks: Iterable[Try], *, every: bool = False) -> None:
-        """Try attacks of a kind; `every` one gets a line."""
-        tried, before = 0, len(self.failed)
-        for name, run, believed in attacks:
-            wrong = self.attack.wrong(run, believed=believed)
-            tried += 1
-            if wrong:
-                self.failed.append(f"{name}: {wrong}")
-                print(self.failed[-1], flush=True)
-            elif every:
+    def row(self, kind: str, attacks: Iterable[Try], *, verbose: bool = False) -> None:
+        """Try attacks of a kind; if `verbose`, each one gets a line."""
+        count, before = 0, len(self.violations)
+        for name, run, trusted in attacks:
+            violation = self.attack.find_violation(run, trusted=trusted)
+            count += 1
+            if violation:
+                self.violations.append(f"{name}: {violation}")
+                print(self.violations[-1], flush=True)
+            elif verbose:
                 print(f"{name:36}{self.attack.outcome}", flush=True)
-        survived = tried - len(self.failed) + before
-        print(f"{what}: {tried} tried, {survived} survived", flush=True)
+        survived = count - len(self.violations) + before
+        print(f"{kind}: {count} tried, {survived} survived", flush=True)
 
 
 def main() -> int:
@@ -248,30 +248,30 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=520)
     parser.add_argument("--entries", type=int, default=500)
     parser.add_argument("--seed", type=int, default=21)
-    chosen = parser.parse_args()
+    arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as top:
         attack = Attack(Path(top))
         table = Table(attack)
         machines = (
-            (name, functools.partial(attack.machine, oddity), False)
+            (name, functools.partial(attack.build_on, oddity), False)
             for name, oddity in MACHINES.items()
         )
-        table.row("odd machines", machines, every=True)
+        table.row("odd machines", machines, verbose=True)
         mortal = Folder(Path(top) / "mortal")
         mortal.root.mkdir()
         with mortal_commands(mortal) as mortals:
             kills = (
-                (name, functools.partial(attack.killed, mortals, exchanges, at), False)
-                for name, exchanges, at in attack.calls(mortals, chosen.kills)
+                (name, functools.partial(attack.kill, mortals, exchanges, at), False)
+                for name, exchanges, at in attack.calls(mortals, arguments.kills)
             )
             table.row("kills", kills)
             print(f"killed: {attack.deaths}")
         entries = (
-            (path[:40], functools.partial(attack.entry, path, data), believed)
-            for path, data, believed in attack.entries(chosen.entries, chosen.seed)
+            (path[:40], functools.partial(attack.build_with, path, data), trusted)
+            for path, data, trusted in attack.entries(arguments.entries, arguments.seed)
         )
         table.row("damaged or poisoned entries", entries)
-    return 1 if table.failed else 0
+    return 1 if table.violations else 0
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Measure coursebuild and its peers side by side, in one run.
+"""Measure coursebuild and its peers in one run.
 
 Run: python benchmarks/builds.py [--peers BIN] [--node NODE_MODULES] [--sizes 80,800] [--docs]
 
@@ -34,7 +34,7 @@ PARTS = ("builds", "serve", "scripts")
 
 
 def arguments_of() -> argparse.Namespace:
-    """What was asked for."""
+    """Parse the arguments."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--peers", type=Path, help="`bin` of an environment with peers.txt")
     parser.add_argument("--node", type=Path, help="`node_modules` with package.json's packages")
@@ -54,21 +54,21 @@ def arguments_of() -> argparse.Namespace:
 
 
 def say(text: str) -> None:
-    """Tell how far it is."""
+    """Report the progress."""
     print(text, file=sys.stderr, flush=True)
 
 
 def main() -> None:
-    """Measure, print, keep."""
+    """Measure, print, save."""
     arguments = arguments_of()
     peers = arguments.peers.resolve() if arguments.peers else None
     node = arguments.node.resolve() if arguments.node else None
     work = arguments.work.resolve() if arguments.work else Path(tempfile.mkdtemp(prefix="bench-"))
     work.mkdir(parents=True, exist_ok=True)
     try:
-        text = measured(arguments, Places(peers, node), work)
-    except CommandError as fault:
-        sys.exit(str(fault))
+        text = measure(arguments, Places(peers, node), work)
+    except CommandError as error:
+        sys.exit(str(error))
     finally:
         if arguments.work is None:
             shutil.rmtree(work, ignore_errors=True)
@@ -77,19 +77,19 @@ def main() -> None:
         put_into(DOCS, text)
 
 
-def measured(arguments: argparse.Namespace, places: Places, work: Path) -> str:
-    """All that was asked for, as text."""
-    every = all_tools(places)
-    keys = {tool.key for tool in every}
-    wanted = set(arguments.tools.split(",")) if arguments.tools else keys
-    if wanted - keys:
-        unknown, known = ", ".join(sorted(wanted - keys)), ", ".join(sorted(keys))
-        raise CommandError(f"no tool is called {unknown}: there are {known}")
-    tools = [tool for tool in every if tool.key in wanted]
+def measure(arguments: argparse.Namespace, places: Places, work: Path) -> str:
+    """Measure everything that the arguments ask for; gives the tables as text."""
+    all_known_tools = all_tools(places)
+    keys = {tool.key for tool in all_known_tools}
+    selection = set(arguments.tools.split(",")) if arguments.tools else keys
+    if selection - keys:
+        unknown, names = ", ".join(sorted(selection - keys)), ", ".join(sorted(keys))
+        raise CommandError(f"no tool is called {unknown}: there are {names}")
+    tools = [tool for tool in all_known_tools if tool.key in selection]
     report = describe(tools, jcache_version(places))
     if any(tool.key == BASE and tool.version is None for tool in tools):
         raise CommandError(f"{sys.executable} cannot run coursebuild")
-    there = [tool for tool in tools if tool.version is not None]
+    installed = [tool for tool in tools if tool.version is not None]
     parts = arguments.parts.split(",")
     sizes = [int(size) for size in arguments.sizes.split(",")]
     rounds = [int(number) for number in arguments.rounds.split(",")]
@@ -97,13 +97,13 @@ def measured(arguments: argparse.Namespace, places: Places, work: Path) -> str:
         turns = rounds[min(i, len(rounds) - 1)]
         sites = []
         if "builds" in parts:
-            sites = measure_builds(there, size, turns, work, places, say)
+            sites = measure_builds(installed, size, turns, work, places, say)
             report.add_sites(sites, size)
             keep(arguments, report.as_json())
         if "serve" in parts:
-            known = {site.tool.key for site in sites}
-            more = [t for t in there if t.serve is not None and t.key not in known]
-            sites += [make_site(tool, size, work, places) for tool in more]
+            built_keys = {site.tool.key for site in sites}
+            unbuilt = [t for t in installed if t.serve is not None and t.key not in built_keys]
+            sites += [make_site(tool, size, work, places) for tool in unbuilt]
             measure_serving(sites, min(turns, 2), 5, say)
         report.add_sites(sites, size)
         keep(arguments, report.as_json())
@@ -114,7 +114,7 @@ def measured(arguments: argparse.Namespace, places: Places, work: Path) -> str:
 
 
 def keep(arguments: argparse.Namespace, figures: dict[str, object]) -> None:
-    """Write what there is so far, so that a run that is broken off is not lost."""
+    """Write the figures so far, so that an interrupted run is not lost."""
     if arguments.json is not None:
         text = json.dumps(figures, indent=1, ensure_ascii=False)
         arguments.json.write_text(text + "\n", encoding="utf-8")

@@ -37,9 +37,9 @@ def write_course(
     if folder.exists() and any(folder.iterdir()):
         raise FileExistsError(f"{folder} is not empty")
     module = importlib.import_module(f"benchmarks.generate.flavors.{flavor}")
-    written = [make_lesson(n, lessons, scripts) for n in range(lessons)]
-    module.write(written, folder)
-    return [lesson.name for lesson in written]
+    course_lessons = [make_lesson(n, lessons, scripts) for n in range(lessons)]
+    module.write(course_lessons, folder)
+    return [lesson.name for lesson in course_lessons]
 
 
 def names_of(lessons: int) -> list[str]:
@@ -57,8 +57,8 @@ def main() -> None:
     arguments = parser.parse_args()
     try:
         write_course(arguments.out, arguments.lessons, arguments.flavor, arguments.scripts)
-    except FileExistsError as fault:
-        sys.exit(str(fault))
+    except FileExistsError as error:
+        sys.exit(str(error))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What the scene diet saves on two scenes: an arm with sensors, and an arm in a field of rubble.
+"""Measure the scene diet on two scenes: an arm with sensors, and an arm in a field of rubble.
 
 Run: python benchmarks/diet.py [--pieces N] [--out DIR]
 
@@ -51,7 +51,7 @@ def rubble(pieces: int) -> str:
 
 
 def main() -> None:
-    """Write the scenes, look at them, print."""
+    """Write the scenes, examine them, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--pieces", type=int, default=24, help="of rubble (default: %(default)s)")
     parser.add_argument("--out", type=Path, default=None, help="where the course goes")
@@ -64,23 +64,23 @@ def main() -> None:
         (root / "models" / "arm.xml").write_text(arm().replace("RUBBLE", ""))
         field = arm().replace("RUBBLE", rubble(arguments.pieces))
         (root / "models" / "rubble.xml").write_text(field)
-        found = diet(Options(root, 1, quiet=True))
-    for report in found.reports:
+        measurement = diet(Options(root, 1, quiet=True))
+    for report in measurement.reports:
         show(report)
 
 
 def show(report: DietReport) -> None:
     """A line for each finding that saves time, and one for all together."""
     print(f"{report.model}  (MuJoCo {report.machine.engine}, {report.machine.cpu})")
-    for one in report.findings:
-        saving = one.saving
+    for finding in report.findings:
+        saving = finding.saving
         if saving.time is not None and saving.certain:
-            print(f"  ×{saving.time:6.2f} ± {saving.spread:.2f}  {one.kind}: {one.label}")
+            print(f"  ×{saving.time:6.2f} ± {saving.spread:.2f}  {finding.kind}: {finding.label}")
     slim = report.slim
     if slim is not None and slim.time is not None:
-        off = report.slim_difference
-        away = "the same bits" if off == 0 else f"differs by {off:.1e}"
-        print(f"  ×{slim.time:6.2f} ± {slim.spread:.2f}  all that goes together: {away}")
+        difference = report.slim_difference
+        remark = "the same bits" if difference == 0 else f"differs by {difference:.1e}"
+        print(f"  ×{slim.time:6.2f} ± {slim.spread:.2f}  all that goes together: {remark}")
 
 
 if __name__ == "__main__":

@@ -95,7 +95,7 @@ STEPS = {
     "six_boxes": 10_000,
     "twenty_boxes": 3_000,
 }
-"""In a turn: at least a third of a second."""
+"""Steps in a turn: at least a third of a second."""
 LESSON = """## {model}
 
 ```lab simlab
@@ -132,10 +132,10 @@ def run(folder: Path, *arguments: str) -> str:
     """Run coursebuild in the scratch course."""
     command = [sys.executable, "-m", "coursebuild", "-C", str(folder), *arguments]
     environment = {**os.environ, "PYTHONPATH": str(HERE)}
-    done = subprocess.run(command, capture_output=True, text=True, env=environment)
-    if done.returncode != 0:
-        sys.exit(done.stdout + done.stderr)
-    return done.stdout
+    process = subprocess.run(command, capture_output=True, text=True, env=environment)
+    if process.returncode != 0:
+        sys.exit(process.stdout + process.stderr)
+    return process.stdout
 
 
 @dataclass
@@ -144,12 +144,12 @@ class Runner:
 
     name: str
     run: Callable[[], float]
-    """Makes the steps from the start; steps a second."""
+    """Make the steps from the start; gives steps a second."""
     speeds: list[float] = field(default_factory=list)
 
 
-def compete(runners: list[Runner], rounds: int) -> None:
-    """Let all run, in rounds, beginning with another one each time."""
+def run_in_turns(runners: list[Runner], rounds: int) -> None:
+    """Run all, in rounds, each round beginning with another one."""
     for runner in runners:
         runner.run()
     for i in range(rounds):
@@ -158,7 +158,7 @@ def compete(runners: list[Runner], rounds: int) -> None:
             runner.speeds.append(runner.run())
 
 
-def native(text: str, steps: int) -> Callable[[], float]:
+def run_native(text: str, steps: int) -> Callable[[], float]:
     """Native MuJoCo, which makes the steps in one call."""
     import mujoco
 
@@ -178,8 +178,8 @@ def native(text: str, steps: int) -> Callable[[], float]:
     return run
 
 
-def headless(engine: Any, lab: Any, mjb: bytes, steps: int) -> Callable[[], float]:
-    """The main run of a trial, in the V8 of this process, without what is recorded for parity."""
+def run_headless(engine: Any, lab: Any, mjb: bytes, steps: int) -> Callable[[], float]:
+    """The main run of a trial, in the V8 of this process, without recording for parity."""
     from coursebuild.features.lab.compile import compile_lab
 
     module = compile_lab(lab, "lab")
@@ -197,13 +197,13 @@ def headless(engine: Any, lab: Any, mjb: bytes, steps: int) -> Callable[[], floa
     return run
 
 
-def in_worker(page: Any, mode: str, steps: int) -> Callable[[], float]:
-    """The worker of a page that has been made ready by `WORKER`."""
+def run_in_worker(page: Any, mode: str, steps: int) -> Callable[[], float]:
+    """The worker of a page that `WORKER` has prepared."""
     return lambda: float(page.evaluate("([mode, n]) => window.pass(mode, n)", [mode, steps]))
 
 
 @contextmanager
-def served(folder: Path) -> Iterator[str]:
+def serve(folder: Path) -> Iterator[str]:
     """Serve a folder on this machine."""
 
     class Quiet(http.server.SimpleHTTPRequestHandler):
@@ -278,7 +278,7 @@ WATCH = """() => {
 
 
 @contextmanager
-def browsing() -> Iterator[Any]:
+def open_browser() -> Iterator[Any]:
     """Headless Chromium, drawing without a GPU."""
     from playwright.sync_api import sync_playwright
 
@@ -290,7 +290,7 @@ def browsing() -> Iterator[Any]:
         browser.close()
 
 
-def race(folder: Path, browser: Any, url: str, rounds: int) -> Iterator[str]:
+def run_race(folder: Path, browser: Any, url: str, rounds: int) -> Iterator[str]:
     """A line for each model."""
     from coursebuild.core.syntax.document import parse_document
     from coursebuild.core.text.source import Source
@@ -310,32 +310,32 @@ def race(folder: Path, browser: Any, url: str, rounds: int) -> Iterator[str]:
             html = (folder / "public" / "lessons" / f"{address(i, name)}.html").read_text()
             page.evaluate(WORKER, re.findall('data-config="([^"]+)"', html)[0])
             runners = [
-                Runner("native", native(text, steps)),
-                Runner("headless", headless(engine, lab, mjb, steps)),
-                Runner("worker", in_worker(page, "step", steps)),
-                Runner("playing", in_worker(page, "play", steps)),
+                Runner("native", run_native(text, steps)),
+                Runner("headless", run_headless(engine, lab, mjb, steps)),
+                Runner("worker", run_in_worker(page, "step", steps)),
+                Runner("playing", run_in_worker(page, "play", steps)),
             ]
-            compete(runners, rounds)
+            run_in_turns(runners, rounds)
             page.close()
             yield row(name, *(runner.speeds for runner in runners))
 
 
-def row(name: str, own: list[float], v8: list[float], *workers: list[float]) -> str:
-    """Speeds, and what they are of others in the same round."""
+def row(name: str, native: list[float], v8: list[float], *workers: list[float]) -> str:
+    """A line of speeds, with their ratios to others in the same round."""
 
-    def ratio(these: list[float], those: list[float]) -> float:
-        return statistics.median(a / b for a, b in zip(these, those, strict=True))
+    def ratio(speeds: list[float], base: list[float]) -> float:
+        return statistics.median(a / b for a, b in zip(speeds, base, strict=True))
 
-    line = f"  {name:<16}{statistics.median(own):10,.0f}"
-    line += f"{statistics.median(v8):11,.0f} (x {ratio(v8, own):.2f})"
+    line = f"  {name:<16}{statistics.median(native):10,.0f}"
+    line += f"{statistics.median(v8):11,.0f} (x {ratio(v8, native):.2f})"
     for worker in workers:
         line += f"{statistics.median(worker):11,.0f}"
-        line += f" (x {ratio(worker, own):.2f}, {ratio(worker, v8):.2f})"
+        line += f" (x {ratio(worker, native):.2f}, {ratio(worker, v8):.2f})"
     return line
 
 
 def page_cost(browser: Any, url: str, name: str) -> str:
-    """What a page costs, and how its lab runs."""
+    """The cost of a page, and how its lab runs."""
     context = browser.new_context(viewport={"width": 1280, "height": 900})
     sizes: list[int] = []
     page = context.new_page()
@@ -354,7 +354,7 @@ def page_cost(browser: Any, url: str, name: str) -> str:
     page.wait_for_selector(".lab-play", timeout=60_000)
     page.evaluate(WATCH)
     clock = "document.querySelector('.lab-time').textContent"
-    started = page.evaluate(
+    start_ms = page.evaluate(
         f"""async () => {{
           const first = {clock}; const began = performance.now()
           document.querySelector('.lab-play').click()
@@ -365,22 +365,22 @@ def page_cost(browser: Any, url: str, name: str) -> str:
     session = context.new_cdp_session(page)
     session.send("Performance.enable")
 
-    def busy() -> tuple[float, float]:
-        found = {m["name"]: m["value"] for m in session.send("Performance.getMetrics")["metrics"]}
-        return found["TaskDuration"], found["Timestamp"]
+    def read_busy_time() -> tuple[float, float]:
+        metrics = {m["name"]: m["value"] for m in session.send("Performance.getMetrics")["metrics"]}
+        return metrics["TaskDuration"], metrics["Timestamp"]
 
-    task, stamp = busy()
+    task, stamp = read_busy_time()
     page.evaluate("() => { window.frames_.length = 0; window.long_.length = 0 }")
     page.wait_for_timeout(5000)
     frames = page.evaluate("window.frames_")
     long = page.evaluate("window.long_")
-    task_end, stamp_end = busy()
+    task_end, stamp_end = read_busy_time()
     context.close()
     median = statistics.median(frames)
     slow = sorted(frames)[int(0.99 * len(frames))]
     return (
         f"  page {name}: {before}; {after}\n"
-        f"    Play to first moving frame {started:.0f} ms (warm cache); frame median"
+        f"    Play to first moving frame {start_ms:.0f} ms (warm cache); frame median"
         f" {median:.1f} ms, 99th percentile {slow:.1f} ms; {len(long)} tasks over 50 ms in 5 s;"
         f" page thread busy {100 * (task_end - task) / (stamp_end - stamp):.0f} %"
     )
@@ -400,7 +400,7 @@ def main() -> None:
         make_course(folder)
         report = json.loads(run(folder, "check", "--quiet", "--format", "json"))
         run(folder, "build", "--quiet")
-        with served(folder / "public") as url, browsing() as browser:
+        with serve(folder / "public") as url, open_browser() as browser:
             print(f"Chromium {browser.version}")
             if arguments.only != "pages":
                 print("\nsteps a second, as `coursebuild check` tells them")
@@ -409,7 +409,7 @@ def main() -> None:
                 print("\nsteps a second      native      V8 headless", end="")
                 print("        worker, in one go         worker, playing")
                 print(f"{'':<31}(x: of native)       (x: of native, of headless)")
-                for line in race(folder, browser, url, arguments.rounds):
+                for line in run_race(folder, browser, url, arguments.rounds):
                     print(line, flush=True)
             if arguments.only != "speed":
                 print("\npages")

@@ -73,7 +73,7 @@ for (const page of pages) {
 # --- building
 
 
-def built(folder: Path, patch: str = "") -> float:
+def build_course(folder: Path, patch: str = "") -> float:
     """Build a course; gives the processor time of it and its children, s."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     command = [sys.executable, "-c", COMMAND.format(patch=patch), "-C", str(folder)]
@@ -83,31 +83,31 @@ def built(folder: Path, patch: str = "") -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def building(work: Path, lessons: int, rounds: int) -> dict[str, Any]:
+def measure_builds(work: Path, lessons: int, rounds: int) -> dict[str, Any]:
     """Processor time of builds with the search and without."""
     ways = {"with": "", "without": WITHOUT}
     cold: dict[str, float] = {}
     for way, patch in ways.items():
         write_wordy(work / way, lessons)
-        cold[way] = built(work / way, patch)
+        cold[way] = build_course(work / way, patch)
     edits: dict[str, list[float]] = {way: [] for way in ways}
     lesson = "content/lessons/1.2-l1.md"
     for number in range(rounds + 1):
         for way, patch in ways.items():
             with (work / way / lesson).open("a", encoding="utf-8") as file:
                 file.write(f"\nA sentence with word{number}.\n")
-            took = built(work / way, patch)
+            took = build_course(work / way, patch)
             if number:  # the first is to be warm
                 edits[way].append(took)
-    each = {way: statistics.median(taken) for way, taken in edits.items()}
+    medians = {way: statistics.median(seconds) for way, seconds in edits.items()}
     differences = [a - b for a, b in zip(edits["with"], edits["without"], strict=True)]
     return {
         "cold_s": cold["with"],
         "cold_added_ms_per_lesson": 1e3 * (cold["with"] - cold["without"]) / lessons,
         "cold_ratio": cold["with"] / cold["without"],
-        "edit_s": each["with"],
+        "edit_s": medians["with"],
         "edit_added_ms": 1e3 * statistics.median(differences),
-        "edit_ratio": each["with"] / each["without"],
+        "edit_ratio": medians["with"] / medians["without"],
     }
 
 
@@ -150,7 +150,7 @@ class Server(http.server.SimpleHTTPRequestHandler):
 
 
 @contextmanager
-def served(folder: Path) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
+def serve(folder: Path) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
     """The address of a folder, and the list of what was sent."""
     sent: list[tuple[str, int, int]] = []
     kind = type("Handler", (Server,), {"sent": sent})
@@ -176,44 +176,44 @@ FIRST = """async (item) => {
 }"""
 
 
-def asking(
+def measure_queries(
     browser: Any,
     address: str,
     sent: list[tuple[str, int, int]],
-    ours: Callable[[str], bool],
+    is_index_file: Callable[[str], bool],
     item: str,
     rounds: int,
 ) -> dict[str, Any]:
-    """What first queries fetch and take; each in a fresh profile."""
-    found: dict[str, list[float]] = {}
+    """The requests, bytes, time and memory of first queries, each in a fresh profile."""
+    figures: dict[str, list[float]] = {}
     for query in QUERIES * rounds:
         context = browser.new_context(service_workers="block")
         page = context.new_page()
         page.add_init_script(WATCH)
         sent.clear()
         page.goto(address + query.replace(" ", "%20"), wait_until="commit")
-        took = page.evaluate(FIRST, item)
+        elapsed = page.evaluate(FIRST, item)
         page.wait_for_timeout(300)
-        mine = [entry for entry in sent if ours(entry[0])]
+        fetched = [entry for entry in sent if is_index_file(entry[0])]
         tools = context.new_cdp_session(page)
         tools.send("HeapProfiler.collectGarbage")
         heap = tools.send("Runtime.getHeapUsage")["usedSize"]
         row = {
-            "first_result_ms": took,
-            "requests": len(mine),
-            "sent_kB": sum(entry[1] for entry in mine) / 1e3,
-            "unpacked_kB": sum(entry[2] for entry in mine) / 1e3,
+            "first_result_ms": elapsed,
+            "requests": len(fetched),
+            "sent_kB": sum(entry[1] for entry in fetched) / 1e3,
+            "unpacked_kB": sum(entry[2] for entry in fetched) / 1e3,
             "heap_MB": heap / 1e6,
             "longest_task_ms": max([0.0, *page.evaluate("() => tasks")]),
         }
         for key, value in row.items():
-            found.setdefault(key, []).append(value)
+            figures.setdefault(key, []).append(value)
         context.close()
-    return {key: statistics.median(values) for key, values in found.items()}
+    return {key: statistics.median(values) for key, values in figures.items()}
 
 
-def misspelt(word: str, chance: random.Random) -> str:
-    """The word with two neighbours swapped, or a letter left out, put in, or another."""
+def misspell(word: str, chance: random.Random) -> str:
+    """The word with two neighbours swapped, or a letter left out, put in, or replaced."""
     at = chance.randrange(1, len(word) - 1)
     letter = chance.choice("aeinrst")
     return chance.choice(
@@ -226,14 +226,16 @@ def misspelt(word: str, chance: random.Random) -> str:
     )
 
 
-def spelling(page: Any, asked: Callable[[Any, str], list[str]], count: int = 40) -> float:
-    """For what share of misspelt words the first result is one of the first three of the word."""
+def share_of_misspellings_found(
+    page: Any, query: Callable[[Any, str], list[str]], count: int = 40
+) -> float:
+    """The share of misspelt words whose first result is among the first three of the right word."""
     chance = random.Random(5)
     words = [word for word in vocabulary()[300:8000] if len(word) >= 6]
     right = 0
     for word in chance.sample(words, count):
-        wrong = misspelt(word, chance)
-        right += bool(set(asked(page, word)[:3]) & set(asked(page, wrong)[:1]))
+        misspelling = misspell(word, chance)
+        right += bool(set(query(page, word)[:3]) & set(query(page, misspelling)[:1]))
     return right / count
 
 
@@ -251,8 +253,8 @@ TYPE = """async (query) => {
 PEER_ASK = """async (query) => (await find(query, 3)).pages.map((p) => p.url)"""
 
 
-def searching(work: Path, pagefind: Path | None, rounds: int) -> dict[str, Any]:
-    """Both in the same browser."""
+def measure_searches(work: Path, pagefind: Path | None, rounds: int) -> dict[str, Any]:
+    """Measure the searches of coursebuild and Pagefind in the same browser."""
     from playwright.sync_api import sync_playwright
 
     chromium = shutil.which("chromium-headless-shell")
@@ -262,45 +264,51 @@ def searching(work: Path, pagefind: Path | None, rounds: int) -> dict[str, Any]:
         result["pagefind_indexing"] = peer_index(site, work / "peer", pagefind)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        with served(site) as (base, sent):
+        with serve(site) as (base, sent):
             address = f"{base}search/index.html?q="
-            mine = lambda path: "search" in path and not path.endswith(".html")  # noqa: E731
-            row = asking(browser, address, sent, mine, ".found-pages > li", rounds)
+            is_index_file = lambda path: "search" in path and not path.endswith(".html")  # noqa: E731
+            row = measure_queries(
+                browser, address, sent, is_index_file, ".found-pages > li", rounds
+            )
             page = browser.new_context(service_workers="block").new_page()
             page.goto(address + "model", wait_until="networkidle")
-            row["misspelt_found"] = spelling(page, lambda p, q: p.evaluate(TYPE, q))
+            row["misspelt_found"] = share_of_misspellings_found(
+                page, lambda p, q: p.evaluate(TYPE, q)
+            )
             result["coursebuild"] = row
         if pagefind is not None:
-            with served(work / "peer") as (base, sent):
+            with serve(work / "peer") as (base, sent):
                 address = f"{base}peer.html?q="
-                mine = lambda path: "/pagefind/" in path  # noqa: E731
-                row = asking(browser, address, sent, mine, "li", rounds)
+                is_index_file = lambda path: "/pagefind/" in path  # noqa: E731
+                row = measure_queries(browser, address, sent, is_index_file, "li", rounds)
                 page = browser.new_context().new_page()
                 page.goto(address + "model", wait_until="networkidle")
-                row["misspelt_found"] = spelling(page, lambda p, q: p.evaluate(PEER_ASK, q))
+                row["misspelt_found"] = share_of_misspellings_found(
+                    page, lambda p, q: p.evaluate(PEER_ASK, q)
+                )
                 result["pagefind"] = row
         browser.close()
     return result
 
 
 def peer_index(site: Path, folder: Path, program: Path) -> dict[str, float]:
-    """Let Pagefind index the lessons; what it takes, the first time and after an edit."""
+    """Let Pagefind index the lessons; gives the cost of the first time and of a second."""
     shutil.copytree(site / "lessons", folder / "lessons")
     (folder / "peer.html").write_text(PEER_PAGE, encoding="utf-8")
     (folder / "peer.js").write_text(PEER_SCRIPT, encoding="utf-8")
     command = [str(program), "--site", str(folder), "--root-selector", "main", "--glob"]
-    taken = []
+    runs = []
     for _ in range(2):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         began = time.perf_counter()
         subprocess.run([*command, "lessons/*.html"], check=True, stdout=subprocess.DEVNULL)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        taken.append((cpu, time.perf_counter() - began))
+        runs.append((cpu, time.perf_counter() - began))
     files = [path for path in (folder / "pagefind").rglob("*") if path.is_file()]
     return {
-        "cpu_s": taken[0][0],
-        "again_cpu_s": taken[1][0],
+        "cpu_s": runs[0][0],
+        "again_cpu_s": runs[1][0],
         "memory_MB": resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e3,
         "files": len(files),
         "MB": sum(path.stat().st_size for path in files) / 1e6,
@@ -316,18 +324,18 @@ def main() -> None:
     parser.add_argument("--site", type=Path, help="a folder with a course `with/`, built before")
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
-    found: dict[str, Any] = {"lessons": arguments.lessons}
+    report: dict[str, Any] = {"lessons": arguments.lessons}
     with tempfile.TemporaryDirectory() as scratch:
         work = arguments.site or Path(scratch)
         if arguments.site is None:
-            found["building"] = building(work, arguments.lessons, arguments.rounds)
+            report["building"] = measure_builds(work, arguments.lessons, arguments.rounds)
         index = work / "with" / "public"
         files = [*(index / "assets" / "search").iterdir(), *(index / "search").iterdir()]
         plain = [path for path in files if path.suffix == ".js"]
-        found["files"] = len(files)
-        found["MB"] = sum(path.stat().st_size for path in plain) / 1e6
-        found |= searching(work, arguments.pagefind, arguments.rounds)
-    text = json.dumps(found, indent=1)
+        report["files"] = len(files)
+        report["MB"] = sum(path.stat().st_size for path in plain) / 1e6
+        report |= measure_searches(work, arguments.pagefind, arguments.rounds)
+    text = json.dumps(report, indent=1)
     print(text)
     if arguments.json:
         arguments.json.write_text(text + "\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What each stage of a build costs, beside what a user would take instead.
+"""The cost of each stage of a build, compared with what a user would take instead.
 
 Run: python benchmarks/stages.py [--course DIR] [--repeat N]
 
@@ -28,9 +28,10 @@ from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Formula, MathError, Results
 from coursebuild.core.model.summary import without_prose
+from coursebuild.core.pages import folding
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.draw import draw
-from coursebuild.core.pages.folding import find_imports, fold
+from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_list
@@ -39,7 +40,7 @@ from coursebuild.core.run.v8 import MathEngine
 from coursebuild.core.syntax import script
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.values import encode
-from coursebuild.features.language_server.commands.diagnosis import diagnoses
+from coursebuild.features.language_server.commands.diagnosis import current_diagnostics
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
@@ -53,7 +54,7 @@ from coursebuild.preview.session import Session
 from coursebuild.report import Style
 
 
-def timed(
+def time_candidates(
     candidates: dict[str, Callable[[], object]],
     repeat: int,
     clock: Callable[[], float] = time.perf_counter,
@@ -78,8 +79,8 @@ def show(title: str, seconds: dict[str, list[float]], base: str) -> None:
         print(f"  {name:<44} {1e3 * low:9.2f} ms  median {1e3 * middle:9.2f}  x {ratio:6.2f}")
 
 
-def parsing(root: Path, repeat: int) -> None:
-    """Our parser beside the library that it stands on."""
+def measure_parsing(root: Path, repeat: int) -> None:
+    """Our parser compared with the library that it uses."""
     from markdown_it import MarkdownIt
 
     course = load(root).value
@@ -94,11 +95,15 @@ def parsing(root: Path, repeat: int) -> None:
             parse_document(s, kinds, lesson=False) for s in sources
         ],
     }
-    show(f"parsing {size / 1e3:.0f} kB", timed(candidates, repeat), "markdown-it-py, tokens only")
+    show(
+        f"parsing {size / 1e3:.0f} kB",
+        time_candidates(candidates, repeat),
+        "markdown-it-py, tokens only",
+    )
 
 
-def typing(root: Path, repeat: int) -> None:
-    """What one more word in the longest lesson costs the language server: time of one core."""
+def measure_typing(root: Path, repeat: int) -> None:
+    """The cost of one more word in the longest lesson for the language server: time of one core."""
     from markdown_it import MarkdownIt
 
     quiet = Progress(quiet=True)
@@ -107,8 +112,10 @@ def typing(root: Path, repeat: int) -> None:
     session.start(quiet)
     rebuild.once()
     assert session.course is not None
-    written = [one.document.source for one in session.course.lessons if one.document is not None]
-    longest = max(written, key=lambda source: len(source.text))
+    sources = [
+        lesson.document.source for lesson in session.course.lessons if lesson.document is not None
+    ]
+    longest = max(sources, key=lambda source: len(source.text))
     bare = MarkdownIt("commonmark").enable(["table", "strikethrough"])
 
     def read() -> None:
@@ -119,77 +126,77 @@ def typing(root: Path, repeat: int) -> None:
     candidates: dict[str, Callable[[], object]] = {
         "markdown-it-py, tokens only": lambda: bare.parse(longest.text),
         "read and check the text": read,
-        "compare it with what scripts printed": lambda: diagnoses(session),
+        "compare it with what scripts printed": lambda: current_diagnostics(session),
     }
-    seconds = timed(candidates, max(2, repeat), time.process_time)
+    seconds = time_candidates(candidates, max(2, repeat), time.process_time)
     show(f"a word in {len(longest.text) / 1e3:.0f} kB", seconds, "markdown-it-py, tokens only")
     rebuild.close()
     session.close()
 
 
-def scripts(root: Path, repeat: int) -> None:
-    """Our runner beside bare Python."""
+def measure_scripts(root: Path, repeat: int) -> None:
+    """Our runner compared with bare Python."""
     options = Options(root, len(os.sched_getaffinity(0)), True)
     course = load(root).value
     assert course is not None
-    chosen = extract_scripts(course, options).runnable
+    runnable = extract_scripts(course, options).runnable
 
     def bare() -> None:
-        for e in chosen:
+        for e in runnable:
             subprocess.run([sys.executable, e.path], cwd=root, capture_output=True, check=True)
 
     candidates: dict[str, Callable[[], object]] = {
         "python, one after the other": bare,
         f"coursebuild, {options.jobs} at a time": lambda: run(
-            chosen, options, Progress(quiet=True)
+            runnable, options, Progress(quiet=True)
         ),
     }
-    seconds = timed(candidates, max(2, repeat // 3))
-    show(f"running {len(chosen)} scripts", seconds, "python, one after the other")
+    seconds = time_candidates(candidates, max(2, repeat // 3))
+    show(f"running {len(runnable)} scripts", seconds, "python, one after the other")
 
 
-def stages(course: Course, results: Results, root: Path, repeat: int) -> None:
-    """The rest of a build."""
+def measure_stages(course: Course, results: Results, root: Path, repeat: int) -> None:
+    """The other stages of a build."""
     options = Options(root, 1, quiet=True)
 
-    def put_together() -> None:
+    def make_files() -> None:
         with Documents(options.store, 1) as documents:
-            loaded = load(root, documents).value
-            assert loaded is not None
-            for file in site_files(loaded, results, documents, options, Reports()).files:
+            loaded_course = load(root, documents).value
+            assert loaded_course is not None
+            for file in site_files(loaded_course, results, documents, options, Reports()).files:
                 file.make()
 
     candidates: dict[str, Callable[[], object]] = {
         "load: read, parse, check": lambda: load(root),
         f"typeset {len(course_formulas(course))} formulas": lambda: typeset(course),
-        "load from the memo and make all files": put_together,
+        "load from the memo and make all files": make_files,
     }
-    show("stages", timed(candidates, max(2, repeat // 2)), "load: read, parse, check")
+    show("stages", time_candidates(candidates, max(2, repeat // 2)), "load: read, parse, check")
 
 
 def typeset(course: Course) -> tuple[tuple[Formula, str | MathError], ...]:
-    """The formulas of a course with their MathML, from an engine just started."""
+    """The formulas of a course with their MathML, from a fresh engine."""
     formulas = course_formulas(course)
     with MathEngine() as engine:
         return tuple(zip(formulas, engine.typeset(formulas), strict=True))
 
 
-def lessons(course: Course, results: Results, repeat: int) -> None:
-    """What each step costs a lesson: time of one core, nothing remembered from lesson to lesson."""
+def measure_lessons(course: Course, results: Results, repeat: int) -> None:
+    """The cost of each step for a lesson: time of one core, without caches between lessons."""
     library = Library.of(course, results, Assets(template_texts(), Bundle()))
     texts = {document.source.path: document for document in course.documents}
-    sheets = (page.inputs(library) for page in page_list(library))
-    drawn = [(inputs, texts[inputs.document]) for inputs in sheets if inputs.document]
+    page_inputs = (page.inputs(library) for page in page_list(library))
+    pages = [(inputs, texts[inputs.document]) for inputs in page_inputs if inputs.document]
     kinds = frozenset(kind.name for kind in course.callouts)
     scripts = [script.code.text for script, _ in library.scripts.values()]
-    tools = library.tools
+    renderer = library.renderer
 
     def draws() -> list[tuple[PageHead, Markup]]:
-        fold.cache_clear()
-        return [draw(inputs, document, tools)[:2] for inputs, document in drawn]
+        folding._analyse.cache_clear()
+        return [draw(inputs, document, renderer)[:2] for inputs, document in pages]
 
     def modules() -> list[frozenset[str]]:
-        find_imports.cache_clear()
+        folding._analyse.cache_clear()
         return [find_imports(script) for script in scripts]
 
     def parses() -> list[object]:
@@ -197,7 +204,7 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
         return [parse_document(d.source, kinds, lesson=True) for d in documents]
 
     drafts = draws()
-    documents = [document for _, document in drawn]
+    documents = [document for _, document in pages]
     steps: dict[str, Callable[[], object]] = {
         "parse": parses,
         "its summary": lambda: [encode(without_prose(d)) for d in documents],
@@ -205,18 +212,18 @@ def lessons(course: Course, results: Results, repeat: int) -> None:
         "draw": draws,
         "settle, facts and links": lambda: [record(*d, course.base_url) for d in drafts],
     }
-    counted = timed(steps, max(2, repeat), time.process_time)
-    print(f"\nof each of {len(drawn)} lessons and pages, one core")
-    for name, values in counted.items():
-        low, middle = min(values) / len(drawn), statistics.median(values) / len(drawn)
+    seconds = time_candidates(steps, max(2, repeat), time.process_time)
+    print(f"\nof each of {len(pages)} lessons and pages, one core")
+    for name, values in seconds.items():
+        low, middle = min(values) / len(pages), statistics.median(values) / len(pages)
         print(f"  {name:<44} {1e3 * low:9.3f} ms  median {1e3 * middle:9.3f}")
 
 
 def main() -> None:
     """Print all tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    here = Path(__file__).resolve().parents[1]
-    parser.add_argument("--course", type=Path, default=here)
+    project = Path(__file__).resolve().parents[1]
+    parser.add_argument("--course", type=Path, default=project)
     parser.add_argument("--repeat", type=int, default=9)
     arguments = parser.parse_args()
     root = arguments.course.resolve()
@@ -224,15 +231,15 @@ def main() -> None:
     print(f"{platform.platform()}, {len(os.sched_getaffinity(0))} cores, {platform.processor()}")
     names = ("markdown-it-py", "mujoco", "numpy")
     print(f"Python {platform.python_version()}, " + ", ".join(f"{n} {version(n)}" for n in names))
-    parsing(root, arguments.repeat)
-    typing(root, arguments.repeat)
-    scripts(root, arguments.repeat)
+    measure_parsing(root, arguments.repeat)
+    measure_typing(root, arguments.repeat)
+    measure_scripts(root, arguments.repeat)
     course = load(root).value
     assert course is not None
     results = verify(course, Options(root, 1, True), Progress(quiet=True)).results
     results = replace(results, formulas=typeset(course))
-    stages(course, results, root, arguments.repeat)
-    lessons(course, results, arguments.repeat)
+    measure_stages(course, results, root, arguments.repeat)
+    measure_lessons(course, results, arguments.repeat)
 
 
 if __name__ == "__main__":

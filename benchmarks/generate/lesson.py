@@ -44,8 +44,8 @@ COSTS = """| method | evaluations a step | order | error when the step is halved
 
 
 @functools.cache
-def shared() -> dict[str, Any]:
-    """What every lesson says, in variants."""
+def shared_texts() -> dict[str, Any]:
+    """The texts that all lessons share, in variants."""
     return tomllib.loads(Path(__file__).with_name("methods.toml").read_text(encoding="utf-8"))
 
 
@@ -73,24 +73,24 @@ class Writer:
     topic: Topic
     values: dict[str, str]
 
-    def say(self, what: str) -> str:
+    def say(self, key: str) -> str:
         """One variant of a text that all lessons share."""
-        variants = shared()[what]
-        return self.fill(variants[pick(self.number, what, len(variants))])
+        variants = shared_texts()[key]
+        return self.fill(variants[pick(self.number, key, len(variants))])
 
     def fill(self, text: str) -> str:
         """The text with the numbers of the run in it."""
         return Fill(text).substitute(self.values)
 
-    def prose(self, what: str) -> Prose:
-        """The same as a paragraph."""
-        return Prose(self.say(what))
+    def prose(self, key: str) -> Prose:
+        """One variant of a shared text, as a paragraph."""
+        return Prose(self.say(key))
 
-    def general(self, index: int) -> Display:
+    def shared_formula(self, index: int) -> Display:
         """A displayed formula that all lessons share, but for its numbers."""
-        return Display(self.fill(shared()["displays"][index]))
+        return Display(self.fill(shared_texts()["displays"][index]))
 
-    def own(self, name: str) -> Display:
+    def topic_formula(self, name: str) -> Display:
         """A displayed formula of the topic."""
         return Display(self.topic.text("formulas", name))
 
@@ -138,7 +138,7 @@ def concept(writer: Writer) -> tuple[Piece, ...]:
     return (
         Heading(2, "Core concept"),
         Prose(first),
-        writer.own("equation"),
+        writer.topic_formula("equation"),
         Prose(second),
         writer.prose("intro"),
         Prose(f"| constant | value |\n| --- | --- |\n{rows}\n| duration | {writer.values['T']} |"),
@@ -149,31 +149,31 @@ def concept(writer: Writer) -> tuple[Piece, ...]:
 def mathematics(writer: Writer) -> tuple[Piece, ...]:
     """The solution, and what is known about the methods."""
     topic = writer.topic
-    derivation = (Prose("Separate what depends on the time:"), writer.own("derivation"))
-    limit = (Prose("A case that can be checked by hand is"), writer.own("special"))
+    derivation = (Prose("Separate what depends on the time:"), writer.topic_formula("derivation"))
+    limit = (Prose("A case that can be checked by hand is"), writer.topic_formula("special"))
     second = 2 + 6 * pick(writer.number, "second formula", 2)
     return (
         Heading(2, "Mathematics"),
         Heading(3, "The solution in closed form"),
         *map(Prose, topic.texts("text", "model")),
-        writer.own("solution"),
+        writer.topic_formula("solution"),
         Callout("derivation", "Where it comes from", True, (*derivation, *limit)),
         Prose("One more identity holds for every solution, and each method can be held to it:"),
-        writer.own("balance"),
+        writer.topic_formula("balance"),
         Heading(3, "Four methods"),
         writer.prose("steps"),
-        writer.general(0),
+        writer.shared_formula(0),
         writer.prose("heun"),
         writer.prose("rk4"),
-        writer.general((1, 8)[pick(writer.number, "tableau", 2)]),
+        writer.shared_formula((1, 8)[pick(writer.number, "tableau", 2)]),
         Heading(3, "Errors and orders"),
         writer.prose("local"),
-        writer.general((3, 4, 9)[pick(writer.number, "bound", 3)]),
+        writer.shared_formula((3, 4, 9)[pick(writer.number, "bound", 3)]),
         writer.prose("whole"),
         writer.prose("order"),
-        writer.general(5),
+        writer.shared_formula(5),
         writer.prose("region"),
-        writer.general((6, second)[pick(writer.number, "last formula", 2)]),
+        writer.shared_formula((6, second)[pick(writer.number, "last formula", 2)]),
         Heading(3, "Cost"),
         Prose(COSTS),
         writer.prose("cost"),
@@ -182,15 +182,15 @@ def mathematics(writer: Writer) -> tuple[Piece, ...]:
 
 def implementation(writer: Writer, script: Script) -> tuple[Piece, ...]:
     """The script, its output, and what it shows."""
-    found = script.output.splitlines()
-    first = next(word for line in found for word in line.split() if is_decimal(word))
-    shown = f"The first number that the script prints is `{first}`{{out}}."
+    lines = script.output.splitlines()
+    first = next(word for line in lines for word in line.split() if is_decimal(word))
+    remark = f"The first number that the script prints is `{first}`{{out}}."
     return (
         Heading(2, "Implementation"),
-        InOut(*shared()["io"]),
+        InOut(*shared_texts()["io"]),
         Callout("implementation", "How it is built", False, (writer.prose("implementation"),)),
         script,
-        Prose(f"{shown} {writer.topic.text('text', 'close')}"),
+        Prose(f"{remark} {writer.topic.text('text', 'close')}"),
         writer.prose("units"),
         writer.prose("reading"),
         writer.prose("discuss"),
@@ -205,12 +205,12 @@ def is_decimal(word: str) -> bool:
 
 def end(writer: Writer, script: Script) -> tuple[Piece, ...]:
     """A summary, the quiz, and where to go from here."""
-    points = shared()["points"]
+    points = shared_texts()["points"]
     first = pick(writer.number, "points", len(points))
-    chosen = [points[(first + i) % len(points)] for i in range(4)]
+    selection = [points[(first + i) % len(points)] for i in range(4)]
     return (
         Heading(2, "Summary"),
-        Prose("\n".join(f"- {point}" for point in chosen)),
+        Prose("\n".join(f"- {point}" for point in selection)),
         Prose(f"**To try.** {writer.say('try')}"),
         Heading(2, "Check"),
         Quiz(questions(writer, script.output.splitlines()[0])),

@@ -194,7 +194,7 @@ def make_script(lesson: int, topic: Topic, title: str, kind: str) -> Script:
     numbers = integrate_numbers(lesson, topic) if kind == "python" else simulate_numbers(lesson)
     template = INTEGRATE if kind == "python" else SIMULATE
     code = Fill(template).substitute(numbers, path=path, title=title)
-    return Script(path, code, printed(code, path))
+    return Script(path, code, run_code(code, path))
 
 
 def duration_of(lesson: int) -> str:
@@ -209,7 +209,7 @@ def step_counts(lesson: int, base: int) -> tuple[int, ...]:
 
 
 def integrate_numbers(lesson: int, topic: Topic) -> dict[str, str]:
-    """What stands in the script that integrates."""
+    """The values to fill into the script that integrates."""
     constants = "\n".join(
         f"{name if len(name) == 1 and name.isupper() else name.upper()} = {value}"
         for name, value in topic.values.items()
@@ -226,7 +226,7 @@ def integrate_numbers(lesson: int, topic: Topic) -> dict[str, str]:
 
 
 def simulate_numbers(lesson: int) -> dict[str, str]:
-    """What stands in the script that simulates."""
+    """The values to fill into the script that simulates."""
     return {
         "duration": duration_of(lesson),
         "steps": ", ".join(map(str, step_counts(lesson, 300))),
@@ -239,8 +239,8 @@ def simulate_numbers(lesson: int) -> dict[str, str]:
     }
 
 
-def printed(code: str, path: str) -> str:
-    """What the script prints."""
+def run_code(code: str, path: str) -> str:
+    """Run a script; gives its output."""
     stream = io.StringIO()
     with contextlib.redirect_stdout(stream):
         exec(compile(code, path, "exec"), {"__name__": "__main__"})

@@ -1,4 +1,4 @@
-"""What lessons are about: the files in `problems/`, filled with the numbers of one lesson.
+"""The topics of lessons: the files in `problems/`, filled with the numbers of one lesson.
 
 Entry point: `topic_of`. Everything depends on the number of the lesson alone, so that two runs, and
 two machines, make the same course.
@@ -17,9 +17,9 @@ from typing import Any
 FOLDER = Path(__file__).with_name("problems")
 
 
-def pick(lesson: int, what: str, count: int) -> int:
+def pick(lesson: int, purpose: str, count: int) -> int:
     """A number from 0 to count - 1 that looks random and is not."""
-    return zlib.crc32(f"{what} {lesson}".encode()) % count
+    return zlib.crc32(f"{purpose} {lesson}".encode()) % count
 
 
 class Fill(Template):
@@ -45,11 +45,11 @@ class Topic:
         return tuple(self.fill(text) for text in self.raw(*path))
 
     def raw(self, *path: str) -> Any:
-        """What the file has there."""
-        found: Any = self.data
+        """The value of the file at a path."""
+        value: Any = self.data
         for name in path:
-            found = found[name]
-        return found
+            value = value[name]
+        return value
 
     def fill(self, text: str) -> str:
         """The text with the numbers in it."""
@@ -65,7 +65,7 @@ def all_topics() -> tuple[dict[str, Any], ...]:
 
 
 def topic_of(lesson: int) -> Topic:
-    """What the lesson is about, and its numbers: each time a topic returns they are others."""
+    """The topic of a lesson with its numbers, which differ each time a topic returns."""
     topics = all_topics()
     data = topics[lesson % len(topics)]
     values = {}

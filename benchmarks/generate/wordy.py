@@ -31,13 +31,13 @@ _GREEK = "alpha beta gamma delta epsilon theta kappa lambda mu rho sigma tau phi
 def vocabulary() -> list[str]:
     """Words by rank, the commonest first; the same each time."""
     chance = random.Random(7)
-    found: dict[str, None] = {}
-    while len(found) < WORDS:
+    words: dict[str, None] = {}
+    while len(words) < WORDS:
         # Common words are short.
-        parts = 1 + (len(found) > 200) + (len(found) > 5000) * (chance.random() < 0.6)
+        parts = 1 + (len(words) > 200) + (len(words) > 5000) * (chance.random() < 0.6)
         word = "".join(chance.choice(_STARTS) + chance.choice(_MIDDLES) for _ in range(parts))
-        found[word + (chance.choice(_ENDS) if chance.random() < 0.7 else "")] = None
-    return list(found)
+        words[word + (chance.choice(_ENDS) if chance.random() < 0.7 else "")] = None
+    return list(words)
 
 
 class _Writer:
@@ -56,7 +56,7 @@ class _Writer:
         chance = random.Random(number)
         topic = [chance.choice(self.words) for _ in range(46)] + chance.sample(_KNOWN, 4)
 
-        def said(count: int) -> str:
+        def phrase(count: int) -> str:
             return " ".join(
                 chance.choice(topic) if chance.random() < 0.15 else self.word(chance)
                 for _ in range(count)
@@ -67,16 +67,16 @@ class _Writer:
             names = chance.sample(self.names, 4)
             greek = chance.choice(_GREEK)
             parts += [
-                f"## {said(3).capitalize()}",
-                f"{said(70).capitalize()}, where $\\{greek}_{{{section}}}$ is {said(12)}.",
+                f"## {phrase(3).capitalize()}",
+                f"{phrase(70).capitalize()}, where $\\{greek}_{{{section}}}$ is {phrase(12)}.",
                 f"$$\n\\{greek} = \\frac{{d}}{{dt}} I_{{{chance.choice('xyz')}}} + {number}\n$$",
-                f"{said(60).capitalize()}. {said(25).capitalize()} with `{names[0]}`.",
+                f"{phrase(60).capitalize()}. {phrase(25).capitalize()} with `{names[0]}`.",
                 "```python fragment\n"
                 + "\n".join(f"{n} = model.{chance.choice(topic)}[{k}]" for k, n in enumerate(names))
                 + "\n```",
             ]
             if section % 3 == 0:
-                rows = "\n".join(f"| {said(2)} | {chance.random():.4f} |" for _ in range(5))
+                rows = "\n".join(f"| {phrase(2)} | {chance.random():.4f} |" for _ in range(5))
                 parts.append(f"| quantity | value |\n| --- | --- |\n{rows}")
         return "\n\n".join(parts) + "\n"
 

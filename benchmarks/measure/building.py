@@ -1,12 +1,12 @@
-"""Builds: cold, with nothing changed, with one lesson edited; the most memory of a cold one.
+"""Builds: cold, with nothing changed, with one lesson edited; the peak memory of a cold one.
 
 Entry point: `measure_builds`. Rounds go over all tools, so that a slow moment of the machine does
-not fall on one of them. Each build is looked at: pages that are missing, or an edit that is not in
+not fall on one of them. Each build is checked: pages that are missing, or an edit that is not in
 its page, count as a failure of the tool.
 
-What a cold build is not to find is moved away, and removed when all is measured: ext4 does not use
-an inode again in the first minutes, and passes over each such one whenever it makes a file. Who
-writes six files for a lesson would pay for the removal of the build before, by up to a quarter.
+Products of earlier builds are moved away, and removed only when all is measured: ext4 does not
+reuse an inode in the first minutes, and skips each such one whenever it makes a file. A tool that
+writes six files for a lesson would pay up to a quarter for the removal of the build before.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks.courses import write_course
-from benchmarks.measure.process import CommandError, peak_memory, timed
+from benchmarks.measure.process import CommandError, peak_memory, time_command
 from benchmarks.measure.tools import Places, Tool, environment
 
 COLD, UNCHANGED, EDITED, MEMORY = "cold build", "nothing changed", "one lesson edited", "memory"
@@ -38,10 +38,10 @@ class Site:
     places: Places
     edits: int = 0
     cleared: int = 0
-    """What was moved away."""
-    failed: str = ""
-    """At what something went wrong, if it did: then its figures are incomplete."""
-    found: dict[str, list[float]] = field(default_factory=dict)
+    """How many files and folders were moved away."""
+    failure: str = ""
+    """The part that failed, if any: then its figures are incomplete."""
+    figures: dict[str, list[float]] = field(default_factory=dict)
 
     @property
     def source(self) -> Path:
@@ -56,9 +56,9 @@ class Site:
         return word
 
     def clear(self) -> None:
-        """Move away what a cold build is not to find."""
-        for made in self.tool.made:
-            head, spares, names = made.partition("!")
+        """Move away the products that a cold build must not find."""
+        for pattern in self.tool.products:
+            head, spares, names = pattern.partition("!")
             path = self.folder / head
             if spares and path.is_dir():
                 for child in path.iterdir():
@@ -75,30 +75,30 @@ class Site:
 
     @property
     def earlier(self) -> Path:
-        """Where what was moved away is, until all is measured."""
+        """The folder of what was moved away, until all is measured."""
         return self.folder.with_name(f"{self.folder.name}-earlier")
 
     @property
     def command(self) -> list[str]:
         """The command for a build."""
         assert self.tool.build is not None
-        return self.filled(self.tool.build)
+        return self.fill_in(self.tool.build)
 
-    def filled(self, command: list[str]) -> list[str]:
-        """A command with the folder of the course in it."""
+    def fill_in(self, command: list[str]) -> list[str]:
+        """A command with the folder of the course filled in."""
         return [part.replace("{folder}", str(self.folder)) for part in command]
 
-    def built(self) -> float:
+    def build(self) -> float:
         """Build; gives seconds."""
-        return timed(self.command, self.folder, environment(self.places))
+        return time_command(self.command, self.folder, environment(self.places))
 
     def page(self) -> str:
         """The built page of the lesson that is edited."""
         return (self.folder / self.tool.page(self.name)).read_text(encoding="utf-8")
 
-    def note(self, what: str, figure: float) -> None:
-        """Keep a figure."""
-        self.found.setdefault(what, []).append(figure)
+    def note(self, quantity: str, figure: float) -> None:
+        """Record a figure."""
+        self.figures.setdefault(quantity, []).append(figure)
 
 
 def remove(path: Path) -> None:
@@ -131,7 +131,7 @@ def measure_builds(
     places: Places,
     say: Callable[[str], None],
 ) -> list[Site]:
-    """All figures of all tools that build."""
+    """Measure all tools that build."""
     sites = [make_site(tool, lessons, work, places) for tool in tools if tool.build is not None]
     for site in sites:
         say(f"{lessons} lessons, first build: {site.tool.title}")
@@ -149,27 +149,27 @@ def measure_builds(
 
 
 def attempt(
-    site: Site, what: str, work: Callable[[Site], None], say: Callable[[str], None]
+    site: Site, part: str, work: Callable[[Site], None], say: Callable[[str], None]
 ) -> None:
-    """Do something with a site; one that fails is told of and left out from there on."""
-    if not site.failed:
+    """Do something with a site; one that fails is reported and left out afterwards."""
+    if not site.failure:
         try:
             work(site)
-        except CommandError as fault:
-            site.failed = what
-            say(f"{site.tool.title} FAILED: {fault}")
+        except CommandError as error:
+            site.failure = part
+            say(f"{site.tool.title} FAILED: {error}")
 
 
 def first_build(site: Site) -> None:
-    """Build once without a look at the clock, and count the pages."""
-    site.built()
+    """Build once without measuring, and count the pages."""
+    site.build()
     pages = sum((site.folder / site.tool.page(name)).exists() for name in site.names)
     if pages != len(site.names):
         raise CommandError(f"{pages} pages of {len(site.names)} were built")
 
 
 def memory(site: Site) -> None:
-    """Note the most memory of a cold build."""
+    """Record the peak memory of a cold build."""
     site.clear()
     site.note(MEMORY, peak_memory(site.command, site.folder, environment(site.places)))
 
@@ -178,10 +178,10 @@ def one_round(site: Site) -> None:
     """A cold build, one with nothing changed, one with a lesson edited."""
     if not site.tool.only_incremental:
         site.clear()
-        site.note(COLD, site.built())
-    site.note(UNCHANGED, site.built())
+        site.note(COLD, site.build())
+    site.note(UNCHANGED, site.build())
     word = site.edit()
-    took = site.built()
+    took = site.build()
     if word not in site.page():
         raise CommandError("what was edited is not in the built page")
     site.note(EDITED, took)

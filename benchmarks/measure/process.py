@@ -1,6 +1,6 @@
-"""A command, and what it took.
+"""The time and memory of commands.
 
-Entry points: `timed`, `peak_memory`, `stop`. Figures are of whole process trees.
+Entry points: `time_command`, `peak_memory`, `stop`. Figures are of whole process trees.
 """
 
 from __future__ import annotations
@@ -16,43 +16,43 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 SAMPLE = 0.02
-"""Seconds between two looks at the memory."""
+"""Seconds between two samples of the memory."""
 LIMIT = 900.0
 """Seconds that any command may take."""
 
 
 class CommandError(Exception):
-    """A command did not do what it was to do."""
+    """A command failed."""
 
 
-def timed(command: Sequence[str], folder: Path, environment: Mapping[str, str]) -> float:
+def time_command(command: Sequence[str], folder: Path, environment: Mapping[str, str]) -> float:
     """Seconds that a command takes, from its start to its end.
 
     Raises:
-        CommandError: it failed; with the end of what it said.
+        CommandError: it failed; with the end of its output.
     """
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as output:
         began = time.perf_counter()
-        done = subprocess.run(
+        process = subprocess.run(
             command,
             cwd=folder,
             env=dict(environment),
             stdin=subprocess.DEVNULL,
-            stdout=said,
-            stderr=said,
+            stdout=output,
+            stderr=output,
             check=False,
             timeout=LIMIT,
         )
         took = time.perf_counter() - began
-        if done.returncode:
-            said.seek(0)
-            text = said.read().decode(errors="replace")[-2000:]
-            raise CommandError(f"{' '.join(command)}: status {done.returncode}\n{text}")
+        if process.returncode:
+            output.seek(0)
+            text = output.read().decode(errors="replace")[-2000:]
+            raise CommandError(f"{' '.join(command)}: status {process.returncode}\n{text}")
     return took
 
 
 def peak_memory(command: Sequence[str], folder: Path, environment: Mapping[str, str]) -> float:
-    """The most memory that a command and its children hold at once, MB.
+    """The peak memory of a command and its children, MB.
 
     It is sampled, and pages that several processes share count once (Linux: proportional set size).
     """
@@ -65,11 +65,11 @@ def peak_memory(command: Sequence[str], folder: Path, environment: Mapping[str, 
         start_new_session=True,
     )
     peak = 0.0
-    ended = threading.Event()
+    has_ended = threading.Event()
 
     def watch() -> None:
         nonlocal peak
-        while not ended.wait(SAMPLE):
+        while not has_ended.wait(SAMPLE):
             peak = max(peak, sum(map(proportional_size, session(process.pid))))
 
     watcher = threading.Thread(target=watch)
@@ -77,7 +77,7 @@ def peak_memory(command: Sequence[str], folder: Path, environment: Mapping[str, 
     try:
         status = process.wait()
     finally:
-        ended.set()
+        has_ended.set()
         watcher.join()
     if status:
         raise CommandError(f"{' '.join(command)}: status {status}")
@@ -86,18 +86,18 @@ def peak_memory(command: Sequence[str], folder: Path, environment: Mapping[str, 
 
 def session(leader: int) -> list[int]:
     """The processes of a session."""
-    found = []
+    pids = []
     for folder in Path("/proc").iterdir():
         if folder.name.isdigit():
             with contextlib.suppress(OSError, IndexError):
                 fields = (folder / "stat").read_text().rpartition(")")[2].split()
                 if int(fields[3]) == leader:
-                    found.append(int(folder.name))
-    return found
+                    pids.append(int(folder.name))
+    return pids
 
 
 def proportional_size(pid: int) -> int:
-    """Bytes of a process in memory; of what n processes share, an n-th part."""
+    """The proportional set size of a process, bytes: of what n processes share, an n-th part."""
     with contextlib.suppress(OSError):
         for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines():
             if line.startswith("Pss:"):
@@ -106,7 +106,7 @@ def proportional_size(pid: int) -> int:
 
 
 def stop(process: subprocess.Popen[bytes]) -> None:
-    """End a process that leads a session, and all that it has started."""
+    """End a process that leads a session, and all its children."""
     for signal_ in (signal.SIGTERM, signal.SIGKILL):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal_)

@@ -1,4 +1,4 @@
-"""Tables of what was measured: for the terminal, as JSON, and for the documentation.
+"""Tables of the measurements: for the terminal, as JSON, and for the documentation.
 
 Entry points: `Report`, `markdown`, `put_into`. A figure is a median; beside it stands its ratio to
 coursebuild's in the same run, above one where coursebuild is faster.
@@ -36,13 +36,13 @@ class Figure:
 
     @property
     def median(self) -> float:
-        """The figure that is shown."""
+        """The median, which is shown."""
         return statistics.median(self.values)
 
 
 @dataclass(slots=True)
 class Report:
-    """Everything that one run has found."""
+    """All results of one run."""
 
     machine: dict[str, str]
     tools: list[dict[str, str]]
@@ -55,22 +55,22 @@ class Report:
     failed: list[str] = field(default_factory=list)
 
     def add_sites(self, sites: list[Site], lessons: int) -> None:
-        """Take over what was found at one size, in the place of what was known before."""
+        """Take the figures of one size, in place of earlier ones."""
         self.figures = [figure for figure in self.figures if figure.lessons != lessons]
         self.failed = [text for text in self.failed if f" {lessons} lessons)" not in text]
         for site in sites:
-            if site.failed:
-                self.failed.append(f"{site.tool.title} ({site.failed}, {lessons} lessons)")
-            for row, values in site.found.items():
+            if site.failure:
+                self.failed.append(f"{site.tool.title} ({site.failure}, {lessons} lessons)")
+            for row, values in site.figures.items():
                 self.figures.append(Figure(row, lessons, site.tool.title, values))
 
     def add_scripts(self, scripts: Scripts) -> None:
-        """Take over what was found with scripts."""
-        self.scripts = {way: scripts.ratios(way) for way in scripts.found}
+        """Take the figures of scripts."""
+        self.scripts = {way: scripts.ratios(way) for way in scripts.figures}
         self.compute = scripts.compute
         self.script_count = len(scripts.paths)
-        if scripts.failed:
-            self.failed.append(scripts.failed)
+        if scripts.failure:
+            self.failed.append(scripts.failure)
 
     def as_json(self) -> dict[str, object]:
         """All figures, not only medians."""
@@ -78,9 +78,9 @@ class Report:
 
 
 def describe(tools: list[Tool], jcache: str | None) -> Report:
-    """What is measured, and on what."""
-    there = [
-        {"title": t.title, "version": t.version, "math": t.math, "how": t.how}
+    """An empty report with the machine and the tools."""
+    installed = [
+        {"title": t.title, "version": t.version, "math": t.math, "how": t.configuration}
         for t in tools
         if t.version is not None
     ]
@@ -88,19 +88,19 @@ def describe(tools: list[Tool], jcache: str | None) -> Report:
     if jcache is None:
         absent.append("jupyter-cache")
     else:
-        there.append(
+        installed.append(
             {"title": "jupyter-cache", "version": jcache, "math": "", "how": "local-parallel"}
         )
-    return Report(machine(), there, absent)
+    return Report(machine(), installed, absent)
 
 
 def machine() -> dict[str, str]:
-    """What the figures hold for."""
+    """The machine that the figures hold for."""
     model = platform.processor() or platform.machine()
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.exists():
-        found = re.search(r"^model name\s*:\s*(.+)$", cpuinfo.read_text(), re.MULTILINE)
-        model = found[1] if found else model
+        match = re.search(r"^model name\s*:\s*(.+)$", cpuinfo.read_text(), re.MULTILINE)
+        model = match[1] if match else model
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     return {
         "date": time.strftime("%Y-%m-%d %H:%M", time.gmtime()) + " UTC",
@@ -116,7 +116,7 @@ def machine() -> dict[str, str]:
 
 
 def markdown(report: Report) -> str:
-    """The tables, with what they hold for."""
+    """The tables, with the machine that they hold for."""
     facts = report.machine
     lines = [
         f"Measured on {facts['date']}: {facts['cores']} cores ({facts['processor']}), "
@@ -129,8 +129,10 @@ def markdown(report: Report) -> str:
         lines += [*scripts_table(report), ""]
     lines += ["| tool | version | formulas typeset | configuration |", "| --- | --- | --- | --- |"]
     for tool in report.tools:
-        where = {"build": "in the build", "reader": "by the reader's browser"}.get(tool["math"], "")
-        lines.append(f"| {tool['title']} | {tool['version']} | {where} | {tool['how']} |")
+        typesetter = {"build": "in the build", "reader": "by the reader's browser"}.get(
+            tool["math"], ""
+        )
+        lines.append(f"| {tool['title']} | {tool['version']} | {typesetter} | {tool['how']} |")
     if report.absent:
         lines += ["", f"Not installed, and so not measured: {', '.join(report.absent)}."]
     if report.failed:
@@ -139,13 +141,13 @@ def markdown(report: Report) -> str:
 
 
 def sizes_table(report: Report, lessons: int) -> list[str]:
-    """Tools down, rows across; the ratio to coursebuild in brackets."""
-    here = {(f.tool, f.row): f for f in report.figures if f.lessons == lessons}
-    rows = [row for row in ROWS if any(key[1] == row for key in here)]
+    """A row for each tool, a column for each build; the ratio to coursebuild in brackets."""
+    figures = {(f.tool, f.row): f for f in report.figures if f.lessons == lessons}
+    rows = [row for row in ROWS if any(key[1] == row for key in figures)]
     heads = [row + (" (MB)" if row == MEMORY else " (s)") for row in rows]
     lines = ["| | " + " | ".join(heads) + " |", "| --- |" + " --- |" * len(rows)]
-    for tool in dict.fromkeys(tool for tool, _ in here):
-        cells = [cell(here.get((tool, row)), here.get((BASE, row))) for row in rows]
+    for tool in dict.fromkeys(tool for tool, _ in figures):
+        cells = [cell(figures.get((tool, row)), figures.get((BASE, row))) for row in rows]
         lines.append(f"| {tool} | " + " | ".join(cells) + " |")
     return lines
 

@@ -1,4 +1,4 @@
-"""Scripts: what running them takes, beside the time that they compute.
+"""Scripts: the time to run them, compared with the time that they compute.
 
 Entry point: `measure_scripts`. The yardstick is one process that has imported NumPy and MuJoCo and
 executes all scripts one after the other: only the execution is counted, no start and no import. It
@@ -18,8 +18,8 @@ from pathlib import Path
 
 from benchmarks.courses import write_course
 from benchmarks.measure.building import remove
-from benchmarks.measure.process import CommandError, timed
-from benchmarks.measure.tools import Places, environment, said_version
+from benchmarks.measure.process import CommandError, time_command
+from benchmarks.measure.tools import Places, environment, read_version
 
 COMPUTE = """
 import contextlib, io, pathlib, sys, time
@@ -52,8 +52,8 @@ with ScriptServer() as server:
         print(time.perf_counter() - began)
         assert len(runs) == len(chosen) and all(run.outcome.value == "ok" for run in runs)
 """
-"""The second time what the scripts import is there already, as it is in the live preview and when
-`update` runs scripts again."""
+"""The second time the modules that scripts import are loaded already, as in the live preview and
+when `update` runs scripts again."""
 CACHED = ("jupyter-cache, parallel", "jupyter-cache, nothing changed")
 CONSENT = """
 import subprocess, sys
@@ -71,10 +71,10 @@ class Scripts:
     places: Places
     compute: list[float] = field(default_factory=list)
     """Seconds of pure computing, a figure for each round."""
-    found: dict[str, list[float]] = field(default_factory=dict)
+    figures: dict[str, list[float]] = field(default_factory=dict)
     """Seconds of each way, a figure for each round."""
-    failed: str = ""
-    """What could not be run: then it has no figures."""
+    failure: str = ""
+    """Why jupyter-cache could not run: then it has no figures."""
 
     @property
     def paths(self) -> list[str]:
@@ -83,7 +83,7 @@ class Scripts:
 
     def ratios(self, way: str) -> list[float]:
         """Seconds over seconds of computing, round by round."""
-        return [a / b for a, b in zip(self.found[way], self.compute, strict=True)]
+        return [a / b for a, b in zip(self.figures[way], self.compute, strict=True)]
 
 
 def measure_scripts(
@@ -95,7 +95,7 @@ def measure_scripts(
     write_course(folder, count, "coursebuild", "mujoco")
     scripts = Scripts(folder, len(os.sched_getaffinity(0)), places)
     python = [sys.executable, "-m", "coursebuild"]
-    timed([*python, "extract", "--quiet"], folder, environment(places))
+    time_command([*python, "extract", "--quiet"], folder, environment(places))
     for turn in range(rounds):
         say(f"{count} scripts, round {turn + 1} of {rounds}")
         one_round(scripts)
@@ -104,43 +104,45 @@ def measure_scripts(
 
 def one_round(scripts: Scripts) -> None:
     """Each way once."""
-    scripts.compute += numbers(scripts, [sys.executable, "-c", COMPUTE, *scripts.paths])
-    note(scripts, "python, one by one", one_by_one(scripts))
-    note(scripts, f"xargs -P{scripts.cores}", spread(scripts))
-    cold, warm = numbers(scripts, [sys.executable, "-c", RUNNER, str(scripts.cores)])
+    scripts.compute += read_numbers(scripts, [sys.executable, "-c", COMPUTE, *scripts.paths])
+    note(scripts, "python, one by one", run_one_by_one(scripts))
+    note(scripts, f"xargs -P{scripts.cores}", run_with_xargs(scripts))
+    cold, warm = read_numbers(scripts, [sys.executable, "-c", RUNNER, str(scripts.cores)])
     note(scripts, "coursebuild, with its start", cold)
     note(scripts, "coursebuild, once more", warm)
     check = [sys.executable, "-m", "coursebuild", "check", "--no-cache", "--quiet"]
-    environment_ = environment(scripts.places)
-    note(scripts, "coursebuild check --no-cache", timed(check, scripts.folder, environment_))
-    again = [sys.executable, "-m", "coursebuild", "check", "--quiet"]
-    touched(scripts)
-    note(scripts, "coursebuild check, text edited", timed(again, scripts.folder, environment_))
+    variables = environment(scripts.places)
+    note(scripts, "coursebuild check --no-cache", time_command(check, scripts.folder, variables))
+    recheck = [sys.executable, "-m", "coursebuild", "check", "--quiet"]
+    touch_lesson(scripts)
+    note(
+        scripts, "coursebuild check, text edited", time_command(recheck, scripts.folder, variables)
+    )
     program = scripts.places.python_tool("jcache")
-    if program is not None and not scripts.failed:
+    if program is not None and not scripts.failure:
         try:
-            for way, seconds in zip(CACHED, notebooks(scripts, program), strict=True):
+            for way, seconds in zip(CACHED, run_notebooks(scripts, program), strict=True):
                 note(scripts, way, seconds)
-        except CommandError as fault:
-            scripts.failed = str(fault)
+        except CommandError as error:
+            scripts.failure = str(error)
             for way in CACHED:
-                scripts.found.pop(way, None)
+                scripts.figures.pop(way, None)
 
 
 def note(scripts: Scripts, way: str, seconds: float) -> None:
-    """Keep a figure."""
-    scripts.found.setdefault(way, []).append(seconds)
+    """Record a figure."""
+    scripts.figures.setdefault(way, []).append(seconds)
 
 
-def touched(scripts: Scripts) -> None:
+def touch_lesson(scripts: Scripts) -> None:
     """Change the text of a lesson, so that `check` has something to do but no script to run."""
     path = min(scripts.folder.glob("content/lessons/*.md"))
     path.write_text(path.read_text(encoding="utf-8") + "\nOne more sentence.\n", encoding="utf-8")
 
 
-def numbers(scripts: Scripts, command: list[str]) -> list[float]:
+def read_numbers(scripts: Scripts, command: list[str]) -> list[float]:
     """The numbers that a command prints."""
-    done = subprocess.run(
+    process = subprocess.run(
         command,
         cwd=scripts.folder,
         env=environment(scripts.places) | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
@@ -148,28 +150,28 @@ def numbers(scripts: Scripts, command: list[str]) -> list[float]:
         text=True,
         check=False,
     )
-    if done.returncode:
-        raise CommandError(done.stderr[-2000:])
-    return [float(word) for word in done.stdout.split()]
+    if process.returncode:
+        raise CommandError(process.stderr[-2000:])
+    return [float(word) for word in process.stdout.split()]
 
 
-def one_by_one(scripts: Scripts) -> float:
+def run_one_by_one(scripts: Scripts) -> float:
     """A process for each script, one after the other."""
     return sum(
-        timed([sys.executable, path], scripts.folder, environment(scripts.places))
+        time_command([sys.executable, path], scripts.folder, environment(scripts.places))
         for path in scripts.paths
     )
 
 
-def spread(scripts: Scripts) -> float:
+def run_with_xargs(scripts: Scripts) -> float:
     """A process for each script, as many at a time as there are cores."""
-    listed = "\n".join(scripts.paths)
+    paths = "\n".join(scripts.paths)
     inner = f'printf "%s" "$1" | xargs -P{scripts.cores} -n1 "{sys.executable}" >/dev/null'
-    command = ["sh", "-c", inner, "sh", listed + "\n"]
-    return timed(command, scripts.folder, environment(scripts.places))
+    command = ["sh", "-c", inner, "sh", paths + "\n"]
+    return time_command(command, scripts.folder, environment(scripts.places))
 
 
-def notebooks(scripts: Scripts, program: str) -> tuple[float, float]:
+def run_notebooks(scripts: Scripts, program: str) -> tuple[float, float]:
     """A notebook for each script: first nothing is cached, then everything."""
     folder = scripts.folder / "notebooks"
     remove(folder)
@@ -180,14 +182,14 @@ def notebooks(scripts: Scripts, program: str) -> tuple[float, float]:
         target.write_text(json.dumps(notebook(text)), encoding="utf-8")
     paths = environment(scripts.places) | {"JUPYTERCACHE": str(folder / ".jupyter_cache")}
     paths["PATH"] = f"{Path(program).parent}:{paths['PATH']}"
-    listed = sorted(path.name for path in folder.glob("*.ipynb"))
-    timed([sys.executable, "-c", CONSENT, program, "notebook", "add", *listed], folder, paths)
+    names = sorted(path.name for path in folder.glob("*.ipynb"))
+    time_command([sys.executable, "-c", CONSENT, program, "notebook", "add", *names], folder, paths)
     execute = [program, "project", "execute", "--executor", "local-parallel", "--timeout", "120"]
-    cold = timed(execute, folder, paths)
-    cached = len(list((folder / ".jupyter_cache" / "executed").iterdir()))
-    if cached != len(listed):
-        raise CommandError(f"jupyter-cache has run {cached} notebooks of {len(listed)}")
-    warm = timed(execute, folder, paths)
+    cold = time_command(execute, folder, paths)
+    count = len(list((folder / ".jupyter_cache" / "executed").iterdir()))
+    if count != len(names):
+        raise CommandError(f"jupyter-cache has run {count} notebooks of {len(names)}")
+    warm = time_command(execute, folder, paths)
     shutil.rmtree(folder)
     return cold, warm
 
@@ -207,6 +209,6 @@ def notebook(code: str) -> dict[str, object]:
 
 
 def jcache_version(places: Places) -> str | None:
-    """Of jupyter-cache."""
+    """The version of jupyter-cache."""
     program = places.python_tool("jcache")
-    return None if program is None else said_version([program, "--version"])
+    return None if program is None else read_version([program, "--version"])

@@ -37,14 +37,14 @@ def one_server(site: Site, edits: int) -> None:
     """Start the preview, edit a few times, stop it. The first edit is not counted."""
     assert site.tool.serve is not None
     port = free_port()
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as output:
         process = subprocess.Popen(
-            site.filled(site.tool.serve(port)),
+            site.fill_in(site.tool.serve(port)),
             cwd=site.folder,
             env=environment(site.places),
             stdin=subprocess.DEVNULL,
-            stdout=said,
-            stderr=said,
+            stdout=output,
+            stderr=output,
             start_new_session=True,
         )
         try:
@@ -57,17 +57,17 @@ def one_server(site: Site, edits: int) -> None:
                 if i:
                     site.note(SERVED, took)
                 time.sleep(0.5 + took)
-        except TimeoutError as fault:
-            said.seek(0)
-            text = said.read().decode(errors="replace")[-2000:]
-            raise CommandError(f"{fault}\n{text}") from None
+        except TimeoutError as error:
+            output.seek(0)
+            text = output.read().decode(errors="replace")[-2000:]
+            raise CommandError(f"{error}\n{text}") from None
         finally:
             stop(process)
             site.source.write_text(site.original, encoding="utf-8")
 
 
 class Reader:
-    """Asks for one page, over a connection that is kept as long as the server keeps it."""
+    """Asks for one page, over a connection that stays open as long as the server keeps it."""
 
     def __init__(self, process: subprocess.Popen[bytes], port: int, path: str) -> None:
         self.process = process

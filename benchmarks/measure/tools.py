@@ -1,4 +1,4 @@
-"""coursebuild and its peers: where they are, how they are called, and how they are configured.
+"""coursebuild and its peers: their places, commands and configurations.
 
 Entry point: `all_tools(places)`. A peer that is not installed has no version and is not measured.
 """
@@ -17,7 +17,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parents[2]
 SCRIPT_KINDS = ("scripts", "last", "installed")
-"""What of `.coursebuild/` holds results of scripts, which a cold build may use."""
+"""The folders of `.coursebuild/` with results of scripts, which a cold build may use."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,13 +57,13 @@ class Tool:
     math: str
     """Where formulas are typeset."""
     version: str | None
-    """Nothing where it is not installed."""
-    how: str
-    """How it is configured."""
+    """`None` where it is not installed."""
+    configuration: str
+    """In words."""
     build: list[str] | None
     """The command for a build; none: not built."""
-    made: tuple[str, ...]
-    """What a cold build does not find; a pattern with a last part `!a,b` spares those names."""
+    products: tuple[str, ...]
+    """What a cold build must not find; a pattern with a last part `!a,b` spares those names."""
     page: Callable[[str], str]
     """From a lesson's name to its built page."""
     source: Callable[[str], str]
@@ -77,7 +77,7 @@ class Tool:
 
 
 def all_tools(places: Places) -> list[Tool]:
-    """All that there are, with those that are not installed."""
+    """All tools, also those that are not installed."""
     return [
         coursebuild(),
         *mkdocs(places),
@@ -91,15 +91,15 @@ def all_tools(places: Places) -> list[Tool]:
 
 
 def environment(places: Places) -> dict[str, str]:
-    """For all of them.
+    """The environment variables for all tools.
 
     Python keeps what it compiled, as it does for readers: a tool that is tried out of its sources
     would otherwise compile them anew in each run, which those that are installed do not.
     """
     paths = [str(HERE), os.environ.get("PYTHONPATH", "")]
-    kept = {name: v for name, v in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    inherited = {name: v for name, v in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     return {
-        **kept,
+        **inherited,
         "PYTHONPATH": os.pathsep.join(filter(None, paths)),
         "NO_MKDOCS_2_WARNING": "1",
         "ELEVENTY_TELEMETRY": "0",
@@ -107,16 +107,16 @@ def environment(places: Places) -> dict[str, str]:
     }
 
 
-def dashed(name: str) -> str:
-    """A lesson's name with no dot, as most peers want it in addresses."""
+def dash_name(name: str) -> str:
+    """A lesson's name with dashes for dots, as most peers want it in addresses."""
     return name.replace(".", "-")
 
 
-def said_version(command: list[str] | None) -> str | None:
-    """The first number with dots in what a command says of its version."""
+def read_version(command: list[str] | None) -> str | None:
+    """The first number with dots in the output of a version command."""
     if command is None:
         return None
-    done = subprocess.run(
+    process = subprocess.run(
         command,
         capture_output=True,
         text=True,
@@ -125,11 +125,11 @@ def said_version(command: list[str] | None) -> str | None:
         timeout=60,
         env=os.environ | {"PYTHONPATH": str(HERE)},
     )
-    match = re.search(r"\d+\.\d[\w.]*", done.stdout + done.stderr)
-    return match[0] if match and done.returncode == 0 else None
+    match = re.search(r"\d+\.\d[\w.]*", process.stdout + process.stderr)
+    return match[0] if match and process.returncode == 0 else None
 
 
-def asked(tool: str | None, *arguments: str) -> list[str] | None:
+def command_if_installed(tool: str | None, *arguments: str) -> list[str] | None:
     """A command, if its program is there."""
     return None if tool is None else [tool, *arguments]
 
@@ -142,7 +142,7 @@ def coursebuild() -> Tool:
         "coursebuild",
         "coursebuild",
         "build",
-        said_version([*command, "--version"]),
+        read_version([*command, "--version"]),
         "as it comes; scripts' results known, all else made anew in a cold build",
         [*command, "build", "--quiet"],
         ("public", f".coursebuild/!{','.join(SCRIPT_KINDS)}"),
@@ -156,10 +156,10 @@ def coursebuild() -> Tool:
 def mkdocs(places: Places) -> list[Tool]:
     """MkDocs with Material, and its option that skips pages whose file is older than the page."""
     program = places.python_tool("mkdocs")
-    version = said_version(asked(program, "--version"))
-    found = []
+    version = read_version(command_if_installed(program, "--version"))
+    tools = []
     for key, extra in (("mkdocs", []), ("mkdocs-dirty", ["--dirty"])):
-        found.append(
+        tools.append(
             Tool(
                 key,
                 "MkDocs with Material" + (" --dirty" if extra else ""),
@@ -179,7 +179,7 @@ def mkdocs(places: Places) -> list[Tool]:
                 only_incremental=bool(extra),
             )
         )
-    return found
+    return tools
 
 
 def zensical(places: Places) -> Tool:
@@ -190,7 +190,7 @@ def zensical(places: Places) -> Tool:
         "Zensical",
         "mkdocs",
         "reader",
-        said_version(asked(program, "--version")),
+        read_version(command_if_installed(program, "--version")),
         "the files of MkDocs with Material",
         [program or "", "build"],
         ("site", ".cache"),
@@ -211,7 +211,7 @@ def sphinx(places: Places) -> Tool:
         "Sphinx with MyST",
         "sphinx",
         "reader",
-        said_version(asked(program, "--version")),
+        read_version(command_if_installed(program, "--version")),
         "MyST-Parser, the default theme, --jobs auto; preview by sphinx-autobuild",
         [program or "", *arguments],
         ("_build",),
@@ -233,23 +233,23 @@ def pelican(places: Places) -> Tool:
         "Pelican",
         "pelican",
         "reader",
-        said_version(asked(program, "--version")),
+        read_version(command_if_installed(program, "--version")),
         "the theme `simple`, no feeds, content cache on",
         [program or "", "--quiet"],
         ("output", "cache", "__pycache__"),
-        lambda name: f"output/{dashed(name)}.html",
+        lambda name: f"output/{dash_name(name)}.html",
         lambda name: f"content/{name}.md",
         lambda port: [program or "", *serving, str(port)],
-        lambda name: f"/{dashed(name)}.html",
+        lambda name: f"/{dash_name(name)}.html",
     )
 
 
 def hugo(places: Places) -> list[Tool]:
     """Hugo with formulas in the build, and without."""
     program = places.python_tool("hugo") or shutil.which("hugo")
-    version = said_version(asked(program, "version"))
-    kept = ["--cacheDir", "{folder}/.cache"]  # with formulas in it: a cold build has none
-    serving = ["server", "--bind", "127.0.0.1", *kept, "--port"]
+    version = read_version(command_if_installed(program, "version"))
+    cache_option = ["--cacheDir", "{folder}/.cache"]  # with formulas in it: a cold build has none
+    serving = ["server", "--bind", "127.0.0.1", *cache_option, "--port"]
     return [
         Tool(
             key,
@@ -257,15 +257,15 @@ def hugo(places: Places) -> list[Tool]:
             key,
             math,
             version,
-            "layouts of a few lines; " + how,
-            [program or "", "build", "--quiet", *kept],
+            "layouts of a few lines; " + typesetting,
+            [program or "", "build", "--quiet", *cache_option],
             ("public", "resources", ".cache", ".hugo_build.lock"),
-            lambda name: f"public/lessons/{dashed(name)}/index.html",
+            lambda name: f"public/lessons/{dash_name(name)}/index.html",
             lambda name: f"content/lessons/{name}.md",
             lambda port: [program or "", *serving, str(port), "--baseURL", "http://127.0.0.1/"],
-            lambda name: f"/lessons/{dashed(name)}/",
+            lambda name: f"/lessons/{dash_name(name)}/",
         )
-        for key, math, how in (
+        for key, math, typesetting in (
             ("hugo", "build", "transform.ToMath"),
             ("hugo_reader", "reader", "formulas as they are"),
         )
@@ -284,12 +284,12 @@ def eleventy(places: Places) -> Tool:
         "markdown-it, KaTeX, Prism, a layout of a few lines; preview with --incremental",
         ["node", program or "", "--quiet"],
         ("_site", ".cache"),
-        lambda name: f"_site/lessons/{dashed(name)}/index.html",
-        lambda name: f"content/lessons/{dashed(name)}.md",
+        lambda name: f"_site/lessons/{dash_name(name)}/index.html",
+        lambda name: f"content/lessons/{dash_name(name)}.md",
         lambda port: [
             *["node", program or "", "--quiet", "--serve", "--incremental", f"--port={port}"]
         ],
-        lambda name: f"/lessons/{dashed(name)}/",
+        lambda name: f"/lessons/{dash_name(name)}/",
     )
 
 
@@ -306,7 +306,7 @@ def vitepress(places: Places) -> Tool:
         None,
         (),
         lambda name: "",
-        lambda name: f"lessons/{dashed(name)}.md",
+        lambda name: f"lessons/{dash_name(name)}.md",
         lambda port: [
             "node",
             program or "",
@@ -317,5 +317,5 @@ def vitepress(places: Places) -> Tool:
             "--host",
             "127.0.0.1",
         ],
-        lambda name: f"/lessons/{dashed(name)}.md",
+        lambda name: f"/lessons/{dash_name(name)}.md",
     )

@@ -1,4 +1,4 @@
-"""What the flavors share."""
+"""Functions that the flavors share."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ def write_text(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def indented(text: str, by: str = "    ") -> str:
-    """The text, each line that is not empty moved to the right."""
+def indent(text: str, by: str = "    ") -> str:
+    """The text with every line indented that is not empty."""
     return "\n".join(by + line if line else line for line in text.split("\n"))
 
 
-def quoted(text: str) -> str:
+def quote(text: str) -> str:
     """The text as a blockquote."""
     return "\n".join(f"> {line}".rstrip() for line in text.split("\n"))
 
@@ -28,5 +28,5 @@ def plain(text: str, address: Callable[[str], str]) -> str:
 
     The address of a lesson follows from its id.
     """
-    linked = re.sub(r"\]\(lesson:([0-9.]+)\)", lambda m: f"]({address(m[1])})", text)
-    return linked.replace("`{out}", "`")
+    text_with_links = re.sub(r"\]\(lesson:([0-9.]+)\)", lambda m: f"]({address(m[1])})", text)
+    return text_with_links.replace("`{out}", "`")

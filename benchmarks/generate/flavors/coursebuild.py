@@ -21,7 +21,7 @@ from benchmarks.generate.document import (
     Quiz,
     Script,
 )
-from benchmarks.generate.flavors.common import quoted, write_text
+from benchmarks.generate.flavors.common import quote, write_text
 
 HEAD = """[course]
 title = "Methods and their errors"
@@ -65,7 +65,7 @@ def piece_text(piece: Piece, lesson: Lesson) -> str:
             return f"$${tex}$$"
         case Callout(kind, title, folded, body):
             inner = "\n\n".join(piece_text(part, lesson) for part in body)
-            return quoted(f"[!{kind}]{'-' if folded else ''} {title}\n{inner}")
+            return quote(f"[!{kind}]{'-' if folded else ''} {title}\n{inner}")
         case Script(path, code, output):
             return f"```python file={path}\n{code}```\n\nOutput:\n\n```text digits\n{output}```"
         case InOut(takes, does, gives):

@@ -10,7 +10,7 @@ import json
 from pathlib import Path
 
 from benchmarks.generate.document import Lesson
-from benchmarks.generate.flavors.common import quoted, write_text
+from benchmarks.generate.flavors.common import quote, write_text
 from benchmarks.generate.flavors.markdown import Dialect
 
 CONFIG = """import { alert } from "@mdit/plugin-alert";
@@ -62,8 +62,8 @@ def callout(kind: str, title: str, folded: bool, body: str) -> str:
     """An alert of one of the five kinds that there are; what is folded goes into `details`."""
     if folded:
         return f"<details><summary>{title}</summary>\n\n{body}\n\n</details>"
-    known = {"warning": "warning", "tip": "tip"}.get(kind, "note")
-    return quoted(f"[!{known}]\n**{title}**\n\n{body}")
+    alert = {"warning": "warning", "tip": "tip"}.get(kind, "note")
+    return quote(f"[!{alert}]\n**{title}**\n\n{body}")
 
 
 def write(lessons: list[Lesson], folder: Path) -> None:

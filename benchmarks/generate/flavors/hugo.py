@@ -11,7 +11,7 @@ import json
 from pathlib import Path
 
 from benchmarks.generate.document import Lesson
-from benchmarks.generate.flavors.common import quoted, write_text
+from benchmarks.generate.flavors.common import quote, write_text
 from benchmarks.generate.flavors.markdown import Dialect
 
 CONFIG = """baseURL = "https://example.org/methods/"
@@ -82,7 +82,7 @@ LIST = """{{ define "main" }}
 
 def callout(kind: str, title: str, folded: bool, body: str) -> str:
     """An alert."""
-    return quoted(f"[!{kind}]{'-' if folded else ''} {title}\n{body}")
+    return quote(f"[!{kind}]{'-' if folded else ''} {title}\n{body}")
 
 
 def write(lessons: list[Lesson], folder: Path, hook: str = HOOK_BUILD) -> None:

@@ -56,8 +56,8 @@ class Dialect:
                     kind, title, folded, "\n\n".join(self.piece(part) for part in body)
                 )
             case Script(path, code, output):
-                printed = self.code("text", output)
-                return f"`{path}`\n\n{self.code('python', code)}\n\nOutput:\n\n{printed}"
+                output_block = self.code("text", output)
+                return f"`{path}`\n\n{self.code('python', code)}\n\nOutput:\n\n{output_block}"
             case InOut(takes, does, gives):
                 rows = ("Input", takes), ("Process", does), ("Output", gives)
                 return "| | |\n| --- | --- |\n" + "\n".join(f"| {a} | {b} |" for a, b in rows)
@@ -68,8 +68,8 @@ class Dialect:
         """One question, and its answer in a folded callout."""
         match question:
             case Choice(text, options, answer, explain):
-                listed = "\n".join(f"- {option}" for option in options)
-                return f"{text}\n\n{listed}\n\n{self.answer(f'{options[answer]}. {explain}')}"
+                bullets = "\n".join(f"- {option}" for option in options)
+                return f"{text}\n\n{bullets}\n\n{self.answer(f'{options[answer]}. {explain}')}"
             case Number(text, value, explain):
                 return f"{text}\n\n{self.answer(f'{value:g}. {explain}')}"
             case Open(text, reference):

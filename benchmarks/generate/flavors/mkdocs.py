@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks.generate.document import Lesson
-from benchmarks.generate.flavors.common import indented, write_text
+from benchmarks.generate.flavors.common import indent, write_text
 from benchmarks.generate.flavors.markdown import Dialect
 
 CONFIG = """site_name: Methods and their errors
@@ -48,7 +48,7 @@ KINDS = {"established": "success", "derivation": "abstract", "implementation": "
 
 def callout(kind: str, title: str, folded: bool, body: str) -> str:
     """An admonition of Python-Markdown, or the folding one of pymdownx."""
-    return f'{"???" if folded else "!!!"} {KINDS.get(kind, kind)} "{title}"\n{indented(body)}'
+    return f'{"???" if folded else "!!!"} {KINDS.get(kind, kind)} "{title}"\n{indent(body)}'
 
 
 def write(lessons: list[Lesson], folder: Path) -> None:
@@ -64,6 +64,6 @@ def write(lessons: list[Lesson], folder: Path) -> None:
         nav.append(f'    - "{lesson.id} {lesson.title}": lessons/{lesson.name}.md\n')
         text = f"# {lesson.title}\n\n{dialect.lesson(lesson)}"
         write_text(folder / "docs" / "lessons" / f"{lesson.name}.md", text)
-    listed = "".join(f"- [{x.title}](lessons/{x.name}.md)\n" for x in lessons)
-    write_text(folder / "docs" / "index.md", f"# Methods and their errors\n\n{listed}")
+    links = "".join(f"- [{x.title}](lessons/{x.name}.md)\n" for x in lessons)
+    write_text(folder / "docs" / "index.md", f"# Methods and their errors\n\n{links}")
     write_text(folder / "mkdocs.yml", "".join(nav))

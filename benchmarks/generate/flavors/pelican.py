@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks.generate.document import Lesson
-from benchmarks.generate.flavors.common import indented, write_text
+from benchmarks.generate.flavors.common import indent, write_text
 from benchmarks.generate.flavors.markdown import Dialect
 
 CONFIG = """SITENAME = "Methods and their errors"
@@ -48,7 +48,7 @@ MARKDOWN = {
 
 def callout(kind: str, title: str, folded: bool, body: str) -> str:
     """An admonition of Python-Markdown, which cannot fold."""
-    return f'!!! {kind} "{title}"\n{indented(body)}'
+    return f'!!! {kind} "{title}"\n{indent(body)}'
 
 
 def write(lessons: list[Lesson], folder: Path) -> None:

@@ -34,7 +34,7 @@ def write(lessons: list[Lesson], folder: Path) -> None:
     for lesson in lessons:
         text = f"# {lesson.title}\n\n{dialect.lesson(lesson)}"
         write_text(folder / "lessons" / f"{lesson.name}.md", text)
-    listed = "".join(f"lessons/{lesson.name}\n" for lesson in lessons)
-    tree = f"```{{toctree}}\n:maxdepth: 1\n\n{listed}```\n"
+    entries = "".join(f"lessons/{lesson.name}\n" for lesson in lessons)
+    tree = f"```{{toctree}}\n:maxdepth: 1\n\n{entries}```\n"
     write_text(folder / "index.md", f"# Methods and their errors\n\n{tree}")
     write_text(folder / "conf.py", CONFIG)
