@@ -148,11 +148,11 @@ def _included_models(course: Course, models: Mapping[str, CompileResult]) -> set
     }
 
 
-def line_span(code: Excerpt, line: int | None, before: int, otherwise: Span) -> Span:
-    """The span of a line that MuJoCo names; `before` lines were put before those of `code`."""
-    if line is None or not 1 <= line - before <= code.text.count("\n") + 1:
-        return otherwise
-    row = code.lines()[line - before - 1]
+def line_span(code: Excerpt, line: int | None, lines_before: int, fallback: Span) -> Span:
+    """The span of a line that MuJoCo names; `lines_before` of them are not in `code`."""
+    if line is None or not 1 <= line - lines_before <= code.text.count("\n") + 1:
+        return fallback
+    row = code.lines()[line - lines_before - 1]
     indent = len(row.text) - len(row.text.lstrip())
     return row.slice(indent, len(row.text.rstrip())).span() if row.text.strip() else row.span()
 

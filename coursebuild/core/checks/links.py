@@ -342,7 +342,7 @@ def _check_url(
 
 
 _ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
-"""The address of a lesson in a course that one page with a script shows."""
+"""The fragment by which a site of a single page names a lesson, as in `#/lesson/4.2`."""
 
 
 def _ids_of_kind(kind: str, targets: LinkTargets) -> Collection[str]:

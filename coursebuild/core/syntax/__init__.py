@@ -1,1 +1,1 @@
-"""Text of a course into values, pure: Markdown, fences, quizzes, labs, the course map."""
+"""Parsers, which are pure: Markdown, fences, JSON, TOML and the course map become values."""

@@ -90,7 +90,7 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
 
 
 def _find_inner_opening(body: Excerpt, marks: str) -> Span | None:
-    """The first line that would begin a fence of these marks, were it not inside one."""
+    """The first line that would begin a fence of these marks if it were not inside one."""
     if marks not in body.text:
         return None
     opening = re.compile(rf"^ {{0,3}}({re.escape(marks[0])}{{{len(marks)},}} *\w[^`\n]*)$", re.M)

@@ -82,7 +82,7 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
 
 
 def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
-    """The same for an address in raw HTML, which is published as it is."""
+    """The diagnostic of a wrong scheme in raw HTML, whose addresses are published unchanged."""
     url = _UNSEEN.sub("", url.strip(_BLANK))
     match = _SCHEME.match(url)
     if match is not None and match[1].lower() in _OURS:
