@@ -36,9 +36,9 @@ from support.sample_lessons import (
     DIGITS_ELLIPSIS,
     ELLIPSIS,
     EXACT,
-    edited,
     recording,
-    within,
+    tolerance,
+    update,
 )
 
 ROOT = Path(__file__).parents[2]
@@ -74,7 +74,7 @@ def lesson(text: str) -> None:
     plain_html(parsed.value)
     course = parse_course_map(Source("content/course.toml", MAP)).value
     assert course is not None
-    told(*parsed.diagnostics, *check_course(with_document(course, parsed.value)))
+    describe(*parsed.diagnostics, *check_course(with_document(course, parsed.value)))
 
 
 def with_document(course: Course, document: Document) -> Course:
@@ -84,7 +84,7 @@ def with_document(course: Course, document: Document) -> Course:
     return replace(course, levels=(replace(level, lessons=lessons),))
 
 
-def told(*found: Diagnostic) -> None:
+def describe(*found: Diagnostic) -> None:
     for one in found:
         assert one.message and diagnostic_text(one, Style(colour=False))
 
@@ -120,7 +120,7 @@ def json_bodies() -> Iterator[bytes]:
 
 
 def course_map(text: str) -> None:
-    told(*parse_course_map(Source("content/course.toml", text)).diagnostics)
+    describe(*parse_course_map(Source("content/course.toml", text)).diagnostics)
 
 
 def course_maps() -> Iterator[bytes]:
@@ -132,7 +132,7 @@ def course_maps() -> Iterator[bytes]:
 
 
 def declarations(text: str) -> None:
-    told(*parse_declarations(Source("models/a.toml", text)).diagnostics)
+    describe(*parse_declarations(Source("models/a.toml", text)).diagnostics)
 
 
 def declared() -> Iterator[bytes]:
@@ -142,7 +142,7 @@ def declared() -> Iterator[bytes]:
 
 # --- outputs
 
-_COMPARISONS = (EXACT, DIGITS, ELLIPSIS, DIGITS_ELLIPSIS, within("0.05", "0.05"))
+_COMPARISONS = (EXACT, DIGITS, ELLIPSIS, DIGITS_ELLIPSIS, tolerance("0.05", "0.05"))
 _UNWRITABLE = "[`~]{3}|[\r\0\ufeff\ud800-\udfff]"
 _FILTERS = ((), (Filter(r"\d\.\d", "N"),), (Filter(r"^b.*\n", ""), Filter(" +$", "")))
 
@@ -161,7 +161,7 @@ def comparison(text: str) -> None:
     body = recording(recorded)
     found = update_body(body, by, filters, printed, printed)
     if isinstance(found, Edit):
-        edited(body, printed, by, filters)
+        update(body, printed, by, filters)
     elif found is None:
         assert compare(body, by, filters, printed).status != "drift"
 

@@ -37,7 +37,7 @@ status = "complete"
 """
 
 
-def within(rtol: str = "0", atol: str = "0") -> Comparison:
+def tolerance(rtol: str = "0", atol: str = "0") -> Comparison:
     return Comparison(Mode.TOLERANCE, Decimal(rtol), Decimal(atol))
 
 
@@ -48,8 +48,8 @@ def document(text: str, path: str = "content/lessons/4.2-mass.md") -> Document:
     return parse_document(Source(path, text), frozenset(), lesson=True).value
 
 
-def recordings(found: Document) -> tuple[Recording, ...]:
-    return tuple(block for block in document_blocks(found) if isinstance(block, Recording))
+def recordings(document: Document) -> tuple[Recording, ...]:
+    return tuple(block for block in document_blocks(document) if isinstance(block, Recording))
 
 
 def recording(body: str, *, prefix: str = "", eol: str = "\n", fence: str = "```") -> Recording:
@@ -71,19 +71,19 @@ def course(
 ) -> Course:
     """A course of these lessons; ids are taken from the file names."""
     text = '[course]\ntitle = "T"\n[[level]]\nid = "1"\ntitle = "One"\n'
-    for found in documents:
-        id, _, slug = found.source.path.rpartition("/")[2].removesuffix(".md").partition("-")
+    for document in documents:
+        id, _, slug = document.source.path.rpartition("/")[2].removesuffix(".md").partition("-")
         text += LESSON.format(id, slug)
-    made = parse_course_map(Source("content/course.toml", text)).value
-    assert made is not None
-    (level,) = made.levels
-    both = zip(level.lessons, documents, strict=True)
-    lessons = tuple(replace(lesson, document=found) for lesson, found in both)
+    course_map = parse_course_map(Source("content/course.toml", text)).value
+    assert course_map is not None
+    (level,) = course_map.levels
+    pairs = zip(level.lessons, documents, strict=True)
+    lessons = tuple(replace(lesson, document=document) for lesson, document in pairs)
     levels = (replace(level, lessons=lessons),)
-    return replace(made, levels=levels, comparison=comparison, filters=filters)
+    return replace(course_map, levels=levels, comparison=comparison, filters=filters)
 
 
-def ran(
+def make_run(
     stdout: str = "",
     *,
     path: str = "examples/a.py",
@@ -94,7 +94,7 @@ def ran(
     return ScriptRun(path, outcome, status, stdout, stderr, 0.1)
 
 
-def told(diagnostic: Diagnostic) -> str:
+def describe(diagnostic: Diagnostic) -> str:
     """All that a diagnostic says, with its places."""
 
     def place(span: Span | None) -> str:
@@ -125,13 +125,13 @@ def verdict(
 
 
 def matches(recorded: str, printed: str, comparison: Comparison = EXACT) -> bool:
-    found = verdict(recorded, printed, comparison)
-    assert found.status in ("verified", "drift")
-    assert bool(found.changes) == (found.status == "drift")
-    return found.status == "verified"
+    result = verdict(recorded, printed, comparison)
+    assert result.status in ("verified", "drift")
+    assert bool(result.changes) == (result.status == "drift")
+    return result.status == "verified"
 
 
-def seen(change: Change) -> tuple[str, str, str]:
+def change_values(change: Change) -> tuple[str, str, str]:
     """Class, recorded text, printed text; the span must hold what it names."""
     if change.kind in (DriftKind.ROUNDING, DriftKind.NUMERIC, DriftKind.TEXT):
         assert change.span.text == change.recorded
@@ -141,15 +141,17 @@ def seen(change: Change) -> tuple[str, str, str]:
 # --- updates
 
 
-def edited(
+def update(
     lesson: Recording,
     printed: str,
     comparison: Comparison = EXACT,
     filters: tuple[Filter, ...] = (),
-    again: str | None = None,
+    repeated: str | None = None,
 ) -> Recording:
     """The recording after its update; a second update has nothing to do."""
-    edit = update_body(lesson, comparison, filters, printed, printed if again is None else again)
+    edit = update_body(
+        lesson, comparison, filters, printed, printed if repeated is None else repeated
+    )
     assert isinstance(edit, Edit), edit
     source = lesson.span.source
     text = apply_edits(source.text, [edit])
@@ -169,13 +171,13 @@ def body(
     **lesson: str,
 ) -> str:
     """The text of a recorded output after its update."""
-    return edited(recording(recorded, **lesson), printed, comparison, filters).body_span.text
+    return update(recording(recorded, **lesson), printed, comparison, filters).body_span.text
 
 
-def refused(
-    recorded: str, printed: str, comparison: Comparison = EXACT, again: str | None = None
+def refusal_text(
+    recorded: str, printed: str, comparison: Comparison = EXACT, repeated: str | None = None
 ) -> str:
-    second = printed if again is None else again
-    found = update_body(recording(recorded), comparison, (), printed, second)
-    assert isinstance(found, Diagnostic), found
-    return told(found)
+    second = printed if repeated is None else repeated
+    refusal = update_body(recording(recorded), comparison, (), printed, second)
+    assert isinstance(refusal, Diagnostic), refusal
+    return describe(refusal)

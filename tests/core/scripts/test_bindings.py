@@ -15,7 +15,7 @@ from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.scripts.bindings import PrintedOutputs, check_bindings, dependent_bindings
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.text.diagnostics import Diagnostic
-from support.sample_lessons import course, document, ran, told
+from support.sample_lessons import course, describe, document, make_run
 
 PRINTED = """\
 an L-shaped body: [0.073333 0.026667 0.      ] m
@@ -41,24 +41,27 @@ LESSON = script() + output()
 
 
 def check(
-    text: str, *runs: ScriptRun, others: tuple[Document, ...] = (), scripts: tuple[str, ...] = ()
+    text: str,
+    *runs: ScriptRun,
+    documents: tuple[Document, ...] = (),
+    scripts: tuple[str, ...] = (),
 ) -> tuple[Diagnostic, ...]:
     lesson = document(text)
-    known = [
+    paths = [
         block.path
-        for found in (lesson, *others)
-        for block in document_blocks(found)
+        for each_document in (lesson, *documents)
+        for block in document_blocks(each_document)
         if isinstance(block, Script)
     ]
-    verdicts = verify(course(lesson, *others), runs)
-    printed = PrintedOutputs(verdicts, runs, [*known, *scripts])
+    verdicts = verify(course(lesson, *documents), runs)
+    printed = PrintedOutputs(verdicts, runs, [*paths, *scripts])
     return check_bindings(lesson, printed)
 
 
-def one(binding: str, printed: str = PRINTED) -> Diagnostic | None:
-    found = check(f"{script()}{output(printed)}\nHere: {binding}\n", ran(printed))
-    assert len(found) <= 1
-    return found[0] if found else None
+def find_mistake(binding: str, printed: str = PRINTED) -> Diagnostic | None:
+    diagnostics = check(f"{script()}{output(printed)}\nHere: {binding}\n", make_run(printed))
+    assert len(diagnostics) <= 1
+    return diagnostics[0] if diagnostics else None
 
 
 @pytest.mark.parametrize(
@@ -95,19 +98,19 @@ def one(binding: str, printed: str = PRINTED) -> Diagnostic | None:
     ],
 )
 def test_a_printed_value_rounded_to_the_digits_shown(binding: str) -> None:
-    assert one(f"`{binding}`{{out}}") is None
+    assert find_mistake(f"`{binding}`{{out}}") is None
 
 
 def test_text_beside_the_number_chooses() -> None:
     printed = "E 6.0 J\nP 6.04 W\nv=6.1 m/s\n"
-    assert one("`6.0`{out}", printed) is None
-    assert one("`6.0 J`{out}", printed) is None
-    assert one("`6.0 W`{out}", printed) is None
-    assert one("`6.1 W`{out}", printed) is not None
-    assert one("`6.1 m`{out}", printed) is None
-    assert one("`v = 6.1`{out}", printed) is None
-    assert one("`P 6.1`{out}", printed) is not None
-    assert one("`6.1 N`{out}", printed) is None
+    assert find_mistake("`6.0`{out}", printed) is None
+    assert find_mistake("`6.0 J`{out}", printed) is None
+    assert find_mistake("`6.0 W`{out}", printed) is None
+    assert find_mistake("`6.1 W`{out}", printed) is not None
+    assert find_mistake("`6.1 m`{out}", printed) is None
+    assert find_mistake("`v = 6.1`{out}", printed) is None
+    assert find_mistake("`P 6.1`{out}", printed) is not None
+    assert find_mistake("`6.1 N`{out}", printed) is None
 
 
 def test_the_nearest_output_above_counts() -> None:
@@ -115,39 +118,42 @@ def test_the_nearest_output_above_counts() -> None:
         script() + output("x 1.5\n") + "\n`1.5`{out} `2.5`{out}\n\n" + output("x 2.5\n")
         + "\n`2.5`{out} `1.5`{out}\n"
     )  # fmt: skip
-    found = check(text)
-    assert [(d.rule, d.span.text) for d in found] == [
+    diagnostics = check(text)
+    assert [(d.rule, d.span.text) for d in diagnostics] == [
         ("binding-mismatch", "2.5"),
         ("binding-mismatch", "1.5"),
     ]
 
 
 def test_a_named_script_is_found_anywhere() -> None:
-    other = document(
+    second = document(
         script("examples/b.py") + output("y 2.5\n") + output("y 3.5\n"), "content/lessons/1.1-x.md"
     )
-    runs = (ran(PRINTED), ran("y 2.5\ny 3.5\n", path="examples/b.py"))
+    runs = (make_run(PRINTED), make_run("y 2.5\ny 3.5\n", path="examples/b.py"))
     text = (
         "`+6.6 %`{out=examples/a.py} `2.5`{out=examples/b.py} `3.5`{out=examples/b.py}\n\n" + LESSON
     )
-    assert check(text, *runs, others=(other,)) == ()
-    (found,) = check("`9.9`{out=examples/b.py}\n\n" + LESSON, *runs, others=(other,))
-    assert (found.rule, found.label) == ("binding-mismatch", "the nearest printed value is 3.5")
+    assert check(text, *runs, documents=(second,)) == ()
+    (diagnostic,) = check("`9.9`{out=examples/b.py}\n\n" + LESSON, *runs, documents=(second,))
+    assert (diagnostic.rule, diagnostic.label) == (
+        "binding-mismatch",
+        "the nearest printed value is 3.5",
+    )
 
 
 def test_a_named_script_without_a_recorded_output_counts_by_its_run() -> None:
     text = (
         LESSON + script("examples/c.py") + "\n`1.5`{out=examples/c.py} `1.7`{out=examples/c.py}\n"
     )
-    run = ran("x 1.52\n", path="examples/c.py")
-    assert [d.span.text for d in check(text, ran(PRINTED), run)] == ["1.7"]
-    skipped = ran("", path="examples/c.py", outcome=Outcome.SKIPPED)
-    assert check(text, ran(PRINTED), skipped) == ()
-    assert check(text, ran(PRINTED)) == ()
-    norun = ran("", path="examples/c.py", outcome=Outcome.NORUN)
-    found = check(text, ran(PRINTED), norun)
+    run = make_run("x 1.52\n", path="examples/c.py")
+    assert [d.span.text for d in check(text, make_run(PRINTED), run)] == ["1.7"]
+    skipped_run = make_run("", path="examples/c.py", outcome=Outcome.SKIPPED)
+    assert check(text, make_run(PRINTED), skipped_run) == ()
+    assert check(text, make_run(PRINTED)) == ()
+    norun = make_run("", path="examples/c.py", outcome=Outcome.NORUN)
+    diagnostics = check(text, make_run(PRINTED), norun)
     assert (
-        told(found[0])
+        describe(diagnostics[0])
         == """\
 binding-orphan at 21:2 `1.5`
   `1.5` is bound to `examples/c.py`, which has no recorded output and is not run
@@ -155,77 +161,80 @@ binding-orphan at 21:2 `1.5`
     )
 
 
-def test_of_a_script_that_failed_nothing_more_is_told() -> None:
+def test_bindings_to_a_failed_script_are_not_reported() -> None:
     good = (Outcome.OK, Outcome.SKIPPED, Outcome.NORUN)
-    failed = [ran(outcome=outcome) for outcome in Outcome if outcome not in good]
-    for run in (*failed, ran("\n")):
+    failed_runs = [make_run(outcome=outcome) for outcome in Outcome if outcome not in good]
+    for run in (*failed_runs, make_run("\n")):
         assert check(LESSON + "\n`99`{out} `98`{out=examples/a.py}\n", run) == ()
 
 
 def test_recorded_text_counts_where_nothing_ran() -> None:
     text = LESSON + "\n`6.6 %`{out} `99`{out}\n"
-    for runs in ((), (ran(outcome=Outcome.SKIPPED),), (ran(outcome=Outcome.NORUN),)):
+    for runs in ((), (make_run(outcome=Outcome.SKIPPED),), (make_run(outcome=Outcome.NORUN),)):
         assert [d.span.text for d in check(text, *runs)] == ["99"]
 
 
 def test_where_recorded_text_drifted_the_run_counts_too() -> None:
     text = LESSON + "\n`6.6 %`{out} `6.7 %`{out} `6.8 %`{out}\n"
-    (found,) = check(text, ran(PRINTED.replace("6.641", "6.702")))
-    assert (found.span.text, found.label) == ("6.8 %", "the nearest printed value is +6.702")
+    (diagnostic,) = check(text, make_run(PRINTED.replace("6.641", "6.702")))
+    assert (diagnostic.span.text, diagnostic.label) == (
+        "6.8 %",
+        "the nearest printed value is +6.702",
+    )
 
 
 def test_what_an_ellipsis_leaves_out_was_printed_too() -> None:
     text = (
         script() + output("start\n...\nend 1.5\n", "ellipsis") + "\n`1.5`{out} `8`{out} `9`{out}\n"
     )
-    assert [d.span.text for d in check(text, ran("start\nx 7.52\nend 1.5\n"))] == ["9"]
+    assert [d.span.text for d in check(text, make_run("start\nx 7.52\nend 1.5\n"))] == ["9"]
 
 
 def test_bindings_in_quotes_and_footnotes_are_checked() -> None:
-    found = check(LESSON + "\n> `9.9`{out}[^a]\n\n[^a]: `9.8`{out}\n", ran(PRINTED))
-    assert [d.span.text for d in found] == ["9.9", "9.8"]
+    diagnostics = check(LESSON + "\n> `9.9`{out}[^a]\n\n[^a]: `9.8`{out}\n", make_run(PRINTED))
+    assert [d.span.text for d in diagnostics] == ["9.9", "9.8"]
 
 
-def test_tables_bear_numbers_too() -> None:
+def test_numbers_of_recorded_tables_count() -> None:
     text = (
         script() + "\nOutput:\n\n| a | b |\n| --- | --- |\n| Euler | **+6.641 %** |\n\n"
         "`+6.6 %`{out} `6.9e-04`{out} `Euler +6.6 %`{out} `7.7 %`{out}\n"
     )
-    found = check(text, ran(PRINTED))
-    assert [(d.span.text, d.label) for d in found] == [
+    diagnostics = check(text, make_run(PRINTED))
+    assert [(d.span.text, d.label) for d in diagnostics] == [
         ("7.7 %", "the nearest printed value is +6.641")
     ]
 
 
-def leaning(text: str, printed: str, *others: Document) -> list[tuple[str, str, str]]:
+def find_dependents(text: str, printed: str, *documents: Document) -> list[tuple[str, str, str]]:
     lesson = document(text)
-    runs = [ran(printed)]
-    verdicts = verify(course(lesson, *others), runs)
+    runs = [make_run(printed)]
+    verdicts = verify(course(lesson, *documents), runs)
     printed_now = PrintedOutputs(verdicts, runs)
     return [
-        (leans.binding.text, leans.change.recorded, leans.change.printed)
+        (dependent.binding.text, dependent.change.recorded, dependent.change.printed)
         for verdict in verdicts
-        for leans in dependent_bindings(verdict, [lesson, *others], printed_now)
+        for dependent in dependent_bindings(verdict, [lesson, *documents], printed_now)
     ]
 
 
-def test_who_leans_on_what_changed() -> None:
+def test_bindings_depend_on_the_values_that_they_show() -> None:
     text = (
         LESSON
         + "\n`+6.6 %`{out} `\u22126.0 %`{out} `4 flips`{out} `0.0733, 0.0267`{out} `RK4`{out}\n"
     )
-    changed = PRINTED.replace("6.641", "6.702").replace("0.026667", "0.03").replace("RK4", "RK5")
-    assert leaning(text, changed) == [
+    new_output = PRINTED.replace("6.641", "6.702").replace("0.026667", "0.03").replace("RK4", "RK5")
+    assert find_dependents(text, new_output) == [
         ("+6.6 %", "+6.641", "+6.702"),
         ("0.0733, 0.0267", "0.026667", "0.03"),
         ("RK4", "RK4", "RK5"),
     ]
-    assert leaning(text, PRINTED) == []
-    other = document("`+6.6 %`{out=examples/a.py} `6.6`{out}\n", "content/lessons/5.1-x.md")
+    assert find_dependents(text, PRINTED) == []
+    second = document("`+6.6 %`{out=examples/a.py} `6.6`{out}\n", "content/lessons/5.1-x.md")
     table = "\nOutput:\n\n| a | b |\n| --- | --- |\n| `Euler` | **+6.641 %** |\n"
     for lesson in (LESSON, script() + table):
-        found = leaning(lesson, PRINTED.replace("6.641", "6.702"), other)
-        assert found == [("+6.6 %", "+6.641", "+6.702")]
+        dependents = find_dependents(lesson, PRINTED.replace("6.641", "6.702"), second)
+        assert dependents == [("+6.6 %", "+6.641", "+6.702")]
 
 
 @settings(max_examples=50)
@@ -234,5 +243,5 @@ def test_fewer_digits_of_what_was_printed_always_hold(
     value: float, printed: int, fewer: int
 ) -> None:
     text = f"{value:.{printed}f}"
-    shown = Decimal(text).quantize(Decimal(1).scaleb(-min(printed, fewer)), ROUND_HALF_EVEN)
-    assert one(f"`{shown:f} J`{{out}}", f"E = {text} J, 3 steps\n") is None
+    rounded = Decimal(text).quantize(Decimal(1).scaleb(-min(printed, fewer)), ROUND_HALF_EVEN)
+    assert find_mistake(f"`{rounded:f} J`{{out}}", f"E = {text} J, 3 steps\n") is None

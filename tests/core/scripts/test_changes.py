@@ -7,7 +7,7 @@ import pytest
 from coursebuild.core.model.results import DriftKind
 from support.sample_lessons import (
     ELLIPSIS,
-    seen,
+    change_values,
     verdict,
 )
 
@@ -21,9 +21,9 @@ conservation over 20 s:
 @pytest.mark.parametrize("prefix", ["> ", "   ", ">   "])
 @pytest.mark.parametrize("eol", ["\n", "\r\n"])
 def test_places_in_nested_fences(prefix: str, eol: str) -> None:
-    found = verdict(ENERGY, ENERGY.replace("6.9e-04", "7.0e-04"), prefix=prefix, eol=eol)
-    (change,) = found.changes
-    assert seen(change) == ("rounding", "6.9e-04", "7.0e-04")
+    result = verdict(ENERGY, ENERGY.replace("6.9e-04", "7.0e-04"), prefix=prefix, eol=eol)
+    (change,) = result.changes
+    assert change_values(change) == ("rounding", "6.9e-04", "7.0e-04")
     assert (change.span.line, change.span.column) == (9, 44 + len(prefix))
 
 
@@ -47,8 +47,8 @@ def test_places_in_nested_fences(prefix: str, eol: str) -> None:
     ],
 )
 def test_classes_of_numbers(recorded: str, printed: str, kind: DriftKind) -> None:
-    found = verdict(f"E {recorded} J", f"E {printed} J")
-    assert [(c.kind, c.recorded, c.printed) for c in found.changes] == [(kind, recorded, printed)]
+    result = verdict(f"E {recorded} J", f"E {printed} J")
+    assert [(c.kind, c.recorded, c.printed) for c in result.changes] == [(kind, recorded, printed)]
 
 
 def test_enormous_errors_stay_finite() -> None:
@@ -57,42 +57,43 @@ def test_enormous_errors_stay_finite() -> None:
 
 
 def test_white_space_is_named_only_where_nothing_else_differs() -> None:
-    found = verdict("a   9.9 b", "a  10.9 b")
-    assert [seen(c) for c in found.changes] == [("numeric", "9.9", "10.9")]
-    found = verdict("a   b", "a  b")
-    assert [seen(c) for c in found.changes] == [("text", "   ", "  ")]
+    result = verdict("a   9.9 b", "a  10.9 b")
+    assert [change_values(c) for c in result.changes] == [("numeric", "9.9", "10.9")]
+    result = verdict("a   b", "a  b")
+    assert [change_values(c) for c in result.changes] == [("text", "   ", "  ")]
 
 
 def test_text_changes_are_small() -> None:
-    found = verdict("the red box at 1.5 m", "the dark blue box at 1.5 m")
-    assert [seen(c) for c in found.changes] == [("text", "red", "dark blue")]
-    found = verdict("E: 6.641 %", "E total: 6.702 %")
-    assert [seen(c) for c in found.changes] == [
+    result = verdict("the red box at 1.5 m", "the dark blue box at 1.5 m")
+    assert [change_values(c) for c in result.changes] == [("text", "red", "dark blue")]
+    result = verdict("E: 6.641 %", "E total: 6.702 %")
+    assert [change_values(c) for c in result.changes] == [
         ("text", "", " total"),
         ("numeric", "6.641", "6.702"),
     ]
 
 
 def test_missing_and_extra_lines() -> None:
-    found = verdict("a one\nb two\nc three\nd four", "a one\nd four")
-    assert [seen(c) for c in found.changes] == [("missing lines", "b two\nc three", "")]
-    assert found.changes[0].span.text == "b two\nc three"
-    found = verdict("a one\nd four", "a one\nb two\nc three\nd four")
-    assert [seen(c) for c in found.changes] == [("extra lines", "", "b two\nc three")]
+    result = verdict("a one\nb two\nc three\nd four", "a one\nd four")
+    assert [change_values(c) for c in result.changes] == [("missing lines", "b two\nc three", "")]
+    assert result.changes[0].span.text == "b two\nc three"
+    result = verdict("a one\nd four", "a one\nb two\nc three\nd four")
+    assert [change_values(c) for c in result.changes] == [("extra lines", "", "b two\nc three")]
     assert (
-        found.changes[0].span.line == 8 and found.changes[0].span.start == found.changes[0].span.end
+        result.changes[0].span.line == 8
+        and result.changes[0].span.start == result.changes[0].span.end
     )
 
 
 def test_a_line_that_moved_is_missing_here_and_extra_there() -> None:
-    found = verdict("x alpha\ny beta\nz gamma", "y beta\nz gamma\nx alpha")
-    assert [c.kind.value for c in found.changes] == ["missing lines", "extra lines"]
+    result = verdict("x alpha\ny beta\nz gamma", "y beta\nz gamma\nx alpha")
+    assert [c.kind.value for c in result.changes] == ["missing lines", "extra lines"]
 
 
 def test_changes_beside_an_ellipsis() -> None:
-    found = verdict("start\n...\nE 1.50\nend", "start\nfoo\nbar\nE 1.70\nend", ELLIPSIS)
-    assert [seen(c) for c in found.changes] == [("numeric", "1.50", "1.70")]
-    found = verdict("t=... s, E 1.5 J", "t=0.1 s, E 2.5 J", ELLIPSIS)
-    assert [seen(c) for c in found.changes] == [("numeric", "1.5", "2.5")]
-    found = verdict("t=... s, E", "u=0.1 s, F", ELLIPSIS)
-    assert [seen(c) for c in found.changes] == [("text", "t=... s, E", "u=0.1 s, F")]
+    result = verdict("start\n...\nE 1.50\nend", "start\nfoo\nbar\nE 1.70\nend", ELLIPSIS)
+    assert [change_values(c) for c in result.changes] == [("numeric", "1.50", "1.70")]
+    result = verdict("t=... s, E 1.5 J", "t=0.1 s, E 2.5 J", ELLIPSIS)
+    assert [change_values(c) for c in result.changes] == [("numeric", "1.5", "2.5")]
+    result = verdict("t=... s, E", "u=0.1 s, F", ELLIPSIS)
+    assert [change_values(c) for c in result.changes] == [("text", "t=... s, E", "u=0.1 s, F")]

@@ -14,10 +14,10 @@ from support.sample_lessons import (
     DIGITS_ELLIPSIS,
     ELLIPSIS,
     EXACT,
+    change_values,
     matches,
-    seen,
+    tolerance,
     verdict,
-    within,
 )
 
 WORDS = st.sampled_from(
@@ -28,7 +28,7 @@ FILTERS = st.lists(
     st.sampled_from([Filter(r"\d", r"<\g<0>>"), Filter(r"^a.*\n", ""), Filter("x", "")]),
     max_size=2,
 ).map(tuple)
-MODES = st.sampled_from([EXACT, DIGITS, within("0.1", "0.1"), ELLIPSIS, DIGITS_ELLIPSIS])
+MODES = st.sampled_from([EXACT, DIGITS, tolerance("0.1", "0.1"), ELLIPSIS, DIGITS_ELLIPSIS])
 
 
 @settings(max_examples=50)
@@ -36,27 +36,27 @@ MODES = st.sampled_from([EXACT, DIGITS, within("0.1", "0.1"), ELLIPSIS, DIGITS_E
 def test_changes_have_true_places(
     recorded: str, printed: str, comparison: Comparison, filters: tuple[Filter, ...]
 ) -> None:
-    found = verdict(recorded, printed, comparison, filters, prefix="> ", eol="\r\n")
-    assert found.status in ("verified", "drift")
-    assert bool(found.changes) == (found.status == "drift")
-    for change in found.changes:
-        seen(change)
-        assert found.recording.body_span.contains(change.span)
+    result = verdict(recorded, printed, comparison, filters, prefix="> ", eol="\r\n")
+    assert result.status in ("verified", "drift")
+    assert bool(result.changes) == (result.status == "drift")
+    for change in result.changes:
+        change_values(change)
+        assert result.recording.body_span.contains(change.span)
 
 
 @settings(max_examples=50)
 @given(OUTPUTS, OUTPUTS)
 def test_ellipsis_takes_what_a_regular_expression_takes(recorded: str, printed: str) -> None:
-    def bare(text: str) -> list[str]:
+    def output_lines(text: str) -> list[str]:
         return [line.rstrip() for line in text.rstrip().split("\n")] if text.strip() else []
 
     pattern = ""
-    for line in bare(recorded):
+    for line in output_lines(recorded):
         if line.strip() == "...":
             pattern += r"(?:[^\n]*\n)*"
         else:
             pattern += r"[^\n]*".join(re.escape(part) for part in line.split("...")) + r"\n"
-    text = "".join(line + "\n" for line in bare(printed))
+    text = "".join(line + "\n" for line in output_lines(printed))
     expected = re.fullmatch(pattern, text) is not None
     assert matches(recorded, printed, ELLIPSIS) == expected
 

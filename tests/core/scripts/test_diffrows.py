@@ -11,18 +11,18 @@ from coursebuild.core.scripts.diff import diff_rows
 from support.sample_lessons import DIGITS_ELLIPSIS, EXACT, recording, table
 
 
-def rows(recorded: str, ran: str) -> list[str]:
+def rows(recorded: str, printed: str) -> list[str]:
     """Each row as text; what changed in it stands in brackets."""
     block = recording(recorded)
-    verdict = compare(block, DIGITS_ELLIPSIS, (), ran)
+    verdict = compare(block, DIGITS_ELLIPSIS, (), printed)
     return [
         row.mark + "".join(f"[{p.text}]" if p.is_changed else p.text for p in row.pieces)
-        for row in diff_rows(verdict, (), ran)
+        for row in diff_rows(verdict, (), printed)
     ]
 
 
 @pytest.mark.parametrize(
-    ("recorded", "ran", "expected"),
+    ("recorded", "printed", "expected"),
     [
         ("pi 3.14\nn 2", "pi 3.14159\nn 3", [" pi 3.14", "-n [2]", "+n [3]"]),
         ("a\n...\nz 1", "a\nb\nc\nz 2", [" a", " ...", "-z [1]", "+z [2]"]),
@@ -34,15 +34,15 @@ def rows(recorded: str, ran: str) -> list[str]:
         ("a\n\nb 1", "a\n\nb 2", [" a", " ", "-b [1]", "+b [2]"]),
     ],
 )
-def test_rows(recorded: str, ran: str, expected: list[str]) -> None:
-    assert rows(recorded, ran) == expected
+def test_rows(recorded: str, printed: str, expected: list[str]) -> None:
+    assert rows(recorded, printed) == expected
 
 
 def test_of_a_table_the_cells_that_changed() -> None:
     block = table("| n | x |\n| --- | --- |\n| 1 | 2.5 |")
     verdict = compare(block, EXACT, (), "1 3.5\n")
-    found = [(row.mark, row.pieces[0].text) for row in diff_rows(verdict, (), "1 3.5\n")]
-    assert found == [("-", "2.5"), ("+", "3.5")]
+    cell_rows = [(row.mark, row.pieces[0].text) for row in diff_rows(verdict, (), "1 3.5\n")]
+    assert cell_rows == [("-", "2.5"), ("+", "3.5")]
 
 
 # No digits beside spaces: `1` and ` 1` are the same number, shown as it was recorded.
@@ -52,11 +52,16 @@ LINES = st.lists(LINE, min_size=1, max_size=6)
 
 @settings(max_examples=50)
 @given(LINES, LINES)
-def test_the_rows_are_both_texts(recorded: list[str], ran: list[str]) -> None:
+def test_the_rows_are_both_texts(recorded: list[str], printed: list[str]) -> None:
     """Without those that came they are what was recorded, without those that went what ran."""
-    one, two = "\n".join(recorded).rstrip("\n"), "\n".join(ran).rstrip("\n")
-    if not one or compare(recording(one), DIGITS_ELLIPSIS, (), two).status != "drift":
+    recorded_text, printed_text = "\n".join(recorded).rstrip("\n"), "\n".join(printed).rstrip("\n")
+    if (
+        not recorded_text
+        or compare(recording(recorded_text), DIGITS_ELLIPSIS, (), printed_text).status != "drift"
+    ):
         return
-    found = [row.replace("[", "").replace("]", "") for row in rows(one, two)]
-    assert [row[1:] for row in found if row[0] != "+"] == one.split("\n")
-    assert [row[1:] for row in found if row[0] != "-"] == (two.split("\n") if two else [])
+    lines = [row.replace("[", "").replace("]", "") for row in rows(recorded_text, printed_text)]
+    assert [row[1:] for row in lines if row[0] != "+"] == recorded_text.split("\n")
+    assert [row[1:] for row in lines if row[0] != "-"] == (
+        printed_text.split("\n") if printed_text else []
+    )

@@ -42,14 +42,14 @@ def test_labels(recorded: str, printed: str, label: str) -> None:
     assert drift(recorded, printed).label == label
 
 
-def test_a_drift_is_told_in_ten_lines() -> None:
+def test_a_drift_is_reported_in_ten_lines() -> None:
     lines = "\n".join(f"row {i} = {i}.5" for i in range(40))
-    found = drift(lines, lines.replace(".5", ".7"))
-    assert found.message == "recorded output differs from this run (numeric: 40)"
-    assert [note.message for note in found.notes] == [
+    diagnostic = drift(lines, lines.replace(".5", ".7"))
+    assert diagnostic.message == "recorded output differs from this run (numeric: 40)"
+    assert [note.message for note in diagnostic.notes] == [
         "recorded 1.5; this run printed 1.7 (relative error 1.3e-01, no digit agrees)",
         "recorded 2.5; this run printed 2.7 (relative error 8.0e-02, 1 digit agrees)",
         "recorded 3.5; this run printed 3.7 (relative error 5.7e-02, 1 digit agrees)",
         "and 36 more differences",
     ]
-    assert len(diagnostic_text(found, Style()).split("\n")) == 10
+    assert len(diagnostic_text(diagnostic, Style()).split("\n")) == 10

@@ -15,9 +15,9 @@ from support.sample_lessons import (
     EXACT,
     VOLATILE,
     body,
-    edited,
     recording,
-    refused,
+    refusal_text,
+    update,
 )
 
 SECONDS = Comparison(volatile="[0-9.]+ s")
@@ -53,13 +53,13 @@ def test_what_matches_is_left_alone() -> None:
 
 
 def test_volatile_text_is_refreshed_where_more_than_its_numbers_changed() -> None:
-    new = edited(recording("took 1 s"), "needed 2 s\n", VOLATILE, again="needed 3 s\n")
+    new = update(recording("took 1 s"), "needed 2 s\n", VOLATILE, repeated="needed 3 s\n")
     assert new.body_span.text == "needed 2 s\n"
 
 
 def test_what_varies_is_written_with_the_rest_of_its_line_only() -> None:
     recorded, printed = "a 1 s, E 2\nb 1 s\n", "a 7 s, E 3\nb 7 s\n"
-    new = edited(recording(recorded), printed, SECONDS, again=printed.replace("7", "8"))
+    new = update(recording(recorded), printed, SECONDS, repeated=printed.replace("7", "8"))
     assert new.body_span.text == "a 7 s, E 3\nb 1 s\n"
 
 
@@ -68,43 +68,45 @@ def test_a_tilde_fence_holds_backticks() -> None:
     assert body("a", "```\n~~~~\nb", fence="~~~~~") == "```\n~~~~\nb\n"
     assert body("a", "    ```\n``\nb") == "    ```\n``\nb\n"
     assert body("a", "```x", fence="~~~") == "```x\n"
-    assert "would close this fence, or begin another" in refused("a", " ```x\nb")
+    assert "would close this fence, or begin another" in refusal_text("a", " ```x\nb")
 
 
 # ------------------------------------------------------------------------------------- refusals
 
 
 def test_what_cannot_be_recorded_is_refused() -> None:
-    assert refused("a", "x\nb\x00\n").split("\n")[1:] == [
+    assert refusal_text("a", "x\nb\x00\n").split("\n")[1:] == [
         "  line 2 of the output has a NUL character, which Markdown cannot hold",
         "  help: print text only",
     ]
     for comparison in (EXACT, VOLATILE):
-        found = refused("a", " \n", comparison)
-        assert found.endswith("`Output:`\n  the script printed nothing to record")
+        refusal = refusal_text("a", " \n", comparison)
+        assert refusal.endswith("`Output:`\n  the script printed nothing to record")
 
 
 def test_a_recording_that_matches_one_run_only_is_unstable() -> None:
-    assert "`lost` was printed in the first run only" in refused("a\nlost", "a\nlost", again="a")
-    text = refused(
-        "a", "\n".join(f"{i}" for i in range(12)), again="\n".join(f"{i}x" for i in range(12))
+    assert "`lost` was printed in the first run only" in refusal_text(
+        "a\nlost", "a\nlost", repeated="a"
+    )
+    text = refusal_text(
+        "a", "\n".join(f"{i}" for i in range(12)), repeated="\n".join(f"{i}x" for i in range(12))
     )
     assert "note: and 2 more lines" in text
-    text = refused(
-        "a", "\n".join(f"{i}" for i in range(11)), again="\n".join(f"{i}x" for i in range(11))
+    text = refusal_text(
+        "a", "\n".join(f"{i}" for i in range(11)), repeated="\n".join(f"{i}x" for i in range(11))
     )
     assert "note: and 1 more line\n" in text
 
 
 def test_stable_is_what_the_comparison_takes() -> None:
-    new = edited(recording("x 9.99"), "x 1.500", DIGITS, again="x 1.5004")
+    new = update(recording("x 9.99"), "x 1.500", DIGITS, repeated="x 1.5004")
     assert new.body_span.text == "x 1.500\n"
-    assert "output-unstable" in refused("x 9.99", "x 1.500", DIGITS, again="x 1.501")
-    new = edited(recording("a 1\n..."), "a 2\n0x1", ELLIPSIS, again="a 2\n0x2")
+    assert "output-unstable" in refusal_text("x 9.99", "x 1.500", DIGITS, repeated="x 1.501")
+    new = update(recording("a 1\n..."), "a 2\n0x1", ELLIPSIS, repeated="a 2\n0x2")
     assert new.body_span.text == "a 2\n...\n"
     filters = (Filter("0x.", "0x"),)
-    found = update_body(recording("a"), EXACT, filters, "b 0x1", "b 0x2")
-    assert isinstance(found, Edit) and found.text == "b 0x1\n"
+    edit = update_body(recording("a"), EXACT, filters, "b 0x1", "b 0x2")
+    assert isinstance(edit, Edit) and edit.text == "b 0x1\n"
 
 
 # -------------------------------------------------------------------------------------- ellipsis
@@ -147,17 +149,20 @@ def test_what_matches_by_a_filter_stays_as_written() -> None:
 
 
 def test_edits_that_overlap_or_are_of_another_text_are_refused() -> None:
-    def applied(*changes: tuple[int, int, str], of: str = "abcdef") -> str:
-        source = Source("a.md", of)
+    def apply_changes(*changes: tuple[int, int, str], text: str = "abcdef") -> str:
+        source = Source("a.md", text)
         return apply_edits("abcdef", [Edit(source.span(a, b), new) for a, b, new in changes])
 
-    assert applied((4, 5, "X"), (0, 1, ""), (1, 3, "YZW"), (6, 6, "!"), (3, 3, "-")) == "YZW-dXf!"
-    for one, two in (
+    assert (
+        apply_changes((4, 5, "X"), (0, 1, ""), (1, 3, "YZW"), (6, 6, "!"), (3, 3, "-"))
+        == "YZW-dXf!"
+    )
+    for first, second in (
         ((0, 2, ""), (1, 3, "")),
         ((1, 1, "x"), (1, 1, "y")),
         ((0, 3, ""), (1, 1, "")),
     ):
         with pytest.raises(ValueError, match="edits overlap at offset 1 of"):
-            applied(one, two)
+            apply_changes(first, second)
     with pytest.raises(ValueError, match=r"an edit of another text than a\.md is now"):
-        applied((0, 1, "x"), of="abc")
+        apply_changes((0, 1, "x"), text="abc")

@@ -17,9 +17,9 @@ from support.sample_lessons import (
     ELLIPSIS,
     EXACT,
     VOLATILE,
-    edited,
     recording,
-    within,
+    tolerance,
+    update,
 )
 
 CHARACTERS = st.characters(exclude_categories=["Cs"], exclude_characters="\x00\n\r")
@@ -49,7 +49,7 @@ def assume_writable(recorded: str, printed: str) -> None:
 @given(
     OUTPUTS,
     OUTPUTS,
-    st.sampled_from([EXACT, DIGITS, VOLATILE, within("0.05", "0.05")]),
+    st.sampled_from([EXACT, DIGITS, VOLATILE, tolerance("0.05", "0.05")]),
     RULES,
     PREFIXES,
     EOLS,
@@ -64,11 +64,11 @@ def test_after_an_update_all_is_well(
 ) -> None:
     assume_writable(recorded, printed)
     lesson = recording(recorded, prefix=prefix, eol=eol)
-    found = update_body(lesson, comparison, filters, printed, printed)
-    if found is None:
+    outcome = update_body(lesson, comparison, filters, printed, printed)
+    if outcome is None:
         assert compare(lesson, comparison, filters, printed).status != "drift"
     else:
-        new = edited(lesson, printed, comparison, filters)
+        new = update(lesson, printed, comparison, filters)
         if not filters:
             assert compare(new, EXACT, (), printed).status == "verified"
 
@@ -86,11 +86,11 @@ def test_an_update_with_ellipses_is_right_or_refused(
 ) -> None:
     assume_writable(recorded, printed)
     lesson = recording(recorded, prefix=prefix, eol=eol)
-    found = update_body(lesson, comparison, (), printed, printed)
-    if isinstance(found, Edit):
-        edited(lesson, printed, comparison)
-    elif isinstance(found, Diagnostic):
-        assert found.rule == "output-not-updatable"
+    outcome = update_body(lesson, comparison, (), printed, printed)
+    if isinstance(outcome, Edit):
+        update(lesson, printed, comparison)
+    elif isinstance(outcome, Diagnostic):
+        assert outcome.rule == "output-not-updatable"
         assert "..." in recorded
 
 
@@ -99,9 +99,9 @@ def test_an_update_with_ellipses_is_right_or_refused(
 def test_what_two_runs_disagree_on_is_never_written(recorded: str, first: str, second: str) -> None:
     assume_writable(recorded, first)
     lesson = recording(recorded)
-    found = update_body(lesson, EXACT, (), first, second)
-    same = compare(recording(first), EXACT, (), second).status == "verified"
-    if isinstance(found, Diagnostic):
-        assert not same and found.rule == "output-unstable"
+    outcome = update_body(lesson, EXACT, (), first, second)
+    is_stable = compare(recording(first), EXACT, (), second).status == "verified"
+    if isinstance(outcome, Diagnostic):
+        assert not is_stable and outcome.rule == "output-unstable"
     else:
-        assert same
+        assert is_stable

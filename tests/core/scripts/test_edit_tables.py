@@ -9,7 +9,7 @@ from coursebuild.core.model import Comparison, Filter
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
-from support.sample_lessons import DIGITS, EXACT, edited, table, within
+from support.sample_lessons import DIGITS, EXACT, table, tolerance, update
 
 HEAD = "| a | b | c |\n| --- | --- | --- |\n"
 
@@ -17,7 +17,7 @@ HEAD = "| a | b | c |\n| --- | --- | --- |\n"
 def table_after(
     rows: str, printed: str, comparison: Comparison = EXACT, filters: tuple[Filter, ...] = ()
 ) -> str:
-    new = edited(table(HEAD + rows), printed, comparison, filters)
+    new = update(table(HEAD + rows), printed, comparison, filters)
     return new.body_span.text.removeprefix(HEAD)
 
 
@@ -33,14 +33,14 @@ def test_a_table_under_digits_keeps_its_decimals() -> None:
     rows = "| Euler | 6.6 | 7e-04 |\n| RK4 | −1.25 | 4 |"
     printed = "Euler +6.7021 9.12e-04\nRK4 -2.349 5\n"
     assert table_after(rows, printed, DIGITS) == "| Euler | 6.7 | 9e-04 |\n| RK4 | −2.35 | 5 |"
-    assert table_after(rows, printed, within("0.01")) == (
+    assert table_after(rows, printed, tolerance("0.01")) == (
         "| Euler | +6.7021 | 9.12e-04 |\n| RK4 | −2.349 | 5 |"
     )
 
 
 def test_lines_that_no_row_shows_may_differ_between_runs() -> None:
-    found = update_body(table(HEAD + "| x | 1.5 | |"), EXACT, (), "x 2.5\nt 1", "x 2.5\nt 2")
-    assert isinstance(found, Edit) and found.text == "2.5"
+    outcome = update_body(table(HEAD + "| x | 1.5 | |"), EXACT, (), "x 2.5\nt 1", "x 2.5\nt 2")
+    assert isinstance(outcome, Edit) and outcome.text == "2.5"
 
 
 CELLS = st.sampled_from(["Euler", "`RK4`", "**1.5 %**", "−2.50", "3.9e-11", "4", "x 7"])
@@ -54,17 +54,17 @@ CELLS = st.sampled_from(["Euler", "`RK4`", "**1.5 %**", "−2.50", "3.9e-11", "4
         min_size=1,
         max_size=5,
     ),
-    st.sampled_from([EXACT, DIGITS, within("0.5")]),
+    st.sampled_from([EXACT, DIGITS, tolerance("0.5")]),
 )
 def test_tables_are_updated_right_or_refused(
     rows: list[tuple[str, str, str]], lines: list[str], comparison: Comparison
 ) -> None:
     lesson = table(HEAD + "\n".join(f"| {a} | {b} | {c} |" for a, b, c in rows))
     printed = "\n".join(lines)
-    found = update_body(lesson, comparison, (), printed, printed)
-    if isinstance(found, Edit):
-        edited(lesson, printed, comparison)
-    elif isinstance(found, Diagnostic):
-        assert found.rule == "output-not-updatable"
+    outcome = update_body(lesson, comparison, (), printed, printed)
+    if isinstance(outcome, Edit):
+        update(lesson, printed, comparison)
+    elif isinstance(outcome, Diagnostic):
+        assert outcome.rule == "output-not-updatable"
     else:
         assert compare(lesson, comparison, (), printed).status == "verified"

@@ -20,14 +20,14 @@ def test_scripts_become_files() -> None:
         + block("examples/a.py", "x = 'µ'\n\nprint(x)\n\n\n", "timeout=5")
         + block("examples/b/c.py", keys="norun")
     )
-    found = extract(course_of(text))
-    assert found.diagnostics == ()
-    a, c = found.value
+    extraction = extract(course_of(text))
+    assert extraction.diagnostics == ()
+    a, c = extraction.value
     assert (a.path, a.text, a.owner, a.document) == (
         "examples/a.py", "x = 'µ'\n\nprint(x)\n", "1.1", "content/lessons/1.1-l.md",
     )  # fmt: skip
     assert a.data == b"x = '\xc2\xb5'\n\nprint(x)\n"
-    assert jobs(found.value) == (
+    assert jobs(extraction.value) == (
         ScriptJob("examples/a.py", (), 5.0, ()),
         ScriptJob("examples/b/c.py", (), 60.0, ()),
     )
@@ -49,9 +49,9 @@ def test_paths_that_clash() -> None:
         ("a.py/c/b.py", "A.py", "`{two}` is a file here and a folder of `{one}`"),
     ):
         first, second = f"examples/{first}", f"examples/{second}"
-        found = extract(course_of(block(first) + block(second)))
-        assert [e.path for e in found.value] == [first]
-        (clash,) = found.diagnostics
+        extraction = extract(course_of(block(first) + block(second)))
+        assert [e.path for e in extraction.value] == [first]
+        (clash,) = extraction.diagnostics
         assert (clash.message, clash.span.text) == (
             message.format(one=first, two=second),
             second,

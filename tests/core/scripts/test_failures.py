@@ -3,11 +3,11 @@ from __future__ import annotations
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import failure_diagnostic
-from support.sample_lessons import course, document, ran, told
+from support.sample_lessons import course, describe, document, make_run
 
 
 def extractions() -> tuple[Extraction, ...]:
-    one = """\
+    first_lesson = """\
 Intro.
 
 ```python file=examples/a.py timeout=2.5
@@ -18,24 +18,24 @@ def go():
 go()
 ```
 """
-    two = (
+    second_lesson = (
         "# x\n\n> ```python file=examples/helper.py\n> def fall():\n>     raise ValueError\n> ```\n"
     )
     return extract(
         course(
-            document(one, "content/lessons/4.2-mass.md"),
-            document(two, "content/lessons/1.1-first.md"),
+            document(first_lesson, "content/lessons/4.2-mass.md"),
+            document(second_lesson, "content/lessons/1.1-first.md"),
         )
     ).value
 
 
-def said(stderr: str = "", outcome: Outcome = Outcome.FAILED, status: int = 1) -> str:
-    found = extractions()
+def describe_failure(stderr: str = "", outcome: Outcome = Outcome.FAILED, status: int = 1) -> str:
+    scripts = extractions()
     diagnostic = failure_diagnostic(
-        found[0], ran(outcome=outcome, status=status, stderr=stderr), found
+        scripts[0], make_run(outcome=outcome, status=status, stderr=stderr), scripts
     )
     assert diagnostic is not None
-    return f"{diagnostic.span.path}\n{told(diagnostic)}"
+    return f"{diagnostic.span.path}\n{describe(diagnostic)}"
 
 
 def test_an_exception_group_ends_with_its_last_exception() -> None:
@@ -46,7 +46,7 @@ def test_an_exception_group_ends_with_its_last_exception() -> None:
         '    | Traceback (most recent call last):\n    |   File "/x/examples/a.py", line 4, in go\n'
         "    |     helper.fall()\n    | ValueError: bad\n    +------------------------\n"
     )
-    assert said(stderr).split("\n")[1:4] == [
+    assert describe_failure(stderr).split("\n")[1:4] == [
         "script-failed at 7:5 `helper.fall()`",
         "  `examples/a.py` exited with status 1",
         "  ^ ValueError: bad",
@@ -54,7 +54,7 @@ def test_an_exception_group_ends_with_its_last_exception() -> None:
 
 
 def test_an_exit_without_a_word_is_told_by_its_status_alone() -> None:
-    assert said("").split("\n")[1:] == [
+    assert describe_failure("").split("\n")[1:] == [
         "script-failed at 3:1 ````python file=examples/a.py timeout=2.5`",
         "  `examples/a.py` exited with status 1",
     ]
@@ -65,7 +65,7 @@ def test_a_syntax_error_and_warnings() -> None:
         "/x/examples/a.py:4: RuntimeWarning: divide by zero\n  helper.fall()\n"
         "  File \"/x/examples/a.py\", line 5\n    go(\n      ^\nSyntaxError: '(' was never closed\n"
     )
-    assert said(stderr).split("\n")[1:6] == [
+    assert describe_failure(stderr).split("\n")[1:6] == [
         "script-failed at 8:1 `go()`",
         "  `examples/a.py` exited with status 1",
         "  ^ SyntaxError: '(' was never closed",
@@ -75,7 +75,7 @@ def test_a_syntax_error_and_warnings() -> None:
 
 
 def test_only_extracted_files_are_replaced() -> None:
-    others = (
+    unrelated_lines = (
         'File "/x/site-packages/pkg/examples/a.py", line 1',
         'File "/x/examples/b.py", line 1',
         'File "/x/examples/a.py", line 99',
@@ -83,17 +83,19 @@ def test_only_extracted_files_are_replaced() -> None:
         'File "<string>", line 1',
         "/x/examples/a.py is here",
     )
-    told_lines = said("\n".join((*others, "/my course/examples/a.py:1: X"))).split("\n")
-    assert [line.strip() for line in told_lines[-7:]] == [
-        *others,
+    lines = describe_failure("\n".join((*unrelated_lines, "/my course/examples/a.py:1: X"))).split(
+        "\n"
+    )
+    assert [line.strip() for line in lines[-7:]] == [
+        *unrelated_lines,
         "content/lessons/4.2-mass.md:4: X",
     ]
 
 
 def test_a_long_standard_error_shows_its_end() -> None:
-    text = said("".join(f"line {i}\n" for i in range(100)))
+    text = describe_failure("".join(f"line {i}\n" for i in range(100)))
     assert "its standard error ended with:\n    line 70\n" in text and text.endswith("line 99")
-    text = said("x" * 10_000 + "\x1b[31mred\x1b[0m")
+    text = describe_failure("x" * 10_000 + "\x1b[31mred\x1b[0m")
     assert text.endswith("xred") and len(text) < 4500
     assert f"  ^ {'x' * 119}…" in text
 
@@ -101,4 +103,4 @@ def test_a_long_standard_error_shows_its_end() -> None:
 def test_a_script_ended_by_a_signal_names_it() -> None:
     for status, name in ((11, "SIGSEGV"), (9, "SIGKILL"), (63, "signal 63")):
         message = f"`examples/a.py` was ended by {name}"
-        assert message in said("", Outcome.KILLED, status).split("\n")[2], status
+        assert message in describe_failure("", Outcome.KILLED, status).split("\n")[2], status

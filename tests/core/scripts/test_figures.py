@@ -16,9 +16,9 @@ def svg(inside: str, size: str = "100 50") -> bytes:
 
 
 def recorded(inside: str) -> bytes:
-    drawn = prepare_figure("x.svg", svg(inside))
-    assert isinstance(drawn, bytes), drawn
-    return drawn
+    figure_file = prepare_figure("x.svg", svg(inside))
+    assert isinstance(figure_file, bytes), figure_file
+    return figure_file
 
 
 def png(size: tuple[int, int] = (20, 10), spots: dict[tuple[int, int], int] | None = None) -> bytes:
@@ -31,16 +31,16 @@ def png(size: tuple[int, int] = (20, 10), spots: dict[tuple[int, int], int] | No
 
 
 def test_what_changes_from_run_to_run_is_not_recorded() -> None:
-    one = recorded(
+    today = recorded(
         '<!-- made today --><metadata>2026-11-22</metadata><defs><path id="m4f2a" d="M0 0"/></defs>'
         '<use href="#m4f2a"/><g clip-path="url(#p1)"/><clipPath id="p1"/>'
     )
-    two = recorded(
+    later = recorded(
         '<!-- made later --><metadata>2027-01-01</metadata><defs><path id="m9c1b" d="M0 0"/></defs>'
         '<use href="#m9c1b"/><g clip-path="url(#p7)"/><clipPath id="p7"/>'
     )
-    assert one == two
-    assert b"20" not in one.replace(b"2000/svg", b"") and b"made" not in one
+    assert today == later
+    assert b"20" not in today.replace(b"2000/svg", b"") and b"made" not in today
 
 
 DIFFERENT = {
@@ -55,17 +55,19 @@ DIFFERENT = {
 
 def test_svg_differs_by_parts_words_and_places() -> None:
     base = recorded('<path d="M0 0L10 1"/>')
-    told = {inside: describe_difference("x.svg", base, recorded(inside)) for inside in DIFFERENT}
-    assert told == DIFFERENT
+    wordings = {
+        inside: describe_difference("x.svg", base, recorded(inside)) for inside in DIFFERENT
+    }
+    assert wordings == DIFFERENT
 
 
 def test_png_differs_by_pixels() -> None:
     base = png()
     assert describe_difference("x.png", base, png(spots={(3, 3): 254})) == ""
-    told = describe_difference("x.png", base, png(spots={(3, 4): 0, (7, 8): 0}))
-    assert told == "pixels differ in columns 3 to 8, rows 4 to 9"
-    told = describe_difference("x.png", base, png((10, 10)))
-    assert told == "it has 10×10 pixels where 20×10 are recorded"
+    wording = describe_difference("x.png", base, png(spots={(3, 4): 0, (7, 8): 0}))
+    assert wording == "pixels differ in columns 3 to 8, rows 4 to 9"
+    wording = describe_difference("x.png", base, png((10, 10)))
+    assert wording == "it has 10×10 pixels where 20×10 are recorded"
     assert describe_difference("x.png", b"no", base) == "the recorded file is no PNG"
 
 
@@ -80,13 +82,13 @@ DIFFERENT_TABLES = {
 def test_data_differ_by_cells() -> None:
     base = prepare_figure("x.csv", b"time,x\r\n0,1.0\r\n1,nan\r\n")
     assert base == b"time,x\n0,1.0\n1,nan\n"
-    told = {table: describe_difference("x.csv", base, table) for table in DIFFERENT_TABLES}
-    assert told == DIFFERENT_TABLES
+    wordings = {table: describe_difference("x.csv", base, table) for table in DIFFERENT_TABLES}
+    assert wordings == DIFFERENT_TABLES
 
 
 def test_what_cannot_be_shown_is_told() -> None:
     bomb = b'<!DOCTYPE svg [<!ENTITY a "aaaa">]><svg xmlns="http://www.w3.org/2000/svg">&a;</svg>'
-    told = [
+    wordings = [
         prepare_figure("x.svg", data)
         for data in (
             b"",
@@ -98,7 +100,7 @@ def test_what_cannot_be_shown_is_told() -> None:
             svg('<image href="https://example.org/x.png"/>'),
         )
     ]
-    assert told == [
+    assert wordings == [
         "is no SVG: no element found: line 1, column 0",
         "is no SVG: its root is another element",
         "declares entities",

@@ -4,7 +4,7 @@ from coursebuild.core.model.results import Outcome
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.findings import script_findings
-from support.sample_lessons import course, document, ran, told
+from support.sample_lessons import course, describe, document, make_run
 
 LESSON = """\
 ```python file=examples/a.py
@@ -31,12 +31,15 @@ def test_where_only_some_scripts_ran_the_others_are_known() -> None:
         'Traceback (most recent call last):\n  File "/x/examples/a.py", line 1, in <module>\n'
         '  File "/x/examples/b.py", line 2, in <module>\nZeroDivisionError: division by zero\n'
     )
-    here = course(document(LESSON))
-    chosen = extract(here).value[:1]
-    runs = [ran(outcome=Outcome.FAILED, status=1, stderr=stderr)]
-    (found,) = script_findings(here, chosen, runs, verify(here, runs))
-    assert told(found).startswith("script-failed at 15:1 `1/0`")
-    assert script_findings(here, chosen, [ran("E 1.5")], verify(here, [ran("E 1.5")])) == ()
+    lessons = course(document(LESSON))
+    scripts = extract(lessons).value[:1]
+    runs = [make_run(outcome=Outcome.FAILED, status=1, stderr=stderr)]
+    (diagnostic,) = script_findings(lessons, scripts, runs, verify(lessons, runs))
+    assert describe(diagnostic).startswith("script-failed at 15:1 `1/0`")
+    assert (
+        script_findings(lessons, scripts, [make_run("E 1.5")], verify(lessons, [make_run("E 1.5")]))
+        == ()
+    )
 
 
 def test_every_recording_gets_a_verdict() -> None:
@@ -67,9 +70,16 @@ Output:
 1.5
 ```
 """
-    here = course(document(text))
-    runs = (ran("one\n"), ran("1.52\n", path="examples/b.py"))
-    assert [v.status for v in verify(here, runs)] == ["verified", "volatile", "verified"]
-    assert [v.status for v in verify(here, runs[:1])] == ["verified", "volatile", "unchecked"]
-    failed = (ran("one\n", outcome=Outcome.FAILED, status=1), ran("", path="examples/b.py"))
-    assert [v.status for v in verify(here, failed)] == ["unchecked"] * 3
+    lessons = course(document(text))
+    runs = (make_run("one\n"), make_run("1.52\n", path="examples/b.py"))
+    assert [v.status for v in verify(lessons, runs)] == ["verified", "volatile", "verified"]
+    assert [v.status for v in verify(lessons, runs[:1])] == [
+        "verified",
+        "volatile",
+        "unchecked",
+    ]
+    failed_runs = (
+        make_run("one\n", outcome=Outcome.FAILED, status=1),
+        make_run("", path="examples/b.py"),
+    )
+    assert [v.status for v in verify(lessons, failed_runs)] == ["unchecked"] * 3

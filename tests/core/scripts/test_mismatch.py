@@ -10,7 +10,7 @@ from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.scripts.bindings import BindingEvidence, PrintedOutputs, check_bindings
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.text.diagnostics import Diagnostic
-from support.sample_lessons import course, document, ran, told
+from support.sample_lessons import course, describe, document, make_run
 
 PENDULUM = "period   2.006 s\nhalf     1.003 s\n"
 
@@ -20,41 +20,41 @@ def lesson(prose: str, output: str, fence: str = "text") -> str:
     return f"```python file=examples/a.py\nprint(1)\n```\n\nOutput:\n\n{body}\n{prose}\n"
 
 
-def look(held: BindingEvidence, text: str, *runs: ScriptRun) -> tuple[Diagnostic, ...]:
-    here = document(text)
-    verdicts = verify(course(here), runs)
-    return check_bindings(here, PrintedOutputs(verdicts, runs, ["examples/a.py"]), held)
+def check(evidence: BindingEvidence, text: str, *runs: ScriptRun) -> tuple[Diagnostic, ...]:
+    page = document(text)
+    verdicts = verify(course(page), runs)
+    return check_bindings(page, PrintedOutputs(verdicts, runs, ["examples/a.py"]), evidence)
 
 
-def anew(binding: str, before: str, now: str, fence: str = "text") -> Diagnostic:
+def mismatch_after(binding: str, before: str, now: str, fence: str = "text") -> Diagnostic:
     """What is wrong with a binding when another output is recorded than the one by which it held.
 
     In between the old one stands beside the new run, as it does before it is accepted.
     """
-    prose, held = f"`{binding}`{{out}}", BindingEvidence()
-    assert look(held, lesson(prose, before, fence), ran(before)) == ()
-    assert look(held, lesson(prose, before, fence), ran(now)) == ()
-    (found,) = look(held, lesson(prose, now, fence), ran(now))
-    offered = [edit.text for edit in found.edits]
-    assert offered == ([found.help[7:-1]] if found.help.startswith("write `") else [])
-    for text in offered:  # what is offered holds
-        assert look(held, lesson(f"`{text}`{{out}}", now, fence), ran(now)) == ()
-    return found
+    prose, evidence = f"`{binding}`{{out}}", BindingEvidence()
+    assert check(evidence, lesson(prose, before, fence), make_run(before)) == ()
+    assert check(evidence, lesson(prose, before, fence), make_run(now)) == ()
+    (diagnostic,) = check(evidence, lesson(prose, now, fence), make_run(now))
+    proposals = [edit.text for edit in diagnostic.edits]
+    assert proposals == ([diagnostic.help[7:-1]] if diagnostic.help.startswith("write `") else [])
+    for text in proposals:  # what is offered holds
+        assert check(evidence, lesson(f"`{text}`{{out}}", now, fence), make_run(now)) == ()
+    return diagnostic
 
 
 def test_what_is_said() -> None:
-    found = anew("2.006 s", PENDULUM, "period   2.950 s\nhalf     1.975 s\n")
+    diagnostic = mismatch_after("2.006 s", PENDULUM, "period   2.950 s\nhalf     1.975 s\n")
     assert (
-        told(found)
+        describe(diagnostic)
         == """\
 binding-mismatch at 12:2 `2.006 s`
   `2.006 s` is not what `examples/a.py` printed, rounded to the digits shown
   ^ 2.950 is printed where 2.006 was
   help: write `2.950 s`"""
     )
-    found = anew("2.006", PENDULUM, "half   1.975 s\nwhole   2.950 s\n")
+    diagnostic = mismatch_after("2.006", PENDULUM, "half   1.975 s\nwhole   2.950 s\n")
     assert (
-        told(found)
+        describe(diagnostic)
         == """\
 binding-mismatch at 12:2 `2.006`
   `2.006` is not what `examples/a.py` printed, rounded to the digits shown
@@ -103,9 +103,9 @@ binding-mismatch at 12:2 `2.006`
 def test_the_number_in_the_same_place_is_proposed(
     binding: str, before: str, now: str, label: str, help_text: str
 ) -> None:
-    found = anew(binding, before + "\n", now + "\n")
-    assert found.label.startswith(label)
-    assert found.help == (help_text and f"write `{help_text}`")
+    diagnostic = mismatch_after(binding, before + "\n", now + "\n")
+    assert diagnostic.label.startswith(label)
+    assert diagnostic.help == (help_text and f"write `{help_text}`")
 
 
 @pytest.mark.parametrize(
@@ -133,34 +133,36 @@ def test_the_number_in_the_same_place_is_proposed(
     ],
 )  # fmt: skip
 def test_which_line_is_the_same(before: str, now: str, successor: str | None) -> None:
-    found = anew("2.5", before + "\n", now + "\n")
+    diagnostic = mismatch_after("2.5", before + "\n", now + "\n")
     if successor is None:
-        assert found.label.startswith("it is not certain what is printed in place of 2.5 now; the ")
-        assert (found.help, found.edits) == ("", ())
+        assert diagnostic.label.startswith(
+            "it is not certain what is printed in place of 2.5 now; the "
+        )
+        assert (diagnostic.help, diagnostic.edits) == ("", ())
     else:
-        assert found.label == f"{successor} is printed where 2.5 was"
-        assert found.help == f"write `{successor}`"
+        assert diagnostic.label == f"{successor} is printed where 2.5 was"
+        assert diagnostic.help == f"write `{successor}`"
 
 
 def test_what_an_ellipsis_leaves_out_has_its_place_too() -> None:
-    held, prose = BindingEvidence(), "`7.5`{out}"
+    evidence, prose = BindingEvidence(), "`7.5`{out}"
     recorded = "start\n...\nend 1.5\n"
     text = lesson(prose, recorded, "text ellipsis")
-    assert look(held, text, ran("start\nx 7.52\nend 1.5\n")) == ()
-    (found,) = look(held, text, ran("start\nx 9.52\ny 7.6\nend 1.5\n"))
-    assert (found.label, found.help) == ("9.52 is printed where 7.52 was", "write `9.5`")
+    assert check(evidence, text, make_run("start\nx 7.52\nend 1.5\n")) == ()
+    (diagnostic,) = check(evidence, text, make_run("start\nx 9.52\ny 7.6\nend 1.5\n"))
+    assert (diagnostic.label, diagnostic.help) == ("9.52 is printed where 7.52 was", "write `9.5`")
 
 
 def test_with_another_number_of_outputs_nobody_knows_which_is_which() -> None:
-    held, now = BindingEvidence(), "period 2.950 s\nhalf 1.975 s\n"
-    assert look(held, lesson("`2.006`{out}", PENDULUM), ran(PENDULUM)) == ()
-    twice = lesson("\nOutput:\n\n```text\n" + now + "```\n`2.006`{out}", now)
-    (found,) = look(held, twice, ran(now))
-    assert found.label == "the nearest printed value is 1.975"
+    evidence, now = BindingEvidence(), "period 2.950 s\nhalf 1.975 s\n"
+    assert check(evidence, lesson("`2.006`{out}", PENDULUM), make_run(PENDULUM)) == ()
+    two_outputs = lesson("\nOutput:\n\n```text\n" + now + "```\n`2.006`{out}", now)
+    (diagnostic,) = check(evidence, two_outputs, make_run(now))
+    assert diagnostic.label == "the nearest printed value is 1.975"
 
 
 @pytest.mark.parametrize(
-    ("binding", "printed", "near", "better"),
+    ("binding", "printed", "nearest", "better"),
     [
         # proposed where no other number can be meant
         ("2.5", "a 2.6 2.60", "2.6", "2.6"),
@@ -179,13 +181,16 @@ def test_with_another_number_of_outputs_nobody_knows_which_is_which() -> None:
     ],
 )
 def test_where_nothing_is_known_of_before(
-    binding: str, printed: str, near: str, better: str
+    binding: str, printed: str, nearest: str, better: str
 ) -> None:
     text = lesson(f"`{binding}`{{out}}", printed + "\n")
-    (found,) = look(BindingEvidence(), text, ran(printed + "\n"))
-    assert found.label.replace("values are", "value is") == f"the nearest printed value is {near}"
-    assert found.help == (better and f"write `{better}`")
-    assert [edit.text for edit in found.edits] == [better][: bool(better)]
+    (diagnostic,) = check(BindingEvidence(), text, make_run(printed + "\n"))
+    assert (
+        diagnostic.label.replace("values are", "value is")
+        == f"the nearest printed value is {nearest}"
+    )
+    assert diagnostic.help == (better and f"write `{better}`")
+    assert [edit.text for edit in diagnostic.edits] == [better][: bool(better)]
 
 
 NUMBER = st.integers(1000, 9999).map(lambda n: f"{n / 100:.2f}")
@@ -202,14 +207,14 @@ def test_a_named_number_is_never_taken_for_another(
     """Lines with names of their own, in any order, with others between them."""
     names = [f"{chr(97 + k)} is" for k in range(len(numbers))]
     before = "".join(f"{name} {number}\n" for name, number in zip(names, numbers, strict=True))
-    others = data.draw(st.lists(NUMBER, min_size=len(names), max_size=len(names), unique=True))
-    rows = [f"{name} {number}\n" for name, number in zip(names, others, strict=True)]
+    new_numbers = data.draw(st.lists(NUMBER, min_size=len(names), max_size=len(names), unique=True))
+    rows = [f"{name} {number}\n" for name, number in zip(names, new_numbers, strict=True)]
     rows += data.draw(st.lists(st.sampled_from(["done\n", "more 17\n"]), max_size=2, unique=True))
     now = "".join(data.draw(st.permutations(rows)))
-    if numbers[0] in others:
+    if numbers[0] in new_numbers:
         return
-    found = anew(numbers[0], before, now)
-    if found.edits:
-        assert (found.label, found.edits[0].text) == (
-            f"{others[0]} is printed where {numbers[0]} was", others[0],
+    diagnostic = mismatch_after(numbers[0], before, now)
+    if diagnostic.edits:
+        assert (diagnostic.label, diagnostic.edits[0].text) == (
+            f"{new_numbers[0]} is printed where {numbers[0]} was", new_numbers[0],
         )  # fmt: skip

@@ -100,7 +100,7 @@ def test_powers_of_ten_in_prose(text: str, value: str, place: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("written", "value", "expected"),
+    ("sample", "value", "expected"),
     [
         ("+6.6", "6.702", "+6.7"),
         ("6.6", "-6.65", "-6.6"),
@@ -115,10 +115,8 @@ def test_powers_of_ten_in_prose(text: str, value: str, place: int) -> None:
         ("1e3", "2345", "2e3"),
     ],
 )
-def test_rounding_in_the_notation_of_another_number(
-    written: str, value: str, expected: str
-) -> None:
-    assert round_like(scan(written)[0], Decimal(value)) == expected
+def test_rounding_in_the_notation_of_another_number(sample: str, value: str, expected: str) -> None:
+    assert round_like(scan(sample)[0], Decimal(value)) == expected
 
 
 @given(st.text())

@@ -16,23 +16,23 @@ from support.sample_lessons import (
     DIGITS,
     EXACT,
     course,
+    describe,
     document,
     recording,
-    within,
+    tolerance,
 )
-from support.sample_lessons import told as told_text
 
 TRACE = Trace((), (), (), ("mujoco",), "")
 
 
-def run(stdout: str, states: Sequence[str] = (), *, moved: bool = True) -> ScriptRun:
-    trace = replace(TRACE, is_perturbed=moved, states=tuple(states))
+def run(stdout: str, states: Sequence[str] = (), *, is_perturbed: bool = True) -> ScriptRun:
+    trace = replace(TRACE, is_perturbed=is_perturbed, states=tuple(states))
     return ScriptRun("examples/a.py", Outcome.OK, 0, stdout, "", 1.0, trace=trace)
 
 
-def measured(
+def measure(
     recorded: str | Recording,
-    *moved: str | ScriptRun,
+    *outputs: str | ScriptRun,
     comparison: Comparison = EXACT,
     base: str | None = None,
     filters: tuple[Filter, ...] = (),
@@ -42,37 +42,41 @@ def measured(
 
     `halved` was printed with half the timestep.
     """
-    one = recording(recorded) if isinstance(recorded, str) else recorded
+    block = recording(recorded) if isinstance(recorded, str) else recorded
     assert base is not None or isinstance(recorded, str)
     printed = base if base is not None else str(recorded)
-    runs = [each if isinstance(each, ScriptRun) else run(each) for each in moved]
+    runs = [output if isinstance(output, ScriptRun) else run(output) for output in outputs]
     runs += [runs[-1]] * (4 - len(runs))
-    whole = course(document("", "content/lessons/1.1-a.md"), comparison=comparison, filters=filters)
-    half = None if halved is None else run(halved)
-    return sensitivity(whole, "examples/a.py", "1.1", [one], run(printed), runs, half)
+    sample_course = course(
+        document("", "content/lessons/1.1-a.md"), comparison=comparison, filters=filters
+    )
+    halved_run = None if halved is None else run(halved)
+    return sensitivity(
+        sample_course, "examples/a.py", "1.1", [block], run(printed), runs, halved_run
+    )
 
 
-def digits(found: Sensitivity) -> list[tuple[str, int, int, str]]:
-    assert found.standing is Standing.MEASURED
-    assert found.flips == ()
-    return [(d.printed, d.digits, d.repeat, d.instead) for d in found.doubts]
+def digits(result: Sensitivity) -> list[tuple[str, int, int, str]]:
+    assert result.standing is Standing.MEASURED
+    assert result.flips == ()
+    return [(d.printed, d.digits, d.repeat, d.instead) for d in result.doubts]
 
 
-def flips(found: Sensitivity) -> list[tuple[str, str]]:
-    assert found.standing is Standing.MEASURED
-    assert found.doubts == ()
-    return [(flip.printed, flip.other) for flip in found.flips]
+def flips(result: Sensitivity) -> list[tuple[str, str]]:
+    assert result.standing is Standing.MEASURED
+    assert result.doubts == ()
+    return [(flip.printed, flip.other) for flip in result.flips]
 
 
-def warnings(found: Sensitivity) -> list[str]:
-    return [told_text(diagnostic) for diagnostic in noise_warnings(found)]
+def warnings(result: Sensitivity) -> list[str]:
+    return [describe(diagnostic) for diagnostic in noise_warnings(result)]
 
 
 # --- numbers
 
 
 @pytest.mark.parametrize(
-    ("recorded", "moved", "expected"),
+    ("recorded", "moved_output", "expected"),
     [
         ("1.23456", ["1.23461", "1.23451"], ("1.23456", 6, 5, "1.2346")),
         ("1.23456", ["1.23462"], ("1.23456", 6, 4, "1.235")),
@@ -91,32 +95,32 @@ def warnings(found: Sensitivity) -> list[str]:
     ],
 )
 def test_digits_that_hold(
-    recorded: str, moved: list[str], expected: tuple[str, int, int, str]
+    recorded: str, moved_output: list[str], expected: tuple[str, int, int, str]
 ) -> None:
     text = "value {} m"
-    found = measured(text.format(recorded), *(text.format(value) for value in moved))
-    assert digits(found) == [expected]
+    result = measure(text.format(recorded), *(text.format(value) for value in moved_output))
+    assert digits(result) == [expected]
 
 
 def test_what_a_filter_takes_out_does_not_count() -> None:
     filters = (Filter("took [0-9.]+ s", "took TIME"),)
-    found = measured("x 1.5, took 3.1 s", "x 1.5, took 4.2 s", filters=filters)
-    assert digits(found) == []
+    result = measure("x 1.5, took 3.1 s", "x 1.5, took 4.2 s", filters=filters)
+    assert digits(result) == []
     volatile = Comparison(volatile="[0-9.]+ s")
-    found = measured("x 1.5, took 3.1 s", "x 1.5, took 4.2 s", comparison=volatile)
-    assert digits(found) == []
+    result = measure("x 1.5, took 3.1 s", "x 1.5, took 4.2 s", comparison=volatile)
+    assert digits(result) == []
 
 
 def test_values_that_a_tolerance_took_are_held_against_those_of_the_run() -> None:
-    comparison = within("1e-3")
-    found = measured("x 1.2345", "x 1.2347", comparison=comparison, base="x 1.2347")
-    assert digits(found) == [], "moving has changed nothing"
-    found = measured("x 1.2345", "x 1.2348", comparison=comparison, base="x 1.2347")
-    assert digits(found) == [("1.2347", 5, 4, "1.235")]
+    comparison = tolerance("1e-3")
+    result = measure("x 1.2345", "x 1.2347", comparison=comparison, base="x 1.2347")
+    assert digits(result) == [], "moving has changed nothing"
+    result = measure("x 1.2345", "x 1.2348", comparison=comparison, base="x 1.2347")
+    assert digits(result) == [("1.2347", 5, 4, "1.235")]
 
 
 @pytest.mark.parametrize(
-    ("recorded", "moved", "halved", "expected"),
+    ("recorded", "moved_output", "halved", "expected"),
     [
         # A pendulum at -3.0662266: its digits repeat, and the last two are not right.
         ("-3.0662252", "-3.0662252", "-3.0662265", (8, 6, "-3.06623", 8)),
@@ -129,34 +133,36 @@ def test_values_that_a_tolerance_took_are_held_against_those_of_the_run() -> Non
     ],
 )
 def test_digits_that_repeat_and_digits_that_are_converged(
-    recorded: str, moved: str, halved: str, expected: tuple[int, int, str, int] | None
+    recorded: str, moved_output: str, halved: str, expected: tuple[int, int, str, int] | None
 ) -> None:
     text = "value {} m"
-    found = measured(text.format(recorded), text.format(moved), halved=text.format(halved))
-    told = [(d.repeat, d.converged, d.instead, d.digits) for d in found.doubts]
-    assert told == ([] if expected is None else [expected])
-    assert found.unhalved == ""
-    assert warnings(found) == warnings(measured(text.format(recorded), text.format(moved)))
+    result = measure(text.format(recorded), text.format(moved_output), halved=text.format(halved))
+    values = [(d.repeat, d.converged, d.instead, d.digits) for d in result.doubts]
+    assert values == ([] if expected is None else [expected])
+    assert result.unhalved == ""
+    assert warnings(result) == warnings(measure(text.format(recorded), text.format(moved_output)))
 
 
 def test_why_nothing_is_known_of_half_the_timestep() -> None:
-    whole, one = course(document("", "content/lessons/1.1-a.md")), recording("x 1.25")
-    for half, said in (
+    sample_course, block = course(document("", "content/lessons/1.1-a.md")), recording("x 1.25")
+    for halved_run, reason in (
         (None, "it was not run with half the timestep"),
-        (run("x 1.24", moved=False), "no step of it can be halved"),
+        (run("x 1.24", is_perturbed=False), "no step of it can be halved"),
         (replace(run(""), outcome=Outcome.TIMEOUT), "it does not run to its end with half the"),
     ):
         runs = [run("x 1.26")] * 4
-        found = sensitivity(whole, "examples/a.py", "1.1", [one], run("x 1.25"), runs, half)
-        assert found.unhalved.startswith(said)
-        assert [(d.repeat, d.converged, d.halved) for d in found.doubts] == [(2, None, "")]
+        result = sensitivity(
+            sample_course, "examples/a.py", "1.1", [block], run("x 1.25"), runs, halved_run
+        )
+        assert result.unhalved.startswith(reason)
+        assert [(d.repeat, d.converged, d.halved) for d in result.doubts] == [(2, None, "")]
 
 
 # --- text
 
 
 @pytest.mark.parametrize(
-    ("recorded", "moved", "expected"),
+    ("recorded", "moved_output", "expected"),
     [
         ("heads", "tails", [("heads", "tails")]),
         ("x -0.0", "x 0.0", [("-0.0", "0.0")]),
@@ -164,8 +170,10 @@ def test_why_nothing_is_known_of_half_the_timestep() -> None:
         ("a", "a\nb", [("", "b")]),
     ],
 )
-def test_text_that_changes(recorded: str, moved: str, expected: list[tuple[str, str]]) -> None:
-    assert flips(measured(recorded, moved)) == expected
+def test_text_that_changes(
+    recorded: str, moved_output: str, expected: list[tuple[str, str]]
+) -> None:
+    assert flips(measure(recorded, moved_output)) == expected
 
 
 # --- scripts
@@ -177,63 +185,63 @@ def test_states_that_end_far_apart_are_chaotic() -> None:
         return [f"0 1 {' '.join(x.hex() for x in numbers)}"]
 
     runs = [run("x 1", state(x)) for x in (2.0, 2.5, 2.0, 2.0 + 1e-12)]
-    found = measured("x 1", *runs)
-    assert found.amplification == pytest.approx(0.5 / 2.0 / 2e-12)
-    assert found.chaotic
-    still = [run("x 1", state(x)) for x in (2.0, 2.0 + 4e-12, 2.0, 2.0)]
-    assert measured("x 1", *still).amplification == pytest.approx(1.0, rel=1e-3)
-    assert not measured("x 1", *still).chaotic
+    result = measure("x 1", *runs)
+    assert result.amplification == pytest.approx(0.5 / 2.0 / 2e-12)
+    assert result.chaotic
+    still_runs = [run("x 1", state(x)) for x in (2.0, 2.0 + 4e-12, 2.0, 2.0)]
+    assert measure("x 1", *still_runs).amplification == pytest.approx(1.0, rel=1e-3)
+    assert not measure("x 1", *still_runs).chaotic
 
 
 def test_states_that_are_lost_end_infinitely_far_apart() -> None:
-    lost = [run("x 1", [f"0 1 0x1p+0 0x0p+0 {x} 0x0p+0"]) for x in ("nan", "0x1p+0")]
-    found = measured("x 1", *lost, *lost)
-    assert found.amplification == math.inf
-    assert found.chaotic
+    lost_runs = [run("x 1", [f"0 1 0x1p+0 0x0p+0 {x} 0x0p+0"]) for x in ("nan", "0x1p+0")]
+    result = measure("x 1", *lost_runs, *lost_runs)
+    assert result.amplification == math.inf
+    assert result.chaotic
 
 
 @pytest.mark.parametrize(
-    ("base", "moved", "standing"),
+    ("base", "moved_run", "standing"),
     [
         (replace(run("x 1"), trace=replace(TRACE, modules=())), run("x 1"), Standing.NO_MUJOCO),
-        (run("x 1", moved=False), run("x 1", moved=False), Standing.NOT_MOVED),
+        (run("x 1", is_perturbed=False), run("x 1", is_perturbed=False), Standing.NOT_MOVED),
         (run("x 2"), run("x 1"), Standing.DRIFTED),
         (replace(run(""), outcome=Outcome.FAILED, status=1), run("x 1"), Standing.DRIFTED),
         (run("x 1"), replace(run("x 1"), outcome=Outcome.TIMEOUT), Standing.FAILED),
         (run("x 1"), replace(run("x 1"), outcome=Outcome.FAILED, status=1), Standing.FAILED),
     ],
 )
-def test_why_nothing_can_be_said(base: ScriptRun, moved: ScriptRun, standing: Standing) -> None:
-    whole = course(document("", "content/lessons/1.1-a.md"))
-    one = recording("x 1")
-    found = sensitivity(whole, "examples/a.py", "1.1", [one], base, [moved] * 4)
-    assert found == Sensitivity("examples/a.py", "1.1", standing)
+def test_why_nothing_can_be_said(base: ScriptRun, moved_run: ScriptRun, standing: Standing) -> None:
+    sample_course = course(document("", "content/lessons/1.1-a.md"))
+    block = recording("x 1")
+    result = sensitivity(sample_course, "examples/a.py", "1.1", [block], base, [moved_run] * 4)
+    assert result == Sensitivity("examples/a.py", "1.1", standing)
     if standing not in (Standing.FAILED, Standing.NOT_MOVED):
-        assert not is_worth_moving(whole, [one], base)
+        assert not is_worth_moving(sample_course, [block], base)
 
 
 # --- warnings
 
 
 @pytest.mark.parametrize(
-    ("comparison", "recorded", "moved", "compared"),
+    ("comparison", "recorded", "moved_output", "compared"),
     [
         (EXACT, "1.2345", "1.2346", True),
         (DIGITS, "1.2345", "1.2346", True),
-        (within("1e-3"), "1.2345", "1.2346", False),
-        (within("1e-6"), "1.2345", "1.2346", True),
-        (within("0", "1e-12"), "3e-13", "-2e-13", False),
+        (tolerance("1e-3"), "1.2345", "1.2346", False),
+        (tolerance("1e-6"), "1.2345", "1.2346", True),
+        (tolerance("0", "1e-12"), "3e-13", "-2e-13", False),
     ],
 )
 def test_only_what_would_be_drift_is_warned_of(
-    comparison: Comparison, recorded: str, moved: str, compared: bool
+    comparison: Comparison, recorded: str, moved_output: str, compared: bool
 ) -> None:
-    found = measured(recorded, moved, comparison=comparison)
-    assert [doubt.compared for doubt in found.doubts] == [compared]
-    assert len(warnings(found)) == int(compared)
+    result = measure(recorded, moved_output, comparison=comparison)
+    assert [doubt.compared for doubt in result.doubts] == [compared]
+    assert len(warnings(result)) == int(compared)
 
 
 def test_a_number_that_came_no_further_than_it_was_moved_is_no_noise() -> None:
-    assert warnings(measured("3.000000000000", "3.000000000003")) == []
-    assert warnings(measured("3.000000000000", "3.000000000300")) != []
-    assert warnings(measured("2.9999999999999654", "2.9999999999970046")) != []
+    assert warnings(measure("3.000000000000", "3.000000000003")) == []
+    assert warnings(measure("3.000000000000", "3.000000000300")) != []
+    assert warnings(measure("2.9999999999999654", "2.9999999999970046")) != []

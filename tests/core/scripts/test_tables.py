@@ -7,7 +7,7 @@ import pytest
 from coursebuild.core.model import Comparison, Filter
 from coursebuild.core.model.results import Verdict
 from coursebuild.core.scripts.compare import compare
-from support.sample_lessons import DIGITS, EXACT, VOLATILE, table, within
+from support.sample_lessons import DIGITS, EXACT, VOLATILE, table, tolerance
 
 PRINTED = """\
 integrators
@@ -60,13 +60,13 @@ def test_numbers_match_by_the_mode() -> None:
     assert verdict("| Euler | 6.64 % | 6.9e-04 |", comparison=DIGITS).status == "verified"
     assert verdict("| Euler | 6.6 % | 7e-04 |", comparison=DIGITS).status == "verified"
     assert verdict("| Euler | 6.63 % | 7e-04 |", comparison=DIGITS).status == "drift"
-    assert verdict("| Euler | 6.7 % | 7e-04 |", comparison=within("0.1")).status == "verified"
+    assert verdict("| Euler | 6.7 % | 7e-04 |", comparison=tolerance("0.1")).status == "verified"
     assert verdict("| Euler | 9.9 % | 7e-04 |", comparison=VOLATILE).status == "volatile"
 
 
 def test_the_number_that_drifted_is_named() -> None:
-    found = verdict(ROWS.replace("6.641", "6.702"))
-    (change,) = found.changes
+    result = verdict(ROWS.replace("6.641", "6.702"))
+    (change,) = result.changes
     assert (change.kind.value, change.recorded, change.printed) == ("numeric", "+6.702", "+6.641")
     assert change.span.text == "+6.702"
     assert change.span.source.line_text(change.span.line).startswith("| `Euler` | **+6.702")
