@@ -1,7 +1,7 @@
-"""The marks of Markdown: links, fences, tables, escapes.
+"""Writing Markdown: links, fences, tables, escapes.
 
-Entry points: `escaped`, `escaped_line`, `guarded`; `link`, `picture`, `code_span`, `fence`,
-`table`, `quoted`, `hang`.
+Entry points: `escape_marks`, `escape_line`, `guard_lines`; `link`, `picture`, `code_span`, `fence`,
+`table`, `block_quote`, `hang`.
 """
 
 from __future__ import annotations
@@ -11,20 +11,20 @@ from collections.abc import Iterable
 
 
 def hang(mark: str, text: str, indent: int | None = None) -> str:
-    """Text behind a mark, its further lines indented by `indent` or by the width of the mark."""
+    """Text after a mark, its further lines indented by `indent` or the width of the mark."""
     space = " " * (len(mark) if indent is None else indent)
     first, *rest = text.split("\n")
     lines = [f"{mark}{first}" if first else mark.rstrip()]
     return "\n".join([*lines, *(f"{space}{line}" if line.strip() else "" for line in rest)])
 
 
-def quoted(text: str) -> str:
-    """Lines in a blockquote."""
+def block_quote(text: str) -> str:
+    """Put text into a block quote."""
     return "\n".join(f"> {line}" if line.strip() else ">" for line in text.split("\n"))
 
 
 def fence(language: str, text: str) -> str:
-    """Code between fences that are longer than any in it."""
+    """Code between fences longer than any in it."""
     runs = _FENCES.findall(text)
     ticks = "`" * max([3, *(len(run) + 1 for run in runs)])
     body = text if text.endswith("\n") or not text else f"{text}\n"
@@ -35,7 +35,7 @@ _FENCES = re.compile(r"^[ ]*(`{3,})", re.MULTILINE)
 
 
 def code_span(text: str, ticks: str = "") -> str:
-    """Text as inline code, between these ticks or as few as do."""
+    """Text as inline code, between these ticks or as few as possible."""
     text = text.replace("\n", " ")
     runs = set(map(len, _TICKS.findall(text)))
     ticks = ticks or "`" * next(n for n in range(1, len(text) + 2) if n not in runs)
@@ -49,14 +49,14 @@ _TICKS = re.compile("`+")
 _MARKS = re.compile(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
 
 
-def escaped(text: str) -> str:
-    """Text with all its marks escaped, in one line or several."""
+def escape_marks(text: str) -> str:
+    """Escape all marks in a text of one or more lines."""
     return _MARKS.sub(lambda match: f"\\{match[0]}", text)
 
 
-def escaped_line(text: str) -> str:
-    """Text in one line with all its marks escaped."""
-    return escaped(" ".join(text.split()))
+def escape_line(text: str) -> str:
+    """Escape all marks in a text and put it on one line."""
+    return escape_marks(" ".join(text.split()))
 
 
 def link(text: str, href: str, title: str = "") -> str:
@@ -66,20 +66,20 @@ def link(text: str, href: str, title: str = "") -> str:
 
 def picture(alt: str, url: str, title: str = "") -> str:
     """A picture; `alt` is plain text."""
-    return f"![{escaped_line(alt)}]({_destination(url)}{_title(title)})"
+    return f"![{escape_line(alt)}]({_destination(url)}{_title(title)})"
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]], align: Iterable[str] = ()) -> str:
-    """A table of cells that are Markdown in one line, their pipes escaped."""
+    """A table; its cells are Markdown on one line, with escaped pipes."""
     head = tuple(head)
     marks = {"left": ":---", "right": "---:", "center": ":---:"}
-    aligned = [marks.get(one, "---") for one in align] or ["---"] * len(head)
-    lines = [head, aligned, *rows]
+    rule = [marks.get(side, "---") for side in align] or ["---"] * len(head)
+    lines = [head, rule, *rows]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 
 _APART = re.compile(r"[\s<>()\\]")
-"""What an address may have in angle brackets only."""
+"""Characters that an address may contain only in angle brackets."""
 
 
 def _destination(url: str) -> str:
@@ -103,20 +103,20 @@ _BEGINS = re.compile(
     r"|(?P<number>\d{1,9})(?P<after>[.)])(?=\s|$)"
     r"|(?P<note>\[\^[^\]]+\]):"
 )
-"""What begins, or makes of the line before it, another block than a paragraph."""
+"""What begins another block than a paragraph, or turns the line above into one."""
 
 
-def guarded(text: str) -> str:
-    """The lines of a paragraph, so that none of them begins another block."""
-    return "\n".join(map(_guarded_line, text.split("\n")))
+def guard_lines(text: str) -> str:
+    """Escape lines of a paragraph that would begin another block."""
+    return "\n".join(map(_guard_line, text.split("\n")))
 
 
-def _guarded_line(line: str) -> str:
-    found = _BEGINS.match(line)
-    if found is None:
+def _guard_line(line: str) -> str:
+    match = _BEGINS.match(line)
+    if match is None:
         return line
-    if found["number"]:
-        return f"{found['number']}\\{line[found.end('number') :]}"
-    if found["note"]:
-        return f"{found['note']}\\{line[found.end('note') :]}"
+    if match["number"]:
+        return f"{match['number']}\\{line[match.end('number') :]}"
+    if match["note"]:
+        return f"{match['note']}\\{line[match.end('note') :]}"
     return f"\\{line}"

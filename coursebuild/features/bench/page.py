@@ -19,7 +19,7 @@ from msgspec.structs import replace
 from coursebuild.core.model import document_blocks, scenario_anchor
 from coursebuild.core.model.results import Machine
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.marks import escaped, guarded
+from coursebuild.core.pages.marks import escape_marks, guard_lines
 from coursebuild.features.bench.figures import Grid, where
 from coursebuild.features.bench.model import Bench, declared_scenarios
 from coursebuild.features.bench.scenarios import ScenarioView, plots, scenario_view
@@ -97,7 +97,7 @@ def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
         silent = replace(report, verdict=replace(report.verdict, text=""))  # the block says it
         plot = work_precision(silent)
         if plot is not None:
-            rest.insert(0, guarded(escaped(f"{plot.title}. {plot.text}")))
+            rest.insert(0, guard_lines(escape_marks(f"{plot.title}. {plot.text}")))
     return "\n\n".join((head, *rest))
 
 

@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 
 from coursebuild.core.model.vocabulary import CALLOUTS
-from coursebuild.core.pages.marks import fence, quoted
+from coursebuild.core.pages.marks import block_quote, fence
 from coursebuild.core.registry import CORE_FENCES, fence_names
 from coursebuild.features.importer.cells import code_for_readers
 from coursebuild.features.importer.context import LessonContext
@@ -83,7 +83,7 @@ def _write_callout(
 ) -> str:
     title = rewrite_prose(title, context, segment.place)
     head = f"[!{_callout_kind(kind, context)}]{fold_mark} {title}".rstrip()
-    return quoted(f"{head}\n{_convert_nested(text, segment, context)}".rstrip("\n"))
+    return block_quote(f"{head}\n{_convert_nested(text, segment, context)}".rstrip("\n"))
 
 
 def _convert_div(segment: Segment, context: LessonContext) -> str:
@@ -131,7 +131,7 @@ def _convert_directive(name: str, argument: str, segment: Segment, context: Less
         case "tableofcontents" | "toctree" | "contents":
             return ""  # the map says it
         case "epigraph" | "pull-quote" | "blockquote":
-            return quoted(_convert_nested(text, segment, context))
+            return block_quote(_convert_nested(text, segment, context))
         case "div" | "container" | "card" | "grid" | "grid-item" | "tab-set" | "tab-item":
             return _convert_nested(text, segment, context)
         case _ if name in _CALLOUTS:

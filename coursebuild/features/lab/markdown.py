@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from coursebuild.core.pages.marks import (
     code_span,
-    escaped,
-    escaped_line,
+    escape_line,
+    escape_marks,
     fence,
     link,
     picture,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     """A lab as it was recorded, with a link to where it runs."""
     words, view = writer.words, page_view(writer.page, lab)
-    parts = [f"**{words('lab.label')}: {escaped(view.title)}**"]
+    parts = [f"**{words('lab.label')}: {escape_marks(view.title)}**"]
     if view.recorded is not None:
         parts += _recorded(writer, view.recorded)
     if lab.goal:
@@ -36,10 +36,12 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     if lab.kind == MJCF and lab.xml is not None:
         parts.append(fence("xml", lab.xml.text))
     if view.controls:
-        rows = [(escaped_line(label), escaped_line(values)) for label, values in view.controls]
+        rows = [(escape_line(label), escape_line(values)) for label, values in view.controls]
         parts.append(table((words("lab.control"), words("lab.range")), rows))
     shows = _shows(writer, view)
-    parts.append("\n".join(f"- {escaped(name)}: {escaped(', '.join(of))}" for name, of in shows))
+    parts.append(
+        "\n".join(f"- {escape_marks(name)}: {escape_marks(', '.join(of))}" for name, of in shows)
+    )
     parts += [writer.blocks(lab.note), link(words("exports.run_lab"), writer.live)]
     return "\n\n".join(filter(None, parts))
 
@@ -48,8 +50,8 @@ def _recorded(writer: MarkdownWriter, recorded: RecordedView) -> Iterator[str]:
     """The picture, and the readouts at the end."""
     yield picture(recorded.alt, writer.locate(recorded.picture))
     if readouts := recorded.record.readouts:
-        yield f"{escaped(recorded.at)}:"
-        rows = [(escaped_line(label), escaped_line(value)) for label, value in readouts]
+        yield f"{escape_marks(recorded.at)}:"
+        rows = [(escape_line(label), escape_line(value)) for label, value in readouts]
         yield table((writer.words("lab.readouts"), ""), rows)
 
 
@@ -58,7 +60,7 @@ def _about(writer: MarkdownWriter, view: LabView) -> str:
     words = writer.words
     about = f"{words('lab.static_xml')}."
     if view.model is not None:
-        name = link(escaped(view.model), writer.locate(view.model_href))
+        name = link(escape_marks(view.model), writer.locate(view.model_href))
         about = f"{words('lab.static')} {name}."
     if view.start:
         about += f" {words('lab.start')} {code_span(view.start)}."

@@ -19,14 +19,14 @@ from typing import assert_never
 from coursebuild.core import model
 from coursebuild.core.pages.html_context import OwnBlock
 from coursebuild.core.pages.marks import (
+    block_quote,
     code_span,
-    escaped,
+    escape_marks,
     fence,
-    guarded,
+    guard_lines,
     hang,
     link,
     picture,
-    quoted,
     table,
 )
 from coursebuild.core.pages.markup import escape, is_tight, raw_html
@@ -108,7 +108,7 @@ class BlockWriter(ABC):
             case model.ListBlock():
                 return self._list(block, after_list=isinstance(previous, model.ListBlock))
             case model.BlockQuote():
-                return quoted(self.blocks(block.blocks))
+                return block_quote(self.blocks(block.blocks))
             case model.CodeBlock():
                 return fence(re.sub(r"[\s`]", "", block.language), block.code.text)
             case model.HtmlBlock():
@@ -170,7 +170,7 @@ class BlockWriter(ABC):
         self, inlines: Iterable[model.Inline], *, line: bool = False, cell: bool = False
     ) -> str:
         text = self._join_inlines(inlines, line=line, cell=cell)
-        return text if line else guarded(text)
+        return text if line else guard_lines(text)
 
     def _join_inlines(self, inlines: Iterable[model.Inline], *, line: bool, cell: bool) -> str:
         return "".join([self._inline(inline, line=line, cell=cell) for inline in inlines])
@@ -190,7 +190,7 @@ class BlockWriter(ABC):
                 ticks = source[: len(source) - len(source.lstrip("`"))]
                 return _escape_pipes(code_span(inline.text, ticks), cell=cell)
             case model.NumberBinding():
-                return escaped(_MINUS.sub("\u2212", inline.text))
+                return escape_marks(_MINUS.sub("\u2212", inline.text))
             case model.Math():
                 tag = self._tag(inline.span.start) if inline.display else ""
                 return _formula(inline, tag, cell=cell)
@@ -219,7 +219,7 @@ class BlockWriter(ABC):
         if source == f"<{model.plain_text(node.children)}>" and not cell:
             return source
         href = self.href(node.target)
-        text = text or escaped(self.link_text(node.target))
+        text = text or escape_marks(self.link_text(node.target))
         return link(text, href.replace("|", "%7C") if cell else href, node.title)
 
 
@@ -227,7 +227,7 @@ def _text(node: model.Text, *, cell: bool) -> str:
     """Write a text, copied from its source if that is the same."""
     source = node.span.text
     if source != node.text:
-        text = escaped(node.text)
+        text = escape_marks(node.text)
         if text[:1].isspace() and not source[:1].isspace():
             text = f"&#{ord(text[0])};{text[1:]}"
         if text[-1:].isspace() and not source[-1:].isspace():

@@ -21,7 +21,7 @@ from coursebuild.core.pages.added_files import SiteContext
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.lesson import LessonLink, LevelView
-from coursebuild.core.pages.marks import code_span, escaped_line, guarded, link
+from coursebuild.core.pages.marks import code_span, escape_line, guard_lines, link
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.strings import Strings
 from coursebuild.features.markdown.from_html import html_to_markdown
@@ -87,14 +87,14 @@ def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     """Return the title, summary, facts and objectives of a lesson; of other pages the title."""
     lesson = inputs.values.get("lesson")
     if not isinstance(lesson, LessonLink):
-        return [f"# {escaped_line(inputs.head.title)}"]
-    parts = [f"# {escaped_line(f'{lesson.id} {lesson.title}')}"]
+        return [f"# {escape_line(inputs.head.title)}"]
+    parts = [f"# {escape_line(f'{lesson.id} {lesson.title}')}"]
     if lesson.summary:
-        parts.append(guarded(escaped_line(lesson.summary)))
+        parts.append(guard_lines(escape_line(lesson.summary)))
     parts.append(" · ".join(_facts(inputs, lesson, words, locate)))
     if lesson.objectives:
-        items = "\n".join(f"- {guarded(escaped_line(text))}" for text in lesson.objectives)
-        parts.append(f"{escaped_line(words('lesson.objectives'))}\n\n{items}")
+        items = "\n".join(f"- {guard_lines(escape_line(text))}" for text in lesson.objectives)
+        parts.append(f"{escape_line(words('lesson.objectives'))}\n\n{items}")
     return parts
 
 
@@ -103,15 +103,15 @@ def _facts(inputs: PageInputs, lesson: LessonLink, words: Strings, locate: Locat
     level = inputs.values.get("level")
     if isinstance(level, LevelView):
         name = f"{words('level.label', id=level.id)}: {level.title}"
-        facts.append(link(escaped_line(name), locate(level.href)))
-    facts.append(escaped_line(words(f"status.{lesson.status}")))
+        facts.append(link(escape_line(name), locate(level.href)))
+    facts.append(escape_line(words(f"status.{lesson.status}")))
     if lesson.minutes:
-        facts.append(escaped_line(words("lesson.minutes", n=lesson.minutes)))
+        facts.append(escape_line(words("lesson.minutes", n=lesson.minutes)))
     if lesson.further:
-        facts.append(escaped_line(words("lesson.more_minutes", n=lesson.further)))
+        facts.append(escape_line(words("lesson.more_minutes", n=lesson.further)))
     needs = lesson_links(lesson.needs, locate)
     if needs:
-        facts.append(f"{escaped_line(words('lesson.needs'))} {', '.join(needs)}")
+        facts.append(f"{escape_line(words('lesson.needs'))} {', '.join(needs)}")
     return facts
 
 
@@ -119,7 +119,7 @@ def lesson_links(value: object, locate: Locate) -> list[str]:
     """Return links to the lessons in a value of a page's inputs: one, or a tuple of them."""
     lessons = value if isinstance(value, tuple) else (value,)
     return [
-        link(escaped_line(f"{lesson.id} {lesson.title}"), locate(lesson.href))
+        link(escape_line(f"{lesson.id} {lesson.title}"), locate(lesson.href))
         for lesson in lessons
         if isinstance(lesson, LessonLink)
     ]
@@ -131,7 +131,7 @@ def _foot(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     scripts = inputs.values.get("scripts")
     if isinstance(scripts, tuple) and scripts:
         script_links = (link(code_span(path), href) for path, href in scripts)
-        rows.append(f"{escaped_line(words('lesson.scripts'))}: {', '.join(script_links)}")
+        rows.append(f"{escape_line(words('lesson.scripts'))}: {', '.join(script_links)}")
     for name, key in (
         ("leads", "lesson.leads"),
         ("previous", "lesson.previous"),
@@ -139,5 +139,5 @@ def _foot(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     ):
         links = lesson_links(inputs.values.get(name), locate)
         if links:
-            rows.append(f"{escaped_line(words(key))}: {', '.join(links)}")
+            rows.append(f"{escape_line(words(key))}: {', '.join(links)}")
     return ["___", "\n".join(f"- {row}" for row in rows)] if rows else []

@@ -15,14 +15,14 @@ from collections.abc import Callable, Iterator
 
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
 from coursebuild.core.pages.marks import (
+    block_quote,
     code_span,
-    escaped,
+    escape_marks,
     fence,
-    guarded,
+    guard_lines,
     hang,
     link,
     picture,
-    quoted,
     table,
 )
 
@@ -53,7 +53,7 @@ class _Converter:
                 if isinstance(child, str) or child.name not in _SKIPPED:
                     line.append(child)
                 continue
-            text = guarded(self._line(line))
+            text = guard_lines(self._line(line))
             line = []
             blocks += [text] if text else []
             if isinstance(child, HtmlElement):
@@ -74,7 +74,7 @@ class _Converter:
         elif name == "dl":
             yield self._terms(node)
         elif name == "blockquote":
-            yield quoted("\n\n".join(self.blocks(node.children)))
+            yield block_quote("\n\n".join(self.blocks(node.children)))
         elif name == "hr":
             yield "___"
         elif name in ("summary", "figcaption", "caption"):
@@ -127,7 +127,7 @@ class _Converter:
 
     def _inline(self, node: HtmlContent) -> str:
         if isinstance(node, str):
-            return escaped(node)
+            return escape_marks(node)
         inner = "".join(map(self._inline, node.children))
         match node.name:
             case name if name in _SKIPPED:
@@ -154,7 +154,7 @@ class _Converter:
                 return " "
             case "math":
                 tex = next((annotation.text for annotation in node.nearest("annotation")), "")
-                return f"${tex.strip()}$" if tex else escaped(node.text)
+                return f"${tex.strip()}$" if tex else escape_marks(node.text)
             case "span" if node.attributes.get("class") == "sep":
                 return f" {inner} "
             case _:

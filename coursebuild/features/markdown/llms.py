@@ -13,7 +13,7 @@ from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.marks import escaped_line, link
+from coursebuild.core.pages.marks import escape_line, link
 
 PATH = "llms.txt"
 
@@ -21,9 +21,9 @@ PATH = "llms.txt"
 def write_llms(library: Library) -> bytes:
     """Return the content of the file."""
     course, words = library.course, library.words
-    parts = [f"# {escaped_line(course.title)}"]
+    parts = [f"# {escape_line(course.title)}"]
     if course.summary:
-        parts.append(f"> {escaped_line(course.summary)}")
+        parts.append(f"> {escape_line(course.summary)}")
     parts.append(words("exports.llms"))
     for level in course.levels:
         label = f"{words('level.label', id=level.id)}: {level.title}"
@@ -31,7 +31,7 @@ def write_llms(library: Library) -> bytes:
             _lesson_row(library, lesson) for lesson in level.lessons if lesson.document is not None
         ]
         if rows:
-            parts.append("\n".join((f"## {escaped_line(label)}", "", *rows)))
+            parts.append("\n".join((f"## {escape_line(label)}", "", *rows)))
     parts += _optional_part(library)
     return visible("\n\n".join(parts) + "\n").encode()
 
@@ -59,4 +59,4 @@ def _optional_part(library: Library) -> list[str]:
 def _row(library: Library, path: str, title: str, text: str) -> str:
     copy = urls.copy_path(path, ".md")
     address = urls.absolute(library.course, copy) or urls.encode(copy)
-    return f"- {link(escaped_line(title), address)}" + (f": {escaped_line(text)}" if text else "")
+    return f"- {link(escape_line(title), address)}" + (f": {escape_line(text)}" if text else "")

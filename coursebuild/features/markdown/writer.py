@@ -19,7 +19,7 @@ from coursebuild.core import model
 from coursebuild.core.pages.blocks import output_receipt, script_receipt
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.html_context import OwnBlock
-from coursebuild.core.pages.marks import code_span, escaped, fence, link, quoted
+from coursebuild.core.pages.marks import block_quote, code_span, escape_marks, fence, link
 from coursebuild.core.registry import kind_of_block
 from coursebuild.features.markdown.blocks import BlockWriter
 from coursebuild.features.markdown.from_html import html_to_markdown
@@ -83,16 +83,16 @@ class DocumentWriter(BlockWriter):
 
     def words(self, key: str, **values: str | int | float) -> str:
         """Return a text of the interface as Markdown."""
-        return escaped(self.page.renderer.words(key, **values))
+        return escape_marks(self.page.renderer.words(key, **values))
 
     # --- callouts, io, MJCF
 
     def _callout(self, block: model.Callout) -> str:
-        label = f"**{escaped(self.page.inputs.callouts[block.kind].label)}**"
+        label = f"**{escape_marks(self.page.inputs.callouts[block.kind].label)}**"
         title = self.inlines(block.title)
         head = f"{label} {title}" if title else label
         inner = self.blocks(block.blocks)
-        return quoted(f"{head}\n\n{inner}" if inner else head)
+        return block_quote(f"{head}\n\n{inner}" if inner else head)
 
     def _mjcf(self, block: model.Mjcf) -> str:
         engine = self.page.inputs.engine
@@ -122,7 +122,7 @@ class DocumentWriter(BlockWriter):
         parts += [self.recording(recording) for recording in recordings]
         if not recordings:
             receipt = script_receipt(self.page, block)
-            parts.append(f"*{escaped(receipt.text)}*")
+            parts.append(f"*{escape_marks(receipt.text)}*")
         return "\n\n".join(parts)
 
     def recording(self, block: model.Recording) -> str:
@@ -135,7 +135,7 @@ class DocumentWriter(BlockWriter):
 
     def receipt(self, block: model.Recording) -> str:
         """Write the receipt of an output: how it was verified."""
-        return f"*{escaped(output_receipt(self.page, block).text)}*"
+        return f"*{escape_marks(output_receipt(self.page, block).text)}*"
 
     def folded(self, label: str, text: str) -> str:
         """Write a text with its label; in a notebook it is folded."""

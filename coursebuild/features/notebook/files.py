@@ -19,7 +19,7 @@ from coursebuild.core.model import Lesson, document_scripts
 from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages import urls, zips
 from coursebuild.core.pages.added_files import SiteContext
-from coursebuild.core.pages.marks import code_span, escaped
+from coursebuild.core.pages.marks import code_span, escape_marks
 from coursebuild.features.notebook.cells import Cell, code_cell, markdown_cell
 
 _MOST = 4 << 20
@@ -73,13 +73,13 @@ def _setup(site: SiteContext, lesson: Lesson, archive: zips.Archive) -> Iterator
     files = {path: data for path, data in files.items() if path not in own or path in early}
     small = _small(files)
     words = site.library.words
-    title = f"## {escaped(words('exports.before'))}"
-    text = escaped(words("exports.setup" if files else "exports.setup_none"))
+    title = f"## {escape_marks(words('exports.before'))}"
+    text = escape_marks(words("exports.setup" if files else "exports.setup_none"))
     if small.keys() != files.keys():
         name = code_span(archive.path.rpartition("/")[2])
-        text += f" {escaped(words('exports.left_out', zip=_SLOT))}".replace(_SLOT, name)
+        text += f" {escape_marks(words('exports.left_out', zip=_SLOT))}".replace(_SLOT, name)
     if needed:
-        yield markdown_cell("before", f"{title}\n\n{escaped(words('exports.install'))}")
+        yield markdown_cell("before", f"{title}\n\n{escape_marks(words('exports.install'))}")
         yield code_cell("install", f"# %pip install {' '.join(needed)}")
         title = ""
     yield markdown_cell("before-setup", f"{title}\n\n{text}".strip())

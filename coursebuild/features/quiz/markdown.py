@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, assert_never
 
-from coursebuild.core.pages.marks import escaped, fence, hang
+from coursebuild.core.pages.marks import escape_marks, fence, hang
 from coursebuild.features.quiz.model import (
     AnyQuestion,
     ChoiceQuestion,
@@ -30,12 +30,12 @@ def quiz_markdown(writer: MarkdownWriter, block: Quiz) -> str:
         for at, question in enumerate(block.questions, 1)
     )
     said = is_heading(writer.page.document, block.title)
-    title = "" if said else f"**{escaped(block.title)}**"
+    title = "" if said else f"**{escape_marks(block.title)}**"
     return "\n\n".join(filter(None, (title, *questions)))
 
 
 def _question(writer: MarkdownWriter, question: AnyQuestion) -> str:
-    parts = [f"*{escaped(question.label)}*"] if question.label else []
+    parts = [f"*{escape_marks(question.label)}*"] if question.label else []
     parts.append(writer.blocks(question.text))
     parts += _asked(writer, question)
     for at, hint in enumerate(question.hints, 1):
@@ -57,7 +57,7 @@ def _asked(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
             )
             return [f"*{writer.words(how)}*" if how else "", "\n".join(options)]
         case NumericQuestion():
-            unit = f"{writer.words('quiz.unit')} {escaped(question.unit)}"
+            unit = f"{writer.words('quiz.unit')} {escape_marks(question.unit)}"
             return [f"*{unit}*"] if question.unit else []
         case OpenQuestion():
             return []
@@ -90,9 +90,9 @@ def _answer(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
             sim = writer.blocks((question.sim,)) if question.sim is not None else ""
             return [f"{right}.", explain, "\n".join(said), sim]
         case NumericQuestion():
-            unit = f" {escaped(question.unit)}" if question.unit else ""
+            unit = f" {escape_marks(question.unit)}" if question.unit else ""
             near = writer.words("quiz.tolerance", tolerance=f"{question.tolerance:.3g}")
-            return [f"{escaped(question.answer_text)}{unit} ({near}).", explain]
+            return [f"{escape_marks(question.answer_text)}{unit} ({near}).", explain]
         case OpenQuestion():
             return [writer.blocks(question.reference), explain]
         case OutputQuestion():

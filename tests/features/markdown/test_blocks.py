@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from coursebuild.core.model import Callout, Document, PlainCode, Target
 from coursebuild.core.pages.html_context import OwnBlock
 from coursebuild.core.pages.marks import (
+    block_quote,
     code_span,
-    escaped,
+    escape_marks,
     fence,
-    guarded,
+    guard_lines,
     link,
     picture,
-    quoted,
 )
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
@@ -50,8 +50,8 @@ class Context(BlockWriter):
 
     def own_block(self, block: OwnBlock) -> str:
         if isinstance(block, Callout):
-            title = guarded(self.inlines(block.title))
-            return quoted("\n\n".join(filter(None, (title, self.blocks(block.blocks)))))
+            title = guard_lines(self.inlines(block.title))
+            return block_quote("\n\n".join(filter(None, (title, self.blocks(block.blocks)))))
         assert isinstance(block, PlainCode), f"no test has a {type(block).__name__}"
         return fence("python", block.code.text)
 
@@ -129,7 +129,7 @@ def test_markdown_of_constructs() -> None:
 
 def test_lines_that_would_begin_another_block_are_escaped() -> None:
     text = "# a\n> b\n- c\n+ d\n1. e\n2) f\n===\n---\n~~~\n```\n* * *\n[^1]: g\n-h\n1986 i\n#j"
-    assert guarded(text) == (
+    assert guard_lines(text) == (
         "\\# a\n\\> b\n\\- c\n\\+ d\n1\\. e\n2\\) f\n\\===\n\\---\n\\~~~\n\\```\n\\* * *\n[^1]\\: g"
         "\n-h\n1986 i\n#j"
     )
@@ -137,9 +137,9 @@ def test_lines_that_would_begin_another_block_are_escaped() -> None:
 
 def test_hostile_titles_stay_text() -> None:
     hostile = "](javascript:alert(1)) <script>&lt; `x` $y$ | ![a](b)"
-    html = plain_html(read(f"{escaped(hostile)}\n"))
+    html = plain_html(read(f"{escape_marks(hostile)}\n"))
     assert "<script" not in html and "<a" not in html and "<img" not in html
-    assert link(escaped("a]b"), "x y(1).html") == "[a\\]b](<x%20y(1).html>)"
+    assert link(escape_marks("a]b"), "x y(1).html") == "[a\\]b](<x%20y(1).html>)"
     assert picture("a]b\nc", "x>y.png", 'say "q"') == '![a\\]b c](<x%3Ey.png> "say \\"q\\"")'
 
 
