@@ -1,4 +1,4 @@
-"""Values as bytes: they come back as they were, and bytes of somebody else's run nothing."""
+"""Values as bytes: decoding gives equal values, and foreign bytes run no code."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ VALUES = st.recursive(
 
 
 @given(VALUES)
-def test_what_is_kept_comes_back(value: object) -> None:
-    found = decode(encode(value), object)
-    assert found == value or value is None
-    assert type(found) is type(value)
-    assert fingerprint(value) == fingerprint(found)
+def test_decoding_gives_the_encoded_value(value: object) -> None:
+    decoded = decode(encode(value), object)
+    assert decoded == value or value is None
+    assert type(decoded) is type(value)
+    assert fingerprint(value) == fingerprint(decoded)
 
 
-def test_values_of_the_tool_come_back_in_the_source_that_is_given() -> None:
+def test_decoded_places_are_in_the_given_source() -> None:
     value = (
         Heading(SPAN, 1, (Text(SPAN, "One"),), "one", True),
         Excerpt(SOURCE, "One\ntwo", ((0, 2), (4, 7))),
@@ -71,8 +71,8 @@ def test_values_of_the_tool_come_back_in_the_source_that_is_given() -> None:
     assert SOURCE.text.encode() not in data
     assert decode(data, list, SOURCE) is None
     assert fingerprint(value) != fingerprint(value, {Span: lambda span: None})
-    moved = (SOURCE.span(0, 1), SOURCE.span(7, 8))
-    assert len({fingerprint(span, {Span: lambda span: None}) for span in moved}) == 1
+    spans = (SOURCE.span(0, 1), SOURCE.span(7, 8))
+    assert len({fingerprint(span, {Span: lambda span: None}) for span in spans}) == 1
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_values_of_the_tool_come_back_in_the_source_that_is_given() -> None:
         ([1], tuple[int, ...]),
     ],
 )
-def test_what_holds_something_of_another_type_is_none(value: object, kind: type) -> None:
+def test_a_value_with_a_part_of_another_type_is_none(value: object, kind: type) -> None:
     assert decode(encode(value), kind, SOURCE) is None
     assert decode(encode((value,)), tuple[kind, ...], SOURCE) is None
 
@@ -110,7 +110,7 @@ def test_equal_sets_have_one_fingerprint() -> None:
     assert fingerprint(frozenset(names)) == fingerprint(frozenset(reversed(names)))
 
 
-def test_what_is_no_value_is_refused() -> None:
+def test_other_objects_cannot_be_encoded() -> None:
     for value in (object(), os.system, [lambda: None], {"a": sys}):
         with pytest.raises(TypeError):
             encode(value)
@@ -145,10 +145,12 @@ class Trap(enum.Enum):
         ("", []),
     ],
 )
-def test_bytes_of_somebody_elses_make_nothing_but_values(name: str, arguments: list[Any]) -> None:
-    loaded = set(sys.modules)
+def test_foreign_bytes_make_nothing_but_values(name: str, arguments: list[Any]) -> None:
+    modules_before = set(sys.modules)
     assert decode(msgspec.msgpack.encode(([name], [16, *arguments])), object) is None
-    assert not {module for module in set(sys.modules) - loaded if "coursebuild" not in module}
+    assert not {
+        module for module in set(sys.modules) - modules_before if "coursebuild" not in module
+    }
 
 
 def test_deep_bytes_are_refused() -> None:

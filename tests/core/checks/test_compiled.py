@@ -67,7 +67,7 @@ def test_texts_of_blocks_and_labs_are_compiled_in_their_order() -> None:
         (" fragment=worldbody", 1, "```mjcf fragment=worldbody"),
     ],
 )
-def test_an_error_is_told_at_its_line_without_indent(
+def test_an_error_is_reported_at_its_line_without_indent(
     keys: str, line: int | None, expected: str
 ) -> None:
     assert told(check(block(keys), failure(line))) == [f"mjcf-error: {expected}"]
@@ -113,7 +113,7 @@ def test_a_part_that_a_lab_uses_as_its_model_must_compile() -> None:
     assert told(check(course, part=failure())) == ["model-error: "]
 
 
-def test_scenarios_are_held_against_the_compiled_model() -> None:
+def test_scenarios_are_compared_with_the_compiled_model() -> None:
     report = "```bench box scenario=fall\n```\n"
     home = CompileResult("", None, facts(keyframes=("home",)))
     undeclared = make_course(report, models={"box": BOX})

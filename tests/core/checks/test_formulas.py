@@ -18,7 +18,7 @@ def test_each_formula_is_listed_once_in_order_of_first_use() -> None:
     )
 
 
-def test_a_formula_is_told_at_each_place_where_it_stops_to_parse() -> None:
+def test_a_wrong_formula_is_reported_at_each_place() -> None:
     document = make_course("Text $a$ and $x + y$.\n\n> $x + y$, $$x + y$$\n").documents[0]
     good = {Formula("a", False): "", Formula("x + y", True): ""}
     for position, expected in ((None, "x + y"), (0, "x"), (4, "y"), (5, "y"), (99, "y")):

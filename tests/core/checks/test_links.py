@@ -40,7 +40,7 @@ def test_links_that_lead_somewhere_are_good() -> None:
 
 
 @pytest.mark.parametrize("rule", BAD)
-def test_links_that_lead_nowhere_are_told_at_their_targets(rule: str) -> None:
+def test_links_that_lead_nowhere_are_reported_at_their_targets(rule: str) -> None:
     messages = messages_of("## Here\n\n" + "\n".join(f"[a]({target})" for target in BAD[rule]))
     assert messages == [f"{rule}: {target}" for target in BAD[rule]]
 
@@ -59,7 +59,7 @@ def test_mentions_are_links_wherever_they_stand(text: str, expected: list[str]) 
     assert messages_of(text) == expected
 
 
-def test_each_thing_of_a_document_that_has_an_anchor_is_known_by_it() -> None:
+def test_anchors_of_a_document() -> None:
     text = (
         "## A B {#a}\n\n"
         + SCRIPT
@@ -92,5 +92,5 @@ def test_each_thing_of_a_document_that_has_an_anchor_is_known_by_it() -> None:
          " [link to a model by its name: `model:box`]"),
     ],
 )  # fmt: skip
-def test_what_is_said_of_a_link_fits_why_it_leads_nowhere(text: str, message: str) -> None:
+def test_the_message_says_why_a_link_leads_nowhere(text: str, message: str) -> None:
     assert said(check_course(make_course(text, models={"box": BOX}))) == [message]

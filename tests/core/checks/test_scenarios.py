@@ -52,11 +52,11 @@ def test_scenarios_that_fit_their_model_are_good() -> None:
          " [a multiple near it is 0.004]"),
     ],
 )  # fmt: skip
-def test_what_does_not_fit_the_model_is_told_at_its_value(line: str, expected: str) -> None:
+def test_a_mismatch_with_the_model_is_reported_at_its_value(line: str, expected: str) -> None:
     assert messages_of(line) == [f"scenario-model: {expected}"]
 
 
-def test_all_that_is_wrong_with_all_scenarios_is_told() -> None:
+def test_all_mismatches_of_all_scenarios_are_reported() -> None:
     messages = messages_of("keyframe = 8\nduration = 0.003", "keyframe = 7\nqvel = [1]")
     assert [message.partition(";")[0] for message in messages] == [
         f"scenario-model: {place}" for place in ("8", "0.003", "7", "[")

@@ -127,7 +127,7 @@ def test_a_complete_map(newline: str) -> None:
     assert kinds["note"] == built_in["note"]
 
 
-def test_the_least_that_a_map_needs() -> None:
+def test_a_minimal_map() -> None:
     course = parse('[course]\ntitle = "T"\n').value
     assert course is not None
     assert (course.language, course.engine) == ("en", None)
@@ -157,7 +157,7 @@ def test_how_outputs_are_compared(verify: str, expected: Comparison) -> None:
 
 @settings(max_examples=100)
 @given(st.data())
-def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
+def test_any_edit_of_a_valid_text_is_parsed_or_reported(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(COMPLETE)))
     piece = data.draw(
         st.sampled_from([*"[]{}=.,\"'\\\n#", "id = 4.2\n", "[[level]]\n", "[course]\n", "1", "\r"])

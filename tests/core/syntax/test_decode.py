@@ -98,7 +98,7 @@ def test_a_clean_value() -> None:
     assert [type(v) for v in (decoding.value.ratio, decoding.value.limits["low"])] == [float, float]
 
 
-def test_what_an_author_is_told(rewriting: bool) -> None:
+def test_diagnostics_of_wrong_fields(rewriting: bool) -> None:
     check_texts("fields", lambda text: (None, read(text).diagnostics), rewriting=rewriting)
 
 

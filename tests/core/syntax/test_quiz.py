@@ -139,7 +139,7 @@ def test_options_and_items_have_keys_of_their_texts_alone() -> None:
 
 @settings(max_examples=150)
 @given(st.data())
-def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
+def test_any_edit_of_a_valid_text_is_parsed_or_reported(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(COMPLETE)))
     piece = data.draw(
         st.sampled_from([*'{}[],:"\\\n 0-1e', "null", "true", "kind", '"x":', "$$", "“", "\x00"])

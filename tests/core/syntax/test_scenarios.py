@@ -60,7 +60,7 @@ def parse(text: str) -> Parsed[Declarations | None]:
 
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
-def test_everything_that_a_file_can_say(newline: str) -> None:
+def test_a_complete_file(newline: str) -> None:
     parsed_file = parse(COMPLETE.replace("\n", newline))
     assert not parsed_file.diagnostics
     declarations = parsed_file.value
@@ -99,7 +99,7 @@ def test_everything_that_a_file_can_say(newline: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "[bench]\n"])
-def test_a_file_may_say_nothing(text: str) -> None:
+def test_an_empty_file(text: str) -> None:
     parsed_file = parse(text)
     assert parsed_file.diagnostics == ()
     assert parsed_file.value is not None

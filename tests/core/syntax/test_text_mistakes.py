@@ -50,7 +50,7 @@ READERS: dict[str, Reader] = {
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_what_an_author_is_told(name: str, rewriting: bool) -> None:
+def test_diagnostics_of_wrong_texts(name: str, rewriting: bool) -> None:
     check_texts(name, READERS[name], rewriting=rewriting)
 
 
@@ -75,7 +75,7 @@ def test_notes_point_at_the_first_key_and_at_the_bracket() -> None:
     ]
 
 
-def test_what_is_too_deep_or_too_long_is_told() -> None:
+def test_deep_nesting_and_long_numbers_are_reported() -> None:
     diagnostics = [
         *parse("[" * 100_000).diagnostics,
         *parse('{"a":' * 100_000).diagnostics,

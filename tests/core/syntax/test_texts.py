@@ -122,6 +122,6 @@ def test_link_definitions_of_a_text_are_its_own() -> None:
         (f"{TICKS}lab\n{{}}\n{TICKS}", "fence-info"),
     ],
 )
-def test_what_needs_lines_of_the_lesson_cannot_stand_in_a_text(text: str, rule: str) -> None:
+def test_a_text_cannot_hold_blocks_that_need_lines_of_the_lesson(text: str, rule: str) -> None:
     _, diagnostics = read(text)
     assert [d.rule for d in diagnostics] == [rule]

@@ -86,7 +86,7 @@ def place_of(rule: str) -> str:
 @pytest.mark.parametrize(
     "path", [pytest.param(path, id=path.stem, marks=TIERS.get(path.stem, ())) for path in FILES]
 )
-def test_mistakes_are_told_once_at_their_places(
+def test_mistakes_are_reported_once_at_their_places(
     path: Path, workshop: Workshop, tmp_path: Path
 ) -> None:
     cases = read_cases(path)

@@ -79,7 +79,7 @@ def test_slices_of_excerpts_agree_with_the_source(
     ) == part.text.rstrip("\n")
 
 
-def test_an_excerpt_that_says_more_than_its_source_stays_in_it() -> None:
+def test_spans_of_an_excerpt_longer_than_its_source_stay_in_it() -> None:
     source = Source("x.md", "abc")
     excerpt = Excerpt(source, "bc\n", ((0, 1),))  # a fence at the end of a text gets a line end
     assert (excerpt.span().end, excerpt.slice(2).span().start, excerpt.offset(3)) == (3, 3, 3)

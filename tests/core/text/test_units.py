@@ -1,4 +1,4 @@
-"""Units that there are, and those that an author surely did not mean."""
+"""Valid units, and wrong ones with the units that their authors likely meant."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def messages(unit: str) -> list[str]:
     return [f"{d.span.text}: {d.help}" for d in check_unit(Excerpt.of_span(source.span()))]
 
 
-def test_units_that_there_are() -> None:
+def test_valid_units() -> None:
     assert {unit: messages(unit) for unit in (*USUAL, *SELDOM) if messages(unit)} == {}
 
 
-def test_what_is_no_unit_is_told_with_the_likely_one() -> None:
+def test_wrong_units_are_reported_with_the_likely_one() -> None:
     likely = {
         **{"mtr": "m", "metr": "m", "radd/s": "rad", "rads": "rad", "KG": "kg", "hz": "Hz"},
         **{"kgm²": "kg m", "secnd": "s", "Newtons": "N"},
