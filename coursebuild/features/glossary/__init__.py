@@ -1,7 +1,7 @@
-"""The terms of a course: what a document says of each, and a page of all.
+"""The terms of a course: how documents define each, and a page that lists all.
 
-1. `terms` reads a document: each term with two sentences of its paragraph (`sentences`).
-2. `page` brings those of all documents together.
+1. `terms` finds the terms of a document, each with two sentences of its paragraph (`sentences`).
+2. `page` collects those of all documents.
 """
 
 from coursebuild.core.features import Feature, PageKind

@@ -1,6 +1,6 @@
-"""The glossary: every term of the course, what the text says of it, and where it is used.
+"""The glossary: every term of the course with its definition and its uses.
 
-Entry point: `glossary_values`, what the page shows.
+Entry point: `glossary_values`, for the page.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ class TermEntry(Struct, frozen=True):
 
     term: DefinedTerm
     place: OwnerLink
-    """Where it is defined."""
+    """The lesson or page that defines it."""
     used: OwnerLinks
-    """Where else it is linked to, in the order of the course."""
+    """The other lessons and pages that link to it, in the order of the course."""
 
 
 def glossary_values(library: Library) -> dict[str, object]:
-    """What the glossary shows: the entries by their letters."""
+    """Return the values for the template: the entries, grouped by letters."""
     place = urls.Place("glossary/index.html")
     entries = sorted(_entries(library, place), key=lambda entry: sort_key(entry.term.name))
     groups = groupby(entries, key=lambda entry: initial(entry.term.name))
@@ -46,31 +46,31 @@ def glossary_values(library: Library) -> dict[str, object]:
 
 
 def _entries(library: Library, place: urls.Place) -> Iterator[TermEntry]:
-    """An entry for each term of the course; of two definitions of one for the first."""
+    """Yield an entry for each term of the course, for its first definition."""
     users: dict[str, list[Owner]] = {}
     for owner, document in library.course.owned_documents:
         targets = links(library.course, document)
         for id in {target.id for target in targets if isinstance(target, TermTarget)}:
             users.setdefault(id, []).append(owner)
-    done: set[str] = set()
-    for owner, found in library.summaries("glossary"):
-        for term in found.terms:
-            if term.id not in done:
-                done.add(term.id)
-                used = [user for user in users.get(term.id, ()) if user is not owner]
+    ids: set[str] = set()
+    for owner, document_terms in library.summaries("glossary"):
+        for term in document_terms.terms:
+            if term.id not in ids:
+                ids.add(term.id)
+                term_users = [user for user in users.get(term.id, ()) if user is not owner]
                 link = owner_link(place, owner, f"term:{term.id}")
-                yield TermEntry(term, link, owner_links(library, place, used))
+                yield TermEntry(term, link, owner_links(library, place, term_users))
 
 
 def sort_key(name: str) -> tuple[object, ...]:
-    """Digits and signs first, then Latin letters, then others; marks and case count last."""
+    """Sort digits and signs before Latin letters and others; marks and case count last."""
     plain = _plain(name)
     first = plain[:1]
     return (first.isalpha() + (first.isalpha() and not _is_latin(first)), plain, name)
 
 
 def initial(name: str) -> str:
-    """The letter under which a name stands; empty for digits and signs."""
+    """Return the letter under which a name is listed; empty for digits and signs."""
     first = _plain(name)[:1]
     return first.upper()[:1] if first.isalpha() else ""
 

@@ -1,10 +1,10 @@
-"""What a glossary shows of the paragraph that defines a term: two sentences.
+"""Takes the definition of a term from its paragraph: two sentences.
 
 Entry points: `definition_of(inlines, term)`, `runs_on(definition)`.
 
-A sentence ends at a full stop, a question or exclamation mark, with what closes behind it, before
-white space; not after an initial or a usual abbreviation, and not before a small letter. The marks
-of Chinese and Japanese end one by themselves.
+A sentence ends at a full stop, a question or exclamation mark, with closing marks, before white
+space; not after an initial or a usual abbreviation, and not before a small letter. The marks of
+Chinese and Japanese need no white space.
 """
 
 from __future__ import annotations
@@ -15,38 +15,38 @@ from collections.abc import Iterator
 from coursebuild.core import model
 
 _END = re.compile(r"[.!?…؟।]+[\"'”’»)\]]*\s+|[。！？]+[」』）”’]*\s*")
-_CLOSED = re.compile(r"[.!?…؟।。！？][\"'”’»」』）)\]]*\s*$")
+_COMPLETE = re.compile(r"[.!?…؟।。！？][\"'”’»」』）)\]]*\s*$")
 _LAST_WORD = re.compile(r"[^\s(\[“‘\"']*$")
 _ABBREVIATIONS = frozenset(
     "approx. ca. cf. ch. e.g. eq. eqs. fig. figs. i.e. p. pp. ref. refs. resp. sec. viz. vs."
     " d.h. z.b. bzw. vgl. abb. gl. p.ej. u.a.".split()
 )
 _OBJECT = "\ufffc"
-"""Stands for what is no text."""
+"""A character in place of content that is not text."""
 
 
 def definition_of(inlines: tuple[model.Inline, ...], term: model.Term) -> tuple[model.Inline, ...]:
-    """The sentence in which a term stands and the next one, unless that defines another term."""
-    texts = [_shown(inline) for inline in inlines]
-    at = next(n for n, inline in enumerate(inlines) if term in model.walk_inlines((inline,)))
-    place = sum(map(len, texts[:at]))
-    whole = "".join(texts)
-    ends = [0, *_ends(whole), len(whole)]
-    start = max(end for end in ends if end <= place)
-    stop, *later = (end for end in ends if end > place)
-    sentence = tuple(_cut(inlines, texts, start, stop))
-    following = tuple(_cut(inlines, texts, stop, later[0])) if later else ()
-    defines = any(isinstance(inline, model.Term) for inline in model.walk_inlines(following))
-    return sentence if defines else sentence + following
+    """Return the sentence of a term and the next one, unless that defines another term."""
+    texts = [_plain_text(inline) for inline in inlines]
+    index = next(n for n, inline in enumerate(inlines) if term in model.walk_inlines((inline,)))
+    term_start = sum(map(len, texts[:index]))
+    text = "".join(texts)
+    ends = [0, *_sentence_ends(text), len(text)]
+    start = max(end for end in ends if end <= term_start)
+    stop, *later = (end for end in ends if end > term_start)
+    sentence = tuple(_slice(inlines, texts, start, stop))
+    following = tuple(_slice(inlines, texts, stop, later[0])) if later else ()
+    has_term = any(isinstance(inline, model.Term) for inline in model.walk_inlines(following))
+    return sentence if has_term else sentence + following
 
 
 def runs_on(definition: tuple[model.Inline, ...]) -> bool:
-    """Whether a definition goes on in what follows its paragraph."""
-    return _CLOSED.search("".join(map(_shown, definition))) is None
+    """Whether a definition continues after its paragraph."""
+    return _COMPLETE.search("".join(map(_plain_text, definition))) is None
 
 
-def _shown(inline: model.Inline) -> str:
-    """What counts of an inline for where sentences end; a character at least for a formula."""
+def _plain_text(inline: model.Inline) -> str:
+    """Return the text of an inline that matters for the ends of sentences."""
     match inline:
         case model.Text():
             return inline.text
@@ -57,38 +57,38 @@ def _shown(inline: model.Inline) -> str:
         case model.CodeSpan() | model.NumberBinding():
             return _OBJECT
         case _:
-            texts = [
-                one.text for one in model.walk_inlines((inline,)) if isinstance(one, model.Text)
-            ]
+            parts = model.walk_inlines((inline,))
+            texts = [part.text for part in parts if isinstance(part, model.Text)]
             return _OBJECT + (texts[-1][-1:] if texts else "")
 
 
-def _ends(text: str) -> Iterator[int]:
-    for found in _END.finditer(text):
-        end = found.end()
-        following = text[end : end + 1]
-        goes_on = following.islower() or _abbreviates(text[: found.start() + 1])
-        if found[0][0] in "。！？" or not goes_on:
+def _sentence_ends(text: str) -> Iterator[int]:
+    for mark in _END.finditer(text):
+        end = mark.end()
+        next_character = text[end : end + 1]
+        goes_on = next_character.islower() or _ends_with_abbreviation(text[: mark.start() + 1])
+        if mark[0][0] in "。！？" or not goes_on:
             yield end
 
 
-def _abbreviates(text: str) -> bool:
-    """Whether a full stop at the end of a text is that of an abbreviation or an initial."""
+def _ends_with_abbreviation(text: str) -> bool:
+    """Whether the full stop at the end of a text is that of an abbreviation or an initial."""
     word = _LAST_WORD.search(text)
     if word is None or not text.endswith("."):
         return False
     return word[0].lower() in _ABBREVIATIONS or (len(word[0]) == 2 and word[0][0].isalpha())
 
 
-def _cut(
+def _slice(
     inlines: tuple[model.Inline, ...], texts: list[str], start: int, stop: int
 ) -> Iterator[model.Inline]:
-    at = 0
+    """Yield the inlines between two offsets of their text."""
+    offset = 0
     for inline, text in zip(inlines, texts, strict=True):
-        first, last = max(start - at, 0), min(stop - at, len(text))
+        first, last = max(start - offset, 0), min(stop - offset, len(text))
         if isinstance(inline, model.Text):
             if first < last:
                 yield model.Text(inline.span, inline.text[first:last])
-        elif first < last or (not text and start < at < stop):
+        elif first < last or (not text and start < offset < stop):
             yield inline
-        at += len(text)
+        offset += len(text)

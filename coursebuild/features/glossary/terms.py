@@ -1,9 +1,8 @@
-"""The terms of a document, each with what the text says of it where it defines it.
+"""Finds the terms of a document with their definitions.
 
-Entry point: `document_terms`. Each term gets the sentence that defines it and the next one, as
-HTML. Where they run on into a formula on a line of its own, the formula comes with them. Links lose
-their addresses, since the glossary stands elsewhere; those to formulas of the document leave their
-numbers.
+Entry point: `document_terms`. A definition is the sentence with the term and the next one, as HTML.
+If they continue in a displayed formula, the formula is part of it. Links lose their addresses,
+since the glossary is another page; of links to formulas of the document the numbers remain.
 """
 
 from __future__ import annotations
@@ -38,14 +37,14 @@ from coursebuild.features.glossary.sentences import definition_of, runs_on
 
 
 class DefinitionPart(Struct, frozen=True):
-    """A part of a definition, as HTML; `display`: a formula on a line of its own."""
+    """A part of a definition, as HTML; `display` means a displayed formula."""
 
     html: Markup
     display: bool = False
 
 
 class DefinedTerm(Struct, frozen=True):
-    """A term, and what the text says of it where it defines it."""
+    """A term with its definition."""
 
     id: str
     name: str
@@ -61,7 +60,7 @@ class DocumentTerms(Struct, frozen=True):
 
 
 def document_terms(document: Document, mathml: Mathml) -> Parsed[DocumentTerms | None]:
-    """The terms of a document; a formula that is not typeset stays TeX."""
+    """Return the terms of a document; a formula that is not typeset remains TeX."""
     terms = tuple(_terms(document, mathml)) if "]{" in document.source.text else ()
     return Parsed(DocumentTerms(terms) if terms else None)
 
@@ -73,8 +72,8 @@ class _Excerpt(Context):
         self._mathml = mathml
 
     def math(self, tex: str) -> Markup:
-        found = self._mathml(tex, False)
-        return Markup(formulas.split_formula(found)) if found else super().math(tex)
+        mathml = self._mathml(tex, False)
+        return Markup(formulas.split_formula(mathml)) if mathml else super().math(tex)
 
     def display(self, tex: str, start: int) -> Markup:
         return Markup(self._mathml(tex, True)) or super().display(tex, start)
@@ -83,7 +82,7 @@ class _Excerpt(Context):
 def _terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
     context = _Excerpt(mathml)
     equations = number_equations(document, mathml).values()
-    names = {f"#{one.id}": f"({one.number})" for one in equations if one.number}
+    names = {f"#{e.id}": f"({e.number})" for e in equations if e.number}
 
     def reference(target: Target) -> str:
         return names.get(unquote(target.url), "") if isinstance(target, UrlTarget) else ""
@@ -111,7 +110,7 @@ def _pieces(
     html: Callable[[tuple[Inline, ...]], Markup],
     context: _Excerpt,
 ) -> Iterator[DefinitionPart]:
-    """A definition, cut at its displayed formulas."""
+    """Split a definition at its displayed formulas."""
     line: list[Inline] = []
     for inline in definition:
         if isinstance(inline, Math) and inline.display:

@@ -1,8 +1,8 @@
-"""How long lessons take, by the pace that the course map states.
+"""Checks how long lessons take, by the pace that the course map states.
 
-Entry point: `FEATURE`. The effort of a document, on its main path and further, is counted when it
-is read, and kept with it. The map says how many minutes a lesson takes; where the count differs by
-more than a quarter, and by more than five minutes, that is a warning.
+Entry point: `FEATURE`. The effort of a document, on its main path and in further sections, is
+counted when it is read, and stored with it. The map says how many minutes a lesson takes; an
+estimate that differs by more than a quarter, and by more than five minutes, is a warning.
 """
 
 from __future__ import annotations
@@ -17,50 +17,50 @@ from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 
 _SHARE, _MINUTES = 0.25, 5
-"""A count is as good as that: it may differ by this share, and by so many minutes."""
+"""The accuracy of an estimate: it can differ by this share, and by so many minutes."""
 
 
 class Effort(Struct, frozen=True):
-    """What there is to read and to do."""
+    """What a reader has to read and to do."""
 
     words: int
-    """To fifty, so that not each edit counts."""
+    """Rounded to fifty, so that a small edit changes nothing."""
     lines: int
-    """Of code and output, to five; a formula is a line."""
+    """Lines of code and output, rounded to five; a formula is a line."""
     tasks: int
 
     def minutes(self, pace: model.Pace) -> int:
-        """How long it takes, to five minutes."""
+        """Estimate how long it takes, rounded to five minutes."""
         exact = self.words / pace.words + self.lines / pace.lines + self.tasks * pace.task
-        return _rounded(exact, 5)
+        return _round_to(exact, 5)
 
 
 class Efforts(Struct, frozen=True):
-    """Of a document."""
+    """The efforts of a document: on its main path, and in further sections."""
 
     main: Effort
     further: Effort
 
 
-def efforts(document: model.Document) -> Efforts:
-    """What a document asks of its reader. Footnotes are read by few, and count nothing."""
+def count_efforts(document: model.Document) -> Efforts:
+    """Count the effort of a document; without footnotes, which few read."""
     parts: dict[bool, list[model.Block]] = {False: [], True: []}
     for further, blocks in model.main_and_further(document.blocks):
         parts[further] += model.walk_blocks(blocks)
-    return Efforts(_effort(parts[False]), _effort(parts[True]))
+    return Efforts(_count_effort(parts[False]), _count_effort(parts[True]))
 
 
-def _effort(blocks: list[model.Block]) -> Effort:
+def _count_effort(blocks: list[model.Block]) -> Effort:
     words = sum(len(model.plain_text(model.block_inlines(block)).split()) for block in blocks)
     tasks = sum(block.tasks() for block in blocks if isinstance(block, model.FeatureBlock))
-    return Effort(_rounded(words, 50), _rounded(sum(map(_lines, blocks)), 5), tasks)
+    return Effort(_round_to(words, 50), _round_to(sum(map(_count_lines, blocks)), 5), tasks)
 
 
-def _rounded(number: float, unit: int) -> int:
+def _round_to(number: float, unit: int) -> int:
     return unit * round(number / unit)
 
 
-def _lines(block: model.Block) -> int:
+def _count_lines(block: model.Block) -> int:
     match block:
         case model.Script() | model.PlainCode() | model.CodeBlock() | model.Mjcf():
             return len(block.code.text.splitlines())
@@ -74,44 +74,40 @@ def _lines(block: model.Block) -> int:
 
 
 def check(course: model.Course, documents: Iterable[model.Document]) -> Iterator[Diagnostic]:
-    """Where a lesson takes longer than the map says, or is done sooner."""
+    """Yield a warning for each lesson that takes more or less time than the map says."""
     if course.pace is None:
         return
-    read = {document.source.path: document for document in documents}
+    by_path = {document.source.path: document for document in documents}
     for lesson in course.lessons:
-        if lesson.path in read:
-            yield from _compare(lesson, _known(read[lesson.path]), course.pace)
+        if lesson.path in by_path:
+            yield from _compare(lesson, _efforts_of(by_path[lesson.path]), course.pace)
 
 
-def _known(document: model.Document) -> Efforts:
-    kept = (document.summaries or {}).get("pace")
-    return kept if isinstance(kept, Efforts) else efforts(document)
+def _efforts_of(document: model.Document) -> Efforts:
+    summary = (document.summaries or {}).get("pace")
+    return summary if isinstance(summary, Efforts) else count_efforts(document)
 
 
-def _compare(lesson: model.Lesson, found: Efforts, pace: model.Pace) -> Iterator[Diagnostic]:
-    for field, part, stated, effort in (
-        ("minutes", f"the main path of lesson {lesson.id} takes", lesson.minutes, found.main),
-        (
-            "further",
-            f"the further sections of lesson {lesson.id} take",
-            lesson.further,
-            found.further,
-        ),
+def _compare(lesson: model.Lesson, efforts: Efforts, pace: model.Pace) -> Iterator[Diagnostic]:
+    main, further = f"the main path of lesson {lesson.id} takes", "the further sections of lesson"
+    for field, part, map_minutes, effort in (
+        ("minutes", main, lesson.minutes, efforts.main),
+        ("further", f"{further} {lesson.id} take", lesson.further, efforts.further),
     ):
-        counted = effort.minutes(pace)
-        if abs(counted - (stated or 0)) <= max(_MINUTES, _SHARE * counted):
+        estimate = effort.minutes(pace)
+        if abs(estimate - (map_minutes or 0)) <= max(_MINUTES, _SHARE * estimate):
             continue
-        says = "does not say so" if stated is None else f"says {stated}"
-        message = f"{part} about {counted} minutes, and the map {says}"
-        help = f"write `{field} = {counted}`"
-        if field == "minutes" and counted > (stated or counted):
+        map_says = "does not say so" if map_minutes is None else f"says {map_minutes}"
+        message = f"{part} about {estimate} minutes, and the map {map_says}"
+        help = f"write `{field} = {estimate}`"
+        if field == "minutes" and estimate > (map_minutes or estimate):
             help += ", or mark sections that only some need with `{.further}`"
         yield diagnose("lesson-minutes", lesson.span, message, help=help)
 
 
 FEATURE = Feature(
     name="pace",
-    summary=lambda document, mathml: Parsed(efforts(document)),
+    summary=lambda document, mathml: Parsed(count_efforts(document)),
     check=check,
     rules=(
         Rule("lesson-minutes", "warning", "A lesson takes more or less time than its map says."),

@@ -1,7 +1,7 @@
-"""The pages that are about the reader: what is read and answered, and what to go over again.
+"""The pages about the reader's progress: what is read and answered, and what to review.
 
-Nothing of a reader is known here. The pages list the lessons with their questions, say what is kept
-and where, and hold places that the page's script fills from the reader's own browser.
+Nothing about a reader is known here. The pages list the lessons with their questions, explain what
+is stored and where, and have places that the page's script fills from the reader's own browser.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.quiz_index import count
 
 _PROGRESS, _REVIEW = "progress/index.html", "review/index.html"
-KEPT_AS = "coursebuild.progress."
-"""What the name under which a browser keeps progress begins with; the course's key follows. As in
+STORAGE_PREFIX = "coursebuild.progress."
+"""The beginning of the name under which a browser stores progress; the course's key follows. As in
 site/js/progress/store.js."""
 
 
-class Asking(Struct, frozen=True):
+class QuestionPage(Struct, frozen=True):
     """A lesson or page with questions."""
 
     id: str
-    """Of a lesson; empty for another page."""
+    """The id of a lesson; empty for other pages."""
     title: str
     href: str
     quiz_index: str
@@ -34,34 +34,34 @@ class Asking(Struct, frozen=True):
 
 
 def progress_values(library: Library) -> dict[str, object]:
-    """What the page of the reader's progress shows: all lessons, by level."""
+    """Return the values for the page of the reader's progress: all lessons, by level."""
     place = urls.Place(_PROGRESS)
     return {
         "levels": tuple(
             level_view(library, place, level, whole=True) for level in library.course.levels
         ),
-        "pages": tuple(one for one in _asking(library, place) if not one.id),
+        "pages": tuple(page for page in _question_pages(library, place) if not page.id),
         "review": place.href(_REVIEW) if library.quiz_index else "",
-        "name": KEPT_AS + library.course.key,
+        "name": STORAGE_PREFIX + library.course.key,
     }
 
 
 def review_values(library: Library) -> dict[str, object]:
-    """What the page of the review shows: where questions are, and when missed ones come back."""
+    """Return the values for the page of the review: the lessons and pages with questions."""
     place = urls.Place(_REVIEW)
-    return {"pages": _asking(library, place), "progress": place.href(_PROGRESS)}
+    return {"pages": _question_pages(library, place), "progress": place.href(_PROGRESS)}
 
 
-def _asking(library: Library, place: urls.Place) -> tuple[Asking, ...]:
-    """Everything with questions, in the order of the course."""
-    found = []
+def _question_pages(library: Library, place: urls.Place) -> tuple[QuestionPage, ...]:
+    """Return everything with questions, in the order of the course."""
+    pages = []
     for owner in library.course.owners:
         text = library.quiz_index.get(owner.path, "")
         if text:
             id = owner.id if isinstance(owner, Lesson) else ""
             href = place.href(urls.owner_path(owner))
-            found.append(Asking(id, owner.title, href, text, count(text)))
-    return tuple(found)
+            pages.append(QuestionPage(id, owner.title, href, text, count(text)))
+    return tuple(pages)
 
 
 _TROUBLE = "progress.trouble."

@@ -1,8 +1,8 @@
-"""The symbols of a course: what a document says of each, and a page of all.
+"""The symbols of a course: what documents declare of each, and a page that lists all.
 
-1. `mathml` reads the symbols of a formula, as the eye reads them.
-2. `uses` reads a document: its symbols, and what it declares of them.
-3. `page` brings those of all lessons together.
+1. `mathml` finds the symbols of a formula.
+2. `uses` finds the symbols of a document, and what it declares of them.
+3. `page` collects those of all lessons.
 """
 
 from coursebuild.core.features import Feature, PageKind

@@ -1,8 +1,8 @@
 """The index of symbols: what the letters in the formulas of the course stand for, and where.
 
-Entry points: `symbols_values`, what the page shows; `used_symbols`.
+Entry points: `symbols_values`, for the page; `used_symbols`.
 
-Symbols whose meaning a lesson declares come first; the others are listed with their places.
+Symbols whose meaning a lesson declares come first; for the others only their places are listed.
 """
 
 from __future__ import annotations
@@ -31,31 +31,31 @@ class CourseSymbol(Struct):
 
     first: SymbolUse
     owners: list[Owner] = field(default_factory=list)
-    """Where it is used, in the order of the course."""
+    """The lessons that use it, in the order of the course."""
     meanings: dict[tuple[str, str], list[Owner]] = field(default_factory=dict)
-    """What it stands for, with its unit, and in which lessons."""
+    """The lessons that declare it, by its meaning and unit there."""
 
 
 def used_symbols(library: Library) -> Iterator[tuple[Lesson, SymbolUse]]:
-    """The symbols of all lessons, in the order of the course."""
-    for owner, found in library.summaries("symbols"):
+    """Yield the symbols of all lessons, in the order of the course."""
+    for owner, symbols in library.summaries("symbols"):
         if isinstance(owner, Lesson):
-            for use in found.uses:
+            for use in symbols.uses:
                 yield owner, use
 
 
 def _course_symbols(library: Library) -> list[CourseSymbol]:
-    found: dict[str, CourseSymbol] = {}
+    rows: dict[str, CourseSymbol] = {}
     for owner, use in used_symbols(library):
-        row = found.setdefault(use.symbol, CourseSymbol(use))
+        row = rows.setdefault(use.symbol, CourseSymbol(use))
         row.owners.append(owner)
         if use.meaning:
             row.meanings.setdefault((use.meaning, use.unit), []).append(owner)
-    return sorted(found.values(), key=lambda row: sort_key(row.first.symbol))
+    return sorted(rows.values(), key=lambda row: sort_key(row.first.symbol))
 
 
 class MeaningView(Struct, frozen=True):
-    """What a symbol stands for; `places`, where lessons differ in it."""
+    """What a symbol stands for; `places` are the lessons that say so, if others differ."""
 
     text: str
     unit: str
@@ -63,18 +63,18 @@ class MeaningView(Struct, frozen=True):
 
 
 class SymbolView(Struct, frozen=True):
-    """A row."""
+    """A symbol in the index."""
 
     symbol: Markup
     meanings: tuple[MeaningView, ...]
     first: OwnerLink
     section: str
-    """The heading under which it stands there; empty before the first."""
+    """The heading above its first use; empty before the first heading."""
     others: OwnerLinks
 
 
 def symbols_values(library: Library) -> dict[str, object]:
-    """What the index shows."""
+    """Return the values for the template of the index."""
     place = urls.Place("symbols/index.html")
     rows = [_view(library, place, row) for row in _course_symbols(library)]
     return {
@@ -86,11 +86,11 @@ def symbols_values(library: Library) -> dict[str, object]:
 
 def _view(library: Library, place: urls.Place, row: CourseSymbol) -> SymbolView:
     anchor, section = row.first.section
-    several = len(row.meanings) > 1
+    is_ambiguous = len(row.meanings) > 1
     return SymbolView(
         Markup(f"<math>{row.first.symbol}</math>"),
         tuple(
-            MeaningView(text, unit, owner_links(library, place, owners) if several else None)
+            MeaningView(text, unit, owner_links(library, place, owners) if is_ambiguous else None)
             for (text, unit), owners in row.meanings.items()
         ),
         owner_link(place, row.owners[0], anchor),

@@ -16,14 +16,14 @@ from coursebuild.features.symbols.mathml import only_symbol, symbols
 
 
 class SymbolUse(Struct, frozen=True):
-    """A symbol of the formulas of a document, where it stands first."""
+    """A symbol in the formulas of a document, with the place of its first use."""
 
     symbol: str
-    """MathML in its shortest form: two symbols that look the same are the same text."""
+    """MathML in its shortest form: symbols that look the same are equal."""
     section: tuple[str, str]
-    """Anchor and text of the heading under which it stands; empty before the first."""
+    """Anchor and text of the heading above it; empty before the first heading."""
     meaning: str = ""
-    """What the document says that it stands for."""
+    """What it stands for, if the document declares that."""
     unit: str = ""
 
 
@@ -34,16 +34,17 @@ class DocumentSymbols(Struct, frozen=True):
 
 
 def document_symbols(document: model.Document, mathml: Mathml) -> Parsed[DocumentSymbols | None]:
-    """The symbols of a document, and what is wrong in its declarations."""
+    """Return the symbols of a document; diagnostics are about its declarations."""
     if "$" not in document.source.text:
         return Parsed(None)
     uses = _uses(document, mathml)
-    wrong = tuple(_misdeclared(document, mathml)) if "${" in document.source.text else ()
-    return Parsed(DocumentSymbols(uses) if uses else None, wrong)
+    has_declarations = "${" in document.source.text
+    diagnostics = tuple(_check_declarations(document, mathml)) if has_declarations else ()
+    return Parsed(DocumentSymbols(uses) if uses else None, diagnostics)
 
 
 def _uses(document: model.Document, mathml: Mathml) -> tuple[SymbolUse, ...]:
-    found: dict[str, SymbolUse] = {}
+    uses: dict[str, SymbolUse] = {}
     section = "", ""
     for block in _blocks(document):
         if block is None:
@@ -56,15 +57,14 @@ def _uses(document: model.Document, mathml: Mathml) -> tuple[SymbolUse, ...]:
             meaning = formula.meaning if isinstance(formula, model.Math) else None
             only = only_symbol(html) if meaning is not None else None
             for symbol in (only,) if only is not None else symbols(html):
-                known = found.setdefault(symbol, SymbolUse(symbol, section))
-                if meaning is not None and not known.meaning:
-                    said = meaning.text, meaning.unit
-                    found[symbol] = SymbolUse(symbol, known.section, *said)
-    return tuple(found.values())
+                use = uses.setdefault(symbol, SymbolUse(symbol, section))
+                if meaning is not None and not use.meaning:
+                    uses[symbol] = SymbolUse(symbol, use.section, meaning.text, meaning.unit)
+    return tuple(uses.values())
 
 
 def _blocks(document: model.Document) -> Iterator[model.Block | None]:
-    """All blocks; `None` before the footnotes, which stand under no heading."""
+    """Yield all blocks, and `None` before the footnotes, which belong to no heading."""
     yield from model.walk_blocks(document.blocks)
     yield None
     for footnote in document.footnotes:
@@ -79,18 +79,18 @@ def _formulas_in(block: model.Block) -> Iterator[model.Math | model.MathBlock]:
             yield inline
 
 
-def _misdeclared(document: model.Document, mathml: Mathml) -> Iterator[Diagnostic]:
-    """Declarations of what is no symbol, and those of one symbol with two meanings."""
+def _check_declarations(document: model.Document, mathml: Mathml) -> Iterator[Diagnostic]:
+    """Yield a diagnostic for each declaration of no symbol, or of one declared before."""
     first: dict[str, model.Math] = {}
     for block in model.document_blocks(document):
         for formula in _formulas_in(block):
             if isinstance(formula, model.Math) and formula.meaning is not None:
                 html = mathml(formula.tex.text, False)
                 if html:
-                    yield from _declaration(formula, html, first)
+                    yield from _check_declaration(formula, html, first)
 
 
-def _declaration(
+def _check_declaration(
     formula: model.Math, html: str, first: dict[str, model.Math]
 ) -> Iterator[Diagnostic]:
     symbol = only_symbol(html)
@@ -99,9 +99,9 @@ def _declaration(
         help = "declare one letter with its accents and indices"
         yield diagnose("symbol-formula", formula.tex.span(), message, help=help)
         return
-    before = first.setdefault(symbol, formula)
-    if before is not formula:
-        note = Note("first declared here", before.span)
+    first_declaration = first.setdefault(symbol, formula)
+    if first_declaration is not formula:
+        note = Note("first declared here", first_declaration.span)
         message = f"`${formula.tex.text}$` is declared twice in this text"
         help = "a reader looks for one meaning; give the other quantity another letter"
         yield diagnose("symbol-repeated", formula.span, message, help=help, notes=[note])
