@@ -1,7 +1,7 @@
-"""What a change does to a course, for those who review it: the command `diff`.
+"""The command `diff`, which reports what a change does to a course, for its reviewers.
 
 `report` compares two states of a course, `weight` their sites; `commands` reads them from the disk,
-an earlier state with git. Nothing is run.
+or an earlier state from git. Nothing is run.
 """
 
 from coursebuild.core.features import Command, Feature

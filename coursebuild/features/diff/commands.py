@@ -30,32 +30,32 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments of the command."""
     parser.add_argument("base", metavar="BASE", help="a revision of git, or a folder with a course")
-    for name, which in (("--base-site", "BASE"), ("--site", "this course")):
-        help = f"where `build` published {which}, for the weight of pages"
+    for name, subject in (("--base-site", "BASE"), ("--site", "this course")):
+        help = f"where `build` published {subject}, for the weight of pages"
         parser.add_argument(name, metavar="FOLDER", help=help)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the report; no difference is a mistake."""
+    """Print the report; the exit status does not depend on differences."""
     root, sites = options_of(arguments).root, (arguments.base_site, arguments.site)
     if sites.count(None) == 1:
         raise UsageError("--site and --base-site belong together: one is compared with the other")
-    with _base(root, arguments.base) as (name, folder):
-        text = report(name, _state(folder), _state(root))
+    with _open_base(root, arguments.base) as (name, folder):
+        text = report(name, _load_state(folder), _load_state(root))
     if None not in sites:
         text += f"\n{weight_section(*(root / site for site in sites))}"
     return write(text, CLEAN)
 
 
-def _state(root: Path) -> CourseState:
+def _load_state(root: Path) -> CourseState:
     return CourseState(load_course(root), functools.partial(read_recorded, root))
 
 
 @contextlib.contextmanager
-def _base(root: Path, name: str) -> Iterator[tuple[str, Path]]:
-    """The earlier state: its name in Markdown, and its folder."""
+def _open_base(root: Path, name: str) -> Iterator[tuple[str, Path]]:
+    """Provide the earlier state: its name in Markdown, and its folder."""
     if (Path(name) / MAP).is_file():
         yield f"`{name}`", Path(name).resolve()
         return
@@ -70,9 +70,9 @@ def _base(root: Path, name: str) -> Iterator[tuple[str, Path]]:
 
 
 def _git(root: Path, *arguments: str) -> bytes:
-    """What git prints; nothing where it fails."""
+    """Return what git prints; nothing if it fails."""
     try:
-        done = subprocess.run(["git", *arguments], cwd=root, capture_output=True)
+        process = subprocess.run(["git", *arguments], cwd=root, capture_output=True)
     except OSError as error:
         raise EffectError(f"git cannot be run: {reason(error)}") from None
-    return done.stdout if done.returncode == 0 else b""
+    return process.stdout if process.returncode == 0 else b""

@@ -1,4 +1,4 @@
-"""Two states of a course beside each other, as Markdown.
+"""Compares two states of a course, as Markdown.
 
 Entry points: `CourseState`, `report(base, old, new)`; `section`, a part of such a report.
 """
@@ -23,12 +23,12 @@ from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.figures import ReadFile, describe_difference
 from coursebuild.core.scripts.findings import classes
 from coursebuild.core.text.source import Excerpt
-from coursebuild.features.truth.claims import Claims, claims_of, documents_of, total
+from coursebuild.features.truth.claims import Claims, claims_of, documents_with_claims, sum_claims
 
 _ROWS = 40
 """Rows of a table: GitHub shows a summary of up to a mebibyte."""
 _SHORT = 40
-"""Characters of a value, up to which it is shown."""
+"""Characters of a value that is short enough to be shown."""
 
 Row = tuple[str, ...]
 K = TypeVar("K")
@@ -36,129 +36,132 @@ V = TypeVar("V")
 
 
 class CourseState(Struct, frozen=True):
-    """A course, and what reads its files."""
+    """A course, and a function that reads its files."""
 
     course: Course
     read: ReadFile
 
 
 class ScriptState(Struct, frozen=True):
-    """A script, and what is recorded of it."""
+    """A script with its recorded outputs."""
 
     owner: str
-    """Id of its lesson or page."""
+    """The id of its lesson or page."""
     code: str
     outputs: tuple[Recording, ...]
-    """Tables as their text, and each with how it is compared."""
+    """Each with its comparison; tables as their text."""
 
 
 class LabState(Struct, frozen=True):
-    """A lab, or whatever else is tried."""
+    """A lab, or another block that `check` tries."""
 
     text: str
     data: Mapping[str, object]
-    """What the text says, of one in JSON."""
+    """The values in its text, if that is JSON."""
     models: Mapping[str, str]
     """The texts of its models, by name."""
 
 
 def report(base: str, old: CourseState, new: CourseState) -> str:
-    """What became of a course since `base`."""
+    """Return a report on the changes of a course since `base`."""
     before, now = (
-        {owner.id: one.source.text for owner, one in state.course.owned_documents}
+        {owner.id: document.source.text for owner, document in state.course.owned_documents}
         for state in (old, new)
     )
-    edited = ", ".join(f"{id} {what}" for id, what in _changes(before, now)) or "no change"
-    figures = _changes(_figures(old), _figures(new), _redrawn)
-    labs = _changes(_labs(old.course), _labs(new.course), _fields)
+    texts = ", ".join(f"{id} {change}" for id, change in _changes(before, now)) or "no change"
+    figures = _changes(_figures(old), _figures(new), _describe_figure_change)
+    labs = _changes(_labs(old.course), _labs(new.course), _describe_lab_change)
     parts = (
-        f"## What this change does\n\nCompared with {base}. Lessons and pages: {edited}.\n",
-        _outputs(_scripts(old.course), _scripts(new.course)),
+        f"## What this change does\n\nCompared with {base}. Lessons and pages: {texts}.\n",
+        _outputs_section(_scripts(old.course), _scripts(new.course)),
         section(
             "Figures",
             "What scripts draw, as it is recorded.",
             ("figure", "change"),
-            [(f"`{path}`", said) for path, said in figures],
+            [(f"`{path}`", change) for path, change in figures],
         ),
         section(
             "Labs",
             "What readers run. Whether each does what it promises is what `check` says.",
             ("in", "lab", "change"),
-            [(*lab, said) for lab, said in labs],
+            [(*lab, change) for lab, change in labs],
         ),
-        _truth(old.course, new.course),
+        _truth_section(old.course, new.course),
     )
     return "\n".join(parts)
 
 
 def section(title: str, meaning: str, header: Row, rows: Sequence[Row]) -> str:
-    """A heading, what the numbers mean, and a table; one line where nothing changed."""
+    """Return a heading, an explanation and a table; one line if nothing changed."""
     if not rows:
         return f"### {title}\n\nNo change.\n"
-    shown = [[" ".join(cell.replace("|", "\\|").split()) for cell in row] for row in rows[:_ROWS]]
-    shown += [[f"and {len(rows) - _ROWS} more"]] if len(rows) > _ROWS else []
-    return f"### {title}\n\n{meaning}\n\n{table(header, shown)}\n"
+    cells = [[" ".join(cell.replace("|", "\\|").split()) for cell in row] for row in rows[:_ROWS]]
+    cells += [[f"and {len(rows) - _ROWS} more"]] if len(rows) > _ROWS else []
+    return f"### {title}\n\n{meaning}\n\n{table(header, cells)}\n"
 
 
 def _changes(
-    before: Mapping[K, V], now: Mapping[K, V], how: Callable[[V, V], str] = lambda a, b: "edited"
+    before: Mapping[K, V],
+    now: Mapping[K, V],
+    describe: Callable[[V, V], str] = lambda a, b: "edited",
 ) -> Iterator[tuple[K, str]]:
-    """What became of each thing that is not as it was; `how` says it, of one that both have."""
+    """Yield each key with a different value, and the change; `describe` is for keys in both."""
     for key in dict.fromkeys((*before, *now)):
         if key not in before or key not in now:
             yield key, "new" if key in now else "removed"
-        elif before[key] != now[key] and (said := how(before[key], now[key])):
-            yield key, said
+        elif before[key] != now[key] and (change := describe(before[key], now[key])):
+            yield key, change
 
 
 # --- outputs
 
 
 def _scripts(course: Course) -> dict[str, ScriptState]:
-    recorded: dict[str | None, list[Recording]] = {}
+    outputs: dict[str | None, list[Recording]] = {}
     for document in course.documents:
         for block in document_blocks(document):
             if isinstance(block, Recording):
                 body = block.body if isinstance(block.body, Excerpt) else None
                 text = body or Excerpt.of_span(block.body_span)
-                how = block.comparison or course.comparison
-                whole = replace(block, body=text, comparison=how)
-                recorded.setdefault(block.script, []).append(whole)
+                comparison = block.comparison or course.comparison
+                output = replace(block, body=text, comparison=comparison)
+                outputs.setdefault(block.script, []).append(output)
     return {
-        one.path: ScriptState(one.owner, one.text, tuple(recorded.get(one.path, ())))
-        for one in extract(course).value
+        script.path: ScriptState(script.owner, script.text, tuple(outputs.get(script.path, ())))
+        for script in extract(course).value
     }
 
 
-def _outputs(before: Mapping[str, ScriptState], now: Mapping[str, ScriptState]) -> str:
-    changes = dict(_changes(before, now, _recorded))
+def _outputs_section(before: Mapping[str, ScriptState], now: Mapping[str, ScriptState]) -> str:
+    changes = dict(_changes(before, now, _describe_script_change))
     rows = [(f"`{path}`", (now.get(path) or before[path]).owner, changes[path]) for path in changes]
     meaning = "What scripts print, as it is recorded. Whether they print it is what `check` says."
     parts = [section("Outputs", meaning, ("script", "in", "change"), rows)]
     for path in [path for path in changes if path in before and path in now][:_ROWS]:
         pairs = zip_longest(before[path].outputs, now[path].outputs)
-        lines = "\n".join(filter(None, (text_diff(_text(one), _text(two)) for one, two in pairs)))
+        lines = "\n".join(filter(None, (text_diff(_text(old), _text(new)) for old, new in pairs)))
         if lines:
             summary = f"<summary><code>{path}</code></summary>"
             parts.append(f"<details>{summary}\n\n{fence('diff', lines)}\n\n</details>\n")
     return "\n".join(parts)
 
 
-def _recorded(before: ScriptState, now: ScriptState) -> str:
-    """How a script and what is recorded of it differ, in words."""
-    said = ["code edited"] if before.code != now.code else []
+def _describe_script_change(before: ScriptState, now: ScriptState) -> str:
+    """Describe how a script and its recorded outputs differ."""
+    parts = ["code edited"] if before.code != now.code else []
     for old, new in zip_longest(before.outputs, now.outputs):
         if old is None or new is None:
-            said.append("an output removed" if new is None else "an output added")
+            parts.append("an output removed" if new is None else "an output added")
             continue
         changes = compare(old, Comparison(), (), _text(new)).changes
         largest = max((change.relative_error or 0.0 for change in changes), default=0.0)
-        more = f" (relative, up to {largest:.1e})" if largest else ""
-        said += [classes(changes) + more] if changes else []
+        suffix = f" (relative, up to {largest:.1e})" if largest else ""
+        parts += [classes(changes) + suffix] if changes else []
         if old.comparison != new.comparison:
-            modes = dict.fromkeys(one.comparison.mode.value for one in (old, new) if one.comparison)
-            said.append(f"**compared in another way** ({' → '.join(modes)})")
-    return "; ".join(said)
+            comparisons = (output.comparison for output in (old, new) if output.comparison)
+            modes = dict.fromkeys(comparison.mode.value for comparison in comparisons)
+            parts.append(f"**compared in another way** ({' → '.join(modes)})")
+    return "; ".join(parts)
 
 
 def _text(recording: Recording | None) -> str:
@@ -169,75 +172,74 @@ def _text(recording: Recording | None) -> str:
 
 
 def _figures(state: CourseState) -> dict[str, tuple[str, bytes]]:
-    """Paths and bytes of recorded figures and their data, by path."""
-    paths = (figure.path for one in state.course.documents for figure in recorded_figures(one))
+    """Return the paths and bytes of recorded figures and their data, by path."""
+    documents = state.course.documents
+    paths = (figure.path for document in documents for figure in recorded_figures(document))
     return {path: (path, data) for path in paths if (data := state.read(path)) is not None}
 
 
-def _redrawn(before: tuple[str, bytes], now: tuple[str, bytes]) -> str:
+def _describe_figure_change(before: tuple[str, bytes], now: tuple[str, bytes]) -> str:
     return describe_difference(*before, now[1]) or "less than can be seen"
 
 
 def _labs(course: Course) -> dict[tuple[str, str], LabState]:
-    """Labs in texts, by the id of the lesson or page and the title, else the name."""
+    """Return the labs in texts, by the id of the lesson or page, and their title or name."""
     texts = {model.name: model.source.text for model in course.models}
-    found: dict[tuple[str, str], LabState] = {}
+    labs: dict[tuple[str, str], LabState] = {}
     for _, trial in feature_trials(course).values():
         text = trial.block.span.text
-        if trial.block.span.path.startswith("models/"):  # of a model that no text shows
+        if trial.block.span.path.startswith("models/"):  # the trial of a model that no text shows
             continue
-        data = _json(text.partition("\n")[2].rpartition("\n")[0])
+        data = _parse_object(text.partition("\n")[2].rpartition("\n")[0])
         key = trial.owner, str(data.get("title") or trial.name)
         models = {name: texts.get(name, "") for name in trial.block.models()}
-        found[(trial.owner, trial.name) if key in found else key] = LabState(text, data, models)
-    return found
+        labs[(trial.owner, trial.name) if key in labs else key] = LabState(text, data, models)
+    return labs
 
 
-def _json(text: str) -> dict[str, object]:
-    """An object; empty where the text is none."""
+def _parse_object(text: str) -> dict[str, object]:
+    """Parse a JSON object; empty if the text is none."""
     try:
-        found = json.loads(text)
+        value = json.loads(text)
     except ValueError:
         return {}
-    return found if isinstance(found, dict) else {}
+    return value if isinstance(value, dict) else {}
 
 
-def _fields(before: LabState, now: LabState) -> str:
-    """Which fields of a lab differ, with their values where these are short, and which models."""
-    said = []
+def _describe_lab_change(before: LabState, now: LabState) -> str:
+    """List the fields of a lab that differ, with their values if short, and the models."""
+    parts = []
     for name in dict.fromkeys((*before.data, *now.data)):
         values = [json.dumps(lab.data.get(name), ensure_ascii=False) for lab in (before, now)]
         if values[0] != values[1]:
-            short = max(map(len, values)) <= _SHORT
-            said.append(f"`{name}`" + (" `{}` → `{}`".format(*values) if short else ""))
-    if before.text != now.text and not said:
-        said.append("its text")
+            is_short = max(map(len, values)) <= _SHORT
+            parts.append(f"`{name}`" + (" `{}` → `{}`".format(*values) if is_short else ""))
+    if before.text != now.text and not parts:
+        parts.append("its text")
     models = _changes(before.models, now.models)
-    return ", ".join((*said, *(f"model `{name}` {what}" for name, what in models)))
+    return ", ".join((*parts, *(f"model `{name}` {change}" for name, change in models)))
 
 
 # --- truth
 
 
-def _truth(old: Course, new: Course) -> str:
+def _truth_section(old: Course, new: Course) -> str:
     before, now = (
-        {owner.id: claims_of(document) for owner, document in documents_of(course)}
+        {owner.id: claims_of(document) for owner, document in documents_with_claims(course)}
         for course in (old, new)
     )
-    nothing = Claims(0, 0, 0, ())
-    pairs = {id: (before.get(id, nothing), now.get(id, nothing)) for id in {**before, **now}}
-    pairs["all"] = total(before.values()), total(now.values())
-    counted = {
-        id: [(*claims.counts, claims.share) for claims in pair] for id, pair in pairs.items()
-    }
+    no_claims = Claims(0, 0, 0, ())
+    pairs = {id: (before.get(id, no_claims), now.get(id, no_claims)) for id in {**before, **now}}
+    pairs["all"] = sum_claims(before.values()), sum_claims(now.values())
+    counts = {id: [(*claims.counts, claims.share) for claims in pair] for id, pair in pairs.items()}
     return section(
         "Truth",
         "Numbers in the text, and those that a script prints, a formula computes, or the author"
         " gives as known. Whether they hold is what `check` says.",
         ("in", "numbers", "printed", "computed", "given", "unproven", "proven"),
         [
-            (id, *(a if a == b else f"{a} → {b}" for a, b in zip(one, two, strict=True)))
-            for id, (one, two) in counted.items()
-            if one != two
+            (id, *(a if a == b else f"{a} → {b}" for a, b in zip(old_row, new_row, strict=True)))
+            for id, (old_row, new_row) in counts.items()
+            if old_row != new_row
         ],
     )

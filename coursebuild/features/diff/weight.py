@@ -1,4 +1,4 @@
-"""How much the pages of a site weigh, before a change and after it.
+"""Compares the weight of the pages of a site before and after a change.
 
 Entry point: `weight_section(old, new)`.
 """
@@ -17,15 +17,15 @@ _WHOLE = "the whole site"
 
 
 def weight_section(old: Path, new: Path) -> str:
-    """What became of the weight of pages; `old` and `new` are folders of sites."""
+    """Report how the weight of pages changed; `old` and `new` are folders of sites."""
     for folder in (old, new):
         if not (folder / "index.html").is_file():
             return f"### Page weight\n\nNot compared: there is no site in `{folder.name}`.\n"
     before, now = _weights(old), _weights(new)
     sizes = {name: (before.get(name, 0), now.get(name, 0)) for name in {**before, **now}}
     rows = []
-    changed = sorted(sizes.items(), key=lambda one: -abs(one[1][1] - one[1][0]))
-    for name, (a, b) in sorted(changed, key=lambda one: one[0] != _WHOLE):
+    by_change = sorted(sizes.items(), key=lambda item: -abs(item[1][1] - item[1][0]))
+    for name, (a, b) in sorted(by_change, key=lambda item: item[0] != _WHOLE):
         if abs(b - a) >= _SHARE * max(a, b) or (name == _WHOLE and a != b):
             change = f"{b / a - 1:+.1%}" if a and b else "new" if b else "removed"
             rows.append((name, f"{a / 1000:.1f} kB", f"{b / 1000:.1f} kB", change))
@@ -39,15 +39,15 @@ def weight_section(old: Path, new: Path) -> str:
 
 
 def _weights(site: Path) -> dict[str, int]:
-    """Bytes of each page with what a browser loads for its HTML, and of all files."""
+    """Return the bytes of each page with the files that its HTML loads, and of all files."""
     files = [path for path in site.rglob("*") if path.is_file()]
     sizes = {path.relative_to(site).as_posix(): path.stat().st_size for path in files}
-    pages = {path: {path, *_loaded(site, path)} for path in sizes if path.endswith(".html")}
-    found = {path: sum(sizes.get(name, 0) for name in names) for path, names in pages.items()}
-    return {**found, _WHOLE: sum(sizes.values())}
+    pages = {path: {path, *_find_assets(site, path)} for path in sizes if path.endswith(".html")}
+    weights = {path: sum(sizes.get(name, 0) for name in names) for path, names in pages.items()}
+    return {**weights, _WHOLE: sum(sizes.values())}
 
 
-def _loaded(site: Path, page: str) -> set[str]:
+def _find_assets(site: Path, page: str) -> set[str]:
     html = (site / page).read_text(encoding="utf-8", errors="replace")
     urls = {
         attributes.get("src") or attributes.get("href") or ""

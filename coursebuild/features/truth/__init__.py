@@ -1,7 +1,7 @@
-"""How much of a course is proven: which numbers are neither bound, nor computed, nor given.
+"""Measures how much of a course is proven: numbers that are bound, computed or given.
 
-The claims of a document are counted when it is read (`claims`), and kept with it. The fence `truth`
-shows them lesson by lesson, and `[verify] truth` in the course map makes a gate of the share.
+The claims of a document are counted when it is read (`claims`), and stored with it. The fence
+`truth` shows them lesson by lesson, and `[verify] truth` in the course map requires a share.
 """
 
 from __future__ import annotations
@@ -12,7 +12,12 @@ from coursebuild.core.features import Feature
 from coursebuild.core.model import Course, Document, Lesson
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
-from coursebuild.features.truth.claims import claims_of, document_claims, documents_of, total
+from coursebuild.features.truth.claims import (
+    claims_of,
+    document_claims,
+    documents_with_claims,
+    sum_claims,
+)
 from coursebuild.features.truth.table import KIND
 
 _TEXTS = """\
@@ -29,28 +34,30 @@ all = "All"
 
 
 def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
-    """That less is proven than the course map asks for."""
+    """Yield an error if less is proven than the course map asks for."""
     if course.truth is None:
         return
-    found = total(claims_of(document) for _, document in documents_of(course))
-    if found.proven < course.truth * found.all:
-        wanted = f"{100 * course.truth:g} %"
-        message = f"{found.share} of the numbers are proven, and {wanted} are asked for"
-        help = f"`coursebuild check --truth` lists the other {len(found.open)}"
+    claims = sum_claims(claims_of(document) for _, document in documents_with_claims(course))
+    if claims.proven < course.truth * claims.all:
+        required = f"{100 * course.truth:g} %"
+        message = f"{claims.share} of the numbers are proven, and {required} are asked for"
+        help = f"`coursebuild check --truth` lists the other {len(claims.open)}"
         yield diagnose("truth-share", course.truth_span, message, help=help)
 
 
 def unproven(course: Course) -> Iterator[Diagnostic | str]:
-    """Each number that nothing proves, and the share of the others by lesson."""
-    known = [(owner, claims_of(document)) for owner, document in documents_of(course)]
-    rows = [(owner.id if isinstance(owner, Lesson) else owner.title, one) for owner, one in known]
-    for name, claims in (*rows, ("all", total(one for _, one in known))):
+    """Yield the share of proven numbers by lesson, and each number that nothing proves."""
+    rows = [
+        (owner.id if isinstance(owner, Lesson) else owner.title, claims_of(document))
+        for owner, document in documents_with_claims(course)
+    ]
+    for name, claims in (*rows, ("all", sum_claims(claims for _, claims in rows))):
         if claims.all:
             yield (
                 f"{name}: {claims.share} of {claims.all} numbers proven: {claims.bound} bound,"
                 f" {claims.computed} computed, {claims.given} given"
             )
-    for _, claims in known:
+    for _, claims in rows:
         for place in claims.open:
             yield diagnose("number-unproven", place, f"nothing proves `{place.text}`")
 

@@ -1,15 +1,15 @@
-"""The numbers that a document claims, and what proves each.
+"""Finds the numbers that a document claims, and what proves each.
 
-Entry points: `claims_of(document)`, `documents_of(course)`, `total(claims)`.
+Entry points: `claims_of(document)`, `documents_with_claims(course)`, `sum_claims(claims)`.
 
-1. A number in digits is a claim, but not: a whole number up to twelve without a unit, which counts
+1. A number in digits is a claim, except: a whole number up to twelve without a unit, which counts
    or names as a word does; a year; what only looks like a number (versions, dates, `x1`).
 2. Headings, footnotes (which name sources), code, addresses, links to lessons, pages and models,
-   and recorded outputs are not looked at.
+   and recorded outputs have no claims.
 3. In formulas a side that is a number is one claim, and so is a side with symbols in which a number
-   has a point. Where arithmetic was computed the whole chain is one claim.
-4. A number in an alternative text, where nothing can be marked, is proven where the document has
-   it bound or given.
+   has a point. A chain whose arithmetic was checked is one claim.
+4. A number in an alternative text, where nothing can be marked, is proven if the same number is
+   bound or given in the document.
 """
 
 from __future__ import annotations
@@ -37,74 +37,74 @@ _UNIT = re.compile(
 )
 _DECIMAL = re.compile(r"\d\.\d")
 _MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
-"""What a formula without claims does not have."""
+"""Every formula with claims matches this."""
 _DIGIT = re.compile("[0-9]")
 
 
 class Claims(Struct, frozen=True):
-    """How many numbers of a document are proven, and where the others stand."""
+    """The number of proven claims of a document, and the places of the others."""
 
     bound: int
     """Printed by a script."""
     computed: int
     """Computed in a formula."""
     given: int
-    """Said to be given by the author."""
+    """Marked as given by the author."""
     open: tuple[Span, ...]
 
     @property
     def proven(self) -> int:
-        """How many are."""
+        """The number of proven claims."""
         return self.bound + self.computed + self.given
 
     @property
     def all(self) -> int:
-        """How many there are."""
+        """The number of claims."""
         return self.proven + len(self.open)
 
     @property
     def share(self) -> str:
-        """The share of those that are proven, rounded down."""
+        """The share of proven claims, rounded down."""
         return f"{1000 * self.proven // self.all / 10:.1f} %" if self.all else "–"
 
     @property
     def counts(self) -> tuple[str, ...]:
-        """How many there are, are proven in each way, and are not."""
+        """The numbers of all claims, of those proven in each way, and of the others."""
         counts = (self.all, self.bound, self.computed, self.given, len(self.open))
         return tuple(map(str, counts))
 
 
 def claims_of(document: model.Document) -> Claims:
-    """The claims of a document whose text may be left out."""
-    known = (document.summaries or {}).get("truth")
-    return known if isinstance(known, Claims) else document_claims(document)
+    """Return the claims of a document, from its summary if it has one."""
+    summary = (document.summaries or {}).get("truth")
+    return summary if isinstance(summary, Claims) else document_claims(document)
 
 
-def documents_of(course: model.Course) -> Iterator[tuple[model.Owner, model.Document]]:
-    """The lessons, and the pages that every page's menu has, as far as they are written."""
+def documents_with_claims(course: model.Course) -> Iterator[tuple[model.Owner, model.Document]]:
+    """Yield the documents whose claims count: of lessons, and of pages in the menu."""
     for owner, document in course.owned_documents:
         if isinstance(owner, model.Lesson) or owner.menu:
             yield owner, document
 
 
-def total(claims: Iterable[Claims]) -> Claims:
-    """The claims of several documents."""
-    known = tuple(claims)
-    places = tuple(place for one in known for place in one.open)
-    bound, computed, given = (sum(getattr(one, kind) for one in known) for kind in KINDS)
+def sum_claims(claims: Iterable[Claims]) -> Claims:
+    """Return the claims of several documents."""
+    terms = tuple(claims)
+    places = tuple(place for term in terms for place in term.open)
+    bound, computed, given = (sum(getattr(term, kind) for term in terms) for kind in KINDS)
     return Claims(bound, computed, given, places)
 
 
 def document_claims(document: model.Document) -> Claims:
-    """The claims of a document, from its text."""
+    """Find the claims of a document in its text."""
     counter = _Counter()
-    recorded: set[int] = set()
+    output_ids: set[int] = set()
     for block in model.walk_blocks(document.blocks):
         if isinstance(block, model.Recording):
-            recorded.add(id(block.body))
+            output_ids.add(id(block.body))
         if isinstance(block, model.MathBlock):
             counter.formula(block.tex, block.label.source if block.label else None)
-        elif not isinstance(block, model.Heading) and id(block) not in recorded:
+        elif not isinstance(block, model.Heading) and id(block) not in output_ids:
             counter.inlines(model.block_inlines(block))
     for span, numbers in counter.alternatives:
         counter.add("bound" if numbers <= counter.marked else "", span)
@@ -120,14 +120,14 @@ class _Counter:
         self.alternatives: list[tuple[Span, set[str]]] = []
 
     def add(self, kind: str, span: Span) -> None:
-        """A claim and what proves it: nothing, where that is empty."""
+        """Add a claim and what proves it; an empty kind stands for no proof."""
         if kind:
             self.kinds.append(kind)
         else:
             self.open.append(span)
 
     def inlines(self, inlines: Iterable[model.Inline]) -> None:
-        """The claims of a line."""
+        """Add the claims of inlines."""
         for inline in inlines:
             match inline:
                 case model.Text():
@@ -142,7 +142,7 @@ class _Counter:
                         source = inline.label.source
                     self.formula(inline.tex, source)
                 case model.Image():
-                    numbers = {number.text for number in claimed(inline.alt)}
+                    numbers = {number.text for number in find_claims(inline.alt)}
                     self.alternatives += [(inline.span, {number}) for number in sorted(numbers)]
                 case model.Link(target=model.UrlTarget() | model.TermTarget()):
                     if not _is_address(inline):
@@ -153,47 +153,47 @@ class _Counter:
                     pass
 
     def text(self, text: model.Text) -> None:
-        """The claims of plain text."""
-        exact = text.span.end - text.span.start == len(text.text)
-        for number in claimed(text.text):
+        """Add the claims of plain text."""
+        is_verbatim = text.span.end - text.span.start == len(text.text)
+        for number in find_claims(text.text):
             span = text.span
-            if exact:
+            if is_verbatim:
                 span = Span(span.source, span.start + number.start, span.start + number.end)
             self.add("", span)
 
     def formula(self, tex: Excerpt, source: str | None) -> None:
-        """The claims of a formula."""
+        """Add the claims of a formula."""
         if _MAY_CLAIM.search(tex.text) is None:
             return
-        holds = [one for one in check_arithmetic(tex.text) if one.kind == "holds"]
+        proofs = [c for c in check_arithmetic(tex.text) if c.kind == "holds"]
         for statement in read_statements(tex.text):
             first, last = statement.sides[0], statement.sides[-1]
-            if any(first.start <= one.start < last.end for one in holds):
+            if any(first.start <= proof.start < last.end for proof in proofs):
                 self.add("computed", tex.span(first.start, last.end))
                 continue
             for side in statement.sides:
                 if _is_claim(side, tex.text):
-                    place = tex.span(*_trimmed(tex.text, side.start, side.end))
+                    place = tex.span(*_strip_range(tex.text, side.start, side.end))
                     self.add("" if source is None else "given", place)
 
 
-def claimed(text: str) -> Iterator[Number]:
-    """The numbers of a text that are claims."""
+def find_claims(text: str) -> Iterator[Number]:
+    """Yield the numbers of a text that are claims."""
     if _DIGIT.search(text) is None:
-        return  # as in most texts, which take long to scan
+        return  # saves time: most texts have no number, and scanning is slow
     for number in scan_prose(text):
         if not number.finite:
             continue
-        whole = number.integer or number.text.endswith(".")
-        small = whole and (number.value in _YEARS or abs(number.value) <= _COUNTS)
-        if not small or _UNIT.match(text, number.end):
+        is_whole = number.integer or number.text.endswith(".")
+        is_small = is_whole and (number.value in _YEARS or abs(number.value) <= _COUNTS)
+        if not is_small or _UNIT.match(text, number.end):
             yield number
 
 
 def _is_address(link: model.Link) -> bool:
-    """Whether a link shows its address."""
-    shown = "".join(child.text for child in link.children if isinstance(child, model.Text))
-    return isinstance(link.target, model.UrlTarget) and shown in link.target.url
+    """Whether a link has its address as its text."""
+    text = "".join(child.text for child in link.children if isinstance(child, model.Text))
+    return isinstance(link.target, model.UrlTarget) and text in link.target.url
 
 
 def _is_claim(side: FormulaSide, tex: str) -> bool:
@@ -209,6 +209,6 @@ def _is_claim(side: FormulaSide, tex: str) -> bool:
     return bool(side.is_numeric and numbers and (units or powers or large))
 
 
-def _trimmed(text: str, start: int, end: int) -> tuple[int, int]:
+def _strip_range(text: str, start: int, end: int) -> tuple[int, int]:
     part = text[start:end]
     return start + len(part) - len(part.lstrip()), start + len(part.rstrip())

@@ -18,7 +18,7 @@ from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt
-from coursebuild.features.truth.claims import KINDS, claims_of, documents_of, total
+from coursebuild.features.truth.claims import KINDS, claims_of, documents_with_claims, sum_claims
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext
@@ -29,45 +29,46 @@ _RIGHT: Literal["right"] = "right"
 
 
 class TruthTable(FeatureBlock, frozen=True):
-    """Where the table stands."""
+    """The place of the table."""
 
     def summary(self) -> TruthTable:
-        """The same: it shows nothing but the course."""
+        """Return the block itself, which has no content of its own."""
         return self
 
 
 class TruthRows(Struct, frozen=True):
-    """What the table shows: for each lesson and page a link and its numbers, the sum last."""
+    """The rows of the table: for each lesson and page a link and its numbers, the sum last."""
 
     rows: tuple[tuple[str, ...], ...]
-    """The first of each is HTML."""
+    """The first cell of each is HTML."""
 
 
 def parse_truth(fence: Fence, texts: TextParser) -> Parsed[TruthTable]:
-    """The fence, which has neither keys nor a text."""
-    wrong = list(fence.keys().diagnostics)
+    """Parse the fence, which has neither keys nor a text."""
+    diagnostics = list(fence.keys().diagnostics)
     if fence.body.text.strip():
         help = "leave it empty: the table is made from the course"
-        wrong.append(diagnose("truth-text", fence.body.span(), "nothing reads this", help=help))
-    return Parsed(TruthTable(fence.span), tuple(wrong))
+        place = fence.body.span()
+        diagnostics.append(diagnose("truth-text", place, "nothing reads this", help=help))
+    return Parsed(TruthTable(fence.span), tuple(diagnostics))
 
 
 def values(library: Library, place: urls.Place, block: TruthTable) -> TruthRows:
-    """The rows."""
-    words, known = library.words, []
+    """Return the rows of the table."""
+    words, claims = library.words, []
     rows: list[tuple[str, ...]] = []
-    for owner, document in documents_of(library.course):
-        known.append(claims_of(document))
+    for owner, document in documents_with_claims(library.course):
+        claims.append(claims_of(document))
         name = f"{owner.id} {owner.title}" if isinstance(owner, Lesson) else owner.title
         link = Markup('<a href="{}">{}</a>').format(place.href(urls.owner_path(owner)), name)
-        rows.append((str(link), known[-1].share, *known[-1].counts))
-    whole = total(known)
-    return TruthRows((*rows, (str(escape(words("truth.all"))), whole.share, *whole.counts)))
+        rows.append((str(link), claims[-1].share, *claims[-1].counts))
+    total = sum_claims(claims)
+    return TruthRows((*rows, (str(escape(words("truth.all"))), total.share, *total.counts)))
 
 
 def _table(page: PageContext, block: TruthTable) -> Table:
-    shown = page.inputs.blocks[block.span.start]
-    assert isinstance(shown, TruthRows)
+    table = page.inputs.blocks[block.span.start]
+    assert isinstance(table, TruthRows)
 
     def cell(inline: Inline) -> Cell:
         return Cell(block.span, Excerpt.of_span(block.span), (inline,))
@@ -76,17 +77,17 @@ def _table(page: PageContext, block: TruthTable) -> Table:
         return (cell(Text(block.span, text)) for text in texts)
 
     header = tuple(cells(page.renderer.words(f"truth.{name}") for name in _COLUMNS))
-    rows = tuple((cell(RawInline(block.span, name)), *cells(row)) for name, *row in shown.rows)
+    rows = tuple((cell(RawInline(block.span, name)), *cells(row)) for name, *row in table.rows)
     return Table(block.span, ("left", *(_RIGHT for _ in _COLUMNS[1:])), header, rows)
 
 
 def draw(page: PageContext, block: TruthTable) -> Markup:
-    """The table in a page."""
+    """Draw the table on a page."""
     return page.blocks((_table(page, block),))
 
 
 def markdown(writer: MarkdownWriter, block: TruthTable) -> str:
-    """The table in Markdown."""
+    """Write the table in Markdown."""
     return writer.blocks((_table(writer.page, block),))
 
 

@@ -11,13 +11,13 @@ from coursebuild.features.glossary.sentences import definition_of, runs_on
 
 
 def definition(text: str) -> tuple[str, bool]:
-    """That of the first term of a text, and whether it runs on."""
+    """Return the definition of the first term of a text, and whether it runs on."""
     document = parse_document(Source("x.md", text), frozenset(), lesson=False).value
     paragraph = document.blocks[0]
     assert isinstance(paragraph, Paragraph)
     term = next(i for i in walk_inlines(paragraph.children) if isinstance(i, Term))
-    found = definition_of(paragraph.children, term)
-    return plain_text(found).strip(), runs_on(found)
+    inlines = definition_of(paragraph.children, term)
+    return plain_text(inlines).strip(), runs_on(inlines)
 
 
 @pytest.mark.parametrize(

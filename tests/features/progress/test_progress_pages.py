@@ -17,40 +17,42 @@ def quiz(id: str, *questions: dict[str, Any]) -> str:
     return f"```quiz\n{json.dumps(data)}\n```\n\n"
 
 
-def why(text: str, **more: str) -> dict[str, Any]:
-    return {"kind": "open", "q": text, "reference": "So.", **more}
+def open_question(text: str, **fields: str) -> dict[str, Any]:
+    return {"kind": "open", "q": text, "reference": "So.", **fields}
 
 
-TWO = quiz("0.1-one", why("Why?"), why("How?", id="how")) + quiz("0.1-two", why("What?"))
+TWO = quiz("0.1-one", open_question("Why?"), open_question("How?", id="how")) + quiz(
+    "0.1-two", open_question("What?")
+)
 WHY, WHAT = text_key("open", "Why?"), text_key("open", "What?")
 NAMES = f"0.1-one:{WHY},how 0.1-two:{WHAT}"
 
 
 @pytest.fixture(scope="module")
-def found(make: Make) -> dict[str, str]:
+def pages(make: Make) -> dict[str, str]:
     """The pages of a course with questions in a lesson and in another page."""
-    site = make(TWO, about=quiz("about", why("Which?", id="which"))).site()
+    site = make(TWO, about=quiz("about", open_question("Which?", id="which"))).site()
     return {path: data.decode() for path, data in site.items() if path.endswith(".html")}
 
 
-def test_lists_of_lessons_name_their_questions(found: dict[str, str]) -> None:
+def test_lists_of_lessons_name_their_questions(pages: dict[str, str]) -> None:
     row = f'data-lesson="0.1" data-quizzes="{NAMES}">'
     for path in ("index.html", "levels/0.html", "progress/index.html"):
-        assert found[path].count(row) == 1, path
-    assert 'data-lesson="1.2">' in found["progress/index.html"]
-    assert 'data-quizzes="about:which">' in found["progress/index.html"]
-    assert re.findall(r'<li data-quizzes="(.*?)"(.*?)>', found["review/index.html"]) == [
+        assert pages[path].count(row) == 1, path
+    assert 'data-lesson="1.2">' in pages["progress/index.html"]
+    assert 'data-quizzes="about:which">' in pages["progress/index.html"]
+    assert re.findall(r'<li data-quizzes="(.*?)"(.*?)>', pages["review/index.html"]) == [
         (NAMES, ' data-lesson="0.1"'),
         ("about:which", ""),
     ]
-    counts = re.findall(r'"asking-count">(.*?)<', found["review/index.html"])
+    counts = re.findall(r'"asking-count">(.*?)<', pages["review/index.html"])
     assert counts == ["3 tasks", "1 task"]
 
 
-def test_only_lists_of_lessons_name_questions(found: dict[str, str]) -> None:
+def test_only_lists_of_lessons_name_questions(pages: dict[str, str]) -> None:
     """So that an edit of a quiz draws no other page."""
     lists = {"index.html", "levels/0.html", "progress/index.html", "review/index.html"}
-    assert {path for path, html in found.items() if "data-quizzes" in html} == lists
+    assert {path for path, html in pages.items() if "data-quizzes" in html} == lists
 
 
 def test_a_course_without_questions_has_no_review(make: Make) -> None:
@@ -62,8 +64,8 @@ def test_a_course_without_questions_has_no_review(make: Make) -> None:
     assert "review" not in foot
 
 
-def test_each_page_carries_the_words_that_it_shows(found: dict[str, str]) -> None:
-    words = {path: set(re.findall(r'data-key="([^"]+)"', html)) for path, html in found.items()}
+def test_each_page_carries_the_words_that_it_shows(pages: dict[str, str]) -> None:
+    words = {path: set(re.findall(r'data-key="([^"]+)"', html)) for path, html in pages.items()}
 
     def groups(path: str) -> set[str]:
         parts = (key.split(".") for key in words[path])
@@ -78,6 +80,6 @@ def test_each_page_carries_the_words_that_it_shows(found: dict[str, str]) -> Non
     assert "quiz.live.check" in words["review/index.html"]
 
 
-def test_only_the_pages_about_the_reader_load_their_script(found: dict[str, str]) -> None:
-    loading = {path for path, html in found.items() if "/reader." in html}
+def test_only_the_pages_about_the_reader_load_their_script(pages: dict[str, str]) -> None:
+    loading = {path for path, html in pages.items() if "/reader." in html}
     assert loading == {"progress/index.html", "review/index.html"}

@@ -1,4 +1,4 @@
-"""The symbols of formulas, as the eye reads them, from what the typesetter makes of TeX."""
+"""The symbols of formulas, from the MathML of the typesetter."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ def typeset() -> Iterator[Typeset]:
     engine = MathEngine()
 
     def make(tex: str) -> str:
-        found = engine.typeset([Formula(tex, False)])[0]
-        assert isinstance(found, str), found
-        return found
+        mathml = engine.typeset([Formula(tex, False)])[0]
+        assert isinstance(mathml, str), mathml
+        return mathml
 
     yield make
     engine.close()
 
 
 def read(mathml: str) -> list[str]:
-    """Symbols as text: what stands in each, indices after `_`, the rest after `^`."""
-    return [shown(symbol) for symbol in symbols(mathml)]
+    """Return symbols as text, indices after `_`, other superscripts after `^`."""
+    return [symbol_text(symbol) for symbol in symbols(mathml)]
 
 
-def shown(symbol: str) -> str:
+def symbol_text(symbol: str) -> str:
     base = r"(<mover>.*?</mover>|<mi[ >].*?</mi>)"
     text = re.sub(rf"<msub(?:sup)?>{base}", r"\1_", symbol)
     text = re.sub(rf"<msup>{base}", r"\1^", text)
@@ -96,8 +96,19 @@ def test_what_is_a_single_symbol_is_the_one_that_formulas_have(typeset: Typeset)
 
 def test_latin_comes_first_then_greek_each_letter_with_its_kin(typeset: Typeset) -> None:
     tex = [r"\omega", r"\mathbf b", "B", "b", r"\alpha", r"b_1", "a", r"\dot a", r"\ell", "m"]
-    made = sorted((symbols(typeset(one))[0] for one in tex), key=sort_key)
-    assert [shown(one) for one in made] == ["a", "a˙", "B", "b", "b_1", "𝐛", "ℓ", "m", "α", "ω"]
+    symbols_in_order = sorted((symbols(typeset(letter))[0] for letter in tex), key=sort_key)
+    assert [symbol_text(symbol) for symbol in symbols_in_order] == [
+        "a",
+        "a˙",
+        "B",
+        "b",
+        "b_1",
+        "𝐛",
+        "ℓ",
+        "m",
+        "α",
+        "ω",
+    ]
 
 
 @given(st.text())
