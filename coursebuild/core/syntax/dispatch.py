@@ -26,29 +26,29 @@ _HEAD_RULES = frozenset(
 """Mistakes that may be why a block is no script."""
 
 
-def read_block(fence: Fence, session: ParsingState, texts: TextParser) -> Block:
+def read_block(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
     """The block of a fence; those with recorded outputs are read in `recording`."""
     if not fence.is_closed or fence.inner is not None:
-        return _read_unclosed(fence, session)
+        return _read_unclosed(fence, state)
     match fence.kind:
         case "python":
-            return _read_script(fence, session)
+            return _read_script(fence, state)
         case "text":
-            check_stray_keys(fence, session)
+            check_stray_keys(fence, state)
             return fence.code()
         case "mjcf":
-            return _read_mjcf(fence, session)
+            return _read_mjcf(fence, state)
         case name if (kind := fence_kind(name)) is not None:
-            return _read_feature_block(kind, fence, session, texts)
+            return _read_feature_block(kind, fence, state, texts)
         case _:
-            session.diagnostics += check_kind(fence)
+            state.diagnostics += check_kind(fence)
             return fence.code()
 
 
-def _read_unclosed(fence: Fence, session: ParsingState) -> CodeBlock:
+def _read_unclosed(fence: Fence, state: ParsingState) -> CodeBlock:
     """Report a fence without end, and show it as code; its content is not checked."""
-    if session.closes_indented and not fence.info.text:
-        session.closes_indented = False
+    if state.closes_indented and not fence.info.text:
+        state.closes_indented = False
         return fence.code()
     marks = fence.head.text[: len(fence.head.text) - len(fence.head.text.lstrip("`~"))]
     name = "backticks" if marks[0] == "`" else "tildes"
@@ -57,48 +57,48 @@ def _read_unclosed(fence: Fence, session: ParsingState) -> CodeBlock:
     if fence.inner is not None:
         message = "this code fence is not closed before another one begins"
         notes = [Note("this line is read as text of the fence above it", fence.inner)]
-    session.report(diagnose("fence-unclosed", fence.head, message, help=help, notes=notes))
+    state.report(diagnose("fence-unclosed", fence.head, message, help=help, notes=notes))
     if fence.kind == "python" or fence.inner is not None:
-        session.script, session.has_invalid_script = None, True
+        state.script, state.has_invalid_script = None, True
     return fence.code()
 
 
-def _read_script(fence: Fence, session: ParsingState) -> Block:
+def _read_script(fence: Fence, state: ParsingState) -> Block:
     parsed_block = parse_python(fence)
-    session.diagnostics += parsed_block.diagnostics
+    state.diagnostics += parsed_block.diagnostics
     if isinstance(parsed_block.value, Script):
-        session.script, session.has_invalid_script = parsed_block.value.path, False
+        state.script, state.has_invalid_script = parsed_block.value.path, False
         names = (figure.name for figure in parsed_block.value.figures)
-        session.figures += [name for name in names if not name.endswith(".csv")]
+        state.figures += [name for name in names if not name.endswith(".csv")]
     elif not fence.nested and any(d.rule in _HEAD_RULES for d in parsed_block.diagnostics):
-        session.script, session.has_invalid_script = None, True
+        state.script, state.has_invalid_script = None, True
     return parsed_block.value
 
 
 def _read_feature_block(
-    kind: FenceKind[FeatureBlock], fence: Fence, session: ParsingState, texts: TextParser
+    kind: FenceKind[FeatureBlock], fence: Fence, state: ParsingState, texts: TextParser
 ) -> Block:
     if fence.nested and not kind.nested:
         message = f"a text of a quiz or lab cannot hold a {fence.kind}"
-        session.report(diagnose("fence-info", fence.head, message))
+        state.report(diagnose("fence-info", fence.head, message))
         return fence.code()
     parsed_block = kind.parse(fence, texts)
-    session.diagnostics += parsed_block.diagnostics
+    state.diagnostics += parsed_block.diagnostics
     return parsed_block.value or fence.code()
 
 
 _ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
 
 
-def _read_mjcf(fence: Fence, session: ParsingState) -> Mjcf | CodeBlock:
+def _read_mjcf(fence: Fence, state: ParsingState) -> Mjcf | CodeBlock:
     """An `mjcf` fence; with wrong keys it cannot be compiled, and is shown as code."""
     parsed_keys = fence.keys(values=("fragment", "error"))
-    session.diagnostics += parsed_keys.diagnostics
+    state.diagnostics += parsed_keys.diagnostics
     keys, fragment = parsed_keys.value, parsed_keys.value.get("fragment")
     if fragment is not None and not _ELEMENTS.fullmatch(fragment.value or ""):
         message = f"`{fragment.value}` is not the name of an element"
         help = 'name the element that it goes into, for example `fragment="worldbody"`'
-        session.report(diagnose("fence-key-value", fragment.value_span, message, help=help))
+        state.report(diagnose("fence-key-value", fragment.value_span, message, help=help))
         return fence.code()
     if parsed_keys.diagnostics:
         return fence.code()

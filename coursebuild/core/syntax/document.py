@@ -49,28 +49,28 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     with which a page may begin is not in the document. Mistakes become diagnostics, in the order of
     their places; the document holds all that could be read.
     """
-    session = ParsingState(callouts, lesson)
-    base = _remove_front_matter(read_markdown(source), session)
+    state = ParsingState(callouts, lesson)
+    base = _remove_front_matter(read_markdown(source), state)
     title = None if lesson else title_line(source)
     if title is not None:
         base = base.slice(len(base.text.partition("\n")[0]))
-    reader = TextReader(base, session, session.references, nested=False)
+    reader = TextReader(base, state, state.references, nested=False)
     blocks = reader.read()
     anchor = "" if title is None else slug(title.text)
-    is_free = not session.anchors.has(anchor)
-    document = Document(source, blocks, session.notes.finish(), anchor if is_free else "")
-    session.diagnostics += _check_placement(document)
-    return Parsed(document, sort_diagnostics(session.diagnostics))
+    is_free = not state.anchors.has(anchor)
+    document = Document(source, blocks, state.notes.finish(), anchor if is_free else "")
+    state.diagnostics += _check_placement(document)
+    return Parsed(document, sort_diagnostics(state.diagnostics))
 
 
-def _remove_front_matter(text: Excerpt, session: ParsingState) -> Excerpt:
+def _remove_front_matter(text: Excerpt, state: ParsingState) -> Excerpt:
     match = _YAML.match(text.text) or _TOML.match(text.text)
     if match is None:
         return text
-    subject = "lesson" if session.lesson else "page"
+    subject = "lesson" if state.lesson else "page"
     message = f"a {subject} has no front matter"
     help = "its title and everything else about it are in content/course.toml; begin with the text"
-    session.report(diagnose("front-matter", text.span(0, 3), message, help=help))
+    state.report(diagnose("front-matter", text.span(0, 3), message, help=help))
     return text.slice(match.end())
 
 

@@ -74,11 +74,11 @@ class _Frame(Struct):
 class InlineReader:
     """Reads the inline content of one text."""
 
-    def __init__(self, references: References, session: ParsingState, balance: Balance) -> None:
+    def __init__(self, references: References, state: ParsingState, balance: Balance) -> None:
         self.references = references
-        self.session = session
+        self.state = state
         self.balance = balance
-        self.report = session.report
+        self.report = state.report
 
     def read(
         self, content: Excerpt, *, mentions: bool = True, html: bool = False
@@ -279,7 +279,7 @@ class _TokenReader:
             return Math(span, tex, display, None, *read_meaning(braces, report))
         label = read_label(braces, report)
         if label is not None:
-            self.reader.session.anchors.take(label.id, label.span)
+            self.reader.state.anchors.take(label.id, label.span)
         return Math(span, tex, display, label)
 
     def _read_number(self, token: PositionedToken, span: Span) -> CodeSpan | NumberBinding:
@@ -326,7 +326,7 @@ class _TokenReader:
         return Image(span, url, alt, str(token.attrs.get("title", "")), place)
 
     def _read_footnote(self, token: PositionedToken, span: Span) -> FootnoteRef | None:
-        reference = self.reader.session.notes.refer(token.content, span)
+        reference = self.reader.state.notes.refer(token.content, span)
         if reference is None:
             self.pieces.append(TextPiece(f"[^{token.content}]", token.start, token.end))
         return reference

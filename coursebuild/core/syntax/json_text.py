@@ -87,44 +87,46 @@ class _UnreadableError(Exception):
 
 
 class _Reader:
-    """Reads a text from its beginning to its end; `at` is the offset of the next character."""
+    """Reads a text from its beginning to its end; `offset` is that of the next character."""
 
     def __init__(self, body: Excerpt) -> None:
         self.body = body
         self.text = body.text
-        self.at = 0
+        self.offset = 0
         self.diagnostics: list[Diagnostic] = []
 
     def read_document(self) -> Node:
         value = self.read_value(0)
         char = self.peek()
         if char and char in "]}":
-            self.report(self.at, self.at + 1, f"`{char}` closes nothing")
+            self.report(self.offset, self.offset + 1, f"`{char}` closes nothing")
         elif char:
-            line = self.text[self.at :].split("\n", 1)[0]
-            self.report(self.at, self.at + len(line), "text after the end of the JSON value")
+            line = self.text[self.offset :].split("\n", 1)[0]
+            self.report(
+                self.offset, self.offset + len(line), "text after the end of the JSON value"
+            )
         return value
 
     def peek(self) -> str:
         """Skip white space; return the next character. Comments and odd spaces are reported."""
         while True:
-            self.at = at = _SPACE.match(self.text, self.at).end()  # type: ignore[union-attr]  # it matches nothing too
+            self.offset = at = _SPACE.match(self.text, self.offset).end()  # type: ignore[union-attr]  # it matches nothing too
             char = self.text[at : at + 1]
             if comment := _COMMENT.match(self.text, at):
                 first_line = comment[0].split("\n", 1)[0]
                 self.report(at, at + len(first_line), "JSON has no comments", "remove it")
-                self.at = comment.end()
+                self.offset = comment.end()
             elif odd := odd_character(char):
                 help = "replace it by a plain space, or remove it"
                 self.report(at, at + 1, f"{odd} is not white space in JSON", help)
-                self.at += 1
+                self.offset += 1
             else:
                 return char
 
     # ----------------------------------------------------------------------- objects and arrays
 
     def read_value(self, depth: int) -> Node:
-        char, start = self.peek(), self.at
+        char, start = self.peek(), self.offset
         if char == '"':
             return self.read_string()
         if char and char in "{[":
@@ -132,12 +134,12 @@ class _Reader:
                 message = f"objects and arrays nest more than {MAX_DEPTH} deep"
                 self.report(start, start + 1, message)
                 raise _UnreadableError
-            self.at += 1
+            self.offset += 1
             return self.read_object(start, depth) if char == "{" else self.read_array(start, depth)
         scalar = _SCALAR.match(self.text, start)
         if scalar is None:
             self.fail_expecting("a value")
-        self.at = scalar.end()
+        self.offset = scalar.end()
         return self.read_scalar(start, scalar[0])
 
     def read_object(self, start: int, depth: int) -> ObjectNode:
@@ -156,8 +158,8 @@ class _Reader:
             self.read_colon(key)
             members.append(Member(key, self.read_value(depth + 1)))
             is_done = self.read_separator(start, "}")
-        self.at += 1
-        return ObjectNode(self.body, start, self.at, (start, start + 1), tuple(members))
+        self.offset += 1
+        return ObjectNode(self.body, start, self.offset, (start, start + 1), tuple(members))
 
     def read_array(self, start: int, depth: int) -> ArrayNode:
         items: list[Node] = []
@@ -167,31 +169,31 @@ class _Reader:
                 self.fail_unclosed(start)
             items.append(self.read_value(depth + 1))
             is_done = self.read_separator(start, "]")
-        self.at += 1
-        return ArrayNode(self.body, start, self.at, (start, start + 1), tuple(items))
+        self.offset += 1
+        return ArrayNode(self.body, start, self.offset, (start, start + 1), tuple(items))
 
     def read_colon(self, key: StringNode) -> None:
         char = self.peek()
         if char == "=":
-            self.report(self.at, self.at + 1, "`=` where JSON has `:`", "write `:`")
+            self.report(self.offset, self.offset + 1, "`=` where JSON has `:`", "write `:`")
         elif char != ":":
             self.fail_expecting(f"`:` after the key `{shorten(key.value)}`")
-        self.at += 1
+        self.offset += 1
 
     def read_separator(self, opening: int, closer: str) -> bool:
         """Read what follows a value, the comma included; whether it was the last value."""
-        end = self.at
-        char, comma = self.peek(), self.at
+        end = self.offset
+        char, comma = self.peek(), self.offset
         if char == ",":
-            self.at += 1
+            self.offset += 1
             while self.peek() == ",":
                 message = "two commas with no value between them"
-                self.report(self.at, self.at + 1, message, "remove one")
-                self.at += 1
+                self.report(self.offset, self.offset + 1, message, "remove one")
+                self.offset += 1
             if self.peek() == closer:
                 self.report(comma, comma + 1, f"a comma before `{closer}`", "remove the comma")
         elif char != closer:
-            key = _KEY.match(self.text, self.at)
+            key = _KEY.match(self.text, self.offset)
             if not (key if closer == "}" else char and char in '"{[-0123456789'):
                 self.fail_expecting(f"`,` or `{closer}`", opening=opening)
             self.report(end, end, "a comma is missing here", "put `,` between the two values")
@@ -201,7 +203,7 @@ class _Reader:
 
     def read_scalar(self, start: int, text: str) -> Node:
         """A number or word; `ErrorNode` for one that is not JSON."""
-        end = self.at
+        end = self.offset
         if text in ("true", "false"):
             return BoolNode(self.body, start, end, text == "true")
         if text == "null":
@@ -221,20 +223,20 @@ class _Reader:
         elif text[0] in "+-.0123456789":
             message, help = f"`{shorten(text)}` is not a number of JSON", _number_help(text)
         else:
-            self.at = start
+            self.offset = start
             self.fail_expecting("a value")
         self.report(start, end, message, help)
         return ErrorNode(self.body, start, end)
 
     def read_string(self) -> StringNode:
-        match = _STRING.match(self.text, self.at)
+        match = _STRING.match(self.text, self.offset)
         if match is None:
-            line = self.text[self.at :].split("\n", 1)[0].rstrip()
+            line = self.text[self.offset :].split("\n", 1)[0].rstrip()
             help = 'close it with `"`; a line end inside a string is written `\\n`'
             message = "the string is not closed on its line"
-            self.report(self.at, self.at + len(line), message, help)
+            self.report(self.offset, self.offset + len(line), message, help)
             raise _UnreadableError
-        self.at = match.end()
+        self.offset = match.end()
         content = match.span(1)
         escapes = _ESCAPE.finditer(self.text, *content)
         return build_string(
@@ -276,7 +278,7 @@ class _Reader:
 
     def fail_expecting(self, noun: str, *, opening: int | None = None) -> NoReturn:
         """Report that something else stands here than `noun`, and give up."""
-        text, at = self.text, self.at
+        text, at = self.text, self.offset
         if at >= len(text):
             if opening is not None:
                 self.fail_unclosed(opening)

@@ -63,22 +63,22 @@ def diagnose_missing_caption(fence: Span) -> Diagnostic:
 
 
 def record_fence(
-    caption: tuple[Inline, ...], caption_span: Span, fence: Fence, session: ParsingState
+    caption: tuple[Inline, ...], caption_span: Span, fence: Fence, state: ParsingState
 ) -> Recording | None:
     """The recording with a caption and this fence as its body; `None` if the fence is none."""
     if not fence.is_closed or fence.inner is not None:
         return None
     if fence.kind != "text":
         if is_known_kind(fence.kind):
-            session.diagnostics += check_missing_body(caption, caption_span)
+            state.diagnostics += check_missing_body(caption, caption_span)
         else:
             subject = f"a block of kind `{fence.kind}`" if fence.kind else "a block without a kind"
-            session.report(diagnose_wrong_body(fence.head, subject))
+            state.report(diagnose_wrong_body(fence.head, subject))
         return None
     keys = fence.keys(values=_VALUES, flags=_FLAGS)
     diagnostics = list(keys.diagnostics)
     comparison = _read_comparison(keys.value, diagnostics)
-    session.diagnostics += diagnostics
+    state.diagnostics += diagnostics
     return Recording(
         caption_span.to(fence.span),
         caption,
@@ -87,20 +87,20 @@ def record_fence(
         fence.body_span,
         fence.prefix,
         comparison,
-        _find_script(caption_span, session),
+        _find_script(caption_span, state),
         readable=not diagnostics,
     )
 
 
 def record_table(
-    caption: tuple[Inline, ...], caption_span: Span, table: Table, session: ParsingState
+    caption: tuple[Inline, ...], caption_span: Span, table: Table, state: ParsingState
 ) -> Recording:
     """The recording with a caption and a table as its body."""
-    span, script = caption_span.to(table.span), _find_script(caption_span, session)
+    span, script = caption_span.to(table.span), _find_script(caption_span, state)
     if not any(cell.text.text for row in table.rows for cell in row):
         message = "the recorded table has no rows, so that nothing is compared"
         help = "write what the script prints into the rows below the header"
-        session.report(diagnose("recording-body", table.span.first_line(), message, help=help))
+        state.report(diagnose("recording-body", table.span.first_line(), message, help=help))
     return Recording(span, caption, caption_span, table, table.span, "", None, script)
 
 
@@ -123,13 +123,13 @@ def diagnose_wrong_body(span: Span, subject: str) -> Diagnostic:
     return diagnose("recording-body", span, message, help=help)
 
 
-def _find_script(caption_span: Span, session: ParsingState) -> str | None:
+def _find_script(caption_span: Span, state: ParsingState) -> str | None:
     """The path of the script above a recording; reports if there is none."""
-    if session.script is None and not session.has_invalid_script:
+    if state.script is None and not state.has_invalid_script:
         message = "no script stands above this recorded output"
         help = "it records what the nearest ```` ```python file=examples/….py ```` above it prints"
-        session.report(diagnose("recording-orphan", caption_span, message, help=help))
-    return session.script
+        state.report(diagnose("recording-orphan", caption_span, message, help=help))
+    return state.script
 
 
 def _read_comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparison | None:
@@ -149,16 +149,16 @@ def _read_comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparis
     return Comparison(mode, rtol or Decimal(0), atol or Decimal(0), ellipsis, volatile)
 
 
-def check_stray_keys(fence: Fence, session: ParsingState) -> None:
+def check_stray_keys(fence: Fence, state: ParsingState) -> None:
     """Report keys on a `text` fence that records no output."""
     keys = fence.keys(values=_VALUES, flags=_FLAGS)
-    session.diagnostics += keys.diagnostics
+    state.diagnostics += keys.diagnostics
     words = keys.value.words
     if words:
         span = words[0].span.to(words[-1].span)
         message = "this block is no recorded output, so it is not compared with anything"
         help = "put a paragraph that begins with `Output` and ends with a colon directly above it"
-        session.report(diagnose("recording-keys", span, message, help=help))
+        state.report(diagnose("recording-keys", span, message, help=help))
 
 
 def _read_tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal | None:

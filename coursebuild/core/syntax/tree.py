@@ -3,8 +3,8 @@
 Entry points: `TextReader`, which reads the blocks of a text; `NestedTextParser`, the `TextParser`
 for quizzes and labs.
 
-1. `TextReader` makes the tokens, and collects the explicit ids and the footnotes in them, which
-   must be known before the first reference.
+1. `TextReader` makes the tokens, and collects the explicit ids and the footnotes in them
+   (`_scan_tokens`), which must be known before the first reference.
 2. It walks the flat tokens once, with a method for each kind of block; containers read the blocks
    inside them by recursion.
 3. A paragraph looks ahead: `Output:` and the block below it are one `Recording`.
@@ -47,57 +47,59 @@ class TextReader:
     """Reads one text; `nested` for a text of a quiz or lab."""
 
     def __init__(
-        self, base: Excerpt, session: ParsingState, references: References, *, nested: bool
+        self, base: Excerpt, state: ParsingState, references: References, *, nested: bool
     ) -> None:
-        self.base, self.session, self.nested = base, session, nested
-        self.balance = Balance(session.report)
-        self.texts = NestedTextParser(session)
+        self.base, self.state, self.nested = base, state, nested
+        self.balance = Balance(state.report)
+        self.texts = NestedTextParser(state)
         self.tokens = block_tokens(base, references)
-        self.at = 0
-        self.inlines = InlineReader(references, session, self.balance)
-        self._collect_ids_and_footnotes()
+        self.index = 0
+        """That of the next token."""
+        self.inlines = InlineReader(references, state, self.balance)
+        self._scan_tokens()
 
-    def _collect_ids_and_footnotes(self) -> None:
+    def _scan_tokens(self) -> None:
+        """Collect explicit ids and footnotes, and report what nests too deep."""
         for i, token in enumerate(self.tokens):
             if token.type == "heading_open" and self.tokens[i + 1].content.endswith("}"):
                 name = read_attributes(self._content(token)).value.id
                 if name is not None:
-                    self.session.anchors.reserve(name.text[1:])
+                    self.state.anchors.reserve(name.text[1:])
             elif token.type == "footnote_reference_open":
                 label, at = token.content, token.start + 2
                 label_span = self.base.span(at, at + len(label))
                 read = self._defer_reading(i + 1)
-                self.session.notes.add(FootnoteText(label, label_span, self._span(token), read))
+                self.state.notes.add(FootnoteText(label, label_span, self._span(token), read))
         deep_token = next((token for token in self.tokens if token.info == TOO_DEEP), None)
         if deep_token is not None:
             message = "quotes, lists or footnotes nest too deep here"
             place = self._span(deep_token).first_line()
-            self.session.report(diagnose("nesting-deep", place, message))
+            self.state.report(diagnose("nesting-deep", place, message))
 
     def _defer_reading(self, at: int) -> Callable[[], tuple[model.Block, ...]]:
         """Return a function that reads the footnote whose first token has the index `at`."""
 
         def read() -> tuple[model.Block, ...]:
-            self.at = at
-            return self._blocks("footnote_reference_close")
+            self.index = at
+            return self._read_blocks("footnote_reference_close")
 
         return read
 
     def read(self) -> tuple[model.Block, ...]:
         """The blocks of the text without its footnotes, which are read last."""
-        blocks = self._blocks(None)
+        blocks = self._read_blocks(None)
         self.balance.finish()
         return blocks
 
     # -- walking
 
-    def _blocks(self, stop: str | None) -> tuple[model.Block, ...]:
+    def _read_blocks(self, stop: str | None) -> tuple[model.Block, ...]:
         """The blocks up to a closing token, which is skipped."""
         blocks: list[model.Block] = []
         self.balance.enter()
-        while self.at < len(self.tokens):
-            token = self.tokens[self.at]
-            self.at += 1
+        while self.index < len(self.tokens):
+            token = self.tokens[self.index]
+            self.index += 1
             if token.type == stop:
                 break
             block = _READERS[token.type](self, token)
@@ -116,7 +118,7 @@ class TextReader:
     # -- leaves
 
     def _read_paragraph(self, token: PositionedToken) -> model.Block:
-        self.at += 2
+        self.index += 2
         content = self._content(token)
         children = self.inlines.read(content)
         span = content.span()
@@ -125,14 +127,14 @@ class TextReader:
             if recording is not None:
                 return recording
         elif not self.nested and (kind := self._peek_fence_kind()) is not None:
-            self.session.diagnostics += check_near_caption(children, span, kind)
+            self.state.diagnostics += check_near_caption(children, span, kind)
         if not self.nested and content.text.startswith(FIGURE):
-            children, shows_image = read_figure(children, span, self.session.figures)
+            children, shows_image = read_figure(children, span, self.state.figures)
             return model.Paragraph(span, children, token.hidden, shows_image)
         return model.Paragraph(span, children, token.hidden)
 
     def _peek(self) -> PositionedToken | None:
-        return self.tokens[self.at] if self.at < len(self.tokens) else None
+        return self.tokens[self.index] if self.index < len(self.tokens) else None
 
     def _peek_fence_kind(self) -> str | None:
         """The kind of the next block, if it is a fence."""
@@ -142,18 +144,18 @@ class TextReader:
         return (token.info.split() or [""])[0]
 
     def _read_heading(self, token: PositionedToken) -> model.Heading:
-        self.at += 2
+        self.index += 2
         span = self._span(token)
         attributes = read_attributes(self._content(token))
-        self.session.diagnostics += attributes.diagnostics
+        self.state.diagnostics += attributes.diagnostics
         children = self.inlines.read(attributes.value.title, mentions=False)
         level = int(token.tag[1:])
-        session, previous_level = self.session, None if self.nested else self.session.level
-        session.diagnostics += check_heading(
-            span, level, previous_level, children, lesson=session.lesson
+        state, previous_level = self.state, None if self.nested else self.state.level
+        state.diagnostics += check_heading(
+            span, level, previous_level, children, lesson=state.lesson
         )
         if not self.nested:
-            session.level = level
+            state.level = level
         return model.Heading(
             span,
             level,
@@ -165,7 +167,7 @@ class TextReader:
     def _take_anchor(
         self, attributes: Attributes, children: tuple[model.Inline, ...]
     ) -> tuple[str, bool]:
-        anchors = self.session.anchors
+        anchors = self.state.anchors
         if attributes.id is not None:
             anchors.take(attributes.id.text[1:], attributes.id.span())
             return attributes.id.text[1:], True
@@ -173,15 +175,15 @@ class TextReader:
 
     def _read_fence(self, token: PositionedToken) -> model.Block:
         fence = read_fence(token, self.base, nested=self.nested)
-        block = read_block(fence, self.session, self.texts)
+        block = read_block(fence, self.state, self.texts)
         if (
             isinstance(block, model.Script)
             and not block.norun
             and self._peek_fence_kind() == "text"
         ):
-            next_token = self.tokens[self.at]
+            next_token = self.tokens[self.index]
             if next_token.info.split() == ["text"]:  # with keys, these are reported instead
-                self.session.report(diagnose_missing_caption(self._span(next_token)))
+                self.state.report(diagnose_missing_caption(self._span(next_token)))
         return block
 
     def _read_code(self, token: PositionedToken) -> model.CodeBlock:
@@ -202,8 +204,8 @@ class TextReader:
         message = "this fence is indented by a tab or four blanks, so its block is shown as text"
         help = "take the white space before it away"
         place = code.span(opening.start(1), opening.end())
-        self.session.report(diagnose("fence-indented", place, message, help=help))
-        self.session.closes_indented = not is_closed
+        self.state.report(diagnose("fence-indented", place, message, help=help))
+        self.state.closes_indented = not is_closed
 
     def _read_html(self, token: PositionedToken) -> model.HtmlBlock | model.HtmlFlow:
         """Raw HTML, read as inlines if it holds formulas or is nested."""
@@ -231,70 +233,70 @@ class TextReader:
         if token.info == "unclosed":
             help = "close it with `$$` on a line below, with no empty line before it"
             place, message = text.span(start - 2, start), "display math is never closed"
-            self.session.report(diagnose("math-unclosed", place, message, help=help))
+            self.state.report(diagnose("math-unclosed", place, message, help=help))
         elif not tex.text:
-            self.session.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
+            self.state.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
         return model.MathBlock(self._span(token), tex, self._read_label(text, end + 2))
 
     def _read_label(self, text: Excerpt, at: int) -> model.Label | None:
         """The label after a formula that ends before an offset."""
         braces = LABEL.match(text.text, at)
-        label = read_label(text.slice(*braces.span(1)), self.session.report) if braces else None
+        label = read_label(text.slice(*braces.span(1)), self.state.report) if braces else None
         if label is not None:
-            self.session.anchors.take(label.id, label.span)
+            self.state.anchors.take(label.id, label.span)
         return label
 
     # -- containers
 
     def _read_quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
-        span, first_token = self._span(token), self.tokens[self.at]
+        span, first_token = self._span(token), self.tokens[self.index]
         if first_token.type == "paragraph_open":
-            head = read_head(self._content(first_token), self.session.callouts)
+            head = read_head(self._content(first_token), self.state.callouts)
             if head is not None:
-                self.session.diagnostics += head.diagnostics
+                self.state.diagnostics += head.diagnostics
                 return self._read_callout(span, head.value)
-        return model.BlockQuote(span, self._blocks("blockquote_close"))
+        return model.BlockQuote(span, self._read_blocks("blockquote_close"))
 
     def _read_callout(self, span: Span, head: Head) -> model.Callout:
         title = self.inlines.read(head.title)
-        self.at += 3
+        self.index += 3
         rest: tuple[model.Block, ...] = ()
         if head.rest.text:
             rest = (model.Paragraph(head.rest.span(), self.inlines.read(head.rest)),)
-        blocks = (*rest, *self._blocks("blockquote_close"))
+        blocks = (*rest, *self._read_blocks("blockquote_close"))
         return model.Callout(span, head.kind, head.kind_span, title, head.folded, blocks)
 
     def _read_list(self, token: PositionedToken) -> model.ListBlock:
         ordered = token.type == "ordered_list_open"
         items: list[model.ListItem] = []
-        while (item := self.tokens[self.at]).type == "list_item_open":
-            self.at += 1
+        while (item := self.tokens[self.index]).type == "list_item_open":
+            self.index += 1
             items.append(self._read_item(item))
-        self.at += 1
+        self.index += 1
         return model.ListBlock(
             self._span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
         )
 
     def _read_item(self, token: PositionedToken) -> model.ListItem:
-        blocks = self._blocks("list_item_close")
+        blocks = self._read_blocks("list_item_close")
         marker = self.base.span(token.start, token.start + len(token.info) + 1)
         span = marker.to(blocks[-1].span) if blocks else marker
         return model.ListItem(span, blocks, token.meta.get("checked"))
 
     def _read_table(self, token: PositionedToken) -> model.Table:
-        table, self.at = self._table_at(self.at - 1)
+        table, self.index = self._table_at(self.index - 1)
         return table
 
     def _table_at(self, at: int) -> tuple[model.Table, int]:
-        return read_table(self.tokens, at, self.base, self.inlines.read, self.session.report)
+        return read_table(self.tokens, at, self.base, self.inlines.read, self.state.report)
 
     def _skip_footnote(self, token: PositionedToken) -> None:
         """Skip a footnote, which is read later."""
         depth = 1
         while depth:
-            kind = self.tokens[self.at].type
+            kind = self.tokens[self.index].type
             depth += (kind == "footnote_reference_open") - (kind == "footnote_reference_close")
-            self.at += 1
+            self.index += 1
 
     # -- recorded output
 
@@ -304,18 +306,18 @@ class TextReader:
         """The recording with the caption just read, if the next block is its body."""
         match self._peek():
             case PositionedToken(type="table_open"):
-                table, self.at = self._table_at(self.at)
-                return record_table(caption, span, table, self.session)
+                table, self.index = self._table_at(self.index)
+                return record_table(caption, span, table, self.state)
             case PositionedToken(type="fence") as token:
                 fence = read_fence(token, self.base, nested=False)
-                recording = record_fence(caption, span, fence, self.session)
-                self.at += recording is not None
+                recording = record_fence(caption, span, fence, self.state)
+                self.index += recording is not None
                 return recording
             case PositionedToken(type="code_block") as token:
                 place = self._span(token).first_line()
-                self.session.report(diagnose_wrong_body(place, "an indented block"))
+                self.state.report(diagnose_wrong_body(place, "an indented block"))
             case _:
-                self.session.diagnostics += check_missing_body(caption, span)
+                self.state.diagnostics += check_missing_body(caption, span)
         return None
 
 
@@ -338,28 +340,28 @@ _READERS: dict[str, Callable[[TextReader, PositionedToken], model.Block | None]]
 class NestedTextParser:
     """Parses Markdown inside quizzes, labs and io blocks, as a `TextParser`."""
 
-    def __init__(self, session: ParsingState) -> None:
-        self._session = session
+    def __init__(self, state: ParsingState) -> None:
+        self._state = state
 
     def blocks(self, excerpt: Excerpt) -> Parsed[tuple[model.Block, ...]]:
         """The blocks of a text; HTML becomes an `HtmlFlow`."""
         base = normalize(excerpt)
-        return self._session.collect_diagnostics(
-            lambda: TextReader(base, self._session, self._references(), nested=True).read()
+        return self._state.collect_diagnostics(
+            lambda: TextReader(base, self._state, self._references(), nested=True).read()
         )
 
     def inlines(self, excerpt: Excerpt) -> Parsed[tuple[model.Inline, ...]]:
         """The inlines of a text that is one paragraph at most."""
         content = trim(normalize(excerpt))
-        return self._session.collect_diagnostics(lambda: self._read_inlines(content))
+        return self._state.collect_diagnostics(lambda: self._read_inlines(content))
 
     def _read_inlines(self, content: Excerpt) -> tuple[model.Inline, ...]:
-        balance = Balance(self._session.report)
-        reader = InlineReader(self._references(), self._session, balance)
+        balance = Balance(self._state.report)
+        reader = InlineReader(self._references(), self._state, balance)
         inlines = reader.read(content)
         balance.finish()
         return inlines
 
     def _references(self) -> References:
         """A copy of the document's link definitions, as those in a text hold in it only."""
-        return dict(self._session.references)
+        return dict(self._state.references)
