@@ -45,7 +45,7 @@ def job(
     return ScriptJob(path, tuple(args), timeout, tuple(requires), perturbation)
 
 
-def alive(pid: int) -> bool:
+def is_alive(pid: int) -> bool:
     try:
         state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
     except OSError:
@@ -57,7 +57,7 @@ def alive(pid: int) -> bool:
     return state != "Z"
 
 
-def computed(pid: int) -> int:
+def processor_time(pid: int) -> int:
     """The processor time that a process has taken, in hundredths of a second."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return int(fields[11]) + int(fields[12])
@@ -69,14 +69,14 @@ def wait_for(path: Path) -> int:
     return int(path.read_text())
 
 
-def gone(pid: int) -> bool:
+def wait_until_ended(pid: int) -> bool:
     """That a process ends."""
-    wait_until(lambda: not alive(pid), f"the end of process {pid}")
+    wait_until(lambda: not is_alive(pid), f"the end of process {pid}")
     return True
 
 
-def hanging(
-    server: ScriptServer, root: Path, *codes: str, said: Callable[[str], object] = bool
+def run_hanging(
+    server: ScriptServer, root: Path, *codes: str, is_done: Callable[[str], object] = bool
 ) -> list[ScriptRun]:
     """What scripts that do not end do, given a limit that lets each say something before."""
     paths = [f"examples/hanging{number}.py" for number in range(len(codes))]
@@ -86,6 +86,6 @@ def hanging(
         jobs = [job(path, timeout=limit) for path in paths]
         runs = server.run(root, jobs, parallel=len(jobs))
         assert all(run.outcome is Outcome.TIMEOUT and run.seconds >= limit for run in runs)
-        if all(said(run.stdout) for run in runs):
+        if all(is_done(run.stdout) for run in runs):
             break
     return list(runs)

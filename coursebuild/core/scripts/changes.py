@@ -152,9 +152,9 @@ def _merge_differences(
         )
 
     visible = [d for d in differences if not is_blank(d)] or differences
-    merged: list[Difference] = []
+    joined: list[Difference] = []
     for d in visible:
-        last = merged[-1] if merged else None
+        last = joined[-1] if joined else None
         if (
             last is not None
             and last.numbers is None
@@ -162,7 +162,7 @@ def _merge_differences(
             and not recorded[last.end : d.start].strip()
             and not printed[last.printed_end : d.printed_start].strip()
         ):
-            merged[-1] = Difference(last.start, d.end, last.printed_start, d.printed_end)
+            joined[-1] = Difference(last.start, d.end, last.printed_start, d.printed_end)
         else:
-            merged.append(d)
-    return tuple(merged)
+            joined.append(d)
+    return tuple(joined)

@@ -87,15 +87,15 @@ class _LessonLines:
     def translate_paths(self, text: str) -> str:
         """The text with paths and lines of extracted files replaced by those of lessons."""
 
-        def frame(found: re.Match[str]) -> str:
-            _, span = self._find(found)
-            return found.group() if span is None else f'File "{span.path}", line {span.line}'
+        def replace_frame(match: re.Match[str]) -> str:
+            _, span = self._find(match)
+            return match.group() if span is None else f'File "{span.path}", line {span.line}'
 
-        def warning(found: re.Match[str]) -> str:
-            _, span = self._find(found)
-            return found.group() if span is None else f"{span.path}:{span.line}"
+        def replace_warning(match: re.Match[str]) -> str:
+            _, span = self._find(match)
+            return match.group() if span is None else f"{span.path}:{span.line}"
 
-        return _WARNING.sub(warning, _FRAME.sub(frame, text))
+        return _WARNING.sub(replace_warning, _FRAME.sub(replace_frame, text))
 
     def _find(self, match: re.Match[str]) -> tuple[Extraction | None, Span | None]:
         parts = match["path"].replace("\\", "/").split("/")

@@ -143,10 +143,10 @@ def unit(place: int) -> Decimal:
     return Decimal((0, (1,), place))
 
 
-def within_half_unit(shown: Number, value: Decimal) -> bool:
-    """Whether `value` is within half a unit of the last place of `shown`, borders included."""
-    gap = difference(shown.value, value)
-    return _EXACT.add(gap, gap) <= unit(shown.place)
+def within_half_unit(number: Number, value: Decimal) -> bool:
+    """Whether `value` is within half a unit of the last place of `number`, borders included."""
+    gap = difference(number.value, value)
+    return _EXACT.add(gap, gap) <= unit(number.place)
 
 
 def within_tolerance(recorded: Decimal, value: Decimal, rtol: Decimal, atol: Decimal) -> bool:

@@ -16,7 +16,7 @@ import pytest
 from coursebuild.core.engine.workers import Workers, can_fork
 from coursebuild.core.files.errors import EffectError
 from support.run_code import run_code
-from support.runners import gone
+from support.runners import wait_until_ended
 
 pytestmark = pytest.mark.site
 
@@ -178,4 +178,4 @@ def test_workers_end_with_the_process(number: signal.Signals, tmp_path: Path) ->
         workers = [int(process.stdout.readline()) for _ in range(2)]
         process.send_signal(number)
         process.wait()
-        assert all(map(gone, workers))
+        assert all(map(wait_until_ended, workers))

@@ -29,8 +29,8 @@ def spawning() -> Iterator[ScriptServer]:
 @pytest.fixture
 def server(request: pytest.FixtureRequest) -> ScriptServer:
     """Runs scripts forked; in both ways where a test is marked `both_ways`."""
-    found: ScriptServer = request.getfixturevalue(getattr(request, "param", "forking"))
-    return found
+    script_server: ScriptServer = request.getfixturevalue(getattr(request, "param", "forking"))
+    return script_server
 
 
 @pytest.fixture

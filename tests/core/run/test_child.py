@@ -14,7 +14,7 @@ import pytest
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.child import JsonChild
-from support.runners import SOURCE_TREE, alive, gone
+from support.runners import SOURCE_TREE, is_alive, wait_until_ended
 from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
@@ -46,17 +46,17 @@ def make(tmp_path: Path, seconds: float = 120.0) -> JsonChild:
 
 
 def test_questions_and_answers(tmp_path: Path, temporary: Path) -> None:
-    with make(tmp_path) as one:
+    with make(tmp_path) as child:
         assert list(temporary.iterdir()) == [], "nothing before it is asked"
-        beside = {"do": "sys.stderr.write('x' * 1_000_000); sys.stderr.flush()"}
-        asked = [None, [1.5, "ü\n\u2028"], {"a": True}, "x" * 3_000_000, beside]
-        replies = [one.ask(question) for question in asked]
-        assert [reply["got"] for reply in replies] == asked
+        noisy = {"do": "sys.stderr.write('x' * 1_000_000); sys.stderr.flush()"}
+        questions = [None, [1.5, "ü\n\u2028"], {"a": True}, "x" * 3_000_000, noisy]
+        replies = [child.ask(question) for question in questions]
+        assert [reply["got"] for reply in replies] == questions
         pids = {reply["pid"] for reply in replies}
         assert len(pids) == 1
         assert Path(replies[0]["cwd"]).parent == temporary
     assert list(temporary.iterdir()) == []
-    assert not alive(pids.pop())
+    assert not is_alive(pids.pop())
 
 
 def test_an_interrupt_from_another_thread(tmp_path: Path, temporary: Path) -> None:
@@ -64,23 +64,25 @@ def test_an_interrupt_from_another_thread(tmp_path: Path, temporary: Path) -> No
 
     def interrupt() -> None:
         wait_until(mark.exists, "the question")
-        one.interrupt()
+        child.interrupt()
 
-    with make(tmp_path) as one:
-        one.ask(1)
+    with make(tmp_path) as child:
+        child.ask(1)
         threading.Thread(target=interrupt, daemon=True).start()
-        assert one.ask({"do": f"open({str(mark)!r}, 'w').close(); signal.pause()"}) is None
-        assert one.death() == "crashed (SIGKILL)", "nobody waited until its time was over"
+        assert child.ask({"do": f"open({str(mark)!r}, 'w').close(); signal.pause()"}) is None
+        assert child.death() == "crashed (SIGKILL)", "nobody waited until its time was over"
         with pytest.raises(EffectError, match="interrupted"):
-            one.ask(2)
+            child.ask(2)
     assert list(temporary.iterdir()) == []
 
 
 def test_half_an_answer_is_waited_for_no_longer_than_a_whole_one(tmp_path: Path) -> None:
-    with make(tmp_path, 0.1) as one:
-        assert one.ask({"do": "sys.stdout.write('{'); sys.stdout.flush(); signal.pause()"}) is None
-        assert one.death() == "took longer than 0.1 s"
-        assert one.ask(1)["got"] == 1, "another child"
+    with make(tmp_path, 0.1) as child:
+        assert (
+            child.ask({"do": "sys.stdout.write('{'); sys.stdout.flush(); signal.pause()"}) is None
+        )
+        assert child.death() == "took longer than 0.1 s"
+        assert child.ask(1)["got"] == 1, "another child"
 
 
 def test_it_ends_with_its_parent(tmp_path: Path) -> None:
@@ -98,6 +100,6 @@ def test_it_ends_with_its_parent(tmp_path: Path) -> None:
     ) as parent:
         assert parent.stdout is not None
         pid = int(parent.stdout.readline())
-        assert alive(pid)
+        assert is_alive(pid)
         os.kill(parent.pid, signal.SIGKILL)
-    assert gone(pid)
+    assert wait_until_ended(pid)

@@ -13,15 +13,15 @@ from coursebuild.core.run.versions import engine_version
     "text", ["", "abc", "3..1", "v3.1", "3.1 ", "==3.1", "3.1; x", "-e", "٣.١"]
 )
 def test_what_is_no_version(text: str) -> None:
-    with pytest.raises(UsageError) as told:
+    with pytest.raises(UsageError) as error:
         check_other_version(text)
-    assert str(told.value) == f"--against: {text!r} is no version of MuJoCo, such as 3.13.0"
+    assert str(error.value) == f"--against: {text!r} is no version of MuJoCo, such as 3.13.0"
 
 
 def test_the_version_of_here_is_no_other_however_it_is_written() -> None:
-    here = engine_version()
-    for text in (here, f"{here}.0"):
-        with pytest.raises(UsageError) as told:
+    installed = engine_version()
+    for text in (installed, f"{installed}.0"):
+        with pytest.raises(UsageError) as error:
             check_other_version(text)
-        assert str(told.value) == f"--against: MuJoCo {here} is the version installed here"
+        assert str(error.value) == f"--against: MuJoCo {installed} is the version installed here"
     assert check_other_version("3.99") == "3.99"

@@ -28,7 +28,7 @@ from support.runners import job
 pytestmark = pytest.mark.site
 
 ARGUMENTS = ("a b", "", "*", "é", "--flag=1", "\udc80")
-Seen = tuple[str, str, int]
+VisibleResult = tuple[str, str, int]
 
 
 @functools.cache
@@ -39,11 +39,11 @@ def library() -> dict[str, str]:
     return {"PYTHONPATH": library_folder()} if lacks else {}
 
 
-def bare(root: Path, path: str) -> Seen:
+def run_alone(root: Path, path: str) -> VisibleResult:
     """What Python itself makes of a script."""
     # As short as the runner's own: the path of a socket in it must not have many characters.
     with tempfile.TemporaryDirectory(prefix="bare-", dir="/tmp") as temporary:
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, path, *ARGUMENTS],
             cwd=root,
             env=clean_environment(os.environ) | {"TMPDIR": temporary} | library(),
@@ -53,19 +53,19 @@ def bare(root: Path, path: str) -> Seen:
         )
     out, err = (
         data.decode("utf-8", "backslashreplace").replace("\r\n", "\n")
-        for data in (done.stdout, done.stderr)
+        for data in (process.stdout, process.stderr)
     )
-    return plain(out), plain(err), done.returncode
+    return without_addresses(out), without_addresses(err), process.returncode
 
 
-def plain(text: str) -> str:
+def without_addresses(text: str) -> str:
     """Without what differs between any two runs."""
     return re.sub(r"0x[0-9a-f]{6,}", "0x…", re.sub(r"\b\d{15}\b", "…", text))
 
 
-def seen(run: ScriptRun) -> Seen:
+def visible_result(run: ScriptRun) -> VisibleResult:
     status = -run.status if run.outcome is Outcome.KILLED else run.status
-    return plain(run.stdout), plain(run.stderr), status
+    return without_addresses(run.stdout), without_addresses(run.stderr), status
 
 
 def differences(server: ScriptServer, root: Path, scripts: Mapping[str, str]) -> list[str]:
@@ -75,23 +75,23 @@ def differences(server: ScriptServer, root: Path, scripts: Mapping[str, str]) ->
         encoding = "latin-1" if "latin-1" in code else "utf-8"
         (root / path).write_bytes(code.encode(encoding, "surrogatepass"))
     runs = server.run(root, [job(path, args=ARGUMENTS) for path in paths], parallel=2)
-    found = []
+    lines = []
     for name, path, run in zip(scripts, paths, runs, strict=True):
-        alone = bare(root, path)
-        found += [
+        alone = run_alone(root, path)
+        lines += [
             f"{name}: {ours!r}, but alone {theirs!r}"
-            for ours, theirs in zip(seen(run), alone, strict=True)
+            for ours, theirs in zip(visible_result(run), alone, strict=True)
             if ours != theirs
         ]
-    return found
+    return lines
 
 
-def dedented(names: list[str]) -> dict[str, str]:
+def dedent_probes(names: list[str]) -> dict[str, str]:
     return {name: textwrap.dedent(PROBES[name]) for name in names}
 
 
 def test_forked_script_finds_what_python_gives_it(forking: ScriptServer, root: Path) -> None:
-    assert differences(forking, root.resolve(), dedented([*PROBES])) == []
+    assert differences(forking, root.resolve(), dedent_probes([*PROBES])) == []
 
 
 def test_forked_script_fails_as_it_does_alone(forking: ScriptServer, root: Path) -> None:
@@ -100,7 +100,7 @@ def test_forked_script_fails_as_it_does_alone(forking: ScriptServer, root: Path)
 
 
 def test_spawned_script_does_what_it_does_alone(spawning: ScriptServer, root: Path) -> None:
-    scripts = dedented(["main", "numbers"]) | {"fails": FAILURES["errors"][0]}
+    scripts = dedent_probes(["main", "numbers"]) | {"fails": FAILURES["errors"][0]}
     assert differences(spawning, root.resolve(), scripts) == []
 
 
@@ -135,14 +135,14 @@ def test_package_that_cannot_be_imported_before_scripts_fails_in_them(
         "import threading\nthreading.Thread(target=threading.Event().wait, daemon=True).start()"
     )
     (root / "examples/x.py").write_text("print('begins', flush=True)\nimport numpy")
-    found = []
+    outcomes = []
     for code in ("1 / 0", "raise SystemExit(3)", thread):
         module.write_text(code)
         with ScriptServer() as server:
             (run,) = server.run(root, [job()], parallel=1, place=place)
-        found.append((run.stdout, run.status))
+        outcomes.append((run.stdout, run.status))
     module.unlink()
-    assert found == [("begins\n", 1), ("begins\n", 3), ("begins\n", 0)]
+    assert outcomes == [("begins\n", 1), ("begins\n", 3), ("begins\n", 0)]
 
 
 def test_other_version_of_a_package_is_imported_anew(place: OtherEnvironment, root: Path) -> None:

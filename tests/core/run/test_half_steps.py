@@ -69,19 +69,19 @@ def spring(timestep: float, force: float = 2.0) -> tuple[float, float]:
 
 
 def test_steps_are_halved_however_they_are_made(run: Run) -> None:
-    def ends(text: str, number: int) -> tuple[bool, Any]:
+    def run_to_end(text: str, number: int) -> tuple[bool, Any]:
         end = "print(json.dumps([*data.qpos, *data.qvel, data.time, model.opt.timestep]))\n"
-        done = run(f"{HEAD}data.ctrl[0] = 2\n{text}{end}", perturbation=number)
-        assert done.trace is not None and done.stdout, done.stderr
-        return done.trace.is_perturbed, json.loads(done.stdout)
+        script_run = run(f"{HEAD}data.ctrl[0] = 2\n{text}{end}", perturbation=number)
+        assert script_run.trace is not None and script_run.stdout, script_run.stderr
+        return script_run.trace.is_perturbed, json.loads(script_run.stdout)
 
     for name, text in TEN.items():
         timestep = 0.05 if "its own timestep" in name else 0.1
         for number, part in ((0, 1.0), (-1, 0.5)):
-            moved, (x, v, time, told) = ends(text, number)
+            is_perturbed, (x, v, time, timestep_read) = run_to_end(text, number)
             assert (x, v) == pytest.approx(spring(timestep * part), rel=1e-9), (name, number)
             assert time == pytest.approx(1.0, rel=1e-12), name
-            assert (told, moved) == (timestep, number < 0), name
-    assert not ends("mujoco.mj_forward(model, data)\n", -1)[0], "there is no step"
+            assert (timestep_read, is_perturbed) == (timestep, number < 0), name
+    assert not run_to_end("mujoco.mj_forward(model, data)\n", -1)[0], "there is no step"
     many = "mujoco.mj_step(model, data, nstep=1000)\n"
-    assert ends(many, 0)[1][2] == ends(many, -1)[1][2], "the time to the last bit"
+    assert run_to_end(many, 0)[1][2] == run_to_end(many, -1)[1][2], "the time to the last bit"

@@ -51,39 +51,39 @@ STEP = "mujoco.mj_step(model, data)\n"
 PULL = "data.qpos[:] = 0.5, 0.25\n"
 OTHER = "model = mujoco.MjModel.from_xml_string(BODY)\ndata = mujoco.MjData(model)\n"
 STATE = "tell('q', data.qpos)\ntell('v', data.qvel)\n"
-Told = Callable[..., dict[str, list[float]]]
+ReadValues = Callable[..., dict[str, list[float]]]
 
 
 @pytest.fixture
-def moving(run: Run) -> Run:
+def run_perturbed(run: Run) -> Run:
     def run_script(text: str, perturbation: int = 1) -> ScriptRun:
-        done = run(f"{HEAD}{text}\nprint(json.dumps(told))\n", perturbation=perturbation)
-        assert done.outcome is Outcome.OK, done.stderr
-        return done
+        result = run(f"{HEAD}{text}\nprint(json.dumps(told))\n", perturbation=perturbation)
+        assert result.outcome is Outcome.OK, result.stderr
+        return result
 
     return run_script
 
 
 @pytest.fixture
-def told(moving: Run) -> Told:
-    def told(text: str, perturbation: int = 1) -> dict[str, list[float]]:
-        values: Any = json.loads(moving(text, perturbation).stdout)
+def read_values(run_perturbed: Run) -> ReadValues:
+    def read_values(text: str, perturbation: int = 1) -> dict[str, list[float]]:
+        values: Any = json.loads(run_perturbed(text, perturbation).stdout)
         return dict(values)
 
-    return told
+    return read_values
 
 
-def moved(values: Sequence[float], *by: float) -> bool:
+def is_moved(values: Sequence[float], *by: float) -> bool:
     """Whether these are as far from what was set as initial states are moved."""
     pairs = zip(values, by, strict=True)
-    return all(abs(abs(value / one - 1.0) - SIZE) < SIZE / 100 for value, one in pairs)
+    return all(abs(abs(value / base - 1.0) - SIZE) < SIZE / 100 for value, base in pairs)
 
 
 @both_ways
-def test_an_ordinary_run_is_as_ever(told: Told) -> None:
+def test_an_ordinary_run_is_as_ever(read_values: ReadValues) -> None:
     text = PULL + STEP * 20 + STATE
-    assert told(text, 0) == told(text, 0)
-    assert told(text, 0) != told(text, 1)
+    assert read_values(text, 0) == read_values(text, 0)
+    assert read_values(text, 0) != read_values(text, 1)
 
 
 FREE = "model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_SPRING\n"
@@ -97,31 +97,31 @@ MOVED = (
 )
 
 
-def test_a_state_is_moved_once_before_anything_is_computed_from_it(told: Told) -> None:
+def test_a_state_is_moved_once_before_anything_is_computed_from_it(read_values: ReadValues) -> None:
     for text in MOVED:
-        assert moved(told(text + STATE)["q"], 0.5, 0.25), text
+        assert is_moved(read_values(text + STATE)["q"], 0.5, 0.25), text
 
 
-def test_runs_of_a_pair_go_in_opposite_directions(told: Told) -> None:
+def test_runs_of_a_pair_go_in_opposite_directions(read_values: ReadValues) -> None:
     text = PULL + FORWARD + "tell('q', data.qpos - [0.5, 0.25])"
-    one, two, three, four = (told(text, number)["q"] for number in (1, 2, 3, 4))
-    assert one == pytest.approx([-x for x in two], rel=1e-3)
-    assert three == pytest.approx([-x for x in four], rel=1e-3)
-    assert abs(three[0]) == pytest.approx(abs(one[0]) / 2, rel=1e-3)
-    assert one[0] * one[1] * three[0] * three[1] < 0, "the second pair goes another way"
+    first, second, third, fourth = (read_values(text, number)["q"] for number in (1, 2, 3, 4))
+    assert first == pytest.approx([-x for x in second], rel=1e-3)
+    assert third == pytest.approx([-x for x in fourth], rel=1e-3)
+    assert abs(third[0]) == pytest.approx(abs(first[0]) / 2, rel=1e-3)
+    assert first[0] * first[1] * third[0] * third[1] < 0, "the second pair goes another way"
 
 
-def test_after_a_reset_the_state_is_moved_again_and_alike(told: Told) -> None:
+def test_after_a_reset_the_state_is_moved_again_and_alike(read_values: ReadValues) -> None:
     text = "for name in 'ab':\n"
     text += "    mujoco.mj_resetDataKeyframe(model, data, 0)\n    mujoco.mj_forward(model, data)\n"
     text += "    tell(name, [*data.qpos, *data.qvel])\n    mujoco.mj_step(model, data, 10)\n"
-    found = told(text)
-    assert moved(found["a"][::3], 0.5, 2.0)
-    assert found["a"] == found["b"]
+    values = read_values(text)
+    assert is_moved(values["a"][::3], 0.5, 2.0)
+    assert values["a"] == values["b"]
 
 
-def test_velocities_and_activations(told: Told) -> None:
-    found = told(f"""
+def test_velocities_and_activations(read_values: ReadValues) -> None:
+    values = read_values(f"""
 act = "<actuator><general joint='j' dyntype='filter' dynprm='1'/></actuator></mujoco>"
 model = mujoco.MjModel.from_xml_string(SPRING.partition("<keyframe>")[0] + act)
 data = mujoco.MjData(model)
@@ -131,15 +131,15 @@ data.qvel[1] = 7.0
 tell("set", [data.act[0], data.qvel[1]])
 tell("v", data.qvel)
 """)
-    assert moved(found["set"], 3.0, 7.0)
-    assert found["v"][0] == 0.0
+    assert is_moved(values["set"], 3.0, 7.0)
+    assert values["v"][0] == 0.0
 
 
-def test_only_what_was_set_is_moved_again(told: Told) -> None:
+def test_only_what_was_set_is_moved_again(read_values: ReadValues) -> None:
     text = PULL + STEP * 5 + "tell('kept', data.qpos)\ndata.qpos[1] = 3.0\n" + FORWARD
-    found = told(text + STATE)
-    assert found["q"][0] == found["kept"][0]
-    assert moved(found["q"][1:], 3.0)
+    values = read_values(text + STATE)
+    assert values["q"][0] == values["kept"][0]
+    assert is_moved(values["q"][1:], 3.0)
 
 
 COPIES = (
@@ -152,16 +152,18 @@ COPIES = (
 )
 
 
-def test_what_is_put_back_or_copied_is_not_moved(told: Told) -> None:
+def test_what_is_put_back_or_copied_is_not_moved(read_values: ReadValues) -> None:
     text = PULL + STEP * 5 + "q, v, t = data.qpos.copy(), data.qvel.copy(), data.time\n" + STEP * 5
     text += "other = data.qpos.copy()\ndata.qpos[:], data.qvel[:], data.time = q, v, t\n" + STEP * 5
-    assert told(text + "tell('apart', data.qpos - other)")["apart"] == [0.0, 0.0]
-    for copied in COPIES:
-        text = PULL + STEP * 5 + copied + STEP * 5 + "mujoco.mj_step(model, other, 5)\n"
-        assert told(text + "tell('apart', other.qpos - data.qpos)")["apart"] == [0.0, 0.0], copied
+    assert read_values(text + "tell('apart', data.qpos - other)")["apart"] == [0.0, 0.0]
+    for copy_code in COPIES:
+        text = PULL + STEP * 5 + copy_code + STEP * 5 + "mujoco.mj_step(model, other, 5)\n"
+        assert read_values(text + "tell('apart', other.qpos - data.qpos)")["apart"] == [0.0, 0.0], (
+            copy_code
+        )
 
 
-def test_equal_states_are_moved_equally_so_that_differences_stay(told: Told) -> None:
+def test_equal_states_are_moved_equally_so_that_differences_stay(read_values: ReadValues) -> None:
     text = """
 def end(offset, timestep):
     model.opt.timestep = timestep
@@ -174,12 +176,12 @@ def end(offset, timestep):
 tell("slope", (end(1e-6, 1e-3) - end(-1e-6, 1e-3)) / 2e-6)
 tell("error", end(0, 1e-3) - end(0, 1e-4))
 """
-    plain, other = told(text, 0), told(text, 1)
-    assert other["slope"] == pytest.approx(plain["slope"], rel=1e-9)
-    assert other["error"] == pytest.approx(plain["error"], rel=1e-10)
+    plain, perturbed = read_values(text, 0), read_values(text, 1)
+    assert perturbed["slope"] == pytest.approx(plain["slope"], rel=1e-9)
+    assert perturbed["error"] == pytest.approx(plain["error"], rel=1e-10)
 
 
-def test_quaternions_keep_their_length(told: Told) -> None:
+def test_quaternions_keep_their_length(read_values: ReadValues) -> None:
     text = """
 data.qpos[3:7] = 0.5, 0.5, -0.5, 0.5
 data.qpos[7:11] = np.array([1, 2, 3, 4]) / np.sqrt(30)
@@ -188,36 +190,36 @@ mujoco.mj_forward(model, data)
 tell("lengths", [np.linalg.norm(data.qpos[at:at + 4]) for at in (3, 7)])
 tell("apart", [np.abs(data.qpos - before)[at:at + 4].max() for at in (3, 7)])
 """
-    found = told(OTHER + text + STATE)
-    assert found["lengths"] == pytest.approx([1.0, 1.0], abs=3e-16)
-    assert all(1e-13 < apart < 1e-12 for apart in found["apart"])
-    assert moved(found["q"][2:3], 1.0)
+    values = read_values(OTHER + text + STATE)
+    assert values["lengths"] == pytest.approx([1.0, 1.0], abs=3e-16)
+    assert all(1e-13 < apart < 1e-12 for apart in values["apart"])
+    assert is_moved(values["q"][2:3], 1.0)
 
 
-def test_zeros_stay_but_for_trees_that_have_nothing_else(told: Told) -> None:
-    found = told("data.qpos[0] = 0.5\n" + FORWARD + STATE)
-    assert moved(found["q"][:1], 0.5) and abs(found["q"][1]) == SIZE
-    assert found["v"] == [0.0, 0.0]
-    found = told("data.qvel[0] = 0.5\n" + FORWARD + STATE)
-    assert found["q"][0] == 0.0 and moved(found["v"][:1], 0.5)
-    turned = told(OTHER + FORWARD + STATE)["q"]
-    assert (turned[:2], turned[3:8]) == ([0.0] * 2, [1.0, 0.0, 0.0, 0.0, 1.0])
-    assert all(abs(abs(x) - SIZE / 2) < 1e-20 for x in turned[8:11]), "the other tree rests"
+def test_zeros_stay_but_for_trees_that_have_nothing_else(read_values: ReadValues) -> None:
+    values = read_values("data.qpos[0] = 0.5\n" + FORWARD + STATE)
+    assert is_moved(values["q"][:1], 0.5) and abs(values["q"][1]) == SIZE
+    assert values["v"] == [0.0, 0.0]
+    values = read_values("data.qvel[0] = 0.5\n" + FORWARD + STATE)
+    assert values["q"][0] == 0.0 and is_moved(values["v"][:1], 0.5)
+    positions = read_values(OTHER + FORWARD + STATE)["q"]
+    assert (positions[:2], positions[3:8]) == ([0.0] * 2, [1.0, 0.0, 0.0, 0.0, 1.0])
+    assert all(abs(abs(x) - SIZE / 2) < 1e-20 for x in positions[8:11]), "the other tree rests"
 
 
-def test_the_correction_of_a_rounding_is_no_initial_state(told: Told) -> None:
+def test_the_correction_of_a_rounding_is_no_initial_state(read_values: ReadValues) -> None:
     text = """
 data.qvel[3:6] = 1, 2, 3
 for _ in range(1000):
     mujoco.mj_step(model, data)
     data.qpos[3:7] /= np.linalg.norm(data.qpos[3:7]) * (1 + 1e-15)
 """
-    plain, other = (told(OTHER + text + STATE, number)["q"] for number in (0, 1))
-    assert other == pytest.approx(plain, rel=1e-10, abs=1e-10)
+    plain, perturbed = (read_values(OTHER + text + STATE, number)["q"] for number in (0, 1))
+    assert perturbed == pytest.approx(plain, rel=1e-10, abs=1e-10)
 
 
-def test_two_models_at_once(told: Told) -> None:
-    found = told(f"""
+def test_two_models_at_once(read_values: ReadValues) -> None:
+    values = read_values(f"""
 other = mujoco.MjModel.from_xml_string(BODY)
 second = mujoco.MjData(other)
 {PULL}
@@ -227,21 +229,21 @@ tell("q", [*data.qpos, second.qpos[2]])
 mujoco.mj_step2(model, data)
 mujoco.mj_step2(other, second)
 """)
-    assert moved(found["q"], 0.5, 0.25, 1.0)
+    assert is_moved(values["q"], 0.5, 0.25, 1.0)
 
 
-def test_the_model_the_time_and_what_drives_stay(told: Told) -> None:
+def test_the_model_the_time_and_what_drives_stay(read_values: ReadValues) -> None:
     text = PULL + "data.time = 3.0\ndata.qfrc_applied[0] = 5.0\ndata.xfrc_applied[1, 0] = 2.0\n"
     text += FORWARD + "".join(
         f"tell({name!r}, {name})\n"
         for name in ("data.time", "data.qfrc_applied", "data.xfrc_applied", "model.geom_size")
     )
     text += "tell('m', [*model.body_mass, *model.qpos0, *model.key_qpos[0]])"
-    assert told(text, 1) == told(text, 0)
+    assert read_values(text, 1) == read_values(text, 0)
 
 
-def test_rollouts(told: Told) -> None:
-    found = told(f"""
+def test_rollouts(read_values: ReadValues) -> None:
+    values = read_values(f"""
 from mujoco import rollout
 states = np.zeros((2, mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
 states[:, 1:3] = (0.5, 0.25), (1.0, 2.0)
@@ -250,32 +252,32 @@ end, _ = rollout.rollout(model, data, states, nstep=3)
 tell("given", states[:, 1:3])
 tell("end", end[:, -1, 1:3])
 """)
-    assert found["given"] == [0.5, 0.25, 1.0, 2.0]
-    assert moved(found["end"], *found["given"])
+    assert values["given"] == [0.5, 0.25, 1.0, 2.0]
+    assert is_moved(values["end"], *values["given"])
 
 
 # --- what is told of them
 
 
-def trace(done: ScriptRun) -> Trace:
-    assert done.trace is not None
-    return done.trace
+def trace(script_run: ScriptRun) -> Trace:
+    assert script_run.trace is not None
+    return script_run.trace
 
 
-def test_what_became_of_the_states_is_noted(moving: Run) -> None:
-    found = trace(moving(PULL + STEP))
-    assert found.is_perturbed
-    number, length, position, velocity, *end = found.states[0].split()
+def test_what_became_of_the_states_is_noted(run_perturbed: Run) -> None:
+    state_trace = trace(run_perturbed(PULL + STEP))
+    assert state_trace.is_perturbed
+    number, length, position, velocity, *end = state_trace.states[0].split()
     assert (number, length, len(end)) == ("0", "2", 4)
-    assert moved([float.fromhex(position)], 0.5)
+    assert is_moved([float.fromhex(position)], 0.5)
     assert float.fromhex(velocity) == pytest.approx(0.5 / 0.002), "as far in the whole time"
-    nothing = trace(moving("tell('mass', model.body_mass)"))
-    assert (nothing.is_perturbed, nothing.states) == (False, ())
+    empty_trace = trace(run_perturbed("tell('mass', model.body_mass)"))
+    assert (empty_trace.is_perturbed, empty_trace.states) == (False, ())
 
 
-def test_states_are_compared_by_the_largest_since_the_simulation_began(moving: Run) -> None:
+def test_states_are_compared_by_the_largest_since_the_simulation_began(run_perturbed: Run) -> None:
     def sizes(text: str) -> tuple[float, float]:
-        _, _, position, velocity, *_ = trace(moving(text)).states[0].split()
+        _, _, position, velocity, *_ = trace(run_perturbed(text)).states[0].split()
         return float.fromhex(position), float.fromhex(velocity)
 
     to_zero = "data.qpos[:] = 0.5\nwhile data.qpos[0] > 0: mujoco.mj_step(model, data)\n"

@@ -34,8 +34,8 @@ def test_names_of_processors(text: str, name: str) -> None:
 
 
 def test_this_machine() -> None:
-    found = machine()
-    assert found.engine.count(".") == 2
-    assert found.system
-    assert found.cpu == cpu_name()
-    assert "\n" not in found.cpu
+    this_machine = machine()
+    assert this_machine.engine.count(".") == 2
+    assert this_machine.system
+    assert this_machine.cpu == cpu_name()
+    assert "\n" not in this_machine.cpu

@@ -66,7 +66,7 @@ def texts(root: Path, xmls: Sequence[str], timeout: float = TIMEOUT) -> tuple[Co
 
 
 def includes(root: Path, xmls: Sequence[str]) -> list[tuple[str, ...] | None]:
-    return [one.facts and one.facts.includes for one in texts(root, xmls)]
+    return [result.facts and result.facts.includes for result in texts(root, xmls)]
 
 
 # --- facts
@@ -100,7 +100,7 @@ def test_facts_of_the_text_that_was_read(root: Path) -> None:
 def test_integrators_by_their_names(root: Path) -> None:
     names = ["Euler", "RK4", "implicit", "implicitfast", "discrete"]
     xmls = [f'\ufeff<mujoco><option integrator="{name}"/></mujoco>' for name in names]
-    assert [one.facts and one.facts.integrator for one in texts(root, xmls)] == names
+    assert [result.facts and result.facts.integrator for result in texts(root, xmls)] == names
 
 
 def test_everything_that_a_model_or_a_text_pulls_in(root: Path) -> None:
@@ -118,14 +118,14 @@ def test_what_is_pulled_in_from_elsewhere_or_by_a_link(root: Path, tmp_path: Pat
     for path in (root / "beside/part.xml", tmp_path / "far.xml", tmp_path / "above.xml"):
         path.write_text(part)
     (root / "models/link.xml").symlink_to("child.xml")
-    told = {
+    paths_by_name = {
         "../beside/part.xml": "beside/part.xml",
         str(tmp_path / "far.xml"): str(tmp_path / "far.xml"),
         "../../above.xml": str(tmp_path / "above.xml"),
         "link.xml": "models/link.xml",
     }
-    xmls = [f'<mujoco><include file="{written}"/></mujoco>' for written in told]
-    assert includes(root, xmls) == [(path,) for path in told.values()]
+    xmls = [f'<mujoco><include file="{name}"/></mujoco>' for name in paths_by_name]
+    assert includes(root, xmls) == [(path,) for path in paths_by_name.values()]
 
 
 def test_what_is_looked_for_and_not_there(root: Path) -> None:
@@ -195,9 +195,9 @@ def test_mistakes_are_told_in_one_line_with_that_of_the_text(root: Path) -> None
     for name, text in INNER.items():
         (root / f"models/{name}.xml").write_text(text)
     results = texts(root, [xml for xml, _ in MISTAKES])
-    for (xml, said), each in zip(MISTAKES, results, strict=True):
-        assert f"{each.line}: {readable_error(each.error)}".startswith(said), xml
-        assert each.error and not each.facts and str(root) not in each.error
+    for (xml, line), result in zip(MISTAKES, results, strict=True):
+        assert f"{result.line}: {readable_error(result.error)}".startswith(line), xml
+        assert result.error and not result.facts and str(root) not in result.error
 
 
 # --- what would take a process down
@@ -224,8 +224,8 @@ def test_a_model_without_end_or_of_any_size_is_ended(root: Path) -> None:
         assert results[0].error == f"MuJoCo's compiler took longer than {limit:g} s"
         if results[2].error == "":
             break
-    told = "MuJoCo's compiler takes more than 1024 MiB of memory for it"
-    assert [result.error for result in results[1:]] == [told, ""]
+    message = "MuJoCo's compiler takes more than 1024 MiB of memory for it"
+    assert [result.error for result in results[1:]] == [message, ""]
 
 
 BAD_WORKER = f"""\

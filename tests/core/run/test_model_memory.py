@@ -29,20 +29,20 @@ class Course:
 
     def __init__(self, root: Path) -> None:
         self.root = root
-        self.asked: list[str] = []
+        self.compiled_names: list[str] = []
         """What MuJoCo was asked to compile since it was last looked at."""
 
-    def compile(self, *more: str, fresh: bool = False) -> dict[str, CompileResult]:
+    def compile(self, *extra_texts: str, fresh: bool = False) -> dict[str, CompileResult]:
         """The results by the name of a model, or by a text."""
-        found = {path.stem: path.read_text() for path in sorted(self.root.glob("models/*.xml"))}
-        given = [(f"models/{name}.xml", text) for name, text in found.items()]
-        given += [(mjcf.TEXT_PATH, text) for text in more]
-        results = compile_or_recall(self.root, Memo(self.root, fresh=fresh), given)
-        return dict(zip([*found, *more], results, strict=True))
+        models = {path.stem: path.read_text() for path in sorted(self.root.glob("models/*.xml"))}
+        texts = [(f"models/{name}.xml", text) for name, text in models.items()]
+        texts += [(mjcf.TEXT_PATH, text) for text in extra_texts]
+        results = compile_or_recall(self.root, Memo(self.root, fresh=fresh), texts)
+        return dict(zip([*models, *extra_texts], results, strict=True))
 
-    def compiled(self) -> list[str]:
-        asked, self.asked = self.asked, []
-        return sorted(asked)
+    def take_compiled(self) -> list[str]:
+        names, self.compiled_names = self.compiled_names, []
+        return sorted(names)
 
 
 @pytest.fixture
@@ -54,7 +54,9 @@ def course(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Course:
     real = mjcf.compile_all
 
     def compile(root: Path, texts: Sequence[tuple[str, str]], **limits: int) -> object:
-        course.asked += [t if path == mjcf.TEXT_PATH else Path(path).stem for path, t in texts]
+        course.compiled_names += [
+            t if path == mjcf.TEXT_PATH else Path(path).stem for path, t in texts
+        ]
         return real(root, texts, **limits)
 
     monkeypatch.setattr(mjcf, "compile_all", compile)
@@ -63,7 +65,7 @@ def course(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Course:
 
 def test_nothing_is_compiled_twice(course: Course) -> None:
     first = course.compile(TEXT, BROKEN, TEXT)
-    assert course.compiled() == sorted(["main", "part", TEXT, BROKEN])
+    assert course.take_compiled() == sorted(["main", "part", TEXT, BROKEN])
     assert first["main"].facts is not None and first["main"].facts.includes == (
         "models/assets/m.obj",
         "models/part.xml",
@@ -73,7 +75,7 @@ def test_nothing_is_compiled_twice(course: Course) -> None:
         os.utime(path)
     course.root = course.root.rename(course.root.with_name("moved"))
     assert course.compile(BROKEN, TEXT) == first
-    assert course.compiled() == []
+    assert course.take_compiled() == []
 
 
 def test_what_is_made_of_a_file_is_compiled_again(course: Course) -> None:
@@ -84,13 +86,13 @@ def test_what_is_made_of_a_file_is_compiled_again(course: Course) -> None:
         ("models/main.xml", ["main"]),
         ("models/other.txt", []),
     ):
-        course.compiled()
-        with (course.root / file).open("a") as opened:
-            opened.write("\n")
+        course.take_compiled()
+        with (course.root / file).open("a") as stream:
+            stream.write("\n")
         course.compile()
-        assert course.compiled() == again, file
+        assert course.take_compiled() == again, file
     course.compile(fresh=True)
-    assert course.compiled() == ["main", "part"]
+    assert course.take_compiled() == ["main", "part"]
 
 
 def test_an_error_is_remembered_until_the_missing_file_is_there(course: Course) -> None:
@@ -98,9 +100,9 @@ def test_an_error_is_remembered_until_the_missing_file_is_there(course: Course) 
     mesh.unlink()
     first = course.compile()
     assert "m.obj" in first["main"].error
-    course.compiled()
+    course.take_compiled()
     assert course.compile() == first
-    assert course.compiled() == []
+    assert course.take_compiled() == []
     mesh.write_text(TETRAHEDRON)
     assert course.compile()["main"].error == ""
-    assert course.compiled() == ["main"]
+    assert course.take_compiled() == ["main"]

@@ -264,33 +264,37 @@ def write(root: Path, files: dict[str, bytes]) -> None:
 
 def run(server: ScriptServer, root: Path, script: str) -> ScriptRun:
     write(root, {"examples/x.py": (SHOW + script).encode()})
-    (done,) = server.run(root, [ScriptJob("examples/x.py", (), 120.0, ())], parallel=1)
-    return done
+    (result,) = server.run(root, [ScriptJob("examples/x.py", (), 120.0, ())], parallel=1)
+    return result
 
 
-def noted(done: ScriptRun) -> set[str]:
-    assert done.trace is not None
-    return {name for name in done.trace.files if not name.endswith(".py")}
+def noted_files(result: ScriptRun) -> set[str]:
+    assert result.trace is not None
+    return {name for name in result.trace.files if not name.endswith(".py")}
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_the_files_of_a_model(case: Case, tmp_path: Path, server: ScriptServer) -> None:
-    there = case.files.keys() - {case.spare}
+    needed_files = case.files.keys() - {case.spare}
     root = tmp_path / "course"
     write(root, case.files)
-    done = run(server, root, case.script)
-    assert (done.status, done.stderr) == (0, "")
-    assert noted(done) == there | ({case.missing} - {""})
-    assert done.trace is not None and done.trace.opaque == ""
+    result = run(server, root, case.script)
+    assert (result.status, result.stderr) == (0, "")
+    assert noted_files(result) == needed_files | ({case.missing} - {""})
+    assert result.trace is not None and result.trace.opaque == ""
 
     alone = tmp_path / "alone"
-    write(alone, {path: case.files[path] for path in there})
-    assert run(server, alone, case.script).stdout == done.stdout, "what was noted does not suffice"
+    write(alone, {path: case.files[path] for path in needed_files})
+    assert run(server, alone, case.script).stdout == result.stdout, (
+        "what was noted does not suffice"
+    )
 
-    for path in there:
+    for path in needed_files:
         (alone / path).unlink()
-        changed = run(server, alone, case.script)
-        assert (changed.status, changed.stdout) != (0, done.stdout), f"{path} is not needed"
+        changed_run = run(server, alone, case.script)
+        assert (changed_run.status, changed_run.stdout) != (0, result.stdout), (
+            f"{path} is not needed"
+        )
         write(alone, {path: case.files[path]})
 
 
@@ -299,7 +303,7 @@ def test_files_that_mujoco_writes_and_plugins_that_it_loads(
 ) -> None:
     (tmp_path / "plugins").mkdir()
     writes, loads = "it writes files of the project", "it loads native code of the project"
-    for call, why in {
+    for call, reason in {
         "mujoco.mj_saveLastXML('out.xml', model)": writes,
         "mujoco.mj_saveModel(model, 'out.mjb')": writes,
         "mujoco.mj_printModel(model, 'out.txt')": writes,
@@ -307,8 +311,8 @@ def test_files_that_mujoco_writes_and_plugins_that_it_loads(
         "Spec().to_file('out.xml')": writes,
         "mujoco.mj_loadAllPluginLibraries('plugins')": loads,
     }.items():
-        done = run(server, tmp_path, f"model = text('<mujoco/>')\n{call}\n")
-        assert done.trace is not None and done.trace.opaque == why, call
+        result = run(server, tmp_path, f"model = text('<mujoco/>')\n{call}\n")
+        assert result.trace is not None and result.trace.opaque == reason, call
 
 
 def test_wrappers_look_like_what_they_wrap(tmp_path: Path, server: ScriptServer) -> None:

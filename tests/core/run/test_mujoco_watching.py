@@ -30,35 +30,37 @@ FAST = "data.qvel[0] = 1e20\n"
 STEP = "mujoco.mj_step(model, data)\n"
 LINE = len(HEAD.splitlines())
 WARNED = "WARNING: Nan, Inf or huge value in QVEL at DOF 0. The simulation is unstable."
-Found = Callable[[str], tuple[Divergence, ...]]
+FindDivergences = Callable[[str], tuple[Divergence, ...]]
 
 
 @pytest.fixture
-def found(run: Run, root: Path) -> Found:
+def find_divergences(run: Run, root: Path) -> FindDivergences:
     def of_script(text: str) -> tuple[Divergence, ...]:
-        done = run(text)
-        assert done.outcome is Outcome.OK, done.stderr
+        result = run(text)
+        assert result.outcome is Outcome.OK, result.stderr
         assert [path.name for path in root.iterdir()] == ["examples"], "something was left"
-        assert done.trace is not None
-        return done.trace.divergences
+        assert result.trace is not None
+        return result.trace.divergences
 
     return of_script
 
 
-def signs(found: tuple[Divergence, ...]) -> list[Sign]:
-    return [one.sign for one in found]
+def signs(divergences: tuple[Divergence, ...]) -> list[Sign]:
+    return [divergence.sign for divergence in divergences]
 
 
 # --- what is noticed
 
 
 @both_ways
-def test_a_warning_is_noticed_with_its_line_time_and_model(found: Found) -> None:
+def test_a_warning_is_noticed_with_its_line_time_and_model(
+    find_divergences: FindDivergences,
+) -> None:
     def warned(line: int, time: str = "0.0000") -> tuple[Divergence, ...]:
         return (Divergence(Sign.VELOCITIES, time, "spinner", "examples/x.py", LINE + line),)
 
-    assert found(HEAD + STEP * 4 + FAST + STEP) == warned(6, "0.0080")
-    assert found(HEAD + "import numpy.random\n" + FAST + STEP) == warned(3)
+    assert find_divergences(HEAD + STEP * 4 + FAST + STEP) == warned(6, "0.0080")
+    assert find_divergences(HEAD + "import numpy.random\n" + FAST + STEP) == warned(3)
 
 
 AFTERWARDS = (
@@ -85,15 +87,19 @@ IMPORTS = (
 )
 
 
-def test_a_warning_is_noticed_however_the_script_goes_about_it(found: Found) -> None:
+def test_a_warning_is_noticed_however_the_script_goes_about_it(
+    find_divergences: FindDivergences,
+) -> None:
     scripts = [HEAD + FAST + STEP + after for after in AFTERWARDS]
     scripts += [f"{HEAD}{FAST}{step}\n" for step in STEPS]
     scripts += [HEAD.replace("import mujoco\n", text, 1) + FAST + STEP for text in IMPORTS]
     for script in scripts:
-        assert signs(found(script)) == [Sign.VELOCITIES], script
+        assert signs(find_divergences(script)) == [Sign.VELOCITIES], script
 
 
-def test_a_warning_in_the_threads_of_a_rollout_has_the_line_that_began_it(found: Found) -> None:
+def test_a_warning_in_the_threads_of_a_rollout_has_the_line_that_began_it(
+    find_divergences: FindDivergences,
+) -> None:
     rollout = """\
 import numpy, threading
 from mujoco import rollout
@@ -102,39 +108,49 @@ states[:, 2] = 1e20
 datas = [mujoco.MjData(model) for _ in range(3)]
 rollout.rollout(model, datas, states, nstep=20)
 """
-    [one] = found(HEAD + rollout)
-    assert (one.sign, one.model, one.line) == (Sign.VELOCITIES, "spinner", LINE + 6)
+    [divergence] = find_divergences(HEAD + rollout)
+    assert (divergence.sign, divergence.model, divergence.line) == (
+        Sign.VELOCITIES,
+        "spinner",
+        LINE + 6,
+    )
 
 
-def test_each_warning_and_each_lost_state_has_its_name(found: Found) -> None:
-    lost = "data.qvel[0] = float('nan')\n"
+def test_each_warning_and_each_lost_state_has_its_name(find_divergences: FindDivergences) -> None:
+    losing = "data.qvel[0] = float('nan')\n"
     for script, sign in (
         ("data.qpos[0] = float('nan')\n" + STEP, Sign.POSITIONS),
         ("data.qvel[0] = float('-inf')\n" + STEP, Sign.VELOCITIES),
         ("data.qfrc_applied[0] = 1e30\n" + STEP, Sign.ACCELERATIONS),
-        (STEP + lost + "data = mujoco.MjData(model)\n" * 9, Sign.STATE),
+        (STEP + losing + "data = mujoco.MjData(model)\n" * 9, Sign.STATE),
         (STEP + "import copy\nother = copy.copy(data)\nother.qpos[0] = 1e400\n", Sign.STATE),
     ):
-        assert signs(found(HEAD + script)) == [sign], script
-    assert found(HEAD + STEP + lost) == (Divergence(Sign.STATE, "0.002", "spinner", "", 0),)
-    for sound in ("data.qvel[0] = 3.0\n" + STEP * 5, lost):  # a state that was never stepped
-        assert found(HEAD + sound) == ()
+        assert signs(find_divergences(HEAD + script)) == [sign], script
+    assert find_divergences(HEAD + STEP + losing) == (
+        Divergence(Sign.STATE, "0.002", "spinner", "", 0),
+    )
+    for harmless in ("data.qvel[0] = 3.0\n" + STEP * 5, losing):  # a state that was never stepped
+        assert find_divergences(HEAD + harmless) == ()
 
 
-def test_of_several_models_the_one_whose_clock_it_is(found: Found) -> None:
-    other = "model = mujoco.MjModel.from_xml_string(XML.replace('spinner', 'other'))\n"
-    twice = HEAD + "first = data\nmujoco.mj_step(model, first)\n" + other
-    [one] = found(twice + "data = mujoco.MjData(model)\n" + FAST + STEP)
-    assert (one.model, one.line) == ("other", LINE + 6)
+def test_of_several_models_the_one_whose_clock_it_is(find_divergences: FindDivergences) -> None:
+    other_model = "model = mujoco.MjModel.from_xml_string(XML.replace('spinner', 'other'))\n"
+    twice = HEAD + "first = data\nmujoco.mj_step(model, first)\n" + other_model
+    [divergence] = find_divergences(twice + "data = mujoco.MjData(model)\n" + FAST + STEP)
+    assert (divergence.model, divergence.line) == ("other", LINE + 6)
 
 
-def test_a_loop_that_diverges_often_does_not_fill_the_notes(found: Found) -> None:
+def test_a_loop_that_diverges_often_does_not_fill_the_notes(
+    find_divergences: FindDivergences,
+) -> None:
     loop = "for i in range(1000):\n    mujoco.mj_resetData(model, data)\n"
     loop += "    data.time = i\n    data.qvel[0] = 1e20\n    mujoco.mj_step(model, data)\n"
-    assert len(found(HEAD + loop)) == 16
+    assert len(find_divergences(HEAD + loop)) == 16
 
 
-def test_a_handler_that_nobody_knows_of_leaves_the_counter(found: Found) -> None:
+def test_a_handler_that_nobody_knows_of_leaves_the_counter(
+    find_divergences: FindDivergences,
+) -> None:
     silent = """\
 import ctypes
 library = ctypes.PyDLL(mujoco._functions.__file__)
@@ -142,8 +158,8 @@ ignore = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(lambda message: None)
 pointer = ctypes.c_void_p.in_dll(library, "mju_user_warning")
 pointer.value = ctypes.cast(ignore, ctypes.c_void_p).value
 """
-    [one] = found(HEAD + silent + FAST + STEP)
-    assert (one.sign, one.model, one.line) == (Sign.VELOCITIES, "spinner", 0)
+    [divergence] = find_divergences(HEAD + silent + FAST + STEP)
+    assert (divergence.sign, divergence.model, divergence.line) == (Sign.VELOCITIES, "spinner", 0)
 
 
 # --- bodies deep in each other
@@ -173,7 +189,9 @@ PLATE = FALL.replace('size="0.1" mass', 'type="box" size="0.1 0.1 1e-4" mass').r
 APART = FALL.replace('name="floor"', 'name="floor" contype="0" conaffinity="0"')
 
 
-def test_a_body_that_is_pressed_into_another_by_half_its_thickness(found: Found) -> None:
+def test_a_body_that_is_pressed_into_another_by_half_its_thickness(
+    find_divergences: FindDivergences,
+) -> None:
     for text, force, is_deep in (
         (FALL, 5000, True),
         (FALL + "mujoco.mj_resetData(model, data)\n", 5000, True),
@@ -182,7 +200,10 @@ def test_a_body_that_is_pressed_into_another_by_half_its_thickness(found: Found)
         (FALL, 0, False),
         (APART, 5000, False),  # an overlap without contact is the model's own
     ):
-        deep = [(one.sign, one.geoms) for one in found(text.replace("{force}", str(force)))]
+        deep = [
+            (divergence.sign, divergence.geoms)
+            for divergence in find_divergences(text.replace("{force}", str(force)))
+        ]
         assert deep == ([(Sign.CONTACT, ("`floor`", "geom 1"))] if is_deep else []), force
 
 

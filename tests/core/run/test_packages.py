@@ -46,12 +46,12 @@ def ask(tmp_path: Path, site: Path) -> InstalledPackages:
 
 
 def test_versions(tmp_path: Path, site: Path) -> None:
-    found = ask(tmp_path, site)
-    assert found.version("tool") == found.version("single") == "Some-Tool 1.2"
-    assert found.version("_fast") == "native 3.0rc1"
-    assert found.version("space") == "native 3.0rc1, other 4"
-    assert found.version("nothing") == ABSENT
-    assert found.version("no.such..name") == ABSENT
+    packages = ask(tmp_path, site)
+    assert packages.version("tool") == packages.version("single") == "Some-Tool 1.2"
+    assert packages.version("_fast") == "native 3.0rc1"
+    assert packages.version("space") == "native 3.0rc1, other 4"
+    assert packages.version("nothing") == ABSENT
+    assert packages.version("no.such..name") == ABSENT
 
 
 def test_a_module_that_no_distribution_names_is_known_by_its_files(
@@ -61,18 +61,18 @@ def test_a_module_that_no_distribution_names_is_known_by_its_files(
     (site / "folder").mkdir()
     (site / "folder/__init__.py").write_text("")
     (site / "folder/data.bin").write_bytes(b"1")
-    one = ask(tmp_path, site)
-    before = one.version("loose"), one.version("folder")
-    library = one.version("mjcourse")  # whose version says nothing while somebody works on it
+    first = ask(tmp_path, site)
+    before = first.version("loose"), first.version("folder")
+    library = first.version("mjcourse")  # whose version says nothing while somebody works on it
     assert all(version.startswith("files ") for version in (*before, library))
     (site / "folder/__pycache__").mkdir()
     (site / "folder/__pycache__/x.pyc").write_bytes(b"1")
     assert ask(tmp_path, site).version("folder") == before[1]
     (site / "loose.py").write_text("a = 2\n")
     (site / "folder/data.bin").write_bytes(b"2")
-    two = ask(tmp_path, site)
-    assert two.version("loose") != before[0]
-    assert two.version("folder") != before[1]
+    second = ask(tmp_path, site)
+    assert second.version("loose") != before[0]
+    assert second.version("folder") != before[1]
 
 
 @pytest.mark.usefixtures("later")
@@ -82,9 +82,9 @@ def test_the_map_is_kept_until_something_is_installed(
     scans: list[int] = []
     real = importlib.metadata.distributions
 
-    def scan(**where: Any) -> Iterable[importlib.metadata.Distribution]:
+    def scan(**keywords: Any) -> Iterable[importlib.metadata.Distribution]:
         scans.append(1)
-        return real(**where)
+        return real(**keywords)
 
     monkeypatch.setattr(importlib.metadata, "distributions", scan)
     for _ in range(3):
@@ -102,5 +102,5 @@ def test_the_first_on_the_path_counts(tmp_path: Path, site: Path) -> None:
     user = tmp_path / "user/site-packages"
     user.mkdir(parents=True)
     install(user, "Some-Tool", "9", ["tool/__init__.py"])
-    found = InstalledPackages(Memo(tmp_path), [str(user), str(site), str(tmp_path / "none")])
-    assert found.version("tool") == "Some-Tool 9"
+    packages = InstalledPackages(Memo(tmp_path), [str(user), str(site), str(tmp_path / "none")])
+    assert packages.version("tool") == "Some-Tool 9"

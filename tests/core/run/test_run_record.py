@@ -19,11 +19,11 @@ def test_a_traceback_is_moved_to_another_machine() -> None:
         "a/home/me/course stays, /home/me/courses is in the home folder\n"
     )
     run = ScriptRun("examples/a.py", Outcome.FAILED, 1, "out\n", stderr, 0.25)
-    kept = to_bytes(record_of(INPUTS, (), 1_700_000_000, "", run), HERE)
-    assert b"/home/me/course/" not in kept and b"/opt/venv" not in kept
-    found = from_bytes(kept)
-    assert found.restore(HERE).stderr == stderr
-    assert found.restore(THERE).stderr == (
+    data = to_bytes(record_of(INPUTS, (), 1_700_000_000, "", run), HERE)
+    assert b"/home/me/course/" not in data and b"/opt/venv" not in data
+    record = from_bytes(data)
+    assert record.restore(HERE).stderr == stderr
+    assert record.restore(THERE).stderr == (
         'File "/ci/build/examples/a.py", line 2\n'
         'File "/usr/lib/python3.11/site-packages/numpy/x.py", line 3\n'
         "/ci/build/examples/a.py:3: UserWarning: ~ is /root and /home/mexico\n"

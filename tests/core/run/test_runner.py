@@ -15,7 +15,7 @@ from coursebuild.core.model.results import Outcome
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.script_environment import clean_environment
 from support.run_code import run_code
-from support.runners import SOURCE_TREE, TOOL, Run, both_ways, forked_or_not, hanging, job
+from support.runners import SOURCE_TREE, TOOL, Run, both_ways, forked_or_not, job, run_hanging
 
 pytestmark = pytest.mark.site
 
@@ -39,31 +39,31 @@ CASES: list[tuple[str, Outcome, int, str]] = [
 
 def test_outcome_status_and_output(run: Run) -> None:
     for code, *expected in CASES:
-        found = run(code)
-        assert [found.outcome, found.status, found.stdout] == expected, code
-        assert found.seconds > 0.0 and not found.cached
+        result = run(code)
+        assert [result.outcome, result.status, result.stdout] == expected, code
+        assert result.seconds > 0.0 and not result.cached
 
 
 def test_output_beyond_the_limit_ends_a_script(run: Run) -> None:
     for code in ("write(b'x' * 1048577)", "while True: write(b'\\xc3\\xa9' * 1000)"):
-        found = run(WRITE + code)
-        assert found.outcome is Outcome.OUTPUT_LIMIT, code
-        assert len(found.stdout.encode()) <= LIMIT
+        result = run(WRITE + code)
+        assert result.outcome is Outcome.OUTPUT_LIMIT, code
+        assert len(result.stdout.encode()) <= LIMIT
 
 
 def test_end_of_a_long_error_output_is_kept(run: Run) -> None:
     code = "import sys\nfor i in range(60_000): sys.stderr.write(f'é{i:06}\\n')\nprint('done')"
-    found = run(code)
-    assert (found.outcome, found.stdout) == (Outcome.OK, "done\n")
-    assert found.stderr.endswith("é059999\n") and "\\x" not in found.stderr
-    assert (1 << 16) - 4 <= len(found.stderr.encode()) <= 1 << 16
+    result = run(code)
+    assert (result.outcome, result.stdout) == (Outcome.OK, "done\n")
+    assert result.stderr.endswith("é059999\n") and "\\x" not in result.stderr
+    assert (1 << 16) - 4 <= len(result.stderr.encode()) <= 1 << 16
 
 
 def test_crash_says_where_and_leaves_no_core(run: Run, root: Path) -> None:
     code = "import ctypes, resource\nprint(resource.getrlimit(resource.RLIMIT_CORE), flush=True)\n"
-    found = run(f"{code}def crash(): ctypes.string_at(0)\ncrash()\n")
-    assert (found.outcome, found.status) == (Outcome.KILLED, signal.SIGSEGV)
-    assert found.stdout == "(0, 0)\n" and "line 3 in crash" in found.stderr
+    result = run(f"{code}def crash(): ctypes.string_at(0)\ncrash()\n")
+    assert (result.outcome, result.status) == (Outcome.KILLED, signal.SIGSEGV)
+    assert result.stdout == "(0, 0)\n" and "line 3 in crash" in result.stderr
     assert [path.name for path in root.iterdir()] == ["examples"]
 
 
@@ -80,30 +80,32 @@ STUBBORN = (
 @both_ways
 def test_script_that_does_not_end_is_ended_and_says_where(server: ScriptServer, root: Path) -> None:
     head = "import os, signal, threading, time\nprint(1, flush=True)\n"
-    first, *others = hanging(server, root, *(head + code for code in STUBBORN))
+    first, *rest = run_hanging(server, root, *(head + code for code in STUBBORN))
     assert "line 3 in hang" in first.stderr
-    assert [found.stdout for found in (first, *others)] == ["1\n"] * len(STUBBORN)
+    assert [result.stdout for result in (first, *rest)] == ["1\n"] * len(STUBBORN)
 
 
 def test_script_that_closes_its_output_goes_on(run: Run, root: Path) -> None:
-    found = run(
+    result = run(
         "import os, time\nprint('x', flush=True)\nos.close(1)\nos.close(2)\n"
         "time.sleep(0.2)\nopen('examples/late', 'w').write('y')\nos._exit(4)\n"
     )
-    assert (found.outcome, found.status, found.stdout) == (Outcome.FAILED, 4, "x\n")
+    assert (result.outcome, result.status, result.stdout) == (Outcome.FAILED, 4, "x\n")
     assert (root / "examples/late").exists()
 
 
 def test_script_that_lacks_a_module_is_skipped(server: ScriptServer, root: Path) -> None:
     (root / "examples/x.py").write_text("print(1)")
-    told: list[object] = []
+    events: list[object] = []
     lacking = ["no_such_module", "json", "json.no_such", "no_such_module.sub"]
     jobs = [job(requires=lacking)]
-    (skipped,) = server.run(root, jobs, parallel=4, on_start=told.append, on_finish=told.append)
-    assert skipped.outcome is Outcome.SKIPPED
-    assert skipped.missing == ("no_such_module", "json.no_such", "no_such_module.sub")
+    (skipped_run,) = server.run(
+        root, jobs, parallel=4, on_start=events.append, on_finish=events.append
+    )
+    assert skipped_run.outcome is Outcome.SKIPPED
+    assert skipped_run.missing == ("no_such_module", "json.no_such", "no_such_module.sub")
 
-    assert told == ["examples/x.py", skipped]
+    assert events == ["examples/x.py", skipped_run]
     assert server.run(root, [], parallel=4) == ()
 
 
@@ -113,8 +115,8 @@ def test_what_is_required_is_found_and_not_imported(run: Run, root: Path) -> Non
         (root / "examples" / name).write_text("raise SystemExit('imported')")
     names = ["numpy", "numpy.linalg", "sibling", "sys", "mjcourse"]
     (root / "examples/package/__init__.py").write_text("")
-    found = run("print('ran')", requires=[*names, "package.inner"])
-    assert (found.stdout, found.missing) == ("ran\n", ())
+    result = run("print('ran')", requires=[*names, "package.inner"])
+    assert (result.stdout, result.missing) == ("ran\n", ())
 
 
 def test_script_that_cannot_be_started_says_why(
@@ -123,12 +125,12 @@ def test_script_that_cannot_be_started_says_why(
     (root / "examples/folder.py").mkdir()
     (root / "examples/folder.py/__main__.py").write_text("print('must not run')")
     for path in ("examples/none.py", "examples/folder.py"):
-        (found,) = server.run(root, [job(path)], parallel=1)
-        assert (found.outcome, found.stdout) == (Outcome.FAILED, "")
-        assert found.stderr == f"there is no file {path}\n"
-    found = run("print(1)", args=["a\0b"])
-    assert found.outcome is Outcome.FAILED
-    assert found.stderr.startswith("the script cannot be started: ")
+        (result,) = server.run(root, [job(path)], parallel=1)
+        assert (result.outcome, result.stdout) == (Outcome.FAILED, "")
+        assert result.stderr == f"there is no file {path}\n"
+    result = run("print(1)", args=["a\0b"])
+    assert result.outcome is Outcome.FAILED
+    assert result.stderr.startswith("the script cannot be started: ")
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
     with pytest.raises(EffectError, match="no place for temporary files: no such file"):
         run("print(1)")
@@ -169,15 +171,21 @@ def test_script_finds_the_course_and_nothing_of_who_runs_it(
     pipe = os.pipe()
     for end in pipe:
         os.set_inheritable(end, True)
-    found = run(PROBE, args=["a b", "", "*", "é"])
-    again = json.loads(run(PROBE).stdout.splitlines()[0])[3]
+    result = run(PROBE, args=["a b", "", "*", "é"])
+    second_hash = json.loads(run(PROBE).stdout.splitlines()[0])[3]
     for end in pipe:
         os.close(end)
-    assert found.outcome is Outcome.OK, found.stderr
-    seen, terminal = found.stdout.splitlines()
-    environment, *others = json.loads(seen)
+    assert result.outcome is Outcome.OK, result.stderr
+    first_line, terminal = result.stdout.splitlines()
+    environment, *rest = json.loads(first_line)
     arguments = ["examples/x.py", "a b", "", "*", "é"]
-    assert others == [arguments, "UTC", again, [], ["0", "1", "2", "3"]]  # 3 is the listing itself
+    assert rest == [
+        arguments,
+        "UTC",
+        second_hash,
+        [],
+        ["0", "1", "2", "3"],
+    ]  # 3 is the listing itself
     assert terminal == "no terminal"
     assert not {"SECRET_TOKEN", "DISPLAY", "COLUMNS", "LC_NUMERIC"} & environment.keys()
     assert environment["MUJOCO_GL"] == "egl"
@@ -192,24 +200,26 @@ def test_script_finds_the_course_and_nothing_of_who_runs_it(
 def test_mjcourse_and_siblings_can_be_imported(run: Run, root: Path) -> None:
     (root / "examples/sibling.py").write_text("value = 42\n")
     (root / "examples/coursebuild.py").write_text("value = 'own'\n")
-    found = run(
+    result = run(
         "import sibling, mjcourse, coursebuild\n"
         "print(sibling.value, coursebuild.value, mjcourse.__file__, sep='\\n')\n"
     )
-    assert found.outcome is Outcome.OK, found.stderr
-    *values, library = found.stdout.splitlines()
+    assert result.outcome is Outcome.OK, result.stderr
+    *values, library = result.stdout.splitlines()
     assert values == ["42", "own"]
     assert Path(library).parent == SOURCE_TREE / "mjcourse"
     assert not (root / "examples/__pycache__").exists()
 
 
 def test_temporary_folder_goes_whatever_is_done_to_it(run: Run, root: Path) -> None:
-    closed = "at = tempfile.mkdtemp()\nopen(at + '/f', 'w').close()\nos.chmod(at, 0)\n"
-    gone = "os.mkdir('w'); os.chdir('w'); os.rmdir('../w'); shutil.rmtree(os.environ['TMPDIR'])\n"
-    for code in (closed, gone):
-        found = run(f"import os, shutil, tempfile\n{code}print(os.environ['TMPDIR'], end='')\n")
-        assert found.outcome is Outcome.OK, found.stderr
-        assert not Path(found.stdout).exists()
+    locked_folder = "at = tempfile.mkdtemp()\nopen(at + '/f', 'w').close()\nos.chmod(at, 0)\n"
+    removed_folder = (
+        "os.mkdir('w'); os.chdir('w'); os.rmdir('../w'); shutil.rmtree(os.environ['TMPDIR'])\n"
+    )
+    for code in (locked_folder, removed_folder):
+        result = run(f"import os, shutil, tempfile\n{code}print(os.environ['TMPDIR'], end='')\n")
+        assert result.outcome is Outcome.OK, result.stderr
+        assert not Path(result.stdout).exists()
 
 
 @forked_or_not
@@ -219,5 +229,5 @@ def test_signals_are_as_at_the_start(root: Path, fork: bool) -> None:
         "import signal\nprint([signal.getsignal(n) is not signal.SIG_IGN for n in (1, 2, 15)])"
     )
     code = "import signal\nfor n in (1, 2, 15): signal.signal(n, signal.SIG_IGN)\n" + TOOL
-    done = run_code(code, root, fork)
-    assert "[True, True, True]" in done.stdout, done.stderr
+    process = run_code(code, root, fork)
+    assert "[True, True, True]" in process.stdout, process.stderr

@@ -15,13 +15,13 @@ from support.runners import (
     SOURCE_TREE,
     TOOL,
     Run,
-    alive,
     both_ways,
     forked_or_not,
-    gone,
-    hanging,
+    is_alive,
     job,
+    run_hanging,
     wait_for,
+    wait_until_ended,
 )
 from support.waiting import wait_until
 
@@ -64,22 +64,22 @@ def daemons(root: Path) -> list[int]:
 @both_ways
 def test_daemons_that_hold_the_pipe_end_with_their_script(run: Run, root: Path) -> None:
     for end, outcome in (("", Outcome.OK), ("os._exit(0)", Outcome.OK), ("os.abort()", None)):
-        found = run(f"{DAEMON}\n{end}\n")
-        assert found.outcome is (outcome or Outcome.KILLED)
-        assert found.stdout == "started\n"
-        assert not any(alive(pid) for pid in daemons(root)), end
+        result = run(f"{DAEMON}\n{end}\n")
+        assert result.outcome is (outcome or Outcome.KILLED)
+        assert result.stdout == "started\n"
+        assert not any(is_alive(pid) for pid in daemons(root)), end
 
 
 def test_all_that_a_hanging_script_has_started_ends(server: ScriptServer, root: Path) -> None:
-    hanging(server, root, f"{DAEMON}\ntime.sleep(600)\n")
-    assert not any(alive(pid) for pid in daemons(root))
+    run_hanging(server, root, f"{DAEMON}\ntime.sleep(600)\n")
+    assert not any(is_alive(pid) for pid in daemons(root))
     code = (
         "import os, time\nfor i in range(5): os.fork()\n"
         "print(os.getpid(), flush=True)\ntime.sleep(600)\n"
     )
-    (found,) = hanging(server, root, code, said=lambda said: said.count("\n") == 32)
-    assert len(found.stdout.split()) == 32
-    assert not any(alive(int(pid)) for pid in found.stdout.split())
+    (result,) = run_hanging(server, root, code, is_done=lambda output: output.count("\n") == 32)
+    assert len(result.stdout.split()) == 32
+    assert not any(is_alive(int(pid)) for pid in result.stdout.split())
 
 
 @forked_or_not
@@ -88,11 +88,11 @@ def test_script_that_kills_its_supervisor(root: Path, fork: bool) -> None:
     (root / "examples/b.py").write_text("print('b')\n")
     jobs = [job("examples/a.py"), job("examples/b.py"), job("examples/b.py")]
     with ScriptServer(fork=fork) as server:
-        a, *others = server.run(root, jobs, parallel=1)
+        a, *later_runs = server.run(root, jobs, parallel=1)
     assert (a.outcome, a.status) == (Outcome.KILLED, 9)
     assert a.stderr == "the process that supervises this script was ended by SIGKILL\n"
-    assert [r.stdout for r in others] == ["b\n", "b\n"]
-    assert gone(wait_for(root / "examples/me"))
+    assert [r.stdout for r in later_runs] == ["b\n", "b\n"]
+    assert wait_until_ended(wait_for(root / "examples/me"))
     assert not Path((root / "examples/tmp").read_text()).parent.exists()
 
 
@@ -105,12 +105,12 @@ def test_nothing_survives_the_tool(root: Path, number: int) -> None:
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=SOURCE_TREE) as tool:
         script = wait_for(root / "examples/me")
         tool.send_signal(number)
-        said, _ = tool.communicate()
-    assert said == ("interrupted\n" if number is signal.SIGINT else "")
+        output, _ = tool.communicate()
+    assert output == ("interrupted\n" if number is signal.SIGINT else "")
     pids = [script, *daemons(root)]
     if number is signal.SIGINT:  # it had the time to see to it
-        assert not any(alive(pid) for pid in pids)
-    assert all(gone(pid) for pid in pids)
+        assert not any(is_alive(pid) for pid in pids)
+    assert all(wait_until_ended(pid) for pid in pids)
     folder = Path((root / "examples/tmp").read_text()).parent
     assert folder.name.startswith("coursebuild-")
     wait_until(lambda: not folder.exists(), "the end of the temporary folder")
@@ -127,7 +127,7 @@ def test_run_that_is_wanted_no_more_is_stopped(root: Path) -> None:
     with ScriptServer() as server:
         with pytest.raises(RunStoppedError):
             server.run(root, jobs, parallel=2, is_unwanted=unwanted)
-        assert gone(wait_for(root / "examples/me"))
+        assert wait_until_ended(wait_for(root / "examples/me"))
         (after,) = server.run(root, jobs[1:], parallel=2, is_unwanted=lambda running: False)
         assert after.stdout == "y\n"
 
@@ -143,7 +143,7 @@ def test_failure_of_who_listens_ends_the_run(server: ScriptServer, root: Path) -
 
     with pytest.raises(RuntimeError, match="listener"):
         server.run(root, [job(), job("examples/y.py")], parallel=2, on_finish=listen)
-    assert not alive(wait_for(root / "examples/me"))
+    assert not is_alive(wait_for(root / "examples/me"))
 
 
 def test_results_come_in_order_and_events_tell(server: ScriptServer, root: Path) -> None:
@@ -157,13 +157,15 @@ def test_results_come_in_order_and_events_tell(server: ScriptServer, root: Path)
         )
     ):
         (root / f"examples/{i}.py").write_text(f"print({i})\n{code}\n")
-    started: list[str] = []
-    finished: list[ScriptRun] = []
+    started_paths: list[str] = []
+    finished_runs: list[ScriptRun] = []
     jobs = [job(f"examples/{i}.py") for i in range(4)]
-    runs = server.run(root, jobs, parallel=2, on_start=started.append, on_finish=finished.append)
+    runs = server.run(
+        root, jobs, parallel=2, on_start=started_paths.append, on_finish=finished_runs.append
+    )
     assert [r.stdout for r in runs] == ["0\n", "1\n", "2\n", "3\n"]
-    assert started == [j.path for j in jobs]
-    assert sorted(finished, key=lambda r: r.path) == list(runs)
+    assert started_paths == [j.path for j in jobs]
+    assert sorted(finished_runs, key=lambda r: r.path) == list(runs)
 
 
 def test_so_many_at_a_time_and_no_more(server: ScriptServer, root: Path) -> None:

@@ -19,7 +19,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.sandbox import find_sandbox
-from support.runners import gone
+from support.runners import wait_until_ended
 from support.sandboxes import require_sandbox
 
 pytestmark = pytest.mark.site
@@ -112,9 +112,9 @@ def test_attempts_fail_and_change_nothing(
     (root / "lesson.md").write_text("as it was")
     code = "import ctypes\nlibc = ctypes.CDLL(None)\n"
     code += f"OTHER, TESTS = {neighbour}, {os.getpid()}\n"
-    (run,) = confine(code + "".join(f"attempt(lambda: {each})\n" for each in ATTEMPTS))
-    for (each, expected), said in zip(ATTEMPTS.items(), run.stdout.splitlines(), strict=True):
-        assert said.startswith(expected), each
+    (run,) = confine(code + "".join(f"attempt(lambda: {attempt})\n" for attempt in ATTEMPTS))
+    for (attempt, expected), answer in zip(ATTEMPTS.items(), run.stdout.splitlines(), strict=True):
+        assert answer.startswith(expected), attempt
     assert (root / "lesson.md").read_text() == "as it was"
     assert sorted(path.name for path in root.iterdir()) == ["examples", "lesson.md"]
     assert [path.name for path in home.iterdir()] == ["secret"]
@@ -145,8 +145,8 @@ def test_the_network_by_address_and_by_name(confine: Confine) -> None:
     assert unknown.startswith("gaierror")
     assert abstract_one.startswith("ConnectionRefusedError")
     assert run.trace is not None
-    asked = ["127.0.0.1", "192.0.2.1", "localhost", "example.org"]
-    assert [each.target for each in run.trace.effects] == asked
+    addresses = ["127.0.0.1", "192.0.2.1", "localhost", "example.org"]
+    assert [effect.target for effect in run.trace.effects] == addresses
 
 
 @pytest.mark.usefixtures("neighbour")
@@ -154,8 +154,8 @@ def test_environments_and_files_of_other_processes(
     confine: Confine, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("GITHUB_TOKEN", "hush")
-    with (home / "secret").open() as held:
-        os.set_inheritable(held.fileno(), True)
+    with (home / "secret").open() as secret_file:
+        os.set_inheritable(secret_file.fileno(), True)
         (run,) = confine(
             "import glob\n"
             "attempt(lambda: sorted(os.environ))\n"
@@ -205,10 +205,10 @@ def test_a_process_that_stays(confine: Confine) -> None:
     assert run.outcome is Outcome.OK, run.stderr
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         try:
-            found = mark.encode() in path.read_bytes()
+            is_sleeper = mark.encode() in path.read_bytes()
         except OSError:
             continue
-        assert not found or gone(int(path.parent.name))
+        assert not is_sleeper or wait_until_ended(int(path.parent.name))
 
 
 def test_filling_the_disk(confine: Confine, root: Path) -> None:
@@ -308,10 +308,15 @@ class TestRefusals:
         return folder
 
     def test_without_user_namespaces(self, programs: Path, root: Path) -> None:
-        shell, said = shutil.which("sh", path="/bin:/usr/bin"), "setting up uid map: not permitted"
-        (programs / "bwrap").write_text(f"#!{shell}\necho 'bwrap: {said}' >&2\nexit 1\n")
+        shell, message = (
+            shutil.which("sh", path="/bin:/usr/bin"),
+            "setting up uid map: not permitted",
+        )
+        (programs / "bwrap").write_text(f"#!{shell}\necho 'bwrap: {message}' >&2\nexit 1\n")
         (programs / "bwrap").chmod(0o755)
         with pytest.raises(EffectError) as refused:
             find_sandbox(root)
-        assert refused.value.message == (f"`--sandbox` does not work here, Bubblewrap says: {said}")
+        assert refused.value.message == (
+            f"`--sandbox` does not work here, Bubblewrap says: {message}"
+        )
         assert "kernel.apparmor_restrict_unprivileged_userns" in refused.value.help

@@ -11,26 +11,39 @@ from coursebuild.core.run.script_environment import conditions, places, wanted_p
 
 
 def test_conditions_are_what_decides_a_result_and_not_who_runs_it_where() -> None:
-    who = {"PATH": "/bin", "HOME": "/home/me", "USER": "me", "LANG": "de", "SECRET": "x"}
-    told = conditions({})
-    assert conditions(who) == told
-    assert dict(told)["Python"] == f"{platform.python_implementation()} {platform.python_version()}"
-    assert dict(told)["platform"].startswith(f"{sys.platform} {platform.machine()}")
-    drawn = conditions({**who, "MUJOCO_GL": "egl", "CUDA_VISIBLE_DEVICES": "1"})
-    more = ("CUDA_VISIBLE_DEVICES", "1"), ("MUJOCO_GL", "egl")
-    assert drawn == tuple(sorted((*told, *((f"environment variable {n}", v) for n, v in more))))
+    user_environment = {
+        "PATH": "/bin",
+        "HOME": "/home/me",
+        "USER": "me",
+        "LANG": "de",
+        "SECRET": "x",
+    }
+    empty_conditions = conditions({})
+    assert conditions(user_environment) == empty_conditions
+    assert (
+        dict(empty_conditions)["Python"]
+        == f"{platform.python_implementation()} {platform.python_version()}"
+    )
+    assert dict(empty_conditions)["platform"].startswith(f"{sys.platform} {platform.machine()}")
+    graphics_conditions = conditions(
+        {**user_environment, "MUJOCO_GL": "egl", "CUDA_VISIBLE_DEVICES": "1"}
+    )
+    additions = ("CUDA_VISIBLE_DEVICES", "1"), ("MUJOCO_GL", "egl")
+    assert graphics_conditions == tuple(
+        sorted((*empty_conditions, *((f"environment variable {n}", v) for n, v in additions)))
+    )
 
 
 def test_places_come_longest_first() -> None:
     """So that a folder inside of another is found before it."""
-    found = places(Path("/home/me/course"), {"HOME": "/home/me"})
-    assert [len(folder) for _, folder in found] == sorted(
-        (len(folder) for _, folder in found), reverse=True
+    folders = places(Path("/home/me/course"), {"HOME": "/home/me"})
+    assert [len(folder) for _, folder in folders] == sorted(
+        (len(folder) for _, folder in folders), reverse=True
     )
-    assert dict(found)["course"] == "/home/me/course"
-    assert dict(found)["home"] == "/home/me"
-    assert dict(found)["prefix"] == sys.prefix
-    assert os.path.isdir(dict(found)["library"])  # noqa: PTH112
+    assert dict(folders)["course"] == "/home/me/course"
+    assert dict(folders)["home"] == "/home/me"
+    assert dict(folders)["prefix"] == sys.prefix
+    assert os.path.isdir(dict(folders)["library"])  # noqa: PTH112
 
 
 def test_packages_are_wanted_that_a_script_or_a_file_beside_it_names(tmp_path: Path) -> None:
@@ -42,8 +55,8 @@ def test_packages_are_wanted_that_a_script_or_a_file_beside_it_names(tmp_path: P
         (b"if x:\n    import os, mujoco as m", ("numpy", "mujoco")),
     )
     os.mkfifo(tmp_path / "pipe.py")
-    for code, wanted in cases:
+    for code, packages in cases:
         for name in ("x.py", "beside.py"):
             (tmp_path / name).write_bytes(code)
-            assert wanted_packages([tmp_path / "none.py", tmp_path / "x.py"]) == wanted, code
+            assert wanted_packages([tmp_path / "none.py", tmp_path / "x.py"]) == packages, code
             (tmp_path / name).unlink()

@@ -10,7 +10,7 @@ import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.run.runner import ScriptServer
-from support.runners import Run, gone, job
+from support.runners import Run, job, wait_until_ended
 
 pytestmark = pytest.mark.site
 
@@ -28,7 +28,7 @@ def test_supervisors_stay_and_one_that_died_is_replaced(root: Path) -> None:
         for number in (signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV):
             dead = supervisor_of(server.run(root, [job()], parallel=1)[0])
             os.kill(dead, number)
-            assert gone(dead)
+            assert wait_until_ended(dead)
             events: list[str] = []
             after = server.run(root, [job()], parallel=1, on_start=events.append)
             assert supervisor_of(after[0]) != dead

@@ -16,7 +16,7 @@ from coursebuild.core.model.results import Trace
 from coursebuild.core.run import tracing
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.tracing import Tracer
-from support.runners import Run, both_ways, hanging, job
+from support.runners import Run, both_ways, job, run_hanging
 
 pytestmark = pytest.mark.site
 
@@ -84,8 +84,8 @@ def test_files_that_are_read_however_the_script_ends(traced: Traced) -> None:
 
 def test_files_that_are_read_before_the_time_is_over(server: ScriptServer, root: Path) -> None:
     code = "open('data/a.txt')\nprint('opened', flush=True)\nwhile True: pass"
-    (found,) = hanging(server, root, code)
-    assert found.trace is not None and found.trace.files == ("data/a.txt",)
+    (result,) = run_hanging(server, root, code)
+    assert result.trace is not None and result.trace.files == ("data/a.txt",)
 
 
 def test_files_outside_and_links_into_the_project(
@@ -215,8 +215,10 @@ def test_forked_and_spawned_scripts_have_the_same_trace(
         "import json, numpy, mujoco\nimport numpy.testing, logging\nopen('data/a.txt')\n"
         "numpy.random.rand()\n"
     )
-    one, other = (s.run(root, [job()], parallel=1)[0].trace for s in (forking, spawning))
-    assert one == other
+    forked_trace, spawned_trace = (
+        s.run(root, [job()], parallel=1)[0].trace for s in (forking, spawning)
+    )
+    assert forked_trace == spawned_trace
 
 
 # --- what cannot be known, or is more than looking
@@ -263,8 +265,8 @@ OPAQUE: list[tuple[str, str]] = [
 
 
 def test_why_a_trace_does_not_say_everything(traced: Traced) -> None:
-    for code, why in OPAQUE:
-        assert traced(code).opaque == why, code
+    for code, reason in OPAQUE:
+        assert traced(code).opaque == reason, code
 
 
 def test_effects_are_told_once_for_each_line(traced: Traced, root: Path, tmp_path: Path) -> None:
@@ -278,7 +280,7 @@ def test_effects_are_told_once_for_each_line(traced: Traced, root: Path, tmp_pat
         "socket.socket().bind(('127.0.0.1', 0))\n"
     )
     assert (trace.opaque, trace.outside) == ("it writes files outside its temporary folder", ())
-    assert sorted((each.target, each.path, each.line) for each in trace.effects) == [
+    assert sorted((effect.target, effect.path, effect.line) for effect in trace.effects) == [
         (str(tmp_path / "o"), "examples/x.py", 2),
         ("127.0.0.1:0", "examples/x.py", 7),
         ("data/0", "examples/x.py", 3),

@@ -25,7 +25,7 @@ from coursebuild.core.run.v8 import (
     StoppedError,
 )
 from support.run_code import run_code
-from support.runners import computed
+from support.runners import processor_time
 from support.waiting import wait_until
 
 pytestmark = pytest.mark.engine
@@ -112,7 +112,7 @@ def engine() -> Iterator[MathEngine]:
         yield engine
 
 
-def one(engine: MathEngine, tex: str, display: bool = False) -> str | MathError:
+def typeset_one(engine: MathEngine, tex: str, display: bool = False) -> str | MathError:
     (result,) = engine.typeset([Formula(tex, display)])
     return result
 
@@ -127,12 +127,12 @@ class TestMarkup:
         cases = [(tex, display) for tex in FORMULAS for display in (False, True)]
         cases += [(tex, True) for tex in DISPLAY_ONLY]
         results = engine.typeset([Formula(tex, display) for tex, display in cases])
-        wrong = {
-            tex: why
+        mistakes = {
+            tex: mistake
             for (tex, display), result in zip(cases, results, strict=True)
-            if (why := self.mistake(result, tex, display))
+            if (mistake := self.mistake(result, tex, display))
         }
-        assert wrong == {}
+        assert mistakes == {}
 
     def test_displays_alone_are_refused_in_a_line(self, engine: MathEngine) -> None:
         results = engine.typeset([Formula(tex, False) for tex in DISPLAY_ONLY])
@@ -160,33 +160,33 @@ class TestMarkup:
 
     def test_text_is_escaped(self, engine: MathEngine) -> None:
         tex = r"\text{</math><script>\"'\& x}"
-        root = mathml(one(engine, tex))
+        root = mathml(typeset_one(engine, tex))
         assert root.find(".//annotation").text == tex
         assert not root.findall(".//script")
 
     def test_negated_relations_are_single_characters(self, engine: MathEngine) -> None:
-        root = mathml(one(engine, r"a \not= b \not\in C"))
+        root = mathml(typeset_one(engine, r"a \not= b \not\in C"))
         assert [mo.text for mo in root.iter("mo")] == ["≠", "∉"]
 
     def test_over_what_is_low_a_root_stands_as_over_a_capital(self, engine: MathEngine) -> None:
         for tex in (r"\sqrt u", r"\sqrt{1-x^2}", r"\sqrt[3]{\dot q}"):
-            root = mathml(one(engine, tex))
+            root = mathml(typeset_one(engine, tex))
             assert "0.7em" in [space.get("height") for space in root.iter("mspace")], tex
             assert all(len(cubic) == 2 for cubic in root.iter("mroot"))
         for tex in (r"\sqrt{x_i}", r"\sqrt{\frac12}", r"\sqrt{\sum k}"):
-            root = mathml(one(engine, tex))
+            root = mathml(typeset_one(engine, tex))
             assert "0.7em" not in [space.get("height") for space in root.iter("mspace")], tex
 
     def test_labels_become_no_ids(self, engine: MathEngine) -> None:
-        result = one(engine, r"\tag{1}\label{introduction} x", True)
+        result = typeset_one(engine, r"\tag{1}\label{introduction} x", True)
         assert isinstance(result, str) and " id=" not in result
 
     def test_same_formula_same_bytes(self, engine: MathEngine) -> None:
         formulas = [Formula(tex, display) for tex in FORMULAS for display in (False, True)]
         first = engine.typeset(formulas)
         assert engine.typeset(formulas) == first
-        with MathEngine() as other:
-            assert other.typeset(formulas[::-1]) == first[::-1]
+        with MathEngine() as second_engine:
+            assert second_engine.typeset(formulas[::-1]) == first[::-1]
 
 
 MISTAKES = [
@@ -229,8 +229,8 @@ MISTAKES = [
 class TestMistakes:
     def test_each_is_said_at_its_place(self, engine: MathEngine) -> None:
         formulas = [Formula(tex.replace('\\"', '"'), False) for tex, *_ in MISTAKES]
-        found = engine.typeset(formulas)
-        assert found == [MathError(message, position) for _, message, position in MISTAKES]
+        errors = engine.typeset(formulas)
+        assert errors == [MathError(message, position) for _, message, position in MISTAKES]
 
     def test_one_bad_formula_spoils_no_other(self, engine: MathEngine) -> None:
         formulas = [Formula(tex, False) for tex in ("a", r"\foo", "b", "{", "c")]
@@ -245,14 +245,14 @@ class TestMistakes:
             assert bad == MathError(r"unknown command \zz", 0)
 
     def test_built_in_commands_cannot_be_changed_for_others(self, engine: MathEngine) -> None:
-        before = one(engine, r"\sin x")
+        before = typeset_one(engine, r"\sin x")
         engine.typeset([Formula(r"\gdef\sin{\cos} \sin", False)])
         engine.typeset([Formula(r"\gdef\__proto__{y} \__proto__", False)])
-        assert one(engine, r"\sin x") == before
+        assert typeset_one(engine, r"\sin x") == before
 
     def test_position_in_a_macro_of_temml_is_not_taken_for_ours(self, engine: MathEngine) -> None:
         for tex in (r"\ket{\ket{", r"\implies^a^b", r"\TeX^a^b", r"\dots\foo"):
-            result = one(engine, tex)
+            result = typeset_one(engine, tex)
             assert isinstance(result, MathError)
             assert result.position is None or 0 <= result.position <= len(tex)
 
@@ -336,10 +336,10 @@ class TestIsolate:
         for n in range(300):
             text = str((0, 2_000, 100_000)[n % 3] + n)
             try:
-                found = isolate.call("busy", text, (0.00002, 0.0002, 0.002, 120.0)[n % 4])
+                result = isolate.call("busy", text, (0.00002, 0.0002, 0.002, 120.0)[n % 4])
             except LimitError:
                 continue
-            assert found == text
+            assert result == text
             in_time += 1
         assert in_time >= 75
 
@@ -383,8 +383,8 @@ class TestIsolate:
             "    print(can_fork())\n"
         )
         can = sys.platform != "darwin"
-        done = run_code(code)
-        assert (done.stdout.splitlines(), done.stderr) == (
+        process = run_code(code)
+        assert (process.stdout.splitlines(), process.stderr) == (
             [str(can), f"True {not can}", "False"],
             "",
         )
@@ -410,11 +410,11 @@ class TestLife:
         with process:
             assert process.stdout is not None and process.stderr is not None
             process.stdout.readline()
-            before = computed(process.pid)
-            wait_until(lambda: computed(process.pid) > before + 20, "the endless loop")
+            before = processor_time(process.pid)
+            wait_until(lambda: processor_time(process.pid) > before + 20, "the endless loop")
             os.kill(process.pid, signal.SIGINT)
-            said, errors = process.communicate(timeout=120)
-        assert (said, errors, process.returncode) == ("interrupted\n", "", 0)
+            output, errors = process.communicate(timeout=120)
+        assert (output, errors, process.returncode) == ("interrupted\n", "", 0)
 
     def test_a_process_that_forgets_to_close_ends(self) -> None:
         code = (
@@ -422,5 +422,5 @@ class TestLife:
             "from coursebuild.core.model.results import Formula\n"
             "engine = MathEngine()\nprint(len(engine.typeset([Formula('x', False)])))\n"
         )
-        done = run_code(code)
-        assert (done.stdout, done.stderr, done.returncode) == ("1\n", "", 0)
+        process = run_code(code)
+        assert (process.stdout, process.stderr, process.returncode) == ("1\n", "", 0)

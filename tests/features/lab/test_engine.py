@@ -19,7 +19,7 @@ from coursebuild.core.run.versions import engine_version
 from coursebuild.features.lab.engines import browser, files
 from coursebuild.features.lab.engines.browser import LabEngine
 from support.lab_values import BALL, Bench, make_lab, request
-from support.runners import computed
+from support.runners import processor_time
 from support.waiting import wait_until
 
 pytestmark = pytest.mark.engine
@@ -186,8 +186,8 @@ def test_an_interrupt_ends_a_trial_and_the_process() -> None:
     with process:
         assert process.stdout is not None
         process.stdout.readline()
-        before = computed(process.pid)
-        wait_until(lambda: computed(process.pid) > before + 30, "the trial's loop")
+        before = processor_time(process.pid)
+        wait_until(lambda: processor_time(process.pid) > before + 30, "the trial's loop")
         os.kill(process.pid, signal.SIGINT)
         said, errors = process.communicate()
     assert (said, errors, process.returncode) == ("interrupted\n", "", 0)
