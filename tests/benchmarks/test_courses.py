@@ -35,18 +35,18 @@ def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.site
 def test_the_recorded_outputs_are_those_of_the_scripts(course: Path) -> None:
-    done = Folder(course).main("check")
-    assert done.status == 0, done.out + done.err
-    assert "16 lessons, 16 scripts run: everything holds" in done.out
+    result = Folder(course).main("check")
+    assert result.status == 0, result.out + result.err
+    assert "16 lessons, 16 scripts run: everything holds" in result.out
 
 
 @pytest.mark.site
 def test_so_are_those_of_scripts_with_mujoco(tmp_path: Path) -> None:
     folder = tmp_path / "course"
     write_course(folder, 2, scripts="mujoco")
-    done = Folder(folder).main("check")
-    assert done.status == 0, done.out + done.err
-    assert "2 lessons, 2 scripts run: everything holds" in done.out
+    result = Folder(folder).main("check")
+    assert result.status == 0, result.out + result.err
+    assert "2 lessons, 2 scripts run: everything holds" in result.out
 
 
 def test_two_runs_write_the_same_bytes(tmp_path: Path) -> None:
@@ -86,11 +86,11 @@ def test_every_flavor_has_the_whole_lesson(tmp_path: Path, course: Path, flavor:
         path for path in folder.rglob("*.md") if path.stem in (name, name.replace(".", "-"))
     ]
     text = theirs.read_text(encoding="utf-8")
-    wanted = ours.read_text(encoding="utf-8")
+    lesson_text = ours.read_text(encoding="utf-8")
     for pattern in (r"observed order [\d.]+", r"\\frac[^$]{3,9}", r"def \w+\(", r"^## .+$"):
-        found = re.findall(pattern, wanted, re.MULTILINE)
-        assert found
-        assert set(found) <= set(re.findall(pattern, text, re.MULTILINE))
+        matches = re.findall(pattern, lesson_text, re.MULTILINE)
+        assert matches
+        assert set(matches) <= set(re.findall(pattern, text, re.MULTILINE))
     if flavor != "coursebuild":
         assert "{out}" not in text
         assert "lesson:" not in text

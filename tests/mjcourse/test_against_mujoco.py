@@ -20,13 +20,13 @@ def unit_quats(rng: np.random.Generator, count: int = COUNT) -> np.ndarray:
     return spatial.quat_normalize(rng.normal(size=(count, 4)))
 
 
-def close(got: np.ndarray, want: np.ndarray, size: float = 1.0) -> None:
+def close(actual: np.ndarray, expected: np.ndarray, size: float = 1.0) -> None:
     """Equal to 8 ulp of a size."""
-    np.testing.assert_allclose(got, want, rtol=0, atol=8 * 2.0**-52 * size)
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=8 * 2.0**-52 * size)
 
 
-def same_rotation(got: np.ndarray, want: np.ndarray) -> None:
-    close(got * np.sign(got @ want), want)
+def same_rotation(actual: np.ndarray, expected: np.ndarray) -> None:
+    close(actual * np.sign(actual @ expected), expected)
 
 
 def test_matrices_both_ways(rng: np.random.Generator) -> None:
@@ -96,7 +96,7 @@ def numbers(values: np.ndarray) -> str:
     return " ".join(map(repr, map(float, values)))
 
 
-def compiled(*geoms: str) -> mujoco.MjModel:
+def compile_geoms(*geoms: str) -> mujoco.MjModel:
     body = f"<body><freejoint/>{''.join(geoms)}</body>"
     return mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
 
@@ -113,7 +113,7 @@ def test_inertia_of_one_geom(rng: np.random.Generator) -> None:
         base, formula = GEOMS[kind]
         mass, size = float(rng.uniform(0.1, 5)), np.array(base) * rng.uniform(0.3, 3)
         pos, quat = rng.normal(size=3), unit_quats(rng, 1)[0]
-        model = compiled(geom(kind, mass, size, pos, quat))
+        model = compile_geoms(geom(kind, mass, size, pos, quat))
         theirs = spatial.inertia_from_principal(model.body_inertia[1], model.body_iquat[1])
         ours = spatial.rotate_inertia(formula(mass, size), spatial.quat_to_mat(quat))
         atol = 4e-15 * np.abs(theirs).max()
@@ -129,7 +129,7 @@ def test_inertia_of_a_composed_body(rng: np.random.Generator) -> None:
             rng.normal(size=(4, 3)),
             unit_quats(rng, 4),
         )
-        model = compiled(
+        model = compile_geoms(
             *(
                 geom(kind, float(mass), np.array(GEOMS[kind][0]), centre, quat)
                 for kind, mass, centre, quat in zip(kinds, masses, centres, quats, strict=True)

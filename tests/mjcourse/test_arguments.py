@@ -27,15 +27,15 @@ SIGNATURES = {
 }
 ARGUMENTS = [
     (name, argument, core)
-    for name, wanted in SIGNATURES.items()
-    for argument, core in wanted.items()
+    for name, shapes_by_name in SIGNATURES.items()
+    for argument, core in shapes_by_name.items()
 ]
 
 
 def routine(name: str) -> Callable[..., object]:
-    found = getattr(spatial, name)
-    assert callable(found)
-    return found
+    function = getattr(spatial, name)
+    assert callable(function)
+    return function
 
 
 def valid(shape: tuple[int, ...], lead: tuple[int, ...] = ()) -> np.ndarray:
@@ -43,66 +43,66 @@ def valid(shape: tuple[int, ...], lead: tuple[int, ...] = ()) -> np.ndarray:
     return np.broadcast_to(entry, (*lead, *shape))
 
 
-def written(shape: tuple[int, ...]) -> str:
+def shape_text(shape: tuple[int, ...]) -> str:
     return f"({', '.join(('...', *map(str, shape)))})"
 
 
-def answer(name: str, **changed: object) -> str:
+def answer(name: str, **replacements: object) -> str:
     """What a routine says to arguments that are valid but for those that are given."""
     arguments = {key: valid(shape) for key, shape in SIGNATURES[name].items()}
     try:
-        routine(name)(**{**arguments, **changed})
+        routine(name)(**{**arguments, **replacements})
     except (TypeError, ValueError) as error:
         return f"{type(error).__name__}: {error}"
     return "nothing"
 
 
 def test_a_bad_shape_says_what_was_expected_and_what_came() -> None:
-    wrong = []
+    mismatches = []
     for name, argument, core in ARGUMENTS:
         if not core:
             continue
         for shape in ((), (5,), (2, *core[:-1], core[-1] + 1), core[1:], (0,)):
-            said = answer(name, **{argument: np.ones(shape)})
-            if said != f"ValueError: {argument} must have shape {written(core)}, got {shape}":
-                wrong.append((name, argument, shape, said))
-    assert wrong == []
+            message = answer(name, **{argument: np.ones(shape)})
+            if message != f"ValueError: {argument} must have shape {shape_text(core)}, got {shape}":
+                mismatches.append((name, argument, shape, message))
+    assert mismatches == []
 
 
 def test_what_is_no_number_is_an_error() -> None:
-    wrong = []
+    mismatches = []
     for name, argument, core in ARGUMENTS:
         for value, dtype in ((1j, "complex128"), (None, "object"), ("1", "<U1")):
-            said = answer(name, **{argument: np.full(core, value)})
-            if said != f"TypeError: {argument} must hold real numbers, got dtype {dtype}":
-                wrong.append((name, argument, value, said))
-    assert wrong == []
+            message = answer(name, **{argument: np.full(core, value)})
+            if message != f"TypeError: {argument} must hold real numbers, got dtype {dtype}":
+                mismatches.append((name, argument, value, message))
+    assert mismatches == []
 
 
 def test_a_ragged_sequence_is_an_error() -> None:
-    wrong = []
+    mismatches = []
     for name, argument, core in ARGUMENTS:
-        said = answer(name, **{argument: [[1.0, 2.0], [3.0]]})
-        expected = f"{argument} must have shape {written(core)}, got a ragged sequence"
-        if said != f"ValueError: {expected}":
-            wrong.append((name, argument, said))
-    assert wrong == []
+        message = answer(name, **{argument: [[1.0, 2.0], [3.0]]})
+        expected = f"{argument} must have shape {shape_text(core)}, got a ragged sequence"
+        if message != f"ValueError: {expected}":
+            mismatches.append((name, argument, message))
+    assert mismatches == []
 
 
 def test_leading_shapes_that_do_not_broadcast_are_named() -> None:
-    wrong = []
-    for name, wanted in SIGNATURES.items():
-        if len(wanted) == 1:
+    mismatches = []
+    for name, shapes_by_name in SIGNATURES.items():
+        if len(shapes_by_name) == 1:
             continue
-        leads = [(2,), (3,), (1,), (1,)][: len(wanted)]
-        parts = zip(wanted.items(), leads, strict=True)
-        said = answer(name, **{key: valid(shape, lead) for (key, shape), lead in parts})
-        shapes = ", ".join(f"{key} {lead}" for key, lead in zip(wanted, leads, strict=True))
+        leads = [(2,), (3,), (1,), (1,)][: len(shapes_by_name)]
+        parts = zip(shapes_by_name.items(), leads, strict=True)
+        message = answer(name, **{key: valid(shape, lead) for (key, shape), lead in parts})
+        shapes = ", ".join(f"{key} {lead}" for key, lead in zip(shapes_by_name, leads, strict=True))
         if name == "transform_spatial_inertia":
             shapes = "spatial (2,), pose (3,)"  # rot and pos were taken together before
-        if said != f"ValueError: leading shapes do not broadcast: {shapes}":
-            wrong.append((name, said))
-    assert wrong == []
+        if message != f"ValueError: leading shapes do not broadcast: {shapes}":
+            mismatches.append((name, message))
+    assert mismatches == []
 
 
 def parts(result: object) -> tuple[object, ...]:
@@ -110,32 +110,32 @@ def parts(result: object) -> tuple[object, ...]:
 
 
 def test_an_empty_batch_gives_an_empty_one() -> None:
-    for name, wanted in SIGNATURES.items():
-        first, *_ = parts(routine(name)(*(valid(shape, (0,)) for shape in wanted.values())))
+    for name, shapes_by_name in SIGNATURES.items():
+        first, *_ = parts(routine(name)(*(valid(shape, (0,)) for shape in shapes_by_name.values())))
         assert isinstance(first, np.ndarray), name
         assert first.shape[0] == 0, name
 
 
 def test_lists_and_other_dtypes_are_taken_as_doubles() -> None:
-    wrong = []
-    for name, wanted in SIGNATURES.items():
-        arguments = [valid(shape) for shape in wanted.values()]
+    mismatches = []
+    for name, shapes_by_name in SIGNATURES.items():
+        arguments = [valid(shape) for shape in shapes_by_name.values()]
         double = parts(routine(name)(*arguments))
-        for kind, given in (
+        for kind, converted in (
             ("lists", [argument.tolist() for argument in arguments]),
             ("float32", [argument.astype(np.float32) for argument in arguments]),
             ("int8", [argument.astype(np.int8) for argument in arguments]),
         ):
-            for one, two in zip(double, parts(routine(name)(*given)), strict=True):
-                alike = np.array_equal(np.asarray(one), np.asarray(two))
-                if not alike or np.asarray(one).dtype != np.asarray(two).dtype:
-                    wrong.append((name, kind, one, two))
-    assert wrong == []
+            for a, b in zip(double, parts(routine(name)(*converted)), strict=True):
+                alike = np.array_equal(np.asarray(a), np.asarray(b))
+                if not alike or np.asarray(a).dtype != np.asarray(b).dtype:
+                    mismatches.append((name, kind, a, b))
+    assert mismatches == []
 
 
 def test_arguments_are_neither_changed_nor_returned() -> None:
-    for name, wanted in SIGNATURES.items():
-        arguments = [np.array(valid(shape)) for shape in wanted.values()]
+    for name, shapes_by_name in SIGNATURES.items():
+        arguments = [np.array(valid(shape)) for shape in shapes_by_name.values()]
         for argument in arguments:
             argument.setflags(write=False)
         for part in parts(routine(name)(*arguments)):

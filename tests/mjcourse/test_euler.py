@@ -41,8 +41,8 @@ def exact_quat(angles: np.ndarray, seq: str) -> hp.Vector:
 def test_quaternion_to_four_ulp() -> None:
     errors = {}
     for seq, angles in itertools.product(SEQUENCES, TURNS):
-        got = spatial.euler_to_quat(angles, seq)
-        errors[seq, angles] = hp.ulps_of(mpmath.mpf(1), got, exact_quat(np.array(angles), seq))
+        actual = spatial.euler_to_quat(angles, seq)
+        errors[seq, angles] = hp.ulps_of(mpmath.mpf(1), actual, exact_quat(np.array(angles), seq))
     assert hp.beyond(4, errors) == []
 
 
@@ -52,24 +52,24 @@ def test_angles_give_the_rotation_back_to_six_ulp() -> None:
     turns = [*TURNS, *np.random.default_rng(11).uniform(-3.2, 3.2, size=(10, 3)).tolist()]
     for seq, angles in itertools.product(SEQUENCES, turns):
         quat = spatial.euler_to_quat(angles, seq)
-        got = spatial.quat_to_euler(quat * 1e-200, seq)
-        want = hp.same_up_to_sign(quat, exact_quat(got, seq))
-        errors[seq, tuple(angles)] = hp.ulps_of(mpmath.mpf(1), quat, want)
-        assert abs(got[[0, 2]]).max() <= np.pi, (seq, angles)
+        actual = spatial.quat_to_euler(quat * 1e-200, seq)
+        expected = hp.same_up_to_sign(quat, exact_quat(actual, seq))
+        errors[seq, tuple(angles)] = hp.ulps_of(mpmath.mpf(1), quat, expected)
+        assert abs(actual[[0, 2]]).max() <= np.pi, (seq, angles)
         low, high = (0, np.pi) if seq[0] == seq[2] else (-np.pi / 2, np.pi / 2)
-        assert low <= got[1] <= high, (seq, angles)
+        assert low <= actual[1] <= high, (seq, angles)
     assert hp.beyond(6, errors) == []
 
 
 def test_gimbal_lock_has_one_answer() -> None:
     quat = spatial.euler_to_quat([0.5, np.pi / 2, 0.25], "xyz")
-    got = spatial.quat_to_euler(quat, "xyz")
-    assert got[0] == 0
-    np.testing.assert_allclose(got[1:], [np.pi / 2, 0.75], rtol=0, atol=3e-8)
-    got = spatial.quat_to_euler(spatial.euler_to_quat([0.5, np.pi / 2, 0.25], "XYZ"), "XYZ")
-    assert got[2] == 0
-    got = spatial.quat_to_euler(spatial.euler_to_quat([0.5, 0.0, 0.25], "zxz"), "zxz")
-    assert got.tolist() == pytest.approx([0, 0, 0.75], abs=1e-15)
+    actual = spatial.quat_to_euler(quat, "xyz")
+    assert actual[0] == 0
+    np.testing.assert_allclose(actual[1:], [np.pi / 2, 0.75], rtol=0, atol=3e-8)
+    actual = spatial.quat_to_euler(spatial.euler_to_quat([0.5, np.pi / 2, 0.25], "XYZ"), "XYZ")
+    assert actual[2] == 0
+    actual = spatial.quat_to_euler(spatial.euler_to_quat([0.5, 0.0, 0.25], "zxz"), "zxz")
+    assert actual.tolist() == pytest.approx([0, 0, 0.75], abs=1e-15)
     assert spatial.quat_to_euler([1, 0, 0, 0], "zyx").tolist() == [0, 0, 0]
     assert not np.signbit(spatial.quat_to_euler([1, 0, 0, 0], "zyx")).any()
 

@@ -11,8 +11,8 @@ def test_importing_mjcourse_loads_numpy_and_nothing_else_that_is_installed() -> 
         "names = {name.partition('.')[0] for name in set(sys.modules) - before}\n"
         "print(*sorted(names - sys.stdlib_module_names))"
     )
-    done = run_code(code, PYTHONWARNINGS="error")
-    assert done.returncode == 0, done.stderr
+    process = run_code(code, PYTHONWARNINGS="error")
+    assert process.returncode == 0, process.stderr
     # NumPy registers some of its compiled modules under top-level names of its own.
-    loaded = [name for name in done.stdout.split() if not name.startswith("_")]
-    assert loaded == ["mjcourse", "numpy"]
+    modules = [name for name in process.stdout.split() if not name.startswith("_")]
+    assert modules == ["mjcourse", "numpy"]

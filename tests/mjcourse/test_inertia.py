@@ -25,11 +25,11 @@ def exact_composition(
     total = sum(ms)
     points = [hp.exact(centre) for centre in centres]
     centre = [sum(m * p[k] for m, p in zip(ms, points, strict=True)) / total for k in range(3)]
-    about = [mpmath.mpf(0)] * 9
+    inertia = [mpmath.mpf(0)] * 9
     for m, point, tensor in zip(ms, points, tensors, strict=True):
         shift = exact_point(m, [p - c for p, c in zip(point, centre, strict=True)])
-        about = [a + t + s for a, t, s in zip(about, hp.exact(tensor), shift, strict=True)]
-    return total, centre, about
+        inertia = [a + t + s for a, t, s in zip(inertia, hp.exact(tensor), shift, strict=True)]
+    return total, centre, inertia
 
 
 def test_parallel_axis_to_three_ulp(rng: np.random.Generator) -> None:
@@ -37,10 +37,10 @@ def test_parallel_axis_to_three_ulp(rng: np.random.Generator) -> None:
         mass, offset = rng.uniform(0.1, 9), rng.normal(size=3) * size
         tensor = spatial.box_inertia(mass, rng.uniform(0.01, 1, size=3))
         point = exact_point(mpmath.mpf(mass), hp.exact(offset))
-        got = spatial.parallel_axis(tensor, mass, offset)
+        actual = spatial.parallel_axis(tensor, mass, offset)
         larger = [max(abs(t), abs(p)) for t, p in zip(hp.exact(tensor), point, strict=True)]
         for entry, base, extra, scale in zip(
-            got.ravel(), hp.exact(tensor), point, larger, strict=True
+            actual.ravel(), hp.exact(tensor), point, larger, strict=True
         ):
             error = abs(mpmath.mpf(float(entry)) - base - extra)
             assert error <= 3 * hp.ULP * scale + hp.DENORMAL, (mass, offset, tensor)
@@ -108,16 +108,16 @@ def test_rotation_of_a_tensor_to_eight_ulp(rng: np.random.Generator) -> None:
         rot = spatial.quat_to_mat(quat)
         rows = hp.exact(rot)
         middle = hp.exact(np.diag(moments))
-        want = hp.matmul(hp.matmul(rows, middle), hp.transpose(rows))
+        expected = hp.matmul(hp.matmul(rows, middle), hp.transpose(rows))
         largest = max(hp.exact(moments))
-        got = spatial.rotate_inertia(np.diag(moments), rot)
-        assert hp.ulps_of(largest, got, want) <= 8
-        assert (got == got.T).all()
+        actual = spatial.rotate_inertia(np.diag(moments), rot)
+        assert hp.ulps_of(largest, actual, expected) <= 8
+        assert (actual == actual.T).all()
         rows = hp.matrix(hp.exact(quat))
-        want = hp.matmul(hp.matmul(rows, middle), hp.transpose(rows))
-        got = spatial.inertia_from_principal(moments, quat * 1e-200)
-        assert hp.ulps_of(largest, got, want) <= 8
-        assert (got == got.T).all()
+        expected = hp.matmul(hp.matmul(rows, middle), hp.transpose(rows))
+        actual = spatial.inertia_from_principal(moments, quat * 1e-200)
+        assert hp.ulps_of(largest, actual, expected) <= 8
+        assert (actual == actual.T).all()
 
 
 def test_spatial_inertia_times_velocity_is_momentum() -> None:

@@ -35,13 +35,13 @@ def ask(script: Path, name: object = "box", run_name: str = "__main__") -> Path:
     """What a script at a path gets."""
     scope: dict[str, object] = {"__name__": run_name, "__file__": str(script), "name": name}
     exec("from mjcourse import model_path\nfound = model_path(name)", scope)
-    found = scope["found"]
-    assert isinstance(found, Path)
-    return found
+    path = scope["found"]
+    assert isinstance(path, Path)
+    return path
 
 
 def run(script: Path | str, *arguments: str, cwd: Path, code: str | None = None) -> str:
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-W", "error", str(script), *arguments],
         cwd=cwd,
         env={**os.environ, "PYTHONPATH": str(PACKAGE)},
@@ -51,8 +51,8 @@ def run(script: Path | str, *arguments: str, cwd: Path, code: str | None = None)
         timeout=300,
         check=False,
     )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
+    assert process.returncode == 0, process.stderr
+    return process.stdout.strip()
 
 
 def test_names_from_anywhere_in_the_course(course: Path) -> None:
@@ -120,7 +120,7 @@ def test_a_course_without_models(course: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "why"),
+    ("name", "reason"),
     [
         ("../models/box", "leads out of models/"),
         ("arms/../box", "leads out of models/"),
@@ -137,10 +137,10 @@ def test_a_course_without_models(course: Path) -> None:
         ("box\0", "holds a character that no portable file name has"),
     ],
 )
-def test_names_that_are_none(course: Path, name: str, why: str) -> None:
+def test_names_that_are_none(course: Path, name: str, reason: str) -> None:
     with pytest.raises(ValueError) as caught:
         ask(course / "x.py", name)
-    assert str(caught.value) == f"model name {name!r} {why}"
+    assert str(caught.value) == f"model name {name!r} {reason}"
 
 
 def test_links_may_not_lead_out_of_models(course: Path, tmp_path: Path) -> None:
@@ -235,16 +235,16 @@ def test_a_real_script_from_any_folder(course: Path) -> None:
     write(course / "examples" / "x.py", SCRIPT)
     write(course / "examples" / "sibling.py", SIBLING)
     out = run("examples/x.py", cwd=course)
-    asked = 6 + 2 * len(multiprocessing.get_all_start_methods())
-    assert out.split() == [str(course / "models" / "box.xml")] * asked
+    call_count = 6 + 2 * len(multiprocessing.get_all_start_methods())
+    assert out.split() == [str(course / "models" / "box.xml")] * call_count
 
 
 @pytest.mark.site
 def test_modules_code_and_prompts(course: Path, tmp_path: Path) -> None:
-    want = str(course / "models" / "box.xml")
+    expected = str(course / "models" / "box.xml")
     script = write(course / "examples" / "x.py", ASK)
-    assert run("-m", "examples.x", cwd=course) == want
-    assert run("-", cwd=course, code=ASK) == want
+    assert run("-m", "examples.x", cwd=course) == expected
+    assert run("-", cwd=course, code=ASK) == expected
     after = run("-i", str(script), cwd=tmp_path, code="print(model_path('v1.2'))\n")
     assert str(course / "models" / "v1.2.xml") in after
 
@@ -256,5 +256,5 @@ def test_code_in_a_folder_that_is_gone_is_in_no_course(tmp_path: Path) -> None:
         "try: model_path('box')\n"
         "except FileNotFoundError as error: print(error)\n"
     )
-    gone = f"import os; os.mkdir('x'); os.chdir('x'); os.rmdir({str(tmp_path / 'x')!r})\n"
-    assert "no course for model 'box'" in run("-c", gone + code, cwd=tmp_path)
+    removal = f"import os; os.mkdir('x'); os.chdir('x'); os.rmdir({str(tmp_path / 'x')!r})\n"
+    assert "no course for model 'box'" in run("-c", removal + code, cwd=tmp_path)

@@ -56,10 +56,10 @@ def test_moments_and_axes() -> None:
         case = repr(tensor.tolist())
         moments, axes = spatial.principal_axes(tensor)
         entries, columns, values = hp.exact(tensor), hp.exact(axes), hp.exact(moments)
-        want = sorted(mpmath.eigsy(table_of(tensor), eigvals_only=True))
-        largest = max(max(map(abs, want)), hp.DENORMAL / hp.ULP)
+        expected = sorted(mpmath.eigsy(table_of(tensor), eigvals_only=True))
+        largest = max(max(map(abs, expected)), hp.DENORMAL / hp.ULP)
         assert list(moments) == sorted(moments), case
-        moment_errors[case] = hp.ulps_of(largest, moments, want)
+        moment_errors[case] = hp.ulps_of(largest, moments, expected)
 
         product = hp.matmul(hp.transpose(columns), columns)
         bends[case] = hp.ulps_of(mpmath.mpf(1), np.eye(3), product)
@@ -78,9 +78,9 @@ def test_graded_tensors_keep_their_small_moments() -> None:
     errors = {}
     for tensor in GRADED:
         with mpmath.workdps(700):
-            want = sorted(mpmath.eigsy(table_of(tensor), eigvals_only=True))
+            expected = sorted(mpmath.eigsy(table_of(tensor), eigvals_only=True))
         moments, _ = spatial.principal_axes(tensor)
-        errors[repr(tensor.tolist())] = hp.own_ulps(moments, want)
+        errors[repr(tensor.tolist())] = hp.own_ulps(moments, expected)
     assert hp.beyond(8, errors) == []
 
 
@@ -145,14 +145,14 @@ def test_a_body_has_moments_of_which_none_exceeds_the_sum_of_the_others() -> Non
         ([1.2e308, 1.2e308, 1.7e308], True),
     ):
         for order in ([0, 1, 2], [1, 2, 0], [2, 0, 1], [1, 0, 2]):
-            got = spatial.is_physical_inertia(np.diag(moments)[order][:, order])
-            assert isinstance(got, np.bool_)
-            assert got == physical, (moments, order)
+            actual = spatial.is_physical_inertia(np.diag(moments)[order][:, order])
+            assert isinstance(actual, np.bool_)
+            assert actual == physical, (moments, order)
 
 
 def test_a_flat_plate_written_with_few_digits() -> None:
     plate = np.diag([0.333, 0.083, 0.417])
     assert not spatial.is_physical_inertia(plate)
     assert spatial.is_physical_inertia(plate, rtol=5e-3)
-    turned = spatial.rotate_inertia(np.diag([1.0, 2.0, 3.0]), spatial.exp_so3([1, 2, 3]))
-    assert spatial.is_physical_inertia(turned)
+    rotated = spatial.rotate_inertia(np.diag([1.0, 2.0, 3.0]), spatial.exp_so3([1, 2, 3]))
+    assert spatial.is_physical_inertia(rotated)

@@ -22,8 +22,8 @@ def size(*arrays: np.ndarray) -> float:
     return float(np.prod([np.linalg.norm(array) for array in arrays]))
 
 
-def near(got: np.ndarray, want: np.ndarray, scale: float, ulps: float = 16) -> None:
-    np.testing.assert_allclose(got, want, rtol=0, atol=ulps * 2.0**-52 * scale + 1e-300)
+def assert_near(actual: np.ndarray, expected: np.ndarray, scale: float, ulps: float = 16) -> None:
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=ulps * 2.0**-52 * scale + 1e-300)
 
 
 @QUICK
@@ -37,16 +37,16 @@ def test_inertia_stays_symmetric_positive_definite(
     velocity: np.ndarray,
 ) -> None:
     rot = spatial.quat_to_mat(quat)
-    here = spatial.spatial_inertia(mass, com, tensor)
-    there = spatial.transform_spatial_inertia(here, rot, pos)
-    for matrix in (here, there):
+    inertia = spatial.spatial_inertia(mass, com, tensor)
+    transformed = spatial.transform_spatial_inertia(inertia, rot, pos)
+    for matrix in (inertia, transformed):
         assert (matrix == matrix.T).all()
-    scale = np.abs(here).max() * (1 + size(pos)) ** 2
-    assert np.linalg.eigvalsh(there).min() > -16 * 2.0**-52 * scale
-    moved = spatial.motion_transform(rot, pos) @ velocity
-    near(
-        moved @ there @ moved,
-        velocity @ here @ velocity,
+    scale = np.abs(inertia).max() * (1 + size(pos)) ** 2
+    assert np.linalg.eigvalsh(transformed).min() > -16 * 2.0**-52 * scale
+    motion = spatial.motion_transform(rot, pos) @ velocity
+    assert_near(
+        motion @ transformed @ motion,
+        velocity @ inertia @ velocity,
         scale * size(velocity) ** 2 * (1 + size(pos)) ** 2,
     )
 
@@ -55,10 +55,14 @@ def test_inertia_stays_symmetric_positive_definite(
 @given(TENSOR, QUAT)
 def test_principal_moments_do_not_depend_on_the_frame(tensor: np.ndarray, quat: np.ndarray) -> None:
     moments, axes = spatial.principal_axes(tensor)
-    turned, _ = spatial.principal_axes(spatial.rotate_inertia(tensor, spatial.quat_to_mat(quat)))
-    near(turned, moments, moments[2])
-    near(axes * moments @ axes.T, tensor, moments[2])
-    near(spatial.inertia_from_principal(moments, spatial.mat_to_quat(axes)), tensor, moments[2], 32)
+    rotated_moments, _ = spatial.principal_axes(
+        spatial.rotate_inertia(tensor, spatial.quat_to_mat(quat))
+    )
+    assert_near(rotated_moments, moments, moments[2])
+    assert_near(axes * moments @ axes.T, tensor, moments[2])
+    assert_near(
+        spatial.inertia_from_principal(moments, spatial.mat_to_quat(axes)), tensor, moments[2], 32
+    )
 
 
 LEADING = npst.mutually_broadcastable_shapes(num_shapes=2, max_dims=2, max_side=3)
@@ -68,16 +72,16 @@ LEADING = npst.mutually_broadcastable_shapes(num_shapes=2, max_dims=2, max_side=
 @given(LEADING, st.integers(0, 2**32 - 1))
 def test_broadcasting_equals_a_loop(shapes: npst.BroadcastableShapes, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    one, two = shapes.input_shapes
-    quat, other = rng.normal(size=(*one, 4)), rng.normal(size=(*two, 4))
-    vector, scalar = rng.normal(size=(*two, 3)) * 4, rng.uniform(0.1, 2, size=two)
-    rot, pos = spatial.quat_to_mat(quat), rng.normal(size=(*two, 3))
-    six, tensor = rng.normal(size=(*two, 6)), spatial.box_inertia(scalar, np.abs(vector))
+    quat_lead, vector_lead = shapes.input_shapes
+    quat, second_quat = rng.normal(size=(*quat_lead, 4)), rng.normal(size=(*vector_lead, 4))
+    vector, scalar = rng.normal(size=(*vector_lead, 3)) * 4, rng.uniform(0.1, 2, size=vector_lead)
+    rot, pos = spatial.quat_to_mat(quat), rng.normal(size=(*vector_lead, 3))
+    six, tensor = rng.normal(size=(*vector_lead, 6)), spatial.box_inertia(scalar, np.abs(vector))
     cases = (
-        (spatial.quat_mul, (quat, other), (1, 1)),
+        (spatial.quat_mul, (quat, second_quat), (1, 1)),
         (spatial.quat_rotate, (quat, vector), (1, 1)),
-        (spatial.quat_sub, (quat, other), (1, 1)),
-        (spatial.angular_distance, (quat, other), (1, 1)),
+        (spatial.quat_sub, (quat, second_quat), (1, 1)),
+        (spatial.angular_distance, (quat, second_quat), (1, 1)),
         (spatial.quat_slerp, (quat, quat[..., ::-1], scalar), (1, 1, 0)),
         (spatial.quat_integrate, (quat, vector, scalar), (1, 1, 0)),
         (spatial.axis_angle_to_quat, (quat[..., 1:], scalar), (1, 0)),
@@ -97,7 +101,7 @@ def test_broadcasting_equals_a_loop(shapes: npst.BroadcastableShapes, seed: int)
         (spatial.capsule_inertia, (scalar, scalar, scalar), (0, 0, 0)),
     )
     for call, arguments, cores in cases:
-        got = call(*arguments)
+        actual = call(*arguments)
         lead = np.broadcast_shapes(
             *(a.shape[: a.ndim - core] for a, core in zip(arguments, cores, strict=True))
         )
@@ -105,9 +109,9 @@ def test_broadcasting_equals_a_loop(shapes: npst.BroadcastableShapes, seed: int)
             np.broadcast_to(a, (*lead, *a.shape[a.ndim - core :]))
             for a, core in zip(arguments, cores, strict=True)
         ]
-        assert np.shape(got)[: len(lead)] == lead
+        assert np.shape(actual)[: len(lead)] == lead
         for index in np.ndindex(lead):
-            want = call(*(a[index] for a in spread))
+            expected = call(*(a[index] for a in spread))
             np.testing.assert_allclose(
-                got[index], want, rtol=0, atol=1e-15 * (1 + np.abs(want).max())
+                actual[index], expected, rtol=0, atol=1e-15 * (1 + np.abs(expected).max())
             )

@@ -32,9 +32,9 @@ def test_normalize_to_two_ulp_at_any_length() -> None:
     )
     errors = {}
     for quat, size in (*itertools.product(QUATS, hp.SIZES), *((end, 1.0) for end in ends)):
-        given = np.array(quat) * size
-        want = hp.unit(hp.exact(given))
-        errors[quat, size] = hp.own_ulps(spatial.quat_normalize(given), want)
+        scaled = np.array(quat) * size
+        expected = hp.unit(hp.exact(scaled))
+        errors[quat, size] = hp.own_ulps(spatial.quat_normalize(scaled), expected)
     assert hp.beyond(2, errors) == []
 
 
@@ -62,10 +62,10 @@ def test_rotate_to_six_ulp_at_any_length() -> None:
     vectors = ((1.0, 2.0, 3.0), (-1e-200, 1e-201, 0.0), (1e306, -1e306, 3e305), (0.0, 0.0, 7.0))
     errors = {}
     for quat, size, vector in itertools.product(QUATS, hp.SIZES, vectors):
-        given = np.array(quat) * size
-        want = hp.turned(hp.exact(given), hp.exact(vector))
-        got = spatial.quat_rotate(given, vector)
-        errors[quat, size, vector] = hp.ulps_of(hp.length(hp.exact(vector)), got, want)
+        scaled = np.array(quat) * size
+        expected = hp.turned(hp.exact(scaled), hp.exact(vector))
+        actual = spatial.quat_rotate(scaled, vector)
+        errors[quat, size, vector] = hp.ulps_of(hp.length(hp.exact(vector)), actual, expected)
     assert hp.beyond(6, errors) == []
 
 
@@ -80,10 +80,10 @@ def test_axis_angle_to_four_ulp() -> None:
     sines, cosines = {}, {}
     for axis, angle in itertools.product(hp.AXES, angles):
         direction, turn = hp.unit(hp.exact(axis)), mpmath.mpf(angle)
-        want = hp.exp([turn * entry for entry in direction])
-        got = spatial.axis_angle_to_quat(axis, angle)
-        sines[axis, angle] = hp.own_ulps(got[1:], want[1:])
-        cosines[axis, angle] = hp.ulps_of(mpmath.mpf(1), got[:1], want[:1])
+        expected = hp.exp([turn * entry for entry in direction])
+        actual = spatial.axis_angle_to_quat(axis, angle)
+        sines[axis, angle] = hp.own_ulps(actual[1:], expected[1:])
+        cosines[axis, angle] = hp.ulps_of(mpmath.mpf(1), actual[:1], expected[:1])
     assert hp.beyond(4, sines) == []
     assert hp.beyond(1, cosines) == []
 
@@ -91,7 +91,7 @@ def test_axis_angle_to_four_ulp() -> None:
 def test_a_bad_quaternion_is_nan_and_the_others_are_not() -> None:
     for bad in (np.nan, np.inf, -np.inf):
         quats = np.array([[0.6, 0.8, 0, 0], [bad, 1, 0, 0], [0, 0, 1e300, 0]])
-        for got in (
+        for actual in (
             spatial.quat_normalize(quats),
             spatial.quat_rotate(quats, [1, 2, 3]),
             spatial.quat_to_mat(quats),
@@ -101,8 +101,8 @@ def test_a_bad_quaternion_is_nan_and_the_others_are_not() -> None:
             spatial.quat_integrate(quats, [1, 2, 3], 0.1),
             spatial.angular_distance(quats, [1, 0, 0, 0]),
         ):
-            assert np.isnan(got[1]).all()
-            assert np.isfinite(got[[0, 2]]).all()
+            assert np.isnan(actual[1]).all()
+            assert np.isfinite(actual[[0, 2]]).all()
 
 
 def test_a_zero_quaternion_is_an_error() -> None:
@@ -123,13 +123,13 @@ def test_a_zero_quaternion_is_an_error() -> None:
 
 
 def test_a_zero_quaternion_is_named_by_its_argument() -> None:
-    one, zero = [1, 0, 0, 0], [0, 0, 0, 0]
+    argument, zero = [1, 0, 0, 0], [0, 0, 0, 0]
     for call in (spatial.quat_sub, spatial.angular_distance):
         with pytest.raises(ValueError, match=r"^a is zero and has no direction$"):
-            call(zero, one)
+            call(zero, argument)
         with pytest.raises(ValueError, match=r"^b is zero and has no direction$"):
-            call(one, zero)
+            call(argument, zero)
     with pytest.raises(ValueError, match=r"^b is zero and has no direction$"):
-        spatial.quat_slerp(one, zero, 0.5)
+        spatial.quat_slerp(argument, zero, 0.5)
     with pytest.raises(ValueError, match=r"^axis is zero and has no direction$"):
         spatial.axis_angle_to_quat([0, 0, 0], 1.0)

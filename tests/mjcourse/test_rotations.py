@@ -28,9 +28,9 @@ def test_matrix_of_a_quaternion() -> None:
     quats += list(np.random.default_rng(5).normal(size=(50, 4)))
     errors, bends = {}, {}
     for quat in quats:
-        got, case = spatial.quat_to_mat(quat), tuple(quat.tolist())
-        errors[case] = hp.ulps_of(ONE, got, hp.matrix(hp.exact(quat)))
-        bends[case] = orthonormality(got)
+        actual, case = spatial.quat_to_mat(quat), tuple(quat.tolist())
+        errors[case] = hp.ulps_of(ONE, actual, hp.matrix(hp.exact(quat)))
+        bends[case] = orthonormality(actual)
     assert hp.beyond(4, errors) == []
     assert hp.beyond(5, bends) == []
 
@@ -41,10 +41,10 @@ def test_quaternion_of_a_matrix_at_any_angle() -> None:
     angles = (*hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 4.0, 1e-8, 1e-12)
     for axis, angle in itertools.product(hp.AXES, angles):
         mat = spatial.exp_so3(np.array(axis) / np.linalg.norm(axis) * angle)
-        got = spatial.mat_to_quat(mat)
-        want = hp.same_up_to_sign(got, exact_quat(mat))
-        errors[axis, angle] = hp.ulps_of(ONE, got, want)
-        assert got[0] >= 0, (axis, angle)
+        actual = spatial.mat_to_quat(mat)
+        expected = hp.same_up_to_sign(actual, exact_quat(mat))
+        errors[axis, angle] = hp.ulps_of(ONE, actual, expected)
+        assert actual[0] >= 0, (axis, angle)
     assert hp.beyond(3, errors) == []
 
 

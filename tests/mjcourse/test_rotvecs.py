@@ -21,8 +21,8 @@ def test_exp_to_four_ulp_of_each_component() -> None:
         rotvec = rotvec_of(axis, angle)
         if hp.length(hp.exact(rotvec)) > mpmath.pi:
             rotvec = rotvec / 2
-        want = hp.exp(hp.exact(rotvec))
-        errors[axis, angle] = hp.own_ulps(spatial.rotvec_to_quat(rotvec)[1:], want[1:])
+        expected = hp.exp(hp.exact(rotvec))
+        errors[axis, angle] = hp.own_ulps(spatial.rotvec_to_quat(rotvec)[1:], expected[1:])
     assert hp.beyond(4, errors) == []
 
 
@@ -32,8 +32,8 @@ def test_log_to_four_ulp_of_each_component() -> None:
     angles = (1e-12, *hp.THRESHOLDS, *hp.PLAIN_ANGLES, *hp.NEAR_PI, 5.0)
     for axis, angle, size in itertools.product(hp.AXES, angles, hp.SIZES):
         quat = spatial.axis_angle_to_quat(axis, angle) * size
-        want = hp.log(hp.exact(quat))
-        errors[axis, angle, size] = hp.own_ulps(spatial.quat_to_rotvec(quat), want)
+        expected = hp.log(hp.exact(quat))
+        errors[axis, angle, size] = hp.own_ulps(spatial.quat_to_rotvec(quat), expected)
     assert hp.beyond(4, errors) == []
 
 
@@ -42,10 +42,10 @@ def test_log_keeps_the_digits_of_the_smallest_angles() -> None:
     for axis, angle in itertools.product(hp.AXES, hp.SMALL_ANGLES):
         rotvec = rotvec_of(axis, angle)
         quat = spatial.rotvec_to_quat(rotvec)
-        got = spatial.quat_to_rotvec(quat)
-        errors[axis, angle, "of the quaternion"] = hp.own_ulps(got, hp.log(hp.exact(quat)))
+        actual = spatial.quat_to_rotvec(quat)
+        errors[axis, angle, "of the quaternion"] = hp.own_ulps(actual, hp.log(hp.exact(quat)))
         if angle > 1e-300:
-            errors[axis, angle, "there and back"] = hp.own_ulps(got, hp.exact(rotvec))
+            errors[axis, angle, "there and back"] = hp.own_ulps(actual, hp.exact(rotvec))
     assert hp.beyond(4, errors) == []
 
 
@@ -53,9 +53,9 @@ def test_log_at_exactly_half_a_turn() -> None:
     for w in (0.0, -0.0):
         assert spatial.quat_to_rotvec([w, 0, -2, 0]).tolist() == [0, np.pi, 0]
         assert spatial.quat_to_rotvec([w, 0, 2, 0]).tolist() == [0, np.pi, 0]
-    got = spatial.quat_to_rotvec([0, -1, 1, 0])
-    assert got[0] > 0 > got[1]
-    assert np.linalg.norm(got) == pytest.approx(np.pi, rel=1e-15)
+    actual = spatial.quat_to_rotvec([0, -1, 1, 0])
+    assert actual[0] > 0 > actual[1]
+    assert np.linalg.norm(actual) == pytest.approx(np.pi, rel=1e-15)
 
 
 def test_log_takes_the_shorter_way_round() -> None:
@@ -76,13 +76,13 @@ def test_difference_of_rotations_keeps_its_digits() -> None:
             turn = spatial.rotvec_to_quat(axis / np.linalg.norm(axis) * apart)
             b = spatial.quat_mul(a, turn) * size_b
             a = a * size_a
-            want = hp.log(hp.mul(hp.conj(hp.exact(a)), hp.exact(b)))
-            size = hp.length(want)
+            expected = hp.log(hp.mul(hp.conj(hp.exact(a)), hp.exact(b)))
+            size = hp.length(expected)
             # Below 1e-16 rad the rounding of the quaternions themselves decides.
             if size < 1e-16:
                 continue
             case = (apart, size_a, size_b, k)
-            errors["difference", *case] = hp.ulps_of(size, spatial.quat_sub(b, a), want)
+            errors["difference", *case] = hp.ulps_of(size, spatial.quat_sub(b, a), expected)
             distance = spatial.angular_distance(a, b)
             errors["distance", *case] = hp.ulps_of(size, [distance], [size])
     assert hp.beyond(4, errors) == []
@@ -111,16 +111,16 @@ def test_slerp_to_four_ulp() -> None:
             begin = hp.unit(hp.exact(a))
             rotvec = hp.log(hp.mul(hp.conj(hp.exact(a)), hp.exact(b)))
             for t in parts:
-                want = hp.mul(begin, hp.exp([mpmath.mpf(t) * entry for entry in rotvec]))
-                errors[apart, k, t] = hp.ulps_of(ONE, spatial.quat_slerp(a, b, t), want)
+                expected = hp.mul(begin, hp.exp([mpmath.mpf(t) * entry for entry in rotvec]))
+                errors[apart, k, t] = hp.ulps_of(ONE, spatial.quat_slerp(a, b, t), expected)
     assert hp.beyond(4, errors) == []
 
 
 def test_slerp_at_its_ends_and_beyond() -> None:
     a, b = spatial.rotvec_to_quat([0, 0, 0.3]), spatial.rotvec_to_quat([0, 0, 0.5])
     assert (spatial.quat_slerp(a, b, 0) == spatial.quat_normalize(a)).all()
-    got = spatial.quat_to_rotvec(spatial.quat_slerp(a, b, [-1.0, 0.5, 1.0, 2.0]))
-    np.testing.assert_allclose(got[:, 2], [0.1, 0.4, 0.5, 0.7], rtol=1e-15)
+    actual = spatial.quat_to_rotvec(spatial.quat_slerp(a, b, [-1.0, 0.5, 1.0, 2.0]))
+    np.testing.assert_allclose(actual[:, 2], [0.1, 0.4, 0.5, 0.7], rtol=1e-15)
 
 
 def test_integrate_to_four_ulp() -> None:
@@ -131,7 +131,7 @@ def test_integrate_to_four_ulp() -> None:
             quat, axis = rng.normal(size=4), rng.normal(size=3)
             angvel = axis / np.linalg.norm(axis) * (angle / abs(dt))
             turn = [mpmath.mpf(dt) * entry for entry in hp.exact(angvel)]
-            want = hp.mul(hp.unit(hp.exact(quat)), hp.exp(turn))
-            got = spatial.quat_integrate(quat, angvel, dt)
-            errors[angle, dt, k] = hp.ulps_of(ONE, got, want)
+            expected = hp.mul(hp.unit(hp.exact(quat)), hp.exp(turn))
+            actual = spatial.quat_integrate(quat, angvel, dt)
+            errors[angle, dt, k] = hp.ulps_of(ONE, actual, expected)
     assert hp.beyond(4, errors) == []

@@ -24,9 +24,9 @@ def test_box_and_ellipsoid_to_four_ulp() -> None:
         m, a, b, c = hp.exact([mass, *half_sizes])
         moments = (b * b + c * c, a * a + c * c, a * a + b * b)
         for call, share in ((spatial.box_inertia, 3), (spatial.ellipsoid_inertia, 5)):
-            want = diagonal(*(m / share * moment for moment in moments))
+            expected = diagonal(*(m / share * moment for moment in moments))
             case = (call.__name__, mass, *half_sizes)
-            errors[case] = hp.own_ulps(call(mass, half_sizes), want)
+            errors[case] = hp.own_ulps(call(mass, half_sizes), expected)
     assert hp.beyond(4, errors) == []
 
 
@@ -35,13 +35,13 @@ def test_sphere_to_three_ulp_cylinder_to_five_and_capsule_to_eight() -> None:
     for mass, radius, half in itertools.product((1.0, 0.7, 1e-7), SIZES, SIZES):
         m, r, h = hp.exact([mass, radius, half])
         ball = m * r * r * 2 / 5
-        got = spatial.sphere_inertia(mass, radius)
-        spheres[mass, radius] = hp.own_ulps(got, diagonal(ball, ball, ball))
-        across, along = m * (r * r / 4 + h * h / 3), m * r * r / 2
-        got = spatial.cylinder_inertia(mass, radius, half)
-        cylinders[mass, radius, half] = hp.own_ulps(got, diagonal(across, across, along))
-        got = spatial.capsule_inertia(mass, radius, half)
-        capsules[mass, radius, half] = hp.own_ulps(got, exact_capsule(m, r, h))
+        actual = spatial.sphere_inertia(mass, radius)
+        spheres[mass, radius] = hp.own_ulps(actual, diagonal(ball, ball, ball))
+        transverse, axial = m * (r * r / 4 + h * h / 3), m * r * r / 2
+        actual = spatial.cylinder_inertia(mass, radius, half)
+        cylinders[mass, radius, half] = hp.own_ulps(actual, diagonal(transverse, transverse, axial))
+        actual = spatial.capsule_inertia(mass, radius, half)
+        capsules[mass, radius, half] = hp.own_ulps(actual, exact_capsule(m, r, h))
     assert hp.beyond(3, spheres) == []
     assert hp.beyond(5, cylinders) == []
     assert hp.beyond(8, capsules) == []
@@ -58,9 +58,9 @@ def exact_capsule(m: mpmath.mpf, r: mpmath.mpf, h: mpmath.mpf) -> hp.Vector:
     height = 2 * mpmath.pi * (h**2 * r**3 * 2 / 3 + h * r**4 / 2 + r**5 * 2 / 15)
     # ∫ x² over a sphere is r²/5 of its volume, over a cylinder r²/4.
     spread = ends * r**2 / 5
-    across = middle * (r**2 / 4 + h**2 / 3) + height + spread
-    along = middle * r**2 / 2 + 2 * spread
-    return diagonal(*(m * moment / (middle + ends) for moment in (across, across, along)))
+    transverse = middle * (r**2 / 4 + h**2 / 3) + height + spread
+    axial = middle * r**2 / 2 + 2 * spread
+    return diagonal(*(m * moment / (middle + ends) for moment in (transverse, transverse, axial)))
 
 
 def test_negative_sizes_are_errors() -> None:

@@ -21,17 +21,17 @@ def cross_matrix(pos: np.ndarray) -> hp.Vector:
 def test_blocks_of_the_transforms() -> None:
     errors = {}
     for rot, pos in POSES:
-        moved = hp.matmul(cross_matrix(pos), hp.exact(rot))
+        coupling = hp.matmul(cross_matrix(pos), hp.exact(rot))
         motion, force = spatial.motion_transform(rot, pos), spatial.force_transform(rot, pos)
         size = 1 + hp.length(hp.exact(pos))
-        for kind, got, zero, full in (
+        for kind, actual, zero, full in (
             ("motion", motion, motion[:3, 3:], motion[3:, :3]),
             ("force", force, force[3:, :3], force[:3, 3:]),
         ):
-            assert (got[:3, :3] == rot).all()
-            assert (got[3:, 3:] == rot).all()
+            assert (actual[:3, :3] == rot).all()
+            assert (actual[3:, 3:] == rot).all()
             assert (zero == 0).all()
-            errors[kind, tuple(pos)] = hp.ulps_of(size, full, moved)
+            errors[kind, tuple(pos)] = hp.ulps_of(size, full, coupling)
     assert hp.beyond(2, errors) == []
 
 

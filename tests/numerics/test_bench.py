@@ -21,7 +21,7 @@ def of_box() -> ScenarioReport:
     """The first flip of the tumbling box."""
     text = (MODELS / "tumbling_box.toml").read_text(encoding="utf-8")
     model = mujoco.MjModel.from_xml_path(str(MODELS / "tumbling_box.xml"))
-    (scene,) = (one for one in scenes(model, declared(text)) if one.name == "first-flip")
+    scene = next(s for s in scenes(model, declared(text)) if s.name == "first-flip")
     return measure_scenario(model, scene, clock=None)
 
 
@@ -30,17 +30,17 @@ def test_a_report_on_the_tumbling_box() -> None:
     report = of_box()
     assert report.reference == "closed"
     assert report.agreement is not None and report.agreement < 1e-10
-    for one in report.rows:
-        assert one.attitude is not None and one.velocity is not None
-        assert min(one.attitude) >= 9.999 * max(report.floor, 1e-14)
-        assert min(one.velocity) >= 9.999 * report.velocity_floor
-        assert one.energy_drift is not None and one.momentum_drift is not None
-        assert (one.status, one.penetration, one.slip, one.refsafe) == ("ok", 0.0, None, False)
-    (own,) = (one for one in report.rows if one.own)
-    assert (own.setting.integrator, own.setting.timestep) == ("RK4", 0.002)
-    assert (own.setting.solver, own.setting.cone) == ("", ""), "nothing is solved"
+    for line in report.rows:
+        assert line.attitude is not None and line.velocity is not None
+        assert min(line.attitude) >= 9.999 * max(report.floor, 1e-14)
+        assert min(line.velocity) >= 9.999 * report.velocity_floor
+        assert line.energy_drift is not None and line.momentum_drift is not None
+        assert (line.status, line.penetration, line.slip, line.refsafe) == ("ok", 0.0, None, False)
+    (own_row,) = (line for line in report.rows if line.own)
+    assert (own_row.setting.integrator, own_row.setting.timestep) == ("RK4", 0.002)
+    assert (own_row.setting.solver, own_row.setting.cone) == ("", ""), "nothing is solved"
     assert report.verdict.noticeable is False
-    assert len({one.setting for one in report.rows}) == len(report.rows) == 35
+    assert len({line.setting for line in report.rows}) == len(report.rows) == 35
 
 
 def test_orders_of_the_tumbling_box() -> None:

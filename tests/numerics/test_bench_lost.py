@@ -39,16 +39,16 @@ def stiff(step: float, start: float, stiffness: float = 1e5) -> Any:
 def test_a_scene_that_blows_up_under_its_own_setting() -> None:
     """Without `autoreset="disable"` such a run ends where it began, with error 0."""
     (report,) = measured(stiff(0.008, 0.01), FROM_KEYFRAME, quick=True)
-    (own,) = (one for one in report.rows if one.own)
-    assert own.status == "diverged"
-    assert "MuJoCo warned of bad accelerations" in own.reasons
-    assert (own.position, own.velocity, own.seen) == (None, None, None)
-    assert own.growth is None or own.growth > 1
+    (own_row,) = (line for line in report.rows if line.own)
+    assert own_row.status == "diverged"
+    assert "MuJoCo warned of bad accelerations" in own_row.reasons
+    assert (own_row.position, own_row.velocity, own_row.seen) == (None, None, None)
+    assert own_row.growth is None or own_row.growth > 1
     assert not report.verdict.on_front
     assert report.verdict.text.startswith(
         "the scene does not run under its own setting, Euler at 8 ms: "
     )
-    limits = {one.integrator: one.largest for one in report.stable}
+    limits = {line.integrator: line.largest for line in report.stable}
     for name in ("Euler", "implicit", "implicitfast"):
         # Below 2/ω it swings within bounds, but just below with any multiple of its energy.
         assert limits[name] == pytest.approx(2 * (10 / 11) ** 0.5 / 1e5**0.5, rel=0.05)
@@ -64,11 +64,11 @@ def test_times_are_of_the_clock() -> None:
     """A clock that ticks evenly: whatever is timed takes the same, and nothing is uncertain."""
     ticks = iter(range(0, 10**15, 2_000_000))
     model = stiff(0.01, 0.1, 10)
-    (one,) = scenes(model, NOTHING, quick=True)
-    report = measure_scenario(model, one, quick=True, clock=lambda: next(ticks))
-    for one in report.rows:
-        assert one.cost is not None and one.seconds is not None and one.realtime is not None
-        assert one.cost.low == one.cost.value == one.cost.high > 0
-        assert one.seconds.value * one.realtime == pytest.approx(1.0)
-    assert [one.cost.value for one in report.rows if one.own and one.cost] == [1.0]
-    assert any(one.front for one in report.rows)
+    (line,) = scenes(model, NOTHING, quick=True)
+    report = measure_scenario(model, line, quick=True, clock=lambda: next(ticks))
+    for line in report.rows:
+        assert line.cost is not None and line.seconds is not None and line.realtime is not None
+        assert line.cost.low == line.cost.value == line.cost.high > 0
+        assert line.seconds.value * line.realtime == pytest.approx(1.0)
+    assert [line.cost.value for line in report.rows if line.own and line.cost] == [1.0]
+    assert any(line.front for line in report.rows)

@@ -75,9 +75,9 @@ def test_chaos_has_a_horizon_and_then_statistics() -> None:
     growth = math.log(0.1 / 1e-10)  # from the nudge to where nothing is in common
     assert first / 1.5 < growth / report.lyapunov < 1.5 * last
     assert any("errors count until" in note for note in report.notes)
-    own = next(one for one in report.rows if one.own)
-    assert own.mean_energy is not None
-    assert own.energy_drift is not None
+    own_row = next(line for line in report.rows if line.own)
+    assert own_row.mean_energy is not None
+    assert own_row.energy_drift is not None
 
 
 BLOCK = """\
@@ -95,27 +95,27 @@ def test_a_block_that_sticks_creeps_alike_in_each_measurement() -> None:
     model = mujoco.MjModel.from_xml_string(BLOCK)
     before = (model.opt.timestep, model.opt.integrator, model.opt.cone, model.opt.disableflags)
     short = '[[scenario]]\nname = "a"\nduration = 0.48\nsample = 0.016\n'
-    (report,), again = (measured(model, short, quick=True) for _ in range(2))
+    (report,), repeated = (measured(model, short, quick=True) for _ in range(2))
     opt = model.opt
     assert (opt.timestep, opt.integrator, opt.cone, opt.disableflags) == before
-    assert again == (report,)
+    assert repeated == (report,)
     assert (report.reference, report.smooth, report.orders) == ("self", False, ())
     assert report.notes == (
         "errors follow no power of the timestep, because of contact",
         "beyond 0.01 s refsafe softens constraints: stable, but another model",
     )
-    settings = [one.setting for one in report.rows]
-    assert {one.cone for one in settings} == {"pyramidal", "elliptic"}
-    assert {one.solver for one in settings} == {"PGS", "CG", "Newton"}
-    assert len({one.iterations for one in settings}) == 3
-    creep = {one.setting.cone: one.slip for one in report.rows}
+    settings = [line.setting for line in report.rows]
+    assert {line.cone for line in settings} == {"pyramidal", "elliptic"}
+    assert {line.solver for line in settings} == {"PGS", "CG", "Newton"}
+    assert len({line.iterations for line in settings}) == 3
+    creep = {line.setting.cone: line.slip for line in report.rows}
     assert creep["pyramidal"] and creep["elliptic"]
     assert 1e-4 < creep["elliptic"] < creep["pyramidal"] < 1e-3
-    errors = {one.setting.cone: one.model_error for one in report.rows}
+    errors = {line.setting.cone: line.model_error for line in report.rows}
     assert errors["elliptic"] is None
     assert all(e is None or e >= 10 * report.floor > 0 for e in errors.values())
     assert errors["pyramidal"] == pytest.approx(creep["pyramidal"] - creep["elliptic"], rel=0.2)
-    assert {one.energy_drift for one in report.rows} == {None}
+    assert {line.energy_drift for line in report.rows} == {None}
 
 
 def test_the_error_of_a_pyramid_is_among_what_is_seen() -> None:
@@ -131,16 +131,16 @@ def test_the_error_of_a_pyramid_is_among_what_is_seen() -> None:
     </mujoco>
     """
     (report,) = measured(mujoco.MjModel.from_xml_string(mjcf), quick=True)
-    own = next(one for one in report.rows if one.own)
+    own_row = next(line for line in report.rows if line.own)
     slope, time = 3 * 2**0.5, 2.0
     exact = (slope - 0.3 * 9 / 2**0.5 - (slope - 0.3 * 9)) * time**2 / 2  # half is enough
-    assert own.model_error == pytest.approx(exact, rel=0.02)
-    assert own.seen is not None and own.seen > 10
+    assert own_row.model_error == pytest.approx(exact, rel=0.02)
+    assert own_row.seen is not None and own_row.seen > 10
     (round_one,) = (
-        one
-        for one in report.rows
-        if (one.setting.integrator, one.setting.timestep, one.setting.cone)
+        line
+        for line in report.rows
+        if (line.setting.integrator, line.setting.timestep, line.setting.cone)
         == ("Euler", 0.004, "elliptic")
     )
-    assert round_one.seen is not None and round_one.seen < own.seen / 5
+    assert round_one.seen is not None and round_one.seen < own_row.seen / 5
     assert report.verdict.noticeable is True

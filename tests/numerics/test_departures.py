@@ -21,25 +21,30 @@ from support.bench_reports import FIRST, MACHINE, interval, lost, row, scenario,
 from support.model_reports import case
 
 
-def between(old: ScenarioReport, new: ScenarioReport) -> list[Departure]:
+def departures_between(old: ScenarioReport, new: ScenarioReport) -> list[Departure]:
     return list(scene_departures(scene(old), scene(new), BenchTable()))
 
 
 def of_rows(old: WorkPrecisionRow, new: WorkPrecisionRow) -> list[tuple[str, ...]]:
-    found = between(scenario([old]), scenario([new]))
-    return [(one.figure, one.recorded, one.measured, one.band) for one in found]
+    departures = departures_between(scenario([old]), scenario([new]))
+    return [
+        (departure.figure, departure.recorded, departure.measured, departure.band)
+        for departure in departures
+    ]
 
 
 def test_times_and_what_follows_from_them_do_not_matter() -> None:
     slow = [replace(r, cost=interval(9.0), seconds=None, front=True) for r in swing().rows]
-    other = replace(swing(), rows=tuple(slow), verdict=scenario([]).verdict, source="elsewhere")
-    new = scene(other, machine=replace(MACHINE, cpu="another"), digest="1" * 64)
+    slow_report = replace(
+        swing(), rows=tuple(slow), verdict=scenario([]).verdict, source="elsewhere"
+    )
+    new = scene(slow_report, machine=replace(MACHINE, cpu="another"), digest="1" * 64)
     assert scene_departures(scene(), new, BenchTable()) == ()
 
 
 def test_an_error_that_left_its_band_is_told_exactly() -> None:
     new = replace(swing(), rows=(*swing().rows[:-1], replace(swing().rows[-1], position=(1, 1))))
-    first, last = between(swing(), new)
+    first, last = departures_between(swing(), new)
     assert first == Departure("swing", "RK4 at 1 ms", "error of position", "1.92e-08", "1", "± 5 %")
     assert last.figure == "error of position at the end"
 
@@ -63,7 +68,7 @@ def test_a_status_says_all_of_its_row() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "found"),
+    ("old", "new", "departure"),
     [
         ({"own": True}, {}, ("own setting", "yes", "no", "the same")),
         ({}, {"refsafe": True}, ("refsafe", "no", "yes", "the same")),
@@ -80,38 +85,43 @@ def test_a_status_says_all_of_its_row() -> None:
     ],
 )
 def test_which_figures_of_a_row_depart_and_how_it_is_said(
-    old: Any, new: Any, found: tuple[str, ...] | None
+    old: Any, new: Any, departure: tuple[str, ...] | None
 ) -> None:
-    assert of_rows(row(**old), row(**new)) == ([] if found is None else [found])
+    assert of_rows(row(**old), row(**new)) == ([] if departure is None else [departure])
 
 
 def test_drifts_of_a_chaotic_scenario_or_a_lost_run_say_nothing() -> None:
-    one, other = row(energy_drift=0.1), row(energy_drift=0.2)
-    whole, chaotic = scenario([one]), scenario([one], horizon=0.5)
-    assert len(between(whole, scenario([other]))) == 1
-    assert between(chaotic, scenario([other], horizon=0.5)) == []
-    for old, new in ((whole, scenario([other], horizon=0.5)), (chaotic, scenario([other]))):
-        assert [found.figure for found in between(old, new)] == ["horizon"]
+    first, second = row(energy_drift=0.1), row(energy_drift=0.2)
+    whole, chaotic = scenario([first]), scenario([first], horizon=0.5)
+    assert len(departures_between(whole, scenario([second]))) == 1
+    assert departures_between(chaotic, scenario([second], horizon=0.5)) == []
+    for old, new in ((whole, scenario([second], horizon=0.5)), (chaotic, scenario([second]))):
+        assert [departure.figure for departure in departures_between(old, new)] == ["horizon"]
     slow = {"status": "slow-growth", "reasons": ("it grows",)}
-    assert of_rows(replace(one, **slow), replace(other, **slow)) == []
+    assert of_rows(replace(first, **slow), replace(second, **slow)) == []
 
 
 def test_no_error_is_known_better_than_the_worse_of_both_references() -> None:
     old, new = (row(velocity=(x, x), position=(x, x)) for x in (1e-3, 2e-3))
-    assert len(between(scenario([old]), scenario([new]))) == 4
-    for floor, other in ((1e-4, 1e-11), (1e-11, 1e-4)):
-        one = scenario([old], floor=floor, velocity_floor=floor)
-        assert between(one, scenario([new], floor=other, velocity_floor=other)) == []
+    assert len(departures_between(scenario([old]), scenario([new]))) == 4
+    for floor, new_floor in ((1e-4, 1e-11), (1e-11, 1e-4)):
+        old_report = scenario([old], floor=floor, velocity_floor=floor)
+        assert (
+            departures_between(
+                old_report, scenario([new], floor=new_floor, velocity_floor=new_floor)
+            )
+            == []
+        )
 
 
 def test_settings_and_scenarios_that_come_and_go() -> None:
-    found = between(scenario([row("Euler")]), scenario([row("RK4", solver="CG")]))
-    assert [(d.setting, d.figure, d.recorded, d.measured) for d in found] == [
+    departures = departures_between(scenario([row("Euler")]), scenario([row("RK4", solver="CG")]))
+    assert [(d.setting, d.figure, d.recorded, d.measured) for d in departures] == [
         ("Euler at 2 ms", "setting", "there", "nothing"),
         ("RK4 at 2 ms, CG", "setting", "nothing", "there"),
     ]
-    found = between(scenario([]), scenario([], name="other"))
-    assert [(d.where, d.recorded, d.measured) for d in found] == [
+    departures = departures_between(scenario([]), scenario([], name="other"))
+    assert [(d.where, d.recorded, d.measured) for d in departures] == [
         ("swing", "there", "nothing"),
         ("other", "nothing", "there"),
     ]
@@ -119,7 +129,7 @@ def test_settings_and_scenarios_that_come_and_go() -> None:
 
 def test_what_is_said_of_the_whole_scenario() -> None:
     new = scenario([], duration=2.0, horizon=0.5, hold=0.1, reference="self", figure="x (m)")
-    assert [(d.figure, d.recorded, d.measured) for d in between(scenario([]), new)] == [
+    assert [(d.figure, d.recorded, d.measured) for d in departures_between(scenario([]), new)] == [
         ("duration", "1", "2"),
         ("hold", "0", "0.1"),
         ("horizon", "1", "0.5"),
@@ -129,7 +139,7 @@ def test_what_is_said_of_the_whole_scenario() -> None:
 
 
 @pytest.mark.parametrize(
-    ("was", "now", "told"),
+    ("was", "now", "expected"),
     [
         (0.04, 0.0403, None),
         (0.04, 0.041, ("0.04", "0.041", "± 1 %")),
@@ -138,38 +148,40 @@ def test_what_is_said_of_the_whole_scenario() -> None:
     ],
 )
 def test_largest_stable_timesteps(
-    was: float | None, now: float | None, told: tuple[str, str, str] | None
+    was: float | None, now: float | None, expected: tuple[str, str, str] | None
 ) -> None:
     def stable(largest: float | None) -> ScenarioReport:
         return scenario(
             [], stable=(StableRow("Euler", largest, (1e-3, 0.1), None, 1.0, 9, 9, None),)
         )
 
-    found = [(d.recorded, d.measured, d.band) for d in between(stable(was), stable(now))]
-    assert found == ([] if told is None else [told])
+    departures = [
+        (d.recorded, d.measured, d.band) for d in departures_between(stable(was), stable(now))
+    ]
+    assert departures == ([] if expected is None else [expected])
 
 
 def test_orders_that_can_be_fitted_no_more() -> None:
     old = scenario([], orders=(OrderRow("RK4", FIRST, None, FittedOrder(3.9, 0.1, 0.1)),))
     new = scenario([], orders=(OrderRow("RK4", None, None, FittedOrder(3.94, 0.1, 0.1)),))
-    (found,) = between(old, new)
-    assert found == Departure("swing", "RK4", "order of position", "1", "nothing", "± 0.05")
+    (departure,) = departures_between(old, new)
+    assert departure == Departure("swing", "RK4", "order of position", "1", "nothing", "± 0.05")
 
 
 def test_a_case_that_is_gone_is_a_departure() -> None:
     assert case_departures([case()], [case()]) == ()
-    (gone,) = case_departures([case()], [])
-    assert gone == Departure("spring", "", "case", "there", "nothing", "the same")
+    (departure,) = case_departures([case()], [])
+    assert departure == Departure("spring", "", "case", "there", "nothing", "the same")
 
 
-def figure(measured: float | None, exact: float | None = 1.0) -> Any:
-    return replace(case(), figures=(FigureLine("growth", "m", "Euler", measured, exact, "a law"),))
+def figure(value: float | None, exact: float | None = 1.0) -> Any:
+    return replace(case(), figures=(FigureLine("growth", "m", "Euler", value, exact, "a law"),))
 
 
 def test_what_is_known_exactly_is_compared_by_how_far_it_is_off() -> None:
     assert case_departures([figure(1 + 1e-4)], [figure(1 + 1.04e-4)]) == ()
-    (found,) = case_departures([figure(1 + 1e-4)], [figure(1 + 2e-4)])
-    assert found == Departure(
+    (departure,) = case_departures([figure(1 + 1e-4)], [figure(1 + 2e-4)])
+    assert departure == Departure(
         "spring", "Euler", "growth, against theory", "0.0001", "0.0002", "± 5 %"
     )
     assert case_departures([figure(-2e-15, 0.0)], [figure(3e-15, 0.0)]) == ()
@@ -183,14 +195,17 @@ def test_boundaries_and_runs_of_cases() -> None:
     )
     old, run = case(), replace(case().errors[0], status="reset")
     new = replace(old, boundaries=(line, *old.boundaries[1:]), errors=(run, *old.errors[1:]))
-    found = case_departures([old], [new])
-    assert [(one.setting, one.figure, one.recorded, one.measured) for one in found] == [
+    departures = case_departures([old], [new])
+    assert [
+        (departure.setting, departure.figure, departure.recorded, departure.measured)
+        for departure in departures
+    ] == [
         ("Euler", "largest stable timestep", "200 ms", "all"),
         ("Euler", "monotone", "yes", "no"),
         ("Euler", "beyond", "diverged", "reset"),
         ("Euler at 10 ms", "status", "ok", "reset"),
     ]
-    near = replace(old, boundaries=(replace(line, largest=0.22), *old.boundaries[1:]))
-    for pair in ((old, near), (near, old)):
-        figures = {one.figure for one in case_departures(pair[:1], pair[1:])}
+    fuzzy = replace(old, boundaries=(replace(line, largest=0.22), *old.boundaries[1:]))
+    for pair in ((old, fuzzy), (fuzzy, old)):
+        figures = {departure.figure for departure in case_departures(pair[:1], pair[1:])}
         assert figures == {"monotone", "beyond"}, "a limit beyond which some are stable is fuzzy"

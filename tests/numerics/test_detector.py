@@ -30,7 +30,7 @@ SPRING = """
 BOUNDS = Setup(scenario=Scenario(1.0, 1.0), position_bound=1.0, velocity_bound=10.0)
 
 
-def begun(timestep: float, qpos: float = 0.0, qvel: float = 0.0) -> tuple[Any, Any]:
+def spring_data(timestep: float, qpos: float = 0.0, qvel: float = 0.0) -> tuple[Any, Any]:
     model = mujoco.MjModel.from_xml_string(SPRING)
     model.opt.timestep = timestep
     data = mujoco.MjData(model)
@@ -39,28 +39,28 @@ def begun(timestep: float, qpos: float = 0.0, qvel: float = 0.0) -> tuple[Any, A
 
 
 def test_a_run_that_was_reset_and_ends_with_error_zero_is_lost() -> None:
-    model, data = begun(0.3, qvel=1.0)
+    model, data = spring_data(0.3, qvel=1.0)
     advance(model, data, 1000)
     assert data.qpos[0] == 0.0 == data.qvel[0]  # as if it had come to rest
-    found = judge(model, data, 1000 * 0.3)
-    assert found.status is RunStatus.RESET
-    assert "MuJoCo warned of bad accelerations" in found.reasons
-    assert any("the state was reset" in reason for reason in found.reasons)
+    judgement = judge(model, data, 1000 * 0.3)
+    assert judgement.status is RunStatus.RESET
+    assert "MuJoCo warned of bad accelerations" in judgement.reasons
+    assert any("the state was reset" in reason for reason in judgement.reasons)
 
 
 def test_a_slow_growth_without_any_warning_is_seen() -> None:
-    model, data = begun(0.2002, qpos=0.5)
+    model, data = spring_data(0.2002, qpos=0.5)
     advance(model, data, 130)
     assert abs(data.qpos[0]) > 100
     assert not any(warning.number for warning in data.warning)
-    found = judge(model, data, 130 * 0.2002, setup=BOUNDS)
-    assert found.status is RunStatus.SLOW_GROWTH
-    assert any(reason.startswith("positions reached") for reason in found.reasons)
+    judgement = judge(model, data, 130 * 0.2002, setup=BOUNDS)
+    assert judgement.status is RunStatus.SLOW_GROWTH
+    assert any(reason.startswith("positions reached") for reason in judgement.reasons)
 
 
 def test_a_state_that_is_no_number() -> None:
     for field in ("qpos", "qvel"):
-        model, data = begun(0.01)
+        model, data = spring_data(0.01)
         getattr(data, field)[0] = np.nan
         assert judge(model, data, 0.0).reasons[0] == "the state is not finite"
 
@@ -78,8 +78,8 @@ def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:
 def test_no_error_is_given_for_a_run_that_was_lost() -> None:
     problem = all_problems()["damped-spring-0"]
     fast = replace(problem, mjcf=problem.mjcf.replace('stiffness="100"', 'stiffness="1e6"'))
-    found = measure(fast, Integrator.RK4, 0.02)
-    assert (found.status, found.position, found.velocity) == ("diverged", None, None)
+    line = measure(fast, Integrator.RK4, 0.02)
+    assert (line.status, line.position, line.velocity) == ("diverged", None, None)
 
 
 def test_where_energy_can_be_judged() -> None:
@@ -89,7 +89,7 @@ def test_where_energy_can_be_judged() -> None:
     none, pushed = Scenario(1.0, 1.0), Scenario(1.0, 1.0, controls=((0.5,),))
     keyed = Scenario(1.0, 1.0, keyframe=0)
     key = '<keyframe><key ctrl="1"/></keyframe>'
-    for actuator, option, joint, rest, scenario, said in (
+    for actuator, option, joint, rest, scenario, causes in (
         ("", "", "", "", none, ""),
         (motor, "", "", "", none, ""),
         (motor, "", "", "", Scenario(1.0, 1.0, controls=((0.0,),)), ""),
@@ -104,7 +104,7 @@ def test_where_energy_can_be_judged() -> None:
             <joint name="j" {joint}/><geom size=".1"/></body></worldbody>
             <actuator>{actuator}</actuator>{rest}</mujoco>"""
         model = mujoco.MjModel.from_xml_string(text)
-        assert driving_force(model, scenario) == said, (actuator, option, joint)
+        assert driving_force(model, scenario) == causes, (actuator, option, joint)
     model.dof_damping[:] = 0
     model.opt.wind[0], model.body_gravcomp[1] = 1.0, 1.0
     assert driving_force(model, none) == "gravity is compensated", "wind is nothing in a vacuum"
@@ -123,7 +123,7 @@ def test_a_state_that_shot_up_and_came_back_is_seen() -> None:
 
 
 def test_a_good_run_is_good() -> None:
-    model, data = begun(0.01, qpos=0.5)
+    model, data = spring_data(0.01, qpos=0.5)
     advance(model, data, 100)
     good = judge(model, data, 1.0, setup=BOUNDS)
     assert good.ok and good.reasons == ()
@@ -132,7 +132,7 @@ def test_a_good_run_is_good() -> None:
 
 
 def test_warnings_are_counted_and_not_printed(capfd: pytest.CaptureFixture[str]) -> None:
-    model, data = begun(0.3, qvel=1.0)
+    model, data = spring_data(0.3, qvel=1.0)
     before = mujoco.get_mju_user_warning()
     advance(model, data, 100)
     assert data.warning[int(mujoco.mjtWarning.mjWARN_BADQACC)].number == 1

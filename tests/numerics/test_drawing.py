@@ -32,10 +32,10 @@ def test_ticks_of_a_logarithmic_axis(low: float, high: float, most: int, texts: 
 @given(low=st.floats(-290, 290), span=st.floats(0.05, 500), most=st.integers(2, 12))
 def test_ticks_rise_and_are_within_the_axis(low: float, span: float, most: int) -> None:
     high = min(low + span, 300.0)
-    found = log_ticks(low, high, most)
-    assert all(low - 1e-6 <= at <= high + 1e-6 for at, _ in found)
-    assert all(a < b for (a, _), (b, _) in pairwise(found))
-    assert len({text for _, text in found}) == len(found)
+    ticks = log_ticks(low, high, most)
+    assert all(low - 1e-6 <= at <= high + 1e-6 for at, _ in ticks)
+    assert all(a < b for (a, _), (b, _) in pairwise(ticks))
+    assert len({text for _, text in ticks}) == len(ticks)
 
 
 @given(st.text())
@@ -45,8 +45,8 @@ def test_markup_can_hold_any_text(text: str) -> None:
     ElementTree.fromstring(f"<text>{markup_text(text)}</text>".encode())
 
 
-@given(wanted=st.lists(st.floats(0, 100), max_size=6), gap=st.floats(1, 10))
-def test_labels_keep_apart(wanted: list[float], gap: float) -> None:
-    places = separate_labels(sorted(wanted), gap, 0, 100)
+@given(heights=st.lists(st.floats(0, 100), max_size=6), gap=st.floats(1, 10))
+def test_labels_keep_apart(heights: list[float], gap: float) -> None:
+    places = separate_labels(sorted(heights), gap, 0, 100)
     assert all(b - a >= gap - 1e-9 for a, b in pairwise(places))
     assert all(place <= 100 + 1e-9 for place in places)

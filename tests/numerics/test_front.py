@@ -12,44 +12,44 @@ Point = tuple[float, float] | None
 """Cost and error; `None`: a run that was lost."""
 
 
-def placed(*points: Point) -> tuple[WorkPrecisionRow, ...]:
+def rows_with_front(*points: Point) -> tuple[WorkPrecisionRow, ...]:
     """Rows of which the first is the scene's own, Euler at 2 ms, and others are RK4 at 10 ms."""
-    found = []
+    rows = []
     for n, point in enumerate(points):
-        own = {"own": True} if n == 0 else {}
+        is_own = {"own": True} if n == 0 else {}
         name, timestep = ("Euler", 0.002) if n == 0 else ("RK4", 0.01)
         if point is None:
-            found.append(lost(name, timestep, **own))
+            rows.append(lost(name, timestep, **is_own))
         else:
-            found.append(row(name, timestep, cost=point[0], seen=point[1], **own))
-    return front(found)
+            rows.append(row(name, timestep, cost=point[0], seen=point[1], **is_own))
+    return front(rows)
 
 
-def on_it(*points: Point) -> list[bool]:
-    return [one.front for one in placed(*points)]
+def are_on_front(*points: Point) -> list[bool]:
+    return [row.front for row in rows_with_front(*points)]
 
 
 def test_cheaper_and_more_accurate_is_better() -> None:
-    found = placed((1, 1e-3), (0.5, 1e-5), (0.1, 0.3), (4, 1e-3), None)
-    assert [one.front for one in found] == [False, True, True, False, False]
-    assert [one.dominated_by for one in found] == [1, None, None, 1, None]
-    found = placed((8, 8.0), (4, 4.0), (2, 2.0), (1, 1.0))
-    assert [one.dominated_by for one in found] == [3, 3, 3, None], "it is on the front"
+    rows = rows_with_front((1, 1e-3), (0.5, 1e-5), (0.1, 0.3), (4, 1e-3), None)
+    assert [row.front for row in rows] == [False, True, True, False, False]
+    assert [row.dominated_by for row in rows] == [1, None, None, 1, None]
+    rows = rows_with_front((8, 8.0), (4, 4.0), (2, 2.0), (1, 1.0))
+    assert [row.dominated_by for row in rows] == [3, 3, 3, None], "it is on the front"
 
 
 def test_small_differences_are_none() -> None:
-    assert on_it((1, 1e-3), (1.02, 1e-3)) == [True, True]
-    assert on_it((1, 1e-3), (1.02, 1.04e-3)) == [True, True]
-    assert on_it((1, 1e-3), (1.2, 1e-3)) == [True, False]
-    assert on_it((1, 1e-3), (1, 1.06e-3)) == [True, False]
-    assert on_it((1, 1e-3), (0.98, 1.5e-3)) == [True, False], "its cost is no better"
-    assert on_it((1, 1e-3), (0.5, 1.04e-3)) == [False, True]
+    assert are_on_front((1, 1e-3), (1.02, 1e-3)) == [True, True]
+    assert are_on_front((1, 1e-3), (1.02, 1.04e-3)) == [True, True]
+    assert are_on_front((1, 1e-3), (1.2, 1e-3)) == [True, False]
+    assert are_on_front((1, 1e-3), (1, 1.06e-3)) == [True, False]
+    assert are_on_front((1, 1e-3), (0.98, 1.5e-3)) == [True, False], "its cost is no better"
+    assert are_on_front((1, 1e-3), (0.5, 1.04e-3)) == [False, True]
 
 
 def test_errors_of_zero_and_nothing_at_all() -> None:
-    assert on_it((1, 0.0), (2, 0.0), (0.5, 1e-12)) == [True, False, True]
-    assert on_it() == []
-    assert on_it(None, None) == [False, False]
+    assert are_on_front((1, 0.0), (2, 0.0), (0.5, 1e-12)) == [True, False, True]
+    assert are_on_front() == []
+    assert are_on_front(None, None) == [False, False]
 
 
 OWN = "no other setting is cheaper without being less accurate"
@@ -77,18 +77,20 @@ SEEN = "a learner would notice its error, which is 2.5 times what can be seen"
     ],
 )
 def test_verdicts(points: tuple[Point, ...], better: int | None, text: str) -> None:
-    rows = placed(*points)
-    found = verdict(rows, [None if one.seen is None else one.seen >= 1 for one in rows])
-    assert (found.better, found.text) == (better, text)
-    assert found.on_front == (better is None and points[0] is not None)
+    rows = rows_with_front(*points)
+    judgement = verdict(rows, [None if row.seen is None else row.seen >= 1 for row in rows])
+    assert (judgement.better, judgement.text) == (better, text)
+    assert judgement.on_front == (better is None and points[0] is not None)
 
 
 def test_a_verdict_where_an_error_is_not_known_or_nothing_was_timed() -> None:
-    found = verdict(placed((1, 2.0), (0.5, 2.0)), [None, None])
-    assert found.noticeable is None
-    assert found.text == (
+    judgement = verdict(rows_with_front((1, 2.0), (0.5, 2.0)), [None, None])
+    assert judgement.noticeable is None
+    assert judgement.text == (
         "RK4 at 10 ms is better: it takes 0.5 of the time and errs no more; whether a learner "
         "would notice its error is not known"
     )
-    found = verdict(front([row(own=True, cost=None, seen=0.5)]), [False])
-    assert found.text.startswith("nothing was timed, so that no setting can be called better; a ")
+    judgement = verdict(front([row(own=True, cost=None, seen=0.5)]), [False])
+    assert judgement.text.startswith(
+        "nothing was timed, so that no setting can be called better; a "
+    )

@@ -17,31 +17,31 @@ from coursebuild.numerics.problem import STANDARD, Integrator, Motion, Sizes
 from coursebuild.numerics.problems import all_problems, double_pendulum, impact, scales
 from coursebuild.numerics.reports.cases import ErrorLine
 
-FIRST = tuple(one for one in STANDARD if one is not Integrator.RK4)
+FIRST = tuple(integrator for integrator in STANDARD if integrator is not Integrator.RK4)
 
 
 @functools.cache
-def measured(name: str, integrator: Integrator) -> tuple[ErrorLine, ...]:
+def error_lines(name: str, integrator: Integrator) -> tuple[ErrorLine, ...]:
     problem = all_problems()[name]
     return tuple(measure(problem, integrator, h) for h in problem.timesteps)
 
 
 def slopes(name: str, integrator: Integrator) -> dict[str, float]:
     """The orders that could be fitted, by what they are of."""
-    found = orders(all_problems()[name], measured(name, integrator))
-    parts = {"position": found.position, "attitude": found.attitude, "velocity": found.velocity}
-    return {part: one.value for part, one in parts.items() if one is not None}
+    row = orders(all_problems()[name], error_lines(name, integrator))
+    parts = {"position": row.position, "attitude": row.attitude, "velocity": row.velocity}
+    return {part: fit.value for part, fit in parts.items() if fit is not None}
 
 
 @pytest.mark.site
 def test_the_euler_family_is_of_first_order() -> None:
     names = ("tumbling-box", "damped-spring-0", "free-top", "projectile")
     for name, integrator in itertools.product(names, FIRST):
-        found = slopes(name, integrator)
+        fits = slopes(name, integrator)
         if name != "tumbling-box":
-            found.pop("velocity", None)
-        assert found
-        assert found == pytest.approx(dict.fromkeys(found, 1.0), abs=0.05), (name, integrator)
+            fits.pop("velocity", None)
+        assert fits
+        assert fits == pytest.approx(dict.fromkeys(fits, 1.0), abs=0.05), (name, integrator)
     assert set(slopes("tumbling-box", Integrator.EULER)) == {"attitude", "velocity"}
 
 
@@ -56,19 +56,19 @@ def test_orders_of_rk4() -> None:
         "damped-spring-0.1": {"position": 4.0, "velocity": 4.0},
         "pendulum-hinge-90": {"position": 3.9},
     }.items():
-        found = slopes(name, Integrator.RK4)
-        known = {part: found[part] for part in expected}
-        assert known == pytest.approx(expected, abs=0.1), name
+        fits = slopes(name, Integrator.RK4)
+        selection = {part: fits[part] for part in expected}
+        assert selection == pytest.approx(expected, abs=0.1), name
 
 
 def test_an_order_is_fitted_only_where_errors_lie_on_a_line() -> None:
     steps = [2.0**-n for n in range(12)]
     clean = [h**3 for h in steps]
     spoilt = [max(e, 1e-7) if e < 0.1 else 5.0 for e in clean]
-    found = fit_order(steps, spoilt, 1e-9)
-    assert found == fit_order(steps[2:8], clean[2:8], 0.0)
-    assert found is not None and found.value == pytest.approx(3.0, abs=1e-12)
-    assert max(found.uncertainty, found.bend) < 1e-9
+    fit = fit_order(steps, spoilt, 1e-9)
+    assert fit == fit_order(steps[2:8], clean[2:8], 0.0)
+    assert fit is not None and fit.value == pytest.approx(3.0, abs=1e-12)
+    assert max(fit.uncertainty, fit.bend) < 1e-9
     assert fit_order(steps[2:5], clean[2:5], 0.0) is None  # three are often on one
     assert fit_order(steps, [1e-12] * 12, 1e-12) is None
     assert fit_order(steps, clean, 0.0, extent=1e-7) is None  # as large as the motion
@@ -77,22 +77,22 @@ def test_an_order_is_fitted_only_where_errors_lie_on_a_line() -> None:
     wavy = [h**2 * (1.3 if n % 2 else 1) for n, h in enumerate(steps)]
     assert fit_order(steps, wavy, 0.0) is None
     shaken = [h**2 * (1.05 if n % 2 else 1) for n, h in enumerate(steps)]
-    told = fit_order(steps, shaken, 0.0)
-    assert told is not None and abs(told.value - 2) < told.uncertainty < 0.05
+    shaken_fit = fit_order(steps, shaken, 0.0)
+    assert shaken_fit is not None and abs(shaken_fit.value - 2) < shaken_fit.uncertainty < 0.05
 
 
 def test_errors_are_apart_and_none_for_what_is_not_there() -> None:
     times = np.array([1.0, 2.0])
     level = np.broadcast_to(np.array([1.0, 0, 0, 0]), (2, 1, 4))
-    turned = np.array([[[np.cos(0.05), np.sin(0.05), 0, 0]], [[-1.0, 0, 0, 0]]])
+    rotated = np.array([[[np.cos(0.05), np.sin(0.05), 0, 0]], [[-1.0, 0, 0, 0]]])
     a = Motion(times, np.empty((2, 0)), level, np.zeros((2, 3)))
-    b = Motion(times, np.empty((2, 0)), turned, np.array([[3.0, 4, 0], [0, 0, 1]]))
-    found = errors(b, a)
-    assert found.position is None
-    assert found.attitude is not None
-    assert found.attitude[0] == pytest.approx(0.1, abs=1e-15)
-    assert found.attitude[1] == 0.0
-    assert found.velocity == (5.0, 1.0)
+    b = Motion(times, np.empty((2, 0)), rotated, np.array([[3.0, 4, 0], [0, 0, 1]]))
+    result = errors(b, a)
+    assert result.position is None
+    assert result.attitude is not None
+    assert result.attitude[0] == pytest.approx(0.1, abs=1e-15)
+    assert result.attitude[1] == 0.0
+    assert result.velocity == (5.0, 1.0)
     assert errors(b, a, Sizes(0, 0, 0.2)).velocity == (5.0, 2.0)
 
 
@@ -107,19 +107,19 @@ def test_a_timestep_that_misses_the_end_is_refused() -> None:
 
 def test_energy_belongs_to_the_moment_it_is_given_for() -> None:
     # The energy that MuJoCo gives after a step is that of before: it would seem to oscillate.
-    found = measure(all_problems()["pendulum-hinge-90"], Integrator.RK4, 0.1 / 160)
-    assert found.energy_drift is not None
-    assert abs(found.energy_drift) < 1e-11
+    line = measure(all_problems()["pendulum-hinge-90"], Integrator.RK4, 0.1 / 160)
+    assert line.energy_drift is not None
+    assert abs(line.energy_drift) < 1e-11
 
 
 def test_energy_may_hold_where_attitude_does_not() -> None:
-    found = measure(all_problems()["tumbling-box"], Integrator.RK4, 0.01)
-    assert found.attitude is not None
-    assert found.energy_drift is not None
-    assert abs(found.energy_drift) < 1e-7
-    assert found.attitude[0] > 1e-5
-    assert found.momentum_drift is not None
-    assert found.momentum_drift > 1e-7
+    line = measure(all_problems()["tumbling-box"], Integrator.RK4, 0.01)
+    assert line.attitude is not None
+    assert line.energy_drift is not None
+    assert abs(line.energy_drift) < 1e-7
+    assert line.attitude[0] > 1e-5
+    assert line.momentum_drift is not None
+    assert line.momentum_drift > 1e-7
 
 
 EULER, IMPLICIT, RK4 = Integrator.EULER, Integrator.IMPLICITFAST, Integrator.RK4
@@ -156,18 +156,18 @@ OTHERWISE = (
 
 @pytest.mark.site
 def test_figures_are_those_of_theory_or_known_to_be_others() -> None:
-    wrong = []
+    mismatches = []
     for name, part, integrators, room in AS_THEORY_SAYS:
-        for check, one in itertools.product(all_problems()[name].checks, integrators):
-            if part in check.name and one in check.integrators:
-                found, exact = check.measure(one), check.expected(one)
-                if not abs(found - exact) <= room:
-                    wrong.append((name, check.name, one, found, exact))
-    for name, part, one, known, room in OTHERWISE:
+        for check, integrator in itertools.product(all_problems()[name].checks, integrators):
+            if part in check.name and integrator in check.integrators:
+                value, exact = check.measure(integrator), check.expected(integrator)
+                if not abs(value - exact) <= room:
+                    mismatches.append((name, check.name, integrator, value, exact))
+    for name, part, integrator, expected, room in OTHERWISE:
         (check,) = (check for check in all_problems()[name].checks if part in check.name)
-        if not abs(check.measure(one) - known) <= room:
-            wrong.append((name, check.name, one, check.measure(one), known))
-    assert wrong == []
+        if not abs(check.measure(integrator) - expected) <= room:
+            mismatches.append((name, check.name, integrator, check.measure(integrator), expected))
+    assert mismatches == []
     with pytest.raises(ValueError, match=r"A \+ B >= C"):
         mujoco.MjModel.from_xml_string(scales.ROUNDED_PLATE)
 
@@ -184,7 +184,9 @@ def test_restitution_comes_to_one_with_more_steps_in_a_contact() -> None:
 
 @pytest.mark.slow
 def test_the_horizon_of_the_double_pendulum() -> None:
-    euler, rk4 = (double_pendulum.horizons(one) for one in (Integrator.EULER, Integrator.RK4))
+    euler, rk4 = (
+        double_pendulum.horizons(integrator) for integrator in (Integrator.EULER, Integrator.RK4)
+    )
     assert 2.0 < min(euler) <= max(euler) < 2.5
     # From 1.5e-11 after a second to 0.1: growth by 1.4 to 2.4 per second, as of so short a time.
     growth = math.log(0.1 / 1.5e-11)

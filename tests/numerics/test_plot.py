@@ -21,9 +21,9 @@ from support.bench_reports import lost, row, scenario, swing
 PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")
 
 
-def drawn(report: ScenarioReport, **how: Any) -> ElementTree.Element:
+def parse_plot(report: ScenarioReport, **options: Any) -> ElementTree.Element:
     """The plot: well-formed, everything inside of it, and no two texts over each other."""
-    svg = plot_svg(report, name="p", **how)
+    svg = plot_svg(report, name="p", **options)
     root = ElementTree.fromstring(svg)
     _, _, width, height = (float(x) for x in root.attrib["viewBox"].split())
     boxes = []
@@ -59,55 +59,56 @@ def texts(root: ElementTree.Element) -> list[str]:
 @pytest.mark.parametrize("narrow", [False, True])
 def test_every_row_is_a_mark_that_says_what_it_is(narrow: bool) -> None:
     report = swing()
-    root = drawn(report, narrow=narrow)
-    found = titles(root)
-    assert len(found) == len(report.rows)
+    root = parse_plot(report, narrow=narrow)
+    tooltips = titles(root)
+    assert len(tooltips) == len(report.rows)
     assert (
-        "RK4 at 20 ms · error 0.00307 · cost 0.39 ± 1 % · 50 steps · on the Pareto front" in found
+        "RK4 at 20 ms · error 0.00307 · cost 0.39 ± 1 % · 50 steps · on the Pareto front"
+        in tooltips
     )
     assert (
         "Euler at 2 ms · error 0.0048 · cost 1 ± 1 % · 500 steps · the scene’s own setting · "
-        "RK4 at 20 ms is better" in found
+        "RK4 at 20 ms is better" in tooltips
     )
-    (gone,) = [title for title in found if "diverged" in title]
-    assert gone == "Euler at 50 ms · diverged; the state is not finite · not timed · 20 steps"
-    (cross,) = (path for path in root.iter("path") if path.findtext("title") == gone)
+    (lost_title,) = [title for title in tooltips if "diverged" in title]
+    assert lost_title == "Euler at 50 ms · diverged; the state is not finite · not timed · 20 steps"
+    (cross,) = (path for path in root.iter("path") if path.findtext("title") == lost_title)
     assert cross.attrib["fill"] == "none" and "l" in cross.attrib["d"]
-    shown = texts(root)
-    assert "the scene’s own: Euler at 2 ms" in shown
-    assert "cost, relative to the scene’s own setting" in shown
-    assert "error: position (m or rad)" in shown
+    labels = texts(root)
+    assert "the scene’s own: Euler at 2 ms" in labels
+    assert "cost, relative to the scene’s own setting" in labels
+    assert "error: position (m or rad)" in labels
     for name in ("Euler", "implicit", "RK4"):
-        assert name in shown
+        assert name in labels
 
 
 def test_what_is_not_resolved_is_a_band() -> None:
     rows = [row("RK4", h, position=(max(h**4, 1e-10),) * 2) for h in (0.1, 0.01, 0.001)]
-    for floor, told in ((1e-11, True), (1e-16, False)):
-        shown = texts(drawn(scenario(rows, floor=floor)))
-        assert ("under 10⁻¹⁰: not resolved by the reference" in shown) is told
+    for floor, expected in ((1e-11, True), (1e-16, False)):
+        labels = texts(parse_plot(scenario(rows, floor=floor)))
+        assert ("under 10⁻¹⁰: not resolved by the reference" in labels) is expected
 
 
 def test_from_where_on_an_error_is_visible() -> None:
-    for *errors, near in ((30.0, 0.02, True), (5.0, 2.0, True), (1e5, 1e3, False)):
+    for *errors, expected in ((30.0, 0.02, True), (5.0, 2.0, True), (1e5, 1e3, False)):
         rows = [row("RK4", 0.01 / (n + 1), seen=error) for n, error in enumerate(errors)]
-        shown = texts(drawn(scenario(rows)))
-        assert ("just visible" in shown) is near
-        assert "error: what is seen (1: just visible)" in shown
+        labels = texts(parse_plot(scenario(rows)))
+        assert ("just visible" in labels) is expected
+        assert "error: what is seen (1: just visible)" in labels
 
 
 def test_the_key_says_what_there_is_and_nothing_else() -> None:
-    shown = texts(drawn(swing()))
-    assert shown[-5:] == [
+    labels = texts(parse_plot(swing()))
+    assert labels[-5:] == [
         *("RK4", "on the Pareto front", "another is better"),
         *("the scene’s own: Euler at 2 ms", "run lost"),
     ]
-    assert texts(drawn(scenario([row(front=True)])))[-1] == "on the Pareto front"
+    assert texts(parse_plot(scenario([row(front=True)])))[-1] == "on the Pareto front"
 
 
 def test_the_own_setting_is_ringed_also_where_it_was_lost() -> None:
     for report in (swing(), scenario([lost(own=True), row("RK4", 0.01)])):
-        root = drawn(report)
+        root = parse_plot(report)
         first, *_ = root.iter("circle")
         assert first.attrib["r"] == "8.5"
         assert [text for text in texts(root) if text.startswith("the scene’s own: Euler at ")]
@@ -115,15 +116,15 @@ def test_the_own_setting_is_ringed_also_where_it_was_lost() -> None:
 
 def test_a_cost_has_a_bar_as_wide_as_its_interval() -> None:
     wide = Interval(1.0, 0.5, 2.0)
-    root = drawn(scenario([replace(row(), cost=wide), row("RK4", 0.01), row("RK4", 1e-4)]))
-    paths = " ".join(one.attrib["d"] for one in root.iter("path"))
+    root = parse_plot(scenario([replace(row(), cost=wide), row("RK4", 0.01), row("RK4", 1e-4)]))
+    paths = " ".join(path.attrib["d"] for path in root.iter("path"))
     bars = re.findall(r"M([\d.]+) [\d.]+H([\d.]+)M\S+ [\d.]+v6M", paths)
     widths = [float(end) - float(start) for start, end in bars]
     assert len(bars) == 3 and widths[0] > 20 * max(widths[1:])
 
 
 def test_described_for_who_cannot_see_it() -> None:
-    root = drawn(swing())
+    root = parse_plot(swing())
     assert root.attrib["role"] == "img"
     assert root.attrib["aria-labelledby"] == "p-title p-text"
     title, text = root.find("title"), root.find("desc")
@@ -145,7 +146,7 @@ def test_other_solvers_are_small_marks_without_a_line() -> None:
     rows = [row("Euler", h, solver="Newton", iterations=100) for h in (0.004, 0.002)]
     rows.append(row("Euler", 0.002, solver="CG", iterations=100, own=False))
     rows[1] = replace(rows[1], own=True)
-    root = drawn(scenario(rows))
+    root = parse_plot(scenario(rows))
     assert "other solver, iterations or cone" in texts(root)
     lines = [p for p in root.iter("path") if p.attrib.get("stroke-width") == "1.7"]
     assert lines[0].attrib["d"].count("L") == 1
@@ -155,20 +156,20 @@ def test_other_solvers_are_small_marks_without_a_line() -> None:
 
 def test_steps_stand_in_for_times_that_are_not_there() -> None:
     rows = [row("Euler", h, cost=None) for h in (0.01, 0.001)]
-    assert "steps" in texts(drawn(scenario(rows)))
+    assert "steps" in texts(parse_plot(scenario(rows)))
     rows = [row("Euler", 0.002, cost=1.0), row("Euler", 0.001, cost=None), row("RK4", 0.01, cost=3)]
-    found = work_precision(scenario(rows))
-    assert found is not None
-    assert [p.x.value for line in found.lines for p in line.points] == [1.0, 2.0, 3.0]
+    chart = work_precision(scenario(rows))
+    assert chart is not None
+    assert [p.x.value for line in chart.lines for p in line.points] == [1.0, 2.0, 3.0]
 
 
 def test_which_error_is_shown() -> None:
     still = [row(position=(1e-11, 1e-11), attitude=(1e-3, 1e-3))]
     assert main_quantity(scenario(still)).name == "attitude"
     report = scenario([row(figure=(1.0, 1.0))], figure="energy (J)")
-    assert [one.name for one in quantities(report)] == ["figure", "position", "velocity"]
+    assert [quantity.name for quantity in quantities(report)] == ["figure", "position", "velocity"]
     assert main_quantity(report).label == "energy (J)"
-    assert "error: energy (J)" in texts(drawn(report))
+    assert "error: energy (J)" in texts(parse_plot(report))
 
 
 ERRORS = st.one_of(st.just(0.0), st.floats(1e-300, 1e300))
@@ -190,9 +191,9 @@ STATUS = st.sampled_from(("ok", "ok", "ok", "diverged", "reset", "slow-growth"))
     narrow=st.booleans(),
 )
 def test_any_report_is_drawn(rows: Any, floor: float, narrow: bool) -> None:
-    made = [
+    report_rows = [
         row(name, h, position=(e, e), velocity=None, cost=cost, status=status, own=n == 0)
         for n, (name, h, e, cost, status) in enumerate(rows)
     ]
-    svg = plot_svg(scenario(made, floor=floor), name="p", narrow=narrow)
-    assert svg == "" or len(titles(ElementTree.fromstring(svg))) == len(made)
+    svg = plot_svg(scenario(report_rows, floor=floor), name="p", narrow=narrow)
+    assert svg == "" or len(titles(ElementTree.fromstring(svg))) == len(report_rows)

@@ -65,29 +65,29 @@ def test_all_thirteen_cases_are_there() -> None:
 
 @pytest.mark.site
 def test_both_references_agree() -> None:
-    assert [name for name, one in all_problems().items() if not said_to_be_known(one)] == []
+    assert [name for name, problem in all_problems().items() if not said_to_be_known(problem)] == []
 
 
 def said_to_be_known(problem: Problem) -> bool:
     try:
-        known = floor(problem)
+        sizes = floor(problem)
     except (DisagreementError, ValueError):  # as where a hold ends between two samples
         return False
-    return 0 < known.largest < 2e-6
+    return 0 < sizes.largest < 2e-6
 
 
 @pytest.mark.slow
 def test_each_number_of_each_problem_that_is_off_by_a_millionth_is_noticed() -> None:
     """Of the model, the scenario and the solution, one after the other."""
-    wrong = {}
+    mismatches = {}
     for problem in all_problems().values():
         if problem.name == "chain-heavy-tip":  # an integration of seconds, forty times
             problem = replace(problem, scenario=replace(problem.scenario, duration=0.003))
-        found = {name for name, other in variants(problem) if said_to_be_known(other)}
+        unnoticed = {name for name, variant in variants(problem) if said_to_be_known(variant)}
         expected = next((v for k, v in IMMATERIAL.items() if problem.name.startswith(k)), set())
-        if found != expected:
-            wrong[problem.name] = found ^ expected
-    assert wrong == {}
+        if unnoticed != expected:
+            mismatches[problem.name] = unnoticed ^ expected
+    assert mismatches == {}
 
 
 def variants(problem: Problem) -> Iterator[tuple[str, Problem]]:
@@ -101,22 +101,24 @@ def variants(problem: Problem) -> Iterator[tuple[str, Problem]]:
                 start, end = (match.start(3) + at for at in number.span())
                 text = f"{problem.mjcf[:start]}{float(number[0]) * OFF!r}{problem.mjcf[end:]}"
                 yield f"{element} {match[2]} {n}", replace(problem, mjcf=text)
-    for name, scenario in changed(problem.scenario, ("qpos", "qvel", "hold", "controls")):
+    for name, scenario in change_each_number(
+        problem.scenario, ("qpos", "qvel", "hold", "controls")
+    ):
         yield name, replace(problem, scenario=scenario)
-    for name, solution in changed(problem.reference.solution):
-        other = replace(problem.reference, solution=solution)
-        yield f"solution {name}", replace(problem, reference=other)
+    for name, solution in change_each_number(problem.reference.solution):
+        reference = replace(problem.reference, solution=solution)
+        yield f"solution {name}", replace(problem, reference=reference)
 
 
-def changed(value: Any, names: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
+def change_each_number(value: Any, names: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
     """A struct with each of its numbers changed, also those in tuples."""
     for name in names or value.__struct_fields__:
         field = getattr(value, name)
         if isinstance(field, float) and field:
             yield name, replace(value, **{name: field * OFF})
-        for n, one in enumerate(field if isinstance(field, tuple) else ()):
-            new = tuple(OFF * x for x in one) if isinstance(one, tuple) else OFF * one
-            if new != one:
+        for n, entry in enumerate(field if isinstance(field, tuple) else ()):
+            new = tuple(OFF * x for x in entry) if isinstance(entry, tuple) else OFF * entry
+            if new != entry:
                 yield f"{name} {n}", replace(value, **{name: (*field[:n], new, *field[n + 1 :])})
 
 

@@ -41,27 +41,29 @@ def pendulum(joint: str = "", floor: float = -9, actuator: str = "", option: str
     return mujoco.MjModel.from_xml_string(text)
 
 
-def known(model: Any, text: str = 'name = "a"\nkeyframe = 0\nduration = 0.5\n') -> KnownMotion:
+def reference_of(
+    model: Any, text: str = 'name = "a"\nkeyframe = 0\nduration = 0.5\n'
+) -> KnownMotion:
     (scene,) = scenes(model, declared("[[scenario]]\n" + text), quick=True)
     return find_reference(model, run_pilot(model, scene), quick=True)
 
 
 def test_names_of_closed_forms_are_those_of_the_hard_cases() -> None:
-    closed = [p.name for p in all_problems().values() if p.reference.kind == "closed"]
-    assert list(CLOSED_FORMS) == closed
+    names = [p.name for p in all_problems().values() if p.reference.kind == "closed"]
+    assert list(CLOSED_FORMS) == names
 
 
 def test_a_smooth_scene_is_integrated_twice() -> None:
-    found = known(pendulum("damping='0.3'"))
-    assert (found.kind, found.note) == ("ode", "")
-    assert found.source == "Bulirsch–Stoer over mj_forward"
-    assert found.second == "DOP853 over mj_forward"
-    assert found.agreement < 1e-12
-    assert found.horizon == 0.5
+    reference = reference_of(pendulum("damping='0.3'"))
+    assert (reference.kind, reference.note) == ("ode", "")
+    assert reference.source == "Bulirsch–Stoer over mj_forward"
+    assert reference.second == "DOP853 over mj_forward"
+    assert reference.agreement < 1e-12
+    assert reference.horizon == 0.5
 
 
 @pytest.mark.parametrize(
-    ("model", "why"),
+    ("model", "reason"),
     [
         (pendulum(floor=-0.5), "contact"),
         (pendulum("range='60 120' limited='true'"), "a limit that is reached"),
@@ -69,16 +71,16 @@ def test_a_smooth_scene_is_integrated_twice() -> None:
     ],
     ids=["contact", "limit", "friction"],
 )
-def test_where_something_jumps_the_engine_is_its_own_reference(model: Any, why: str) -> None:
+def test_where_something_jumps_the_engine_is_its_own_reference(model: Any, reason: str) -> None:
     (scene,) = scenes(model, NOTHING, quick=True)
-    first = run_pilot(model, scene)
-    assert first.jumps == (why,)
-    found = find_reference(model, first, quick=True)
-    assert found.kind == "self"
+    pilot = run_pilot(model, scene)
+    assert pilot.jumps == (reason,)
+    reference = find_reference(model, pilot, quick=True)
+    assert reference.kind == "self"
     step = min(scene.timesteps) / 8
-    assert found.source == f"the engine itself: implicitfast at {step:g} s, Newton's solver"
-    assert found.second == f"the same under Euler at {2 * step:g} s"
-    assert found.floor.place > 1e-7, "it is not called better known than it is"
+    assert reference.source == f"the engine itself: implicitfast at {step:g} s, Newton's solver"
+    assert reference.second == f"the same under Euler at {2 * step:g} s"
+    assert reference.floor.place > 1e-7, "it is not called better known than it is"
 
 
 FULL = 'dyntype="integrator" gainprm="2" actlimited="true" actrange="-{most} {most}"'
@@ -90,14 +92,14 @@ def test_an_activation_at_its_limit_is_a_jump() -> None:
     model = pendulum("damping='1'", actuator=FULL.format(most=0.3))
     model.key_ctrl[0, 0] = 1.0
     (scene,) = scenes(model, NOTHING, quick=True)
-    first = run_pilot(model, scene)
-    assert first.jumps == ("an activation at its limit",)
-    found = find_reference(model, first, quick=True)
-    assert (found.kind, found.states.act[-1, 0]) == ("self", 0.3)
-    unseen = replace(first, jumps=())  # as of something that is not looked for
-    found = find_reference(model, unseen, quick=True)
-    assert found.kind == "self"
-    assert found.note == "no integration: the engine in small steps tends elsewhere"
+    pilot = run_pilot(model, scene)
+    assert pilot.jumps == ("an activation at its limit",)
+    reference = find_reference(model, pilot, quick=True)
+    assert (reference.kind, reference.states.act[-1, 0]) == ("self", 0.3)
+    unseen = replace(pilot, jumps=())  # as of something that is not looked for
+    reference = find_reference(model, unseen, quick=True)
+    assert reference.kind == "self"
+    assert reference.note == "no integration: the engine in small steps tends elsewhere"
 
 
 def test_an_activation_that_looks_ahead_by_a_timestep() -> None:
@@ -106,7 +108,7 @@ def test_an_activation_that_looks_ahead_by_a_timestep() -> None:
     late = pendulum(actuator=text)
     for model in (early, late):
         model.key_ctrl[0, 0] = 1.0
-    first, second = known(early), known(late)
+    first, second = reference_of(early), reference_of(late)
     assert (first.kind, second.kind) == ("ode", "ode")
     assert np.array_equal(first.states.qpos, second.states.qpos)
 
@@ -116,20 +118,20 @@ def test_commands_and_activations_are_integrated() -> None:
     act = 'dyntype="filter" dynprm="0.2" gainprm="3"'
     model = pendulum("", actuator=act, option='<flag gravity="disable"/>')
     text = 'name = "a"\ncontrols = [[1], [-1]]\nhold = 0.2\nsample = 0.1\nduration = 0.4\n'
-    found = known(model, text)
-    times = found.states.times
+    reference = reference_of(model, text)
+    times = reference.states.times
     rising = 1 - np.exp(-times / 0.2)
     then = -1 + (1 + 1 - np.exp(-1.0)) * np.exp(-(times - 0.2) / 0.2)
     exact = np.where(times <= 0.2 + 1e-9, rising, then)
-    assert found.kind == "ode"
-    assert np.max(np.abs(found.states.act[:, 0] - exact)) < 1e-12
+    assert reference.kind == "ode"
+    assert np.max(np.abs(reference.states.act[:, 0] - exact)) < 1e-12
 
 
 def test_an_author_may_choose() -> None:
     text = 'name = "a"\nkeyframe = 0\nduration = 0.1\nreference = '
-    assert known(pendulum(), text + '"self"').kind == "self"
+    assert reference_of(pendulum(), text + '"self"').kind == "self"
     with pytest.raises(SceneError) as caught:
-        known(pendulum(floor=-0.5), 'name = "a"\nkeyframe = 0\nreference = "ode"')
+        reference_of(pendulum(floor=-0.5), 'name = "a"\nkeyframe = 0\nreference = "ode"')
     assert caught.value.message == "no integration can be the reference: there is contact"
 
 
@@ -154,9 +156,9 @@ def test_a_closed_form_comes_first_and_is_refused_where_it_is_of_something_else(
     text = (
         'name = "a"\nduration = 1\nqpos = [1]\nqvel = [5]\nreference = "closed:damped-spring-0.1"\n'
     )
-    found = known(spring(100), text)
-    assert (found.kind, found.second) == ("closed", "Bulirsch–Stoer over mj_forward")
-    assert found.agreement < 1e-11
+    reference = reference_of(spring(100), text)
+    assert (reference.kind, reference.second) == ("closed", "Bulirsch–Stoer over mj_forward")
+    assert reference.agreement < 1e-11
     for model, toml, message in (
         (
             spring(101),
@@ -167,7 +169,7 @@ def test_a_closed_form_comes_first_and_is_refused_where_it_is_of_something_else(
         (pendulum(), text.replace("damped-spring-0.1", "coin"), "the model has other joints than"),
     ):
         with pytest.raises(SceneError) as caught:
-            known(model, toml)
+            reference_of(model, toml)
         assert caught.value.message.startswith(message)
         assert caught.value.span is not None
         assert caught.value.span.text.startswith('"closed:')

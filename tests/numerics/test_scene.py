@@ -39,8 +39,8 @@ def arm(step: float = 0.002) -> Any:
 
 
 def only(text: str, model: Any = None) -> Scene:
-    (found,) = scenes(arm() if model is None else model, declared("[[scenario]]\n" + text))
-    return found
+    (scene,) = scenes(arm() if model is None else model, declared("[[scenario]]\n" + text))
+    return scene
 
 
 def test_keyframes_are_scenarios_by_themselves() -> None:
@@ -59,18 +59,18 @@ def test_where_nothing_moves_there_is_nothing_to_measure() -> None:
 
 
 def test_what_is_declared_is_taken() -> None:
-    found = only(
+    scene = only(
         'name = "a"\nkeyframe = "home"\nqpos = [0, 2, 0, 0, 0]\nqvel = [1, 2, 3, 4]\n'
         "controls = [[1], [-1]]\nhold = 0.2\nsample = 0.04\nduration = 0.8\n"
         "timesteps = [0.04, 0.0005]\n"
     )
-    scenario = found.scenario
+    scenario = scene.scenario
     assert scenario.qpos == (0, 1, 0, 0, 0), "quaternions are made unit ones"
     assert scenario.qvel == (1, 2, 3, 4)
     assert (scenario.duration, scenario.sample, scenario.hold) == (0.8, 0.04, 0.2)
     assert (scenario.keyframe, scenario.controls) == (0, ((1,), (-1,)))
-    assert found.timesteps == (0.0005, 0.002, 0.04)
-    assert (found.timestep, found.title) == (0.002, "a")
+    assert scene.timesteps == (0.0005, 0.002, 0.04)
+    assert (scene.timestep, scene.title) == (0.002, "a")
 
 
 @settings(max_examples=150, deadline=None)
@@ -90,12 +90,12 @@ def test_all_times_are_whole_numbers_of_each_other(
     if hold is not None:
         lines.append("controls = [" + "[1]," * count + "]")
     text = '[[scenario]]\nname = "a"\n' + "\n".join(lines) + "\n"
-    parsed = parse_declarations(Source("models/arm.toml", text))
-    assume(parsed.value is not None)
-    (found,) = scenes(arm(step), parsed.value, quick=quick)
-    scenario = found.scenario
+    declarations = parse_declarations(Source("models/arm.toml", text))
+    assume(declarations.value is not None)
+    (scene,) = scenes(arm(step), declarations.value, quick=quick)
+    scenario = scene.scenario
     assert is_multiple(scenario.duration, scenario.sample)
-    assert is_multiple(scenario.sample, found.timestep)
+    assert is_multiple(scenario.sample, scene.timestep)
     if hold is not None:
         assert is_multiple(scenario.hold, scenario.sample)
     if steps is not None:
@@ -104,10 +104,10 @@ def test_all_times_are_whole_numbers_of_each_other(
         commanded = 0 if hold is None or count == 1 else hold * count * step
         assert scenario.duration >= max(2.0, commanded) * (1 - 1e-9)
         assert len(scenario.times) >= 2
-    assert found.timestep in found.timesteps
-    assert sorted(set(found.timesteps)) == list(found.timesteps)
-    for one in found.timesteps:
-        assert is_multiple(scenario.sample, one)
+    assert scene.timestep in scene.timesteps
+    assert sorted(set(scene.timesteps)) == list(scene.timesteps)
+    for timestep in scene.timesteps:
+        assert is_multiple(scenario.sample, timestep)
 
 
 def test_a_tiny_timestep_makes_a_short_scenario_from_the_models_own_state() -> None:
@@ -115,9 +115,9 @@ def test_a_tiny_timestep_makes_a_short_scenario_from_the_models_own_state() -> N
         "<mujoco><option timestep='1e-6'/><worldbody><body><joint/><geom size='1'/></body>"
         "</worldbody></mujoco>"
     )
-    (found,) = scenes(model, NOTHING)
-    assert (found.name, found.scenario.keyframe) == ("start", -1)
-    assert found.scenario.duration == pytest.approx(0.02, rel=0.01)
+    (scene,) = scenes(model, NOTHING)
+    assert (scene.name, scene.scenario.keyframe) == ("start", -1)
+    assert scene.scenario.duration == pytest.approx(0.02, rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -29,9 +29,9 @@ pytestmark = pytest.mark.site
 
 def test_limits_are_those_of_theory() -> None:
     """What is beyond by δ grows by 2δ in a step or more: it shows after a growth of exp 9."""
-    wrong = []
-    limited = [one for one in all_problems().values() if one.limit is not None]
-    problems = [with_energy_bound(replace(one, span=1.0)) for one in limited]
+    mismatches = []
+    limited = [p for p in all_problems().values() if p.limit is not None]
+    problems = [with_energy_bound(replace(p, span=1.0)) for p in limited]
     for problem, integrator in itertools.product(problems, Integrator):
         theory = problem.limit(integrator) if problem.limit else None
         trials = {0.1: True, 1.0: True, 10.0: True}
@@ -41,43 +41,47 @@ def test_limits_are_those_of_theory() -> None:
             problem = replace(problem, span=4000 * theory.timestep)
             trials = {0.996 * theory.timestep: True, 1.004 * theory.timestep: False}
         for timestep, stable in trials.items():
-            found = attempt(problem, integrator, timestep)
-            if found.stable != stable:
-                wrong.append((problem.name, integrator, timestep, found.status))
-    assert wrong == []
+            trial = attempt(problem, integrator, timestep)
+            if trial.stable != stable:
+                mismatches.append((problem.name, integrator, timestep, trial.status))
+    assert mismatches == []
 
 
 def test_a_boundary_is_found_beside_theory() -> None:
     problem = replace(all_problems()["damped-spring-0.1"], search=(0.1, 1.0), span=200.0)
-    found_all = {one.integrator: one for one in boundaries(problem)}
-    assert {one.value for one in Integrator} == set(found_all), "joints with damping know eulerdamp"
+    lines = {line.integrator: line for line in boundaries(problem)}
+    assert {integrator.value for integrator in Integrator} == set(lines), (
+        "joints with damping know eulerdamp"
+    )
     for integrator in (Integrator.EULER, Integrator.EULER_EXPLICIT, Integrator.RK4):
-        found = found_all[integrator.value]
-        assert found.largest is not None and found.difference is not None
-        assert abs(found.difference) < 0.01
-        assert found.monotone and found.beyond == "slow-growth"
-        assert found.duration == problem.span == 200
-        assert found.steps == math.ceil(200 / found.largest)
-        assert found.tried >= 40
+        line = lines[integrator.value]
+        assert line.largest is not None and line.difference is not None
+        assert abs(line.difference) < 0.01
+        assert line.monotone and line.beyond == "slow-growth"
+        assert line.duration == problem.span == 200
+        assert line.steps == math.ceil(200 / line.largest)
+        assert line.tried >= 40
 
 
 def test_where_all_or_none_is_stable() -> None:
     problem = replace(all_problems()["damped-spring-1"], search=(0.05, 0.5))
-    found = boundary(problem, Integrator.DISCRETE)
-    assert (found.largest, found.searched, found.steps) == (None, (0.05, 0.5), 1000)
-    found = boundary(replace(problem, search=(0.6, 2.0)), Integrator.EULER)
-    assert (found.largest, found.difference, found.tried) == (0.0, None, 0)
+    line = boundary(problem, Integrator.DISCRETE)
+    assert (line.largest, line.searched, line.steps) == (None, (0.05, 0.5), 1000)
+    line = boundary(replace(problem, search=(0.6, 2.0)), Integrator.EULER)
+    assert (line.largest, line.difference, line.tried) == (0.0, None, 0)
     assert boundaries(replace(problem, search=None)) == ()
-    free = replace(all_problems()["damped-spring-0"], search=(0.1, 0.3), span=10.0)
-    assert Integrator.EULER_EXPLICIT.value not in {one.integrator for one in boundaries(free)}
+    undamped = replace(all_problems()["damped-spring-0"], search=(0.1, 0.3), span=10.0)
+    assert Integrator.EULER_EXPLICIT.value not in {
+        boundary_line.integrator for boundary_line in boundaries(undamped)
+    }
 
 
-def searched(lost: Callable[[float], bool], search: tuple[float, float]) -> StableRow:
-    def tried(step: float) -> StabilityTrial:
+def search_row(lost: Callable[[float], bool], search: tuple[float, float]) -> StableRow:
+    def attempt_at(step: float) -> StabilityTrial:
         return StabilityTrial(step, RunStatus.DIVERGED if lost(step) else RunStatus.OK, 1.0)
 
     setup = Setup(scenario=Scenario(5.0, 5.0))
-    return stable_row(Integrator.RK4, scan(tried, search), setup, 5.0)
+    return stable_row(Integrator.RK4, scan(attempt_at, search), setup, 5.0)
 
 
 @pytest.mark.parametrize(
@@ -94,12 +98,12 @@ def test_the_largest_is_below_everything_that_is_lost(
     island: tuple[float, float], largest: float
 ) -> None:
     low, high = island
-    found = searched(lambda step: low < step < high or 62 < step < 100, (1.0, 1000.0))
-    assert found.largest == pytest.approx(largest, rel=2e-4)
-    assert found.largest <= largest
-    assert found.islands is not None and found.islands[1] == pytest.approx(1000.0)
-    assert found.searched[0] <= max(1.001, largest / 8)
-    assert found.steps == math.ceil(5.0 / found.largest)
+    row = search_row(lambda step: low < step < high or 62 < step < 100, (1.0, 1000.0))
+    assert row.largest == pytest.approx(largest, rel=2e-4)
+    assert row.largest <= largest
+    assert row.islands is not None and row.islands[1] == pytest.approx(1000.0)
+    assert row.searched[0] <= max(1.001, largest / 8)
+    assert row.steps == math.ceil(5.0 / row.largest)
 
 
 def test_energy_that_cannot_be_is_instability() -> None:
@@ -107,9 +111,9 @@ def test_energy_that_cannot_be_is_instability() -> None:
     chain = with_energy_bound(all_problems()["chain-balls"])
     rest = 6 * 7 / 2 * 0.1 * 9.81 * 0.1  # J below the pivot when it hangs
     assert chain.energy_bound + rest == pytest.approx(11 * 0.26, rel=0.1)
-    found = attempt(chain, Integrator.EULER, 7.5e-3)
-    assert found.status is RunStatus.SLOW_GROWTH
-    assert found.growth > 1
+    trial = attempt(chain, Integrator.EULER, 7.5e-3)
+    assert trial.status is RunStatus.SLOW_GROWTH
+    assert trial.growth > 1
     assert attempt(chain, Integrator.EULER, 2e-3).stable
     servo = with_energy_bound(all_problems()["stiff-servo-1"])
     assert servo.energy_bound == math.inf, "a motor drives it"
@@ -117,7 +121,7 @@ def test_energy_that_cannot_be_is_instability() -> None:
 
 def test_all_timesteps_run_for_the_same_time() -> None:
     """A body that leaves its bounds at the end of that time, whatever divides it."""
-    free = replace(
+    drifting = replace(
         all_problems()["damped-spring-0"],
         mjcf="<mujoco><option gravity='0 0 0'/><worldbody><body><joint type='slide'/>"
         "<geom size='.1'/></body></worldbody></mujoco>",
@@ -126,8 +130,8 @@ def test_all_timesteps_run_for_the_same_time() -> None:
         position_bound=0.385,
     )
     steps = [part * 0.39 / n for n in range(2, 60) for part in (1.0, 1.01)]
-    assert [step for step in steps if attempt(free, Integrator.EULER, step).stable] == []
-    assert attempt(replace(free, span=0.38), Integrator.EULER, 0.01).stable
+    assert [step for step in steps if attempt(drifting, Integrator.EULER, step).stable] == []
+    assert attempt(replace(drifting, span=0.38), Integrator.EULER, 0.01).stable
 
 
 def test_growth_beyond_the_boundary_is_that_of_theory() -> None:

@@ -42,21 +42,23 @@ measure = "body:ball"
 """
 
 
-def swept(lines: str, mjcf: str = BALL, *, toml: str = TOML, timed: bool = False) -> SweepReport:
+def run_sweep(
+    lines: str, mjcf: str = BALL, *, toml: str = TOML, timed: bool = False
+) -> SweepReport:
     text = f'{toml}\n[[sweep]]\nname = "s"\n{lines}\n'
-    said = declared(text)
-    (scene,) = scenes(mujoco.MjModel.from_xml_string(mjcf), said)
+    declarations = declared(text)
+    (scene,) = scenes(mujoco.MjModel.from_xml_string(mjcf), declarations)
     ticks = iter(range(0, 10**12, 2_000_000))
     clocks = (lambda: next(ticks), lambda: next(ticks)) if timed else None
     spec = mujoco.MjSpec.from_string(mjcf)
-    return measure_sweep(spec, scene, said.sweeps[0], clocks, quick=True)
+    return measure_sweep(spec, scene, declarations.sweeps[0], clocks, quick=True)
 
 
 def test_a_spring_gives_back_what_it_takes_and_a_damper_does_not() -> None:
     """Depth v √(m/k), and restitution exp(-πζ/√(1-ζ²)), where ζ = b / (2 √k)."""
-    found = swept('vary = { "geom.solref" = [[-10000, 0], [-40000, 0], [-10000, -40]] }')
-    undamped, stiffer, damped = found.rows
-    assert [row.own for row in found.rows] == [True, False, False]
+    report = run_sweep('vary = { "geom.solref" = [[-10000, 0], [-40000, 0], [-10000, -40]] }')
+    undamped, stiffer, damped = report.rows
+    assert [row.own for row in report.rows] == [True, False, False]
     assert undamped.restitution == pytest.approx(1, rel=0.02)
     assert undamped.penetration == pytest.approx(0.01, rel=0.03)
     assert stiffer.penetration == pytest.approx(0.005, rel=0.05)
@@ -68,11 +70,11 @@ def test_a_spring_gives_back_what_it_takes_and_a_damper_does_not() -> None:
 
 
 def test_one_element_an_enumeration_and_a_share() -> None:
-    found = swept('vary = { "body:ball.pos[2]" = "±10 %", "option.cone" = ["elliptic"] }')
-    less, more, cone = found.rows
-    assert [row.value for row in found.rows] == ["-10 %", "+10 %", "elliptic"]
-    assert less.figure == pytest.approx(0.03, rel=0.05), "a tenth of 0.3 m"
-    assert more.figure is not None and cone.figure == pytest.approx(0, abs=1e-12)
+    report = run_sweep('vary = { "body:ball.pos[2]" = "±10 %", "option.cone" = ["elliptic"] }')
+    lighter, heavier, cone = report.rows
+    assert [row.value for row in report.rows] == ["-10 %", "+10 %", "elliptic"]
+    assert lighter.figure == pytest.approx(0.03, rel=0.05), "a tenth of 0.3 m"
+    assert heavier.figure is not None and cone.figure == pytest.approx(0, abs=1e-12)
 
 
 def test_a_solver_with_little_time_leaves_more() -> None:
@@ -85,18 +87,18 @@ def test_a_solver_with_little_time_leaves_more() -> None:
     mjcf = f"<mujoco>{floor}{boxes}</worldbody></mujoco>"
     vary = 'vary = { "option.iterations" = [1, 3, 100], "option.tolerance" = [1e-2, 1e-10] }'
     toml = TOML.replace("qvel = [-1]\n", "").replace('measure = "body:ball"\n', "")
-    one, three, all_, rough, fine = swept(vary, mjcf, toml=toml).rows
-    assert one.residual and three.residual and all_.residual and rough.residual and fine.residual
-    assert 2 > one.residual > 10 * three.residual >= 10 * all_.residual
+    single, three, all_, rough, fine = run_sweep(vary, mjcf, toml=toml).rows
+    assert single.residual and three.residual and all_.residual and rough.residual and fine.residual
+    assert 2 > single.residual > 10 * three.residual >= 10 * all_.residual
     assert rough.residual > 1e3 * fine.residual
-    assert one.iterations == pytest.approx(1, abs=0.01) and one.slip is not None
+    assert single.iterations == pytest.approx(1, abs=0.01) and single.slip is not None
 
 
 def test_a_block_without_friction_slides_as_far_as_it_goes() -> None:
     floor = '<worldbody><geom type="plane" size="1 1 1" condim="1"/><body pos="0 0 0.1">'
     box = '<freejoint/><geom type="box" size="0.1 0.1 0.1" condim="1"/></body></worldbody>'
     toml = TOML.replace("[-1]", "[1, 0, 0, 0, 0, 0]").replace('measure = "body:ball"\n', "")
-    (row,) = swept(
+    (row,) = run_sweep(
         'vary = { "option.timestep" = [0.002] }', f"<mujoco>{floor}{box}</mujoco>", toml=toml
     ).rows
     assert row.slip == pytest.approx(0.4, rel=0.02)
@@ -116,21 +118,23 @@ def test_a_block_without_friction_slides_as_far_as_it_goes() -> None:
 )
 def test_what_is_no_parameter_is_told(vary: str, message: str) -> None:
     with pytest.raises(SceneError) as caught:
-        swept(f"vary = {vary}")
+        run_sweep(f"vary = {vary}")
     assert message in caught.value.message
     assert caught.value.span is not None and caught.value.span.path == "models/a.toml"
 
 
 def test_costs_and_threads_have_intervals() -> None:
-    found = swept('vary = { "option.timestep" = [0.0005, 0.001], "threads" = [1, 2] }', timed=True)
-    short, long, *threads = found.rows
+    report = run_sweep(
+        'vary = { "option.timestep" = [0.0005, 0.001], "threads" = [1, 2] }', timed=True
+    )
+    short, long, *threads = report.rows
     assert short.cost is not None and long.cost is not None
     assert [row.value for row in threads] == ["1", "2"]
     assert all(row.throughput is not None and row.change is None for row in threads)
 
 
 def test_a_lost_run_says_why() -> None:
-    (row,) = swept('vary = { "option.gravity[2]" = [-1e15] }').rows
+    (row,) = run_sweep('vary = { "option.gravity[2]" = [-1e15] }').rows
     assert row.status != "ok" and row.reasons and row.change is None
 
 
@@ -156,26 +160,30 @@ def test_figures_that_differ_are_shown_unless_others_are_named() -> None:
 def test_every_value_is_a_dot_in_the_plot(narrow: bool) -> None:
     report = table(*ROWS, show=("penetration", "throughput"))
     root = ElementTree.fromstring(sweep_svg(report, name="p", narrow=narrow))
-    titles = [one.text for path in root.iter("path") for one in path.iter("title")]
+    titles = [element.text for path in root.iter("path") for element in path.iter("title")]
     assert titles == [
         "geom.solref[0] 0.01: 0.0001",
         "geom.solref[0] 0.1: 0.01",
         "threads 2: 2000 ± 50 %",
     ]
-    texts = [one.text for one in root.iter("text")]
+    texts = [element.text for element in root.iter("text")]
     assert {"geom.solref[0]", "option.cone", "diverged", "as the model is", "depth (m)"} <= {*texts}
     assert len(list(root.iter("circle"))) == 2, "around the own value, and in the key"
-    said = root.find("desc")
-    assert said is not None and "option.cone elliptic: depth (m) diverged" in (said.text or "")
+    description = root.find("desc")
+    assert description is not None and "option.cone elliptic: depth (m) diverged" in (
+        description.text or ""
+    )
 
 
 def test_a_figure_that_left_its_band_is_told() -> None:
     old, new = table(*ROWS), table(replace(ROWS[0], penetration=2e-4), *ROWS[1:])
 
-    def departures(one: SweepReport, other: SweepReport) -> list[tuple[str, str, str]]:
-        pair = (replace(scene(), sweeps=(sweep,)) for sweep in (one, other))
-        found = scene_departures(*pair, BenchTable())
-        return [(each.setting, each.figure, each.measured) for each in found]
+    def departures(
+        recorded: SweepReport, measured_sweep: SweepReport
+    ) -> list[tuple[str, str, str]]:
+        pair = (replace(scene(), sweeps=(sweep,)) for sweep in (recorded, measured_sweep))
+        departed = scene_departures(*pair, BenchTable())
+        return [(departure.setting, departure.figure, departure.measured) for departure in departed]
 
     assert departures(old, old) == []
     assert departures(old, new) == [("geom.solref[0] 0.01", "penetration", "0.0002")]

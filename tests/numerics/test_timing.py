@@ -59,9 +59,9 @@ class Neighbours:
 
 def test_a_quiet_machine_is_asked_as_seldom_as_can_be() -> None:
     machine = Machine()
-    found = time_jobs([machine.job(c) for c in (2e6, 1e6, 5e6)], 1, machine.clock)
-    assert [one.ratio for one in found] == [Interval(c, c, c) for c in (2.0, 1.0, 5.0)]
-    assert [one.nanoseconds.value for one in found] == [2e6, 1e6, 5e6]
+    timings = time_jobs([machine.job(c) for c in (2e6, 1e6, 5e6)], 1, machine.clock)
+    assert [timing.ratio for timing in timings] == [Interval(c, c, c) for c in (2.0, 1.0, 5.0)]
+    assert [timing.nanoseconds.value for timing in timings] == [2e6, 1e6, 5e6]
     assert len(machine.done) == 3 * (FEWEST + 1), "and once before, to warm up"
 
 
@@ -71,12 +71,12 @@ def test_ratios_on_a_noisy_machine_lie_in_their_intervals(seed: int) -> None:
     inside = []
     for half in (0, 1):
         machine = Machine(Neighbours(2 * seed + half))
-        found = time_jobs([machine.job(1e7 * c) for c in true], 2, machine.clock)
+        timings = time_jobs([machine.job(1e7 * c) for c in true], 2, machine.clock)
         assert sum(machine.slowed) > 0.2 * len(machine.slowed), "there was noise"
-        for one, cost in zip(found, true, strict=True):
-            assert one.ratio.value == pytest.approx(cost, rel=0.03)
-            assert one.ratio.half_width < 0.1
-            inside.append(0.99 * one.ratio.low <= cost <= 1.01 * one.ratio.high)
+        for timing, cost in zip(timings, true, strict=True):
+            assert timing.ratio.value == pytest.approx(cost, rel=0.03)
+            assert timing.ratio.half_width < 0.1
+            inside.append(0.99 * timing.ratio.low <= cost <= 1.01 * timing.ratio.high)
     assert sum(inside) >= 10
 
 
@@ -110,8 +110,8 @@ def test_costs_are_of_the_whole_scenario(monkeypatch: pytest.MonkeyPatch) -> Non
         machine.now += 1e4 * abs(float(data.qpos[0]))
 
     monkeypatch.setattr(mujoco, "mj_step", step)
-    chosen = [MeasuredSetting(name, 0.004, "", 0, "") for name in ("RK4", "Euler")]
-    found = costs(model, scene, chosen, 1, machine.clock)
+    settings = [MeasuredSetting(name, 0.004, "", 0, "") for name in ("RK4", "Euler")]
+    timings = costs(model, scene, settings, 1, machine.clock)
     steps = round(scene.scenario.duration / 0.004)
     ends = []
     for integrator in (mujoco.mjtIntegrator.mjINT_RK4, mujoco.mjtIntegrator.mjINT_EULER):
@@ -120,5 +120,7 @@ def test_costs_are_of_the_whole_scenario(monkeypatch: pytest.MonkeyPatch) -> Non
         mujoco.mj_resetDataKeyframe(model, data, 0)
         real(model, data, steps)
         ends.append(steps * price[integrator] + 1e4 * abs(float(data.qpos[0])))
-    assert [one.nanoseconds.value for one in found] == pytest.approx(ends, rel=1e-4), "its own end"
-    assert found[0].ratio.value == pytest.approx(ends[0] / ends[1], rel=1e-4)
+    assert [timing.nanoseconds.value for timing in timings] == pytest.approx(ends, rel=1e-4), (
+        "its own end"
+    )
+    assert timings[0].ratio.value == pytest.approx(ends[0] / ends[1], rel=1e-4)

@@ -45,10 +45,10 @@ def test_stability_prints_text_and_then_json_without_measuring_again(
     (report,) = json.loads(out)
     assert report["case"] == 4
     assert report["reference"]["position"] < 1e-13
-    figures = {one["integrator"]: one for one in report["figures"]}
+    figures = {figure["integrator"]: figure for figure in report["figures"]}
     assert figures["Euler"]["exact"] == -0.04905
     assert abs(figures["Euler"]["measured"] + 0.04905) < 1e-13
-    assert {one["integrator"] for one in report["errors"]} == set(figures)
+    assert {figure["integrator"] for figure in report["errors"]} == set(figures)
     assert main(["-C", str(course), "stability", "projectile", "--no-cache"]) == 0
     assert "projectile: measured after" in capsys.readouterr().err
 
@@ -57,11 +57,11 @@ def test_stability_of_a_family_and_of_an_unknown_case(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["-C", str(course), "stability", "tumbling-bocks"]) == 2
-    said = capsys.readouterr().err
-    assert "no hard case is called `tumbling-bocks`; did you mean `tumbling-box`?" in said
+    message = capsys.readouterr().err
+    assert "no hard case is called `tumbling-bocks`; did you mean `tumbling-box`?" in message
     assert main(["-C", str(course), "stability", "nope"]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith(
+    message = capsys.readouterr().err
+    assert message.startswith(
         "coursebuild: no hard case is called `nope`; known: tumbling-box, pendulum-hinge-90, "
     )
     assert run(course, "flat", "millimetre") == 0
@@ -112,12 +112,12 @@ def test_a_figure_that_left_its_band(course: Path, capsys: pytest.CaptureFixture
     run(course, "projectile", "--record")
     path = course / STABILITY.path()
     (case,) = STABILITY.decode(path.read_bytes())
-    wrong = tuple(
+    figures = tuple(
         replace(line, measured=-0.06) if line.integrator == "Euler" else line
         for line in case.figures
     )
-    other = replace(case, machine=replace(case.machine, engine="3.7.0"), figures=wrong)
-    path.write_bytes(STABILITY.encode((other,)))
+    changed_case = replace(case, machine=replace(case.machine, engine="3.7.0"), figures=figures)
+    path.write_bytes(STABILITY.encode((changed_case,)))
     capsys.readouterr()
     assert run(course, "projectile", "--check") == 1
     head, remark, _, name, _, figure = capsys.readouterr().out.splitlines()
@@ -128,9 +128,9 @@ def test_a_figure_that_left_its_band(course: Path, capsys: pytest.CaptureFixture
         "    Euler    error of the height after 1 s at 10 ms, against theory  -0.01095  "
     )
     assert run(course, "projectile", "--check", "--format", "json") == 1
-    found = json.loads(capsys.readouterr().out)
-    assert sorted(found) == ["cases", "checked", "diagnostics", "failures", "remarks"]
-    (departure,) = found["checked"][0]["departures"]
+    document = json.loads(capsys.readouterr().out)
+    assert sorted(document) == ["cases", "checked", "diagnostics", "failures", "remarks"]
+    (departure,) = document["checked"][0]["departures"]
     assert departure["recorded"] == "-0.01095"
 
 

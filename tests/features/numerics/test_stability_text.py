@@ -13,7 +13,7 @@ from support.model_reports import case
 
 
 def test_text_puts_integrators_with_equal_figures_together(rewriting: bool) -> None:
-    first, *others = case().boundaries
+    first, *remaining = case().boundaries
     none = replace(first, integrator="none", largest=0.0, theory=0.0, difference=None)
-    text = stability_text([case(boundaries=(first, *others, none))], Style())
+    text = stability_text([case(boundaries=(first, *remaining, none))], Style())
     check_text(Path(__file__).with_name("spring.txt"), text, rewriting=rewriting)

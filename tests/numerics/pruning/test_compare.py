@@ -21,41 +21,41 @@ DOUBLE = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".
   </body></worldbody><keyframe><key qpos="-1.4 .5"/></keyframe></mujoco>"""
 
 
-def lasting(duration: float, keyframe: int = -1) -> Scene:
+def scene_of(duration: float, keyframe: int = -1) -> Scene:
     scenario = Scenario(duration, 0.002, keyframe=keyframe)
     nobody = DeclaredScenario("go", span=NOTHING.source.span(0, 0))
     return Scene("go", "go", scenario, (0.002,), 0.002, BenchTable(), nobody)
 
 
-CHAOS, SHORT = lasting(15.0, 0), lasting(1.0, 0)
+CHAOS, SHORT = scene_of(15.0, 0), scene_of(1.0, 0)
 
 
 def double(mass: float = 1.0) -> Any:
     return mujoco.MjModel.from_xml_string(DOUBLE.format(mass=mass))
 
 
-def same(model: Any) -> IndexMap:
+def identity_map(model: Any) -> IndexMap:
     return index_map(model, Removal())
 
 
 def test_chaos_is_no_difference() -> None:
     """After 15 s the trajectories are far apart for that; within 50 ms they are one."""
-    one, other = double(), double(1.0 + 1e-13)
-    found = compare(one, other, same(one), [CHAOS])
-    assert not found.identical and 0 < found.difference < 1e-11
+    base, variant = double(), double(1.0 + 1e-13)
+    comparison = compare(base, variant, identity_map(base), [CHAOS])
+    assert not comparison.identical and 0 < comparison.difference < 1e-11
     ends = []
-    for model in (one, other):
+    for model in (base, variant):
         data = initial_data(CHAOS.scenario, model)
         mujoco.mj_step(model, data, 7500)
         ends.append(data.qpos.copy())
-    assert np.max(np.abs(ends[0] - ends[1])) > 1e5 * found.difference
+    assert np.max(np.abs(ends[0] - ends[1])) > 1e5 * comparison.difference
 
 
 def test_a_changed_model_that_diverges_is_not_equal() -> None:
-    one, other = double(), double()
-    other.dof_damping[:] = -1e6
-    found = compare(one, other, same(one), [CHAOS])
-    assert not found.identical and math.isinf(found.difference)
+    base, variant = double(), double()
+    variant.dof_damping[:] = -1e6
+    comparison = compare(base, variant, identity_map(base), [CHAOS])
+    assert not comparison.identical and math.isinf(comparison.difference)
 
 
 def test_contacts_count_though_nothing_moves() -> None:
@@ -63,13 +63,13 @@ def test_contacts_count_though_nothing_moves() -> None:
     text = """<mujoco><option gravity="0 0 0"/><worldbody><geom name="{}" size=".1" pos="0 0 -.1"/>
       <geom name="{}" size=".1" pos="0 0 -.1"/><body><freejoint/><geom size=".1" pos="0 0 .1"/>
       </body></worldbody></mujoco>"""
-    one = mujoco.MjModel.from_xml_string(text.format("a", "b"))
-    other = mujoco.MjModel.from_xml_string(text.format("a", "b"))
-    other.geom_contype[0] = other.geom_conaffinity[0] = 0
-    scene = lasting(0.002)
-    assert compare(one, one, same(one), [scene]).identical
-    found = compare(one, other, same(one), [scene])
-    assert not found.identical
+    base = mujoco.MjModel.from_xml_string(text.format("a", "b"))
+    variant = mujoco.MjModel.from_xml_string(text.format("a", "b"))
+    variant.geom_contype[0] = variant.geom_conaffinity[0] = 0
+    scene = scene_of(0.002)
+    assert compare(base, base, identity_map(base), [scene]).identical
+    comparison = compare(base, variant, identity_map(base), [scene])
+    assert not comparison.identical
 
 
 FULL = """<mujoco><worldbody><body name="m" mocap="true"/>
@@ -82,16 +82,20 @@ FULL = """<mujoco><worldbody><body name="m" mocap="true"/>
 def test_a_state_is_brought_over() -> None:
     model, spec = mujoco.MjModel.from_xml_string(FULL), mujoco.MjSpec.from_string(FULL)
     spec.delete(spec.body("a"))
-    other = spec.compile()
+    variant = spec.compile()
     left = index_map(model, Removal(frozenset({model.body("a").id})))
-    assert fits(left, model, other)
-    data, into = mujoco.MjData(model), mujoco.MjData(other)
+    assert fits(left, model, variant)
+    data, variant_data = mujoco.MjData(model), mujoco.MjData(variant)
     data.qpos[:], data.qvel[:] = range(12), range(10)
     data.time, data.act[:], data.ctrl[:], data.mocap_pos[0] = 3.0, [1], [4, 5], 7
-    transfer(model, data, left, other, into)
-    assert (into.time, into.qpos.tolist(), into.qvel.tolist()) == (3.0, [11.0], [9.0])
-    assert (into.act.tolist(), into.ctrl.tolist()) == ([1], [4, 5])
-    assert into.mocap_pos[0].tolist() == [7] * 3
+    transfer(model, data, left, variant, variant_data)
+    assert (variant_data.time, variant_data.qpos.tolist(), variant_data.qvel.tolist()) == (
+        3.0,
+        [11.0],
+        [9.0],
+    )
+    assert (variant_data.act.tolist(), variant_data.ctrl.tolist()) == ([1], [4, 5])
+    assert variant_data.mocap_pos[0].tolist() == [7] * 3
 
 
 def test_scenarios_as_the_author_wrote_them() -> None:
@@ -102,7 +106,7 @@ controls = [[1], [2]]\nqvel = [0, 5]\n"""
     model = mujoco.MjModel.from_xml_string(mjcf.replace("</mujoco>", motor))
     (scene,) = pruning_scenes(model, declared(text))
     assert (scene.name, scene.scenario.qvel[-1]) == ("push", 5)
-    given = [(step, command[0]) for step, command in enumerate(scene.scenario.commands(0.002))]
-    assert given == [(step, 1 if step < 100 else 2) for step in range(500)]
+    commands = [(step, command[0]) for step, command in enumerate(scene.scenario.commands(0.002))]
+    assert commands == [(step, 1 if step < 100 else 2) for step in range(500)]
     (short,) = pruning_scenes(model, declared(text), quick=True)
     assert short.scenario.duration == 0.5

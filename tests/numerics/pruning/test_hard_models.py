@@ -19,7 +19,7 @@ pytestmark = pytest.mark.site
 
 def motion(model: mujoco.MjModel, joints: list[str], steps: int = 150) -> bytes:
     """Positions and velocities of joints that have names, from every keyframe, bit for bit."""
-    seen: list[bytes] = []
+    states: list[bytes] = []
     for key in range(-1, model.nkey):
         data = mujoco.MjData(model)
         if key >= 0:
@@ -27,8 +27,8 @@ def motion(model: mujoco.MjModel, joints: list[str], steps: int = 150) -> bytes:
         for _ in range(steps):
             mujoco.mj_step(model, data)
             for name in joints:
-                seen += [data.joint(name).qpos.tobytes(), data.joint(name).qvel.tobytes()]
-    return b"".join(seen)
+                states += [data.joint(name).qpos.tobytes(), data.joint(name).qvel.tobytes()]
+    return b"".join(states)
 
 
 def joints_of(model: mujoco.MjModel) -> list[str]:
@@ -126,8 +126,8 @@ REPLICATED = f"""<mujoco>
 
 def test_what_is_repeated_is_one_element() -> None:
     survey, left = whole(REPLICATED)
-    seen = found(survey)
-    assert names(seen["far-body"]) == ["mujoco/worldbody/replicate[2]/body"]
+    findings = found(survey)
+    assert names(findings["far-body"]) == ["mujoco/worldbody/replicate[2]/body"]
     assert left.count("<replicate") == 3 and 'pos="80 0 1"' in left
     assert "idle" not in left and "jointpos" not in left
 
@@ -155,9 +155,9 @@ def test_tendons_equalities_and_excluded_pairs() -> None:
 </mujoco>
 """
     survey, left = whole(text)
-    seen = found(survey)
-    assert names(seen["far-body"]) == ["d"]  # `c` is coupled to what matters
-    assert any("<contact>" in edit.old for edit in seen["far-body"].edits)
+    findings = found(survey)
+    assert names(findings["far-body"]) == ["d"]  # `c` is coupled to what matters
+    assert any("<contact>" in edit.old for edit in findings["far-body"].edits)
     assert "<sensor>" not in left and "<equality>" in left and left.count("<site") == 4
 
 
@@ -244,23 +244,23 @@ def random_model(random: np.random.Generator) -> str:
     def body(depth: int, away: float) -> str:
         nonlocal count
         count += 1
-        own = count
+        number = count
         place = f'pos="{away + random.normal(0, 0.5):.3f} {random.normal(0, 0.5):.3f} 1"'
         kind = random.choice(["hinge", "slide", "ball"])
-        joint = f'<joint name="j{own}" type="{kind}" axis="{numbers(1)}" damping=".1"/>'
-        name = f'name="b{own}"' if random.random() < 0.7 else ""
+        joint = f'<joint name="j{number}" type="{kind}" axis="{numbers(1)}" damping=".1"/>'
+        name = f'name="b{number}"' if random.random() < 0.7 else ""
         geom = f'<geom type="{random.choice(SHAPES)}" size=".05 .06 .07" pos="{numbers(0.2)}"'
         geom += chance(' material="m0"') + chance(' class="c0"') + "/>"
         inner = body(depth - 1, 0) if depth else ""
-        site = chance(f'<site name="s{own}"/>')
+        site = chance(f'<site name="s{number}"/>')
         return f"<body {name} {place}>{joint}{geom}{site}{inner}</body>\n"
 
     trees = "".join(body(int(random.integers(0, 3)), 0) for _ in range(int(random.integers(1, 4))))
-    near = count
+    tree_joint_count = count
     trees += "".join(body(0, 200) for _ in range(int(random.integers(0, 3))))
     sensors = "".join(
         chance(f'<jointpos joint="j{i}" name="p{i}"/>' if "ball" not in trees else "<clock/>")
-        for i in range(1, near + 1)
+        for i in range(1, tree_joint_count + 1)
     )
     motor = chance('<motor name="drive" joint="j1"/>') + chance('<motor joint="j1" gear="2"/>', 0.3)
     solver = random.choice(["Newton", "CG", "PGS"])

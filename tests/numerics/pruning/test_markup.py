@@ -16,10 +16,10 @@ def after(text: str, *edits: ModelEdit) -> str:
     return apply_edits(text.encode(), edits).decode()
 
 
-def without(text: str, *tags: str) -> str:
-    found = [one for one in document(text).root.walk() if one.tag in tags]
-    assert found
-    return after(text, *remove_elements(found))
+def remove_by_tag(text: str, *tags: str) -> str:
+    elements = [element for element in document(text).root.walk() if element.tag in tags]
+    assert elements
+    return after(text, *remove_elements(elements))
 
 
 ODD = (
@@ -34,19 +34,19 @@ ODD = (
 
 def test_places_in_an_odd_text() -> None:
     """A byte order mark, CRLF, a wrong encoding, quotes, references, comments, CDATA."""
-    found = document(ODD)
-    elements = list(found.root.walk())
-    assert [one.tag for one in elements] == ["mujoco", "worldbody", "body", "geom", "geom"]
-    assert found.root.get("model") == "é&<"
+    markup = document(ODD)
+    elements = list(markup.root.walk())
+    assert [element.tag for element in elements] == ["mujoco", "worldbody", "body", "geom", "geom"]
+    assert markup.root.get("model") == "é&<"
     body = elements[2]
     assert body.get("name") == "ü > ñ" and body.get("pos") == '1 "2" 3'
-    assert found.position(body.start) == (5, 3)
-    assert found.position(elements[3].start) == (7, 4)
-    assert found.position(elements[4].start) == (7, 21)
-    assert found.data[elements[4].start : elements[4].end].decode().startswith("<geom\tname=")
-    assert found.position(found.root.start) == (3, 1)
+    assert markup.position(body.start) == (5, 3)
+    assert markup.position(elements[3].start) == (7, 4)
+    assert markup.position(elements[4].start) == (7, 21)
+    assert markup.data[elements[4].start : elements[4].end].decode().startswith("<geom\tname=")
+    assert markup.position(markup.root.start) == (3, 1)
     start, end = elements[4].attribute("name").inner
-    assert found.data[start:end].decode() == "🎈"
+    assert markup.data[start:end].decode() == "🎈"
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_what_is_no_xml_is_refused(text: str, line: int, column: int, words: str
     ],
 )
 def test_elements_go_with_their_lines_only(before: str, left: str) -> None:
-    assert without(before, "x") == left
+    assert remove_by_tag(before, "x") == left
 
 
 @pytest.mark.parametrize(
@@ -93,16 +93,16 @@ def test_elements_go_with_their_lines_only(before: str, left: str) -> None:
     ],
 )
 def test_only_empty_sections_go_with_the_last_of_them(before: str, left: str | None) -> None:
-    found = without(before, "x")
+    rest = remove_by_tag(before, "x")
     if left is None:
-        assert "<x/>" not in found and found != before
-        assert found.count("<") == before.count("<") - 1
+        assert "<x/>" not in rest and rest != before
+        assert rest.count("<") == before.count("<") - 1
     else:
-        assert found == left
+        assert rest == left
 
 
 @pytest.mark.parametrize(
-    ("gone", "left"),
+    ("removed_numbers", "left"),
     [
         ([0], ' q="2\n 3  4"'),
         ([1, 2], ' q="1 4"'),
@@ -111,10 +111,10 @@ def test_only_empty_sections_go_with_the_last_of_them(before: str, left: str | N
         ([3, 4, 5], ' q="1 2\n 3"'),
     ],
 )
-def test_numbers_go_out_of_a_list(gone: list[int], left: str) -> None:
+def test_numbers_go_out_of_a_list(removed_numbers: list[int], left: str) -> None:
     text = '<k q="1 2\n 3  4"/>'
-    assert after(text, *drop_numbers(document(text).root, "q", gone)) == f"<k{left}/>"
-    assert drop_numbers(document(text).root, "other", gone) == ()
+    assert after(text, *drop_numbers(document(text).root, "q", removed_numbers)) == f"<k{left}/>"
+    assert drop_numbers(document(text).root, "other", removed_numbers) == ()
 
 
 def test_edits_that_contradict_each_other_are_refused() -> None:

@@ -115,9 +115,9 @@ def far(world: str, *, lesson: str = "", rest: str = "") -> list[str]:
 
 
 def piece(x: float, name: str = "") -> str:
-    named = f'name="{name}"' if name else ""
+    name_attribute = f'name="{name}"' if name else ""
     geom = f'<geom name="g{x}" type="box" size=".1 .1 .1"/>'
-    return f'<body {named} pos="{x} 0 .1"><freejoint/>{geom}</body>'
+    return f'<body {name_attribute} pos="{x} 0 .1"><freejoint/>{geom}</body>'
 
 
 ARM = """<geom type="plane" size="9 9 1"/>

@@ -9,7 +9,7 @@ import pytest
 from coursebuild.numerics.pruning.reachability import find_separate, possible_pairs
 
 
-def compiled(body: str, *, option: str = "", rest: str = "", root: str = "") -> mujoco.MjModel:
+def compile_model(body: str, *, option: str = "", rest: str = "", root: str = "") -> mujoco.MjModel:
     text = f"<mujoco>{root}<option>{option}</option><worldbody>{body}</worldbody>{rest}</mujoco>"
     return mujoco.MjModel.from_xml_string(text)
 
@@ -50,7 +50,7 @@ def random_state(random: np.random.Generator, model: mujoco.MjModel, data: mujoc
 
 @pytest.mark.site
 def test_what_is_said_to_be_separate_never_touches() -> None:
-    wrong = []
+    mismatches = []
     for seed in range(10):
         random = np.random.default_rng(seed)
         fixed = "".join(
@@ -58,7 +58,7 @@ def test_what_is_said_to_be_separate_never_touches() -> None:
             for x, y, z in random.normal(0, 1.5, (4, 3))
         )
         plane = '<geom type="plane" size="1 1 1" pos="0 0 -4" euler="10 5 0"/>'
-        model = compiled(fixed + plane + tree(random, 2) + tree(random, 3))
+        model = compile_model(fixed + plane + tree(random, 2) + tree(random, 3))
         pairs = possible_pairs(model)
         apart = find_separate(model, pairs)
         assert apart < pairs or not pairs, seed
@@ -68,11 +68,11 @@ def test_what_is_said_to_be_separate_never_touches() -> None:
             random_state(random, model, data)
             mujoco.mj_forward(model, data)
             touching = {tuple(sorted(pair)) for pair in data.contact.geom[: data.ncon].tolist()}
-            wrong += [(seed, "touch", *pair) for pair in touching & apart]
+            mismatches += [(seed, "touch", *pair) for pair in touching & apart]
             for a, b in apart:
                 if not {a, b} & flat and mujoco.mj_geomDistance(model, data, a, b, 10.0, None) <= 0:
-                    wrong.append((seed, "lie in each other", a, b))
-    assert wrong == []
+                    mismatches.append((seed, "lie in each other", a, b))
+    assert mismatches == []
 
 
 def test_only_bounded_joints_keep_a_body_away() -> None:
@@ -83,22 +83,24 @@ def test_only_bounded_joints_keep_a_body_away() -> None:
         ('<joint type="slide" axis="1 0 0"/>', False),
         ("<freejoint/>", False),
     ):
-        model = compiled(f'<geom size=".1" pos="6 0 0"/><body>{joint}<geom size=".1"/></body>')
+        model = compile_model(f'<geom size=".1" pos="6 0 0"/><body>{joint}<geom size=".1"/></body>')
         assert bool(find_separate(model, possible_pairs(model))) is bounded, joint
     mocap = '<body mocap="true" pos="50 0 0"><geom size=".1"/></body>'
-    model = compiled(f'{mocap}<body><joint/><geom size=".1" pos=".2 0 0"/></body>')
+    model = compile_model(f'{mocap}<body><joint/><geom size=".1" pos=".2 0 0"/></body>')
     assert len(possible_pairs(model)) == 1 and not find_separate(model, possible_pairs(model))
 
 
 def test_margins_count() -> None:
     body = '<geom size=".1" pos="2 0 0" margin="{}"/><body><joint/><geom size=".1"/></body>'
-    near, far = (compiled(body.format(margin)) for margin in ("0", "1.9"))
-    assert find_separate(near, possible_pairs(near)) and not find_separate(far, possible_pairs(far))
+    near_model, far_model = (compile_model(body.format(margin)) for margin in ("0", "1.9"))
+    assert find_separate(near_model, possible_pairs(near_model)) and not find_separate(
+        far_model, possible_pairs(far_model)
+    )
     pair = '<contact><pair geom1="a" geom2="b" margin="1.9"/></contact>'
-    named = """<geom name="a" size=".1" pos="2 0 0"/>
+    mjcf = """<geom name="a" size=".1" pos="2 0 0"/>
         <body><joint/><geom name="b" size=".1"/></body>"""
-    paired = compiled(named, rest=pair)
-    assert not find_separate(paired, possible_pairs(paired))
+    paired_model = compile_model(mjcf, rest=pair)
+    assert not find_separate(paired_model, possible_pairs(paired_model))
 
 
 def test_possible_pairs_are_those_that_mujoco_looks_at() -> None:
@@ -108,8 +110,8 @@ def test_possible_pairs_are_those_that_mujoco_looks_at() -> None:
             model = everything_touching(seed, flag)
             data = mujoco.MjData(model)
             mujoco.mj_forward(model, data)
-            found = {tuple(sorted(pair)) for pair in data.contact.geom[: data.ncon].tolist()}
-            assert found == possible_pairs(model), (seed, flag)
+            pairs = {tuple(sorted(pair)) for pair in data.contact.geom[: data.ncon].tolist()}
+            assert pairs == possible_pairs(model), (seed, flag)
 
 
 def everything_touching(seed: int, flag: str) -> mujoco.MjModel:
@@ -119,12 +121,12 @@ def everything_touching(seed: int, flag: str) -> mujoco.MjModel:
     def body(depth: int) -> str:
         nonlocal count
         count += 1
-        own = count
+        number = count
         joint = random.choice(["", '<joint axis="0 1 0"/>', "<joint type='ball'/>"])
         mask = f'contype="{random.integers(0, 4)}" conaffinity="{random.integers(0, 4)}"'
-        geoms = f'<geom name="g{own}" size=".1" {mask} margin="1000"/>'
+        geoms = f'<geom name="g{number}" size=".1" {mask} margin="1000"/>'
         inner = "".join(body(depth - 1) for _ in range(2)) if depth else ""
-        return f'<body name="b{own}" pos=".3 0 0">{joint}{geoms}{inner}</body>'
+        return f'<body name="b{number}" pos=".3 0 0">{joint}{geoms}{inner}</body>'
 
     trees = body(2) + body(1) + '<geom size=".1" margin="1000"/>'
     trees += '<body mocap="true"><geom size=".1" margin="1000"/></body>'
@@ -132,4 +134,4 @@ def everything_touching(seed: int, flag: str) -> mujoco.MjModel:
     contact = """<contact><exclude body1="b1" body2="b5"/>
         <pair geom1="g2" geom2="g3" margin="1000"/></contact>"""
     size = '<size memory="50M"/>'
-    return compiled(trees, option=flag, rest=contact, root=size)
+    return compile_model(trees, option=flag, rest=contact, root=size)

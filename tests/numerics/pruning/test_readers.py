@@ -75,14 +75,18 @@ HOSTILE = {
 @pytest.mark.site
 def test_no_hostile_script_loses_a_part() -> None:
     findings = tried(MODEL, declared=GO).report.findings
-    whole = {one.kind: names(one) for one in findings if one.fixable}
+    whole = {finding.kind: names(finding) for finding in findings if finding.fixable}
     lost = []
     for title, (part, script) in HOSTILE.items():
         kind, _, name = part.partition(" ")
-        assert any(kind in one for one in whole), kind
+        assert any(kind in finding for finding in whole), kind
         survey = tried(MODEL, lesson=HEAD + script, declared=GO)
-        counted = [one for one in survey.report.findings if one.is_fault and kind in one.kind]
-        lost += [(title, one.kind) for one in counted if not name or name in names(one)]
+        faults = [
+            finding
+            for finding in survey.report.findings
+            if finding.is_fault and kind in finding.kind
+        ]
+        lost += [(title, finding.kind) for finding in faults if not name or name in names(finding)]
     assert lost == []
 
 
@@ -98,9 +102,11 @@ def test_what_a_script_names_stays_and_the_rest_goes() -> None:
         print("the spare cube and spin are in the prose only")
     """)
     survey = tried(MODEL, lesson=HEAD + script, declared=GO)
-    found = {one.kind: names(one) for one in survey.report.findings if one.is_fault}
-    assert found.pop("contact-off") == []
-    assert found == {
+    names_by_kind = {
+        finding.kind: names(finding) for finding in survey.report.findings if finding.is_fault
+    }
+    assert names_by_kind.pop("contact-off") == []
+    assert names_by_kind == {
         "energy-flag": ["energy"],
         "sensor-unread": ["hip_r", "spin", "at"],
         "actuator-idle": ["push"],

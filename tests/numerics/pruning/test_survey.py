@@ -35,18 +35,20 @@ SHOWN = """<geom type="mesh" mesh="used" material="table" mass="0"/>"""
 def test_assets_that_nothing_uses_with_those_that_only_they_use() -> None:
     text = scene(PENDULUM.replace("</body>", SHOWN + "</body>"), head=ASSETS)
     survey = tried(text)
-    seen = found(survey)
-    assert {kind: names(one) for kind, one in seen.items()} == {
+    findings = found(survey)
+    assert {kind: names(finding) for kind, finding in findings.items()} == {
         "unused-material": ["curtain"],
         "unused-texture": ["cloth"],
         "unused-mesh": ["ünüsed"],
         "unused-hfield": ["hill"],
     }
-    assert all(one.label == PROVED and one.fixable for one in seen.values())
-    assert seen["unused-texture"].saving.text > 50 and seen["unused-mesh"].saving.memory > 100
+    assert all(finding.label == PROVED and finding.fixable for finding in findings.values())
+    assert (
+        findings["unused-texture"].saving.text > 50 and findings["unused-mesh"].saving.memory > 100
+    )
     left = fixed(survey)
-    for gone in ("curtain", "cloth", "ünüsed", "hill"):
-        assert gone not in left
+    for asset in ("curtain", "cloth", "ünüsed", "hill"):
+        assert asset not in left
     assert len(left.splitlines()) == len(text.splitlines()) - 4
     second = tried(left)
     assert second.report.findings == () and fixed(second) == left
@@ -55,10 +57,10 @@ def test_assets_that_nothing_uses_with_those_that_only_they_use() -> None:
 def test_a_texture_of_a_kept_material_is_used() -> None:
     text = scene(PENDULUM.replace("</body>", SHOWN + "</body>"), head=ASSETS)
     survey = tried(text, keeps={"unused-material curtain": "for the next lesson"})
-    seen = found(survey)
-    assert seen["unused-material"].kept == "for the next lesson"
-    assert not seen["unused-material"].fixable and not seen["unused-material"].is_fault
-    assert "unused-texture" not in seen and survey.report.stale == ()
+    findings = found(survey)
+    assert findings["unused-material"].kept == "for the next lesson"
+    assert not findings["unused-material"].fixable and not findings["unused-material"].is_fault
+    assert "unused-texture" not in findings and survey.report.stale == ()
 
 
 def test_an_asset_is_called_after_its_file() -> None:
@@ -104,9 +106,9 @@ TENDON = """<tendon><spatial stiffness="1"><site site="held"/><site site="end"/>
 def test_sites_and_sensors() -> None:
     """Those of a tendon stay; one that only an unread sensor needs goes with it."""
     survey = tried(scene(SITES, rest=TENDON), lesson='print(data.site("read").xpos)')
-    seen = found(survey)
-    assert names(seen["sensor-unread"]) == ["mujoco/sensor/framepos"]
-    assert names(seen["unused-site"]) == [
+    findings = found(survey)
+    assert names(findings["sensor-unread"]) == ["mujoco/sensor/framepos"]
+    assert names(findings["unused-site"]) == [
         'mujoco/worldbody/body[@name="arm"]/site[3]',
         "idle",
         "sensed",
@@ -143,7 +145,7 @@ def test_what_only_runs_speak_for_is_told_for_the_time_that_it_saves() -> None:
     <body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1" condim="4"/></body>"""
     survey = tried(scene(world), clock=itertools.count(step=10**6).__next__)
     assert survey.report.findings == ()
-    slow = {one.kind for one in survey.report.tried if "no time" in one.reason}
+    slow = {finding.kind for finding in survey.report.tried if "no time" in finding.reason}
     assert {"island", "cone"} <= slow
 
 
