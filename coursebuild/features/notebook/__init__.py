@@ -1,7 +1,7 @@
 """Every lesson as a Jupyter notebook that runs.
 
-1. `cells` writes a lesson as Markdown and scripts, when its page is drawn.
-2. `files` makes files of these, with a cell that writes what the scripts need (`setup`).
+1. `cells` writes a lesson as cells of Markdown and code, when its page is drawn.
+2. `files` writes them to files, with a cell that writes what the scripts need (`setup`).
 """
 
 from coursebuild.core.features import Feature, PageCopy

@@ -1,7 +1,7 @@
-"""The notebooks of a site: the cells of each lesson, and what its scripts need around them.
+"""The notebooks of a site: the cells of each lesson, and what its scripts need.
 
-Entry point: `notebook_files`. A cell at the start carries the files that scripts need (models,
-`mjcourse`, other scripts), packed, and writes those that are not there.
+Entry point: `notebook_files`. A cell at the start contains the files that scripts need (models,
+`mjcourse`, other scripts), packed, and writes those that are missing.
 """
 
 from __future__ import annotations
@@ -22,25 +22,29 @@ from coursebuild.core.pages.added_files import SiteContext
 from coursebuild.core.pages.marks import code_span, escape_marks
 from coursebuild.features.notebook.cells import Cell, code_cell, markdown_cell
 
-_MOST = 4 << 20
-"""Bytes of files that a notebook carries at most."""
-_SLOT = "\ue000"
+_MAX_SIZE = 4 << 20
+"""The limit for the files in a notebook, in bytes."""
+_PLACEHOLDER = "\ue000"
 """Stands for a name in a text."""
 
 
 def notebook_files(site: SiteContext) -> Iterator[CachedFile]:
-    """The notebooks of all written lessons."""
+    """Yield the notebooks of all written lessons."""
     for page in site.pages:
         lesson = site.library.lessons[page.id]
         archive = site.archives.get(urls.lesson_zip_path(lesson))
         key = step_key("notebook", page.digest, archive.key if archive else "")
         path = urls.copy_path(page.path, ".ipynb")
-        yield CachedFile(path, key, functools.partial(_notebook, site, lesson, page.path, archive))
+        yield CachedFile(
+            path, key, functools.partial(_write_notebook, site, lesson, page.path, archive)
+        )
 
 
-def _notebook(site: SiteContext, lesson: Lesson, page: str, archive: zips.Archive | None) -> bytes:
+def _write_notebook(
+    site: SiteContext, lesson: Lesson, page: str, archive: zips.Archive | None
+) -> bytes:
     head, *cells = json.loads(site.note(page))
-    setup = () if archive is None else _setup(site, lesson, archive)
+    setup = () if archive is None else _setup_cells(site, lesson, archive)
     document = {
         "cells": [head, *setup, *cells],
         "metadata": {
@@ -59,68 +63,70 @@ def _notebook(site: SiteContext, lesson: Lesson, page: str, archive: zips.Archiv
         "nbformat_minor": 5,
     }
     text = json.dumps(document, ensure_ascii=False, sort_keys=True)
-    # As Jupyter writes it; `json` itself takes five times as long to indent.
+    # As Jupyter writes it; `json` takes five times as long to indent.
     return msgspec.json.format(text.encode("utf-8", "replace"), indent=1) + b"\n"
 
 
-def _setup(site: SiteContext, lesson: Lesson, archive: zips.Archive) -> Iterator[Cell]:
+def _setup_cells(site: SiteContext, lesson: Lesson, archive: zips.Archive) -> Iterator[Cell]:
     assert lesson.document is not None, "a notebook is of a written lesson"
     files = {path.partition("/")[2]: data for path, data in archive.files.items()}
-    needed = sorted(files.pop("requirements.txt", b"").decode().split())
+    packages = sorted(files.pop("requirements.txt", b"").decode().split())
     files.pop("README.md", None)
-    own = [script.path for script in document_scripts(lesson.document)]
-    early = _needed_early(site, own, files)
-    files = {path: data for path, data in files.items() if path not in own or path in early}
-    small = _small(files)
+    scripts = [script.path for script in document_scripts(lesson.document)]
+    early = _imported_early(site, scripts, files)
+    files = {path: data for path, data in files.items() if path not in scripts or path in early}
+    included = _select_smallest(files)
     words = site.library.words
     title = f"## {escape_marks(words('exports.before'))}"
     text = escape_marks(words("exports.setup" if files else "exports.setup_none"))
-    if small.keys() != files.keys():
+    if included.keys() != files.keys():
         name = code_span(archive.path.rpartition("/")[2])
-        text += f" {escape_marks(words('exports.left_out', zip=_SLOT))}".replace(_SLOT, name)
-    if needed:
+        text += f" {escape_marks(words('exports.left_out', zip=_PLACEHOLDER))}".replace(
+            _PLACEHOLDER, name
+        )
+    if packages:
         yield markdown_cell("before", f"{title}\n\n{escape_marks(words('exports.install'))}")
-        yield code_cell("install", f"# %pip install {' '.join(needed)}")
+        yield code_cell("install", f"# %pip install {' '.join(packages)}")
         title = ""
     yield markdown_cell("before-setup", f"{title}\n\n{text}".strip())
     template = site.assets.template("notebook/setup.py")
-    code = _setup_code(template, small, sorted(files.keys() - small.keys()))
+    code = _setup_code(template, included, sorted(files.keys() - included.keys()))
     yield code_cell("setup", code, hidden=True)
 
 
-def _small(files: Mapping[str, bytes]) -> dict[str, bytes]:
-    """The files that a notebook can carry, the smallest first."""
-    room, found = _MOST, {}
+def _select_smallest(files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return the files that a notebook can contain, the smallest first."""
+    room, selection = _MAX_SIZE, {}
     for path, data in sorted(files.items(), key=lambda item: (len(item[1]), item[0])):
         room -= len(data)
         if room >= 0:
-            found[path] = data
-    return found
+            selection[path] = data
+    return selection
 
 
-def _needed_early(site: SiteContext, own: list[str], files: Mapping[str, bytes]) -> set[str]:
-    """The scripts of the lesson that one above them imports, maybe through others."""
+def _imported_early(site: SiteContext, scripts: list[str], files: Mapping[str, bytes]) -> set[str]:
+    """Return the scripts of the lesson that one above them imports, directly or indirectly."""
     modules = {
         path.removeprefix("examples/").removesuffix(".py"): path
         for path in files
         if re.fullmatch(r"examples/[^/]+\.py", path)
     }
     early: set[str] = set()
-    for at, path in enumerate(own):
-        seen, waiting = set[str](), [path]
-        while waiting:
-            one = waiting.pop()
-            if one in files and one not in seen:
-                seen.add(one)
-                named = site.imports(files[one].decode("utf-8", "replace"))
-                waiting += [modules[name] for name in named if name in modules]
-        early |= seen.intersection(own[at + 1 :])
+    for number, script in enumerate(scripts, 1):
+        visited, pending = set[str](), [script]
+        while pending:
+            path = pending.pop()
+            if path in files and path not in visited:
+                visited.add(path)
+                names = site.imports(files[path].decode("utf-8", "replace"))
+                pending += [modules[name] for name in names if name in modules]
+        early |= visited.intersection(scripts[number:])
     return early
 
 
 def _setup_code(template: str, files: Mapping[str, bytes], missing: list[str]) -> str:
-    """The cell that writes the files and makes the magic."""
+    """Return the cell that writes the files and defines the magic."""
     packed = base64.b64encode(zips.pack(files)).decode() if files else ""
-    lines = "\n".join(packed[at : at + 100] for at in range(0, len(packed), 100))
+    lines = "\n".join(packed[start : start + 100] for start in range(0, len(packed), 100))
     code = template.replace("ELSEWHERE = ()", f"ELSEWHERE = {tuple(missing)!r}")
     return code.replace('FILES = ""', f'FILES = """\n{lines}\n"""' if packed else 'FILES = ""')

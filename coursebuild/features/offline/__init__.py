@@ -1,4 +1,4 @@
-"""The site without a network, and the page about it, which is also shown where a page is not."""
+"""The site without a network, and the page about it, which is also shown for missing pages."""
 
 from coursebuild.core.features import Feature, PageKind, PagePart
 from coursebuild.features.offline.files import offline_files
