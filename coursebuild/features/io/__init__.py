@@ -14,19 +14,19 @@ if TYPE_CHECKING:
 
 
 def draw(page: PageContext, card: Io) -> Markup:
-    """The card as a list of terms."""
+    """Draw the card as a list of terms."""
     rows = tuple((page.renderer.words(name), page.inlines(text)) for name, text in card.parts())
     return page.template("io/io.html", rows=rows)
 
 
 def markdown(writer: MarkdownWriter, card: Io) -> str:
-    """The card as a list."""
+    """Write the card as a list."""
     rows = ((writer.words(name), writer.inlines(text)) for name, text in card.parts())
     return "\n".join(f"- **{label}:** {text}" for label, text in rows)
 
 
 def index(reader: IndexReader, card: Io) -> None:
-    """All lines can be found."""
+    """Index all lines of the card."""
     for _, text in card.parts():
         reader.add("text", reader.text(text))
 

@@ -48,65 +48,67 @@ class _Part(Struct, frozen=True):
 
 
 def parse_io(fence: Fence, texts: TextParser) -> Parsed[Io]:
-    """An `io` fence."""
-    stray, *given = _parts(fence.body)
+    """Parse an `io` fence."""
+    unlabelled, *labelled_parts = _split_at_labels(fence.body)
     parts: dict[str, _Part] = {}
-    found = list(fence.keys().diagnostics)
-    for part in given:
+    diagnostics = list(fence.keys().diagnostics)
+    for part in labelled_parts:
         if (first := parts.setdefault(part.label, part)) is not part:
             notes = [Note("first given here", first.span)]
             message = f"`{part.label}:` is given twice"
-            found.append(diagnose("io-repeated", part.span, message, notes=notes))
-    found += (*_stray(stray), *_order(parts))
+            diagnostics.append(diagnose("io-repeated", part.span, message, notes=notes))
+    diagnostics += (*_check_unlabelled(unlabelled), *_check_order(parts))
     contents: dict[str, tuple[Inline, ...]] = {}
     for label in LABELS:
-        text = _text(parts[label].lines) if label in parts else None
+        text = _join_lines(parts[label].lines) if label in parts else None
         if text is None:
-            found.append(_missing(label, parts, (stray, *parts.values()), fence))
+            all_parts = (unlabelled, *parts.values())
+            diagnostics.append(_diagnose_missing(label, parts, all_parts, fence))
         else:
-            parsed = texts.inlines(text)
-            contents[label] = parsed.value
-            found += parsed.diagnostics
+            inlines = texts.inlines(text)
+            contents[label] = inlines.value
+            diagnostics += inlines.diagnostics
     io = Io(fence.span, *(contents.get(label, ()) for label in LABELS))
-    return Parsed(io, tuple(found))
+    return Parsed(io, tuple(diagnostics))
 
 
-def _parts(body: Excerpt) -> list[_Part]:
-    """The lines of a block by their labels; those before the first have none."""
+def _split_at_labels(body: Excerpt) -> list[_Part]:
+    """Split a block into parts; the first holds the lines before the first label."""
     parts = [_Part("", body.span(), [])]
     for line in body.lines():
-        found = _LABEL.match(line.text)
-        if found is None:
+        label = _LABEL.match(line.text)
+        if label is None:
             parts[-1].lines.append(line)
         else:
-            span = line.span(found.start(1), found.end())
-            parts.append(_Part(found[1], span, [line.slice(found.end())]))
+            span = line.span(label.start(1), label.end())
+            parts.append(_Part(label[1], span, [line.slice(label.end())]))
     return parts
 
 
-def _stray(part: _Part) -> Iterator[Diagnostic]:
+def _check_unlabelled(part: _Part) -> Iterator[Diagnostic]:
     for line in [line for line in part.lines if line.text.strip()][:1]:
         help = "begin with a line `INPUT: …`"
         span, message = trim(line).span(), "this text belongs to no line of the io block"
         yield diagnose("io-stray", span, message, help=help)
 
 
-def _order(parts: Mapping[str, _Part]) -> Iterator[Diagnostic]:
-    wanted = [label for label in LABELS if label in parts]
-    odd = [(have, want) for have, want in zip(parts, wanted, strict=True) if have != want]
-    for have, want in odd[:1]:
-        message = f"`{have}:` stands before `{want}:`"
+def _check_order(parts: Mapping[str, _Part]) -> Iterator[Diagnostic]:
+    expected = [label for label in LABELS if label in parts]
+    swaps = [(label, first) for label, first in zip(parts, expected, strict=True) if label != first]
+    for label, first in swaps[:1]:
+        message = f"`{label}:` stands before `{first}:`"
         help = "the order is `INPUT:`, `PROCESS:`, `OUTPUT:`"
-        yield diagnose("io-order", parts[have].span, message, help=help)
+        yield diagnose("io-order", parts[label].span, message, help=help)
 
 
-def _missing(
-    label: str, parts: Mapping[str, _Part], looked_at: Iterable[_Part], fence: Fence
+def _diagnose_missing(
+    label: str, parts: Mapping[str, _Part], all_parts: Iterable[_Part], fence: Fence
 ) -> Diagnostic:
+    """Say that a part is missing or empty, and point at lines whose label looks misspelt."""
     if label in parts:
         return diagnose("io-missing", parts[label].span, f"nothing follows `{label}:`")
     notes = []
-    for line in (line for part in looked_at for line in part.lines):
+    for line in (line for part in all_parts for line in part.lines):
         like = _LIKE_LABEL.match(line.text)
         if like is not None and nearest(like[1].upper(), LABELS, cutoff=0.75) == label:
             span = line.span(like.start(1), like.end())
@@ -115,7 +117,7 @@ def _missing(
     return diagnose("io-missing", fence.head, message, notes=notes)
 
 
-def _text(lines: list[Excerpt]) -> Excerpt | None:
-    """The lines of a part as one text without indentation and empty lines; `None` where none is."""
-    parts = [trim(line) for line in lines if line.text.strip()]
-    return Excerpt.join(parts, "\n") if parts else None
+def _join_lines(lines: list[Excerpt]) -> Excerpt | None:
+    """Join the lines of a part without indentation and empty lines; `None` if none is left."""
+    texts = [trim(line) for line in lines if line.text.strip()]
+    return Excerpt.join(texts, "\n") if texts else None

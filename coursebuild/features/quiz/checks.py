@@ -31,14 +31,14 @@ from coursebuild.features.quiz.model import ChoiceQuestion, Quiz
 
 
 def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
-    """Repeated ids, anchors that are taken, and output questions about scripts that nothing runs.
+    """Report repeated ids, anchors in use, and output questions about scripts that nothing runs.
 
-    What is wrong in `documents` is reported; ids are compared with those of the whole course.
+    Only `documents` are checked; ids are compared with those of the whole course.
     """
     first: dict[str, Quiz] = {}
     for document in course.documents:
         for quiz in quizzes(document):
-            first.setdefault(quiz.id, quiz)  # one whose id cannot be read has none
+            first.setdefault(quiz.id, quiz)  # the id is empty where it cannot be read
     norun = {s.path: s.norun for document in course.documents for s in document_scripts(document)}
     for document in documents:
         for quiz in quizzes(document):
@@ -50,8 +50,8 @@ def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Dia
                     help="a learner's progress is kept under the id; give each quiz its own",
                     notes=[Note("the first one is here", first[quiz.id].id_span)],
                 )
-            yield from _output_questions(quiz, norun)
-        yield from _taken_anchors(document)
+            yield from _check_scripts(quiz, norun)
+        yield from _check_anchors(document)
 
 
 def quizzes(document: Document) -> Iterator[Quiz]:
@@ -59,14 +59,14 @@ def quizzes(document: Document) -> Iterator[Quiz]:
     return (block for block in document_blocks(document) if isinstance(block, Quiz))
 
 
-def _taken_anchors(document: Document) -> Iterator[Diagnostic]:
-    """Questions whose anchor a heading or another quiz of the document has."""
-    found = [quiz for quiz in quizzes(document) if quiz.id]
-    taken = {b.anchor: b.span for b in document_blocks(document) if isinstance(b, Heading)}
-    taken |= {quiz.id: quiz.id_span for quiz in found}
-    for quiz in found:
+def _check_anchors(document: Document) -> Iterator[Diagnostic]:
+    """Report questions whose anchor a heading or another quiz of the document has."""
+    named_quizzes = [quiz for quiz in quizzes(document) if quiz.id]
+    places = {b.anchor: b.span for b in document_blocks(document) if isinstance(b, Heading)}
+    places |= {quiz.id: quiz.id_span for quiz in named_quizzes}
+    for quiz in named_quizzes:
         for key in quiz.keys:
-            first = taken.get(quiz.anchor(key))
+            first = places.get(quiz.anchor(key))
             if first is not None:
                 yield diagnose(
                     "anchor-repeated",
@@ -78,46 +78,48 @@ def _taken_anchors(document: Document) -> Iterator[Diagnostic]:
 
 
 def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | None]:
-    """Predictions with nothing below them to hide, or no lab there to run: from all of a text."""
-    found = (_predictions(quiz, _below(quiz, document)) for quiz in quizzes(document))
-    return Parsed(None, tuple(chain.from_iterable(found)))
+    """Report predictions with nothing to hide below them, or no lab there to run."""
+    diagnostics = (
+        _check_predictions(quiz, _following_blocks(quiz, document)) for quiz in quizzes(document)
+    )
+    return Parsed(None, tuple(chain.from_iterable(diagnostics)))
 
 
-def _below(quiz: Quiz, document: Document) -> tuple[Block, ...]:
-    """What follows a quiz, up to the next heading or rule; nothing where it is inside a block."""
+def _following_blocks(quiz: Quiz, document: Document) -> tuple[Block, ...]:
+    """The blocks after a quiz, up to the next heading or rule; none if it is inside a block."""
     at = next((at for at, block in enumerate(document.blocks) if block is quiz), None)
     rest = () if at is None else document.blocks[at + 1 :]
     ends = (i for i, block in enumerate(rest) if isinstance(block, Heading | ThematicBreak))
     return rest[: next(ends, None)]
 
 
-def _predictions(quiz: Quiz, below: tuple[Block, ...]) -> Iterator[Diagnostic]:
-    labs = [block for block in below if isinstance(block, Lab)]
+def _check_predictions(quiz: Quiz, blocks: tuple[Block, ...]) -> Iterator[Diagnostic]:
+    labs = [block for block in blocks if isinstance(block, Lab)]
     for question in quiz.questions:
         if not isinstance(question, ChoiceQuestion):
             continue
-        if question.gate and below in ((), tuple(labs[:1])):
+        if question.gate and blocks in ((), tuple(labs[:1])):
             message = "nothing follows that could be hidden"
             help = "what answers the question stands below the quiz, before the next heading"
             yield diagnose("quiz-gate", question.gate_span, message, help=help)
         if question.run is not None:
-            yield from _run(question.run, labs, below)
+            yield from _check_run(question.run, labs, blocks)
 
 
-def _run(run: Excerpt, labs: list[Lab], below: tuple[Block, ...]) -> Iterator[Diagnostic]:
+def _check_run(run: Excerpt, labs: list[Lab], blocks: tuple[Block, ...]) -> Iterator[Diagnostic]:
     if labs:
         from coursebuild.features.lab.relations import check_steps
 
         node = parse_json(run, run.span()).value
         controls = {control.label: control for control in labs[0].fields.controls}
         yield from () if node is None else check_steps(node, "run", controls)
-    elif not any(isinstance(block, CodeBlock) and block.language == "lab" for block in below):
+    elif not any(isinstance(block, CodeBlock) and block.language == "lab" for block in blocks):
         message = "no lab follows that could be run"
         help = "the lab stands below the quiz, before the next heading"
         yield diagnose("quiz-gate", run.span(), message, help=help)
 
 
-def _output_questions(quiz: Quiz, scripts: Mapping[str, bool]) -> Iterator[Diagnostic]:
+def _check_scripts(quiz: Quiz, scripts: Mapping[str, bool]) -> Iterator[Diagnostic]:
     for question in quiz.output_questions():
         norun = scripts.get(question.script)
         if norun is None:
@@ -136,10 +138,10 @@ def _output_questions(quiz: Quiz, scripts: Mapping[str, bool]) -> Iterator[Diagn
 
 
 def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:
-    """`output` questions about a line that the script, run to its end, did not print."""
+    """Report `output` questions about a line that the script, run to its end, did not print."""
     printed = {run.path: run.stdout for run in runs if run.outcome is Outcome.OK}
-    found = (quiz for document in course.documents for quiz in quizzes(document))
-    for question in (question for quiz in found for question in quiz.output_questions()):
+    course_quizzes = (quiz for document in course.documents for quiz in quizzes(document))
+    for question in (q for quiz in course_quizzes for q in quiz.output_questions()):
         if question.script in printed:
             count = len(printed[question.script].rstrip().split("\n"))
             if question.line > count:

@@ -1,9 +1,9 @@
-"""Keys by which a learner's answers find their question again, whatever else of a quiz changes.
+"""Keys that lead a learner's answers back to their question, whatever else in the quiz changes.
 
 Entry points: `text_key`, `unique_keys`.
 
-A question's key is its `id`, or else a hash of its kind and its text; an option's and an item's is
-a hash of its text. So adding, removing and moving them changes no other's key.
+A question's key is its `id`, or else a hash of its kind and its text; the key of an option or
+an item is a hash of its text. So adding, removing or moving one changes the key of no other.
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ import unicodedata
 from collections.abc import Iterable, Iterator
 
 DIGITS = 8
-"""Hexadecimal digits of a hash: so few that an address with them can still be read."""
+"""Hexadecimal digits of a hash: few, so that an address that holds one stays readable."""
 
 
 def text_key(kind: str, text: str) -> str:
-    """The key of a text of a kind (`mcq`, `option`); what white space stands in it is no matter."""
+    """Return the key of a text of a kind (`mcq`, `option`), whatever its white space."""
     folded = unicodedata.normalize("NFC", " ".join(text.split()))
     data = f"{kind}\n{folded}".encode("utf-8", "surrogatepass")
     return hashlib.sha256(data).hexdigest()[:DIGITS]
 
 
-def unique_keys(texts: Iterable[tuple[str, str]], taken: Iterable[str] = ()) -> Iterator[str]:
-    """The keys of texts, each after its kind; one that is taken gets a number behind it."""
-    known = set(taken)
+def unique_keys(texts: Iterable[tuple[str, str]], used_keys: Iterable[str] = ()) -> Iterator[str]:
+    """Yield the keys of texts, given as (kind, text); a key already in use gets a number."""
+    used = set(used_keys)
     for kind, text in texts:
         base = key = text_key(kind, text)
         count = 1
-        while key in known:
+        while key in used:
             count += 1
             key = f"{base}-{count}"
-        known.add(key)
+        used.add(key)
         yield key

@@ -24,50 +24,50 @@ if TYPE_CHECKING:
 
 
 def quiz_markdown(writer: MarkdownWriter, block: Quiz) -> str:
-    """A quiz as a list of its questions, each with its answer."""
+    """Write a quiz as a list of its questions, each with its answer."""
     questions = (
-        hang(f"{at}. ", _question(writer, question))
-        for at, question in enumerate(block.questions, 1)
+        hang(f"{number}. ", _question(writer, question))
+        for number, question in enumerate(block.questions, 1)
     )
-    said = is_heading(writer.page.document, block.title)
-    title = "" if said else f"**{escape_marks(block.title)}**"
+    has_heading = is_heading(writer.page.document, block.title)
+    title = "" if has_heading else f"**{escape_marks(block.title)}**"
     return "\n\n".join(filter(None, (title, *questions)))
 
 
 def _question(writer: MarkdownWriter, question: AnyQuestion) -> str:
     parts = [f"*{escape_marks(question.label)}*"] if question.label else []
     parts.append(writer.blocks(question.text))
-    parts += _asked(writer, question)
-    for at, hint in enumerate(question.hints, 1):
-        parts.append(writer.folded(writer.words("quiz.hint", n=at), writer.blocks(hint)))
+    parts += _task(writer, question)
+    for number, hint in enumerate(question.hints, 1):
+        parts.append(writer.folded(writer.words("quiz.hint", n=number), writer.blocks(hint)))
     answer = "\n\n".join(filter(None, _answer(writer, question)))
     parts.append(writer.folded(writer.words("quiz.answer"), answer))
     return "\n\n".join(filter(None, parts))
 
 
-def _asked(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
-    """What is said of how to answer, and what there is to choose from."""
+def _task(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
+    """Say how to answer, and list what there is to choose from."""
     match question:
         case ChoiceQuestion():
-            how = "quiz.commit" if question.predict else ""
-            how = "quiz.choose_all" if question.several else how
+            instruction = "quiz.commit" if question.predict else ""
+            instruction = "quiz.choose_all" if question.several else instruction
             options = (
                 f"- {letter(at)}: {writer.inlines(option.text)}"
                 for at, option in enumerate(question.options)
             )
-            return [f"*{writer.words(how)}*" if how else "", "\n".join(options)]
+            return [f"*{writer.words(instruction)}*" if instruction else "", "\n".join(options)]
         case NumericQuestion():
             unit = f"{writer.words('quiz.unit')} {escape_marks(question.unit)}"
             return [f"*{unit}*"] if question.unit else []
         case OpenQuestion():
             return []
         case OutputQuestion():
-            asked = writer.words("quiz.output_of", path=question.script, line=question.line)
-            return [f"*{asked}*"]
+            task = writer.words("quiz.output_of", path=question.script, line=question.line)
+            return [f"*{task}*"]
         case OrderQuestion():
-            right = [writer.inlines(item) for item in question.items]
-            items = sorted(right)
-            items = [*items[1:], items[0]] if items == right else items
+            solution = [writer.inlines(item) for item in question.items]
+            items = sorted(solution)
+            items = [*items[1:], items[0]] if items == solution else items
             return [
                 f"*{writer.words('quiz.order')}*",
                 "\n".join(f"- {item}" for item in items),
@@ -81,24 +81,24 @@ def _answer(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
     match question:
         case ChoiceQuestion():
             right = ", ".join(letter(at) for at in question.answers)
-            said = [
+            feedback = [
                 f"- {writer.words('quiz.feedback', option=letter(at))}: "
                 + hang("", writer.blocks(option.feedback), 2)
                 for at, option in enumerate(question.options)
                 if option.feedback
             ]
             sim = writer.blocks((question.sim,)) if question.sim is not None else ""
-            return [f"{right}.", explain, "\n".join(said), sim]
+            return [f"{right}.", explain, "\n".join(feedback), sim]
         case NumericQuestion():
             unit = f" {escape_marks(question.unit)}" if question.unit else ""
-            near = writer.words("quiz.tolerance", tolerance=f"{question.tolerance:.3g}")
-            return [f"{escape_marks(question.answer_text)}{unit} ({near}).", explain]
+            tolerance = writer.words("quiz.tolerance", tolerance=f"{question.tolerance:.3g}")
+            return [f"{escape_marks(question.answer_text)}{unit} ({tolerance}).", explain]
         case OpenQuestion():
             return [writer.blocks(question.reference), explain]
         case OutputQuestion():
             line = output_line(writer.page, question)
-            shown = writer.words("quiz.none") if line is None else fence("text", line)
-            return [shown, explain]
+            answer = writer.words("quiz.none") if line is None else fence("text", line)
+            return [answer, explain]
         case OrderQuestion():
             right = "\n".join(
                 f"{at}. {writer.inlines(item)}" for at, item in enumerate(question.items, 1)

@@ -17,11 +17,11 @@ from coursebuild.features.lab.model import Lab
 
 
 class Choice(Struct, frozen=True):
-    """An option of a question, with what to say to a learner who takes it."""
+    """An option of a question, with the feedback for a learner who takes it."""
 
     span: Span
     key: str
-    """Among the options of its question; it depends on the text alone."""
+    """Unique among the options of its question; made from the text alone."""
     text: tuple[Inline, ...]
     feedback: tuple[Block, ...]
 
@@ -31,7 +31,7 @@ class Question(Struct, frozen=True):
 
     span: Span
     key: str
-    """Among the questions of its quiz: a learner's answer hangs on it."""
+    """Unique among the questions of its quiz; a learner's answer is kept under it."""
     label: str
     text: tuple[Block, ...]
     explain: tuple[Block, ...]
@@ -54,7 +54,7 @@ class ChoiceQuestion(Question, frozen=True):
     """Whether what follows the quiz is hidden until the learner has answered."""
     gate_span: Span
     run: Excerpt | None
-    """What is then done with the next lab of the section, as JSON."""
+    """The steps then done with the next lab of the section, as JSON."""
 
 
 class NumericQuestion(Question, frozen=True):
@@ -74,7 +74,7 @@ class OpenQuestion(Question, frozen=True):
 
 
 class OutputQuestion(Question, frozen=True):
-    """What does the script print there? The key is the verified output's line `line` (from 1)."""
+    """What does the script print? The answer is line `line`, from 1, of its verified output."""
 
     script: str
     script_span: Span
@@ -87,7 +87,7 @@ class OrderQuestion(Question, frozen=True):
 
     items: tuple[tuple[Inline, ...], ...]
     item_keys: tuple[str, ...]
-    """Of each item; it depends on the item's text alone."""
+    """The key of each item, made from its text alone."""
 
 
 AnyQuestion: TypeAlias = (
@@ -103,10 +103,10 @@ class Quiz(FeatureBlock, frozen=True):
     title: str
     questions: tuple[AnyQuestion, ...]
     keys: tuple[str, ...]
-    """Of all questions, also where `questions` holds only some of them."""
+    """The keys of all questions, even if `questions` holds only some of them."""
 
     def anchor(self, key: str) -> str:
-        """The anchor of the question with a key; its dot parts it from the quiz's own."""
+        """Return the anchor of the question with this key."""
         return f"{self.id}.{key}"
 
     def child_blocks(self) -> tuple[Block, ...]:
@@ -127,19 +127,19 @@ class Quiz(FeatureBlock, frozen=True):
         return replace(self, questions=tuple(bare))
 
     def anchors(self) -> tuple[str, ...]:
-        """Those of the quiz and of its questions."""
+        """The anchors of the quiz and of its questions."""
         return (self.id, *map(self.anchor, self.keys))
 
     def quoted_lines(self) -> tuple[tuple[str, int], ...]:
-        """Those that questions ask for."""
+        """The lines of output that questions ask for, as (script, line)."""
         return tuple((question.script, question.line) for question in self.output_questions())
 
     def progress_keys(self) -> tuple[str, tuple[str, ...]]:
-        """What a reader's answers are kept under."""
+        """The keys under which a reader's answers are kept: of the quiz, and of its questions."""
         return self.id, self.keys
 
     def tasks(self) -> int:
-        """Its questions."""
+        """The number of its questions."""
         return len(self.keys)
 
     def output_questions(self) -> Iterator[OutputQuestion]:

@@ -1,11 +1,11 @@
-"""Quizzes as a page shows them before any script runs: all readable, each answer behind a fold.
+"""Quizzes as a page shows them before any script runs: all readable, the answers folded.
 
 Entry points: `quiz(page, block)`, `index_quiz`. The page's script finds each question by
-`data-question`, its key, and its kind by `data-kind`; what it grades by stands in further data
-attributes.
+`data-question`, its key, and its kind by `data-kind`; further data attributes hold what it needs
+to grade an answer.
 
-The items of an order question are shown in an order that looks shuffled and depends on nothing but
-their number and the quiz's id, and that is never the right one.
+The items of an order question stand in an order that looks shuffled, is never the right one, and
+depends only on how many they are, on the quiz's id and on the question's number.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 
 def quiz(page: PageContext, block: Quiz) -> Markup:
-    """A quiz with its questions."""
+    """Draw a quiz with its questions."""
     headings = (b for b in document_blocks(page.document) if isinstance(b, Heading))
     return page.template(
         "quiz/quiz.html",
@@ -77,7 +77,7 @@ def index_quiz(reader: IndexReader, block: Quiz) -> None:
 
 
 def is_heading(document: Document, title: str) -> bool:
-    """Whether a heading of a document says the title of a quiz."""
+    """Whether a heading of the document reads like the title."""
     headings = (b for b in document_blocks(document) if isinstance(b, Heading))
     return any(plain_text(h.children).strip() == title.strip() for h in headings)
 
@@ -100,7 +100,7 @@ def _kind(question: AnyQuestion) -> str:
 
 
 def _graded_by(page: PageContext, question: AnyQuestion) -> Iterator[tuple[str, str]]:
-    """The data attributes by which the page's script grades an answer."""
+    """Yield the data attributes by which the page's script grades an answer."""
     match question:
         case ChoiceQuestion():
             yield "answer", " ".join(question.options[at].key for at in question.answers)
@@ -117,24 +117,24 @@ def _graded_by(page: PageContext, question: AnyQuestion) -> Iterator[tuple[str, 
         case OutputQuestion():
             if line := output_line(page, question):
                 yield "answer", line
-                yield "compare", _compared(page, question.script)
+                yield "compare", _comparison_rule(page, question.script)
         case OrderQuestion():
             yield "answer", " ".join(question.item_keys)
         case _:
             assert_never(question)
 
 
-def _compared(page: PageContext, script: str) -> str:
-    """How the numbers in the output of a script are compared, for the page's script."""
+def _comparison_rule(page: PageContext, script: str) -> str:
+    """Say for the page's script how the numbers in the output of a lesson's script compare."""
     for block in document_blocks(page.document):
         if isinstance(block, Recording) and block.script == script:
             verdict = page.inputs.verdicts.get(block.span.start)
             if verdict is not None:
-                return _rule(verdict.comparison)
-    return _rule(Comparison(Mode.DIGITS))
+                return _format_rule(verdict.comparison)
+    return _format_rule(Comparison(Mode.DIGITS))
 
 
-def _rule(comparison: Comparison) -> str:
+def _format_rule(comparison: Comparison) -> str:
     match comparison.mode:
         case Mode.EXACT:
             return "exact"
@@ -149,11 +149,11 @@ def _rule(comparison: Comparison) -> str:
 def unit_html(unit: str) -> Markup:
     """A unit with its exponents raised: `kg m^2`, `m/s^-1`."""
     parts = re.split(r"\^\{?([-\u2212]?\d+)\}?", unit)
-    raised = (
+    pieces = (
         Markup("<sup>{}</sup>").format(part.replace("-", "\u2212")) if i % 2 else escape(part)
         for i, part in enumerate(parts)
     )
-    return Markup().join(raised)
+    return Markup().join(pieces)
 
 
 def letter(index: int) -> str:
@@ -167,7 +167,7 @@ def letter(index: int) -> str:
 
 
 def output_line(page: PageContext, question: OutputQuestion) -> str | None:
-    """The line of the output that is asked for; `None` where the script did not run to its end."""
+    """Return the line of output asked for; `None` if the script did not run to its end."""
     run = page.inputs.runs.get(question.script)
     if run is None or run.outcome is not Outcome.OK:
         return None
@@ -175,7 +175,7 @@ def output_line(page: PageContext, question: OutputQuestion) -> str | None:
 
 
 def shuffle(count: int, key: str) -> tuple[int, ...]:
-    """An order of `count` items that depends on `key` alone; never the right one if another is."""
+    """Return an order of `count` items that depends only on `key`, and is not the right one."""
     order = sorted(range(count), key=lambda i: hashlib.sha256(f"{key}/{i}".encode()).digest())
     if count > 1 and order == list(range(count)):
         order = [*order[1:], order[0]]

@@ -5,9 +5,9 @@ Entry points: `parse_fence`; `parse_quiz`, from the text inside one.
 1. The JSON is read into nodes, and these into the declared fields.
 2. Each question whose own fields are right is checked for what no type can say: an answer that is
    one of the options, as many feedbacks as options, a tolerance where the answer is 0.
-3. The Markdown in it is parsed, and all of it becomes a `Quiz`. One with mistakes becomes a quiz of
-   those questions that are right, so that what is wrong in them beside (a formula, a link, a script
-   that no lesson has) is told in the same run.
+3. The Markdown in it is parsed, and all becomes a `Quiz`. If some questions have mistakes, the quiz
+   holds the others, so that diagnostics that only later steps can make (of a formula, a link, a
+   script that no lesson has) come in the same run.
 """
 
 from __future__ import annotations
@@ -51,82 +51,84 @@ from coursebuild.features.quiz.schema import (
 )
 
 TOLERANCE = 0.02
-"""Of the answer's size, where a numeric question gives no tolerance."""
+"""The tolerance of a numeric question that gives none, as a share of the answer."""
 
 
 def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Quiz | None]:
-    """A `quiz` fence, which has no keys."""
+    """Parse a `quiz` fence, which has no keys."""
     quiz = parse_quiz(fence.span, fence.body, texts)
     return Parsed(quiz.value, (*fence.keys().diagnostics, *quiz.diagnostics))
 
 
 def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[Quiz | None]:
-    """The quiz of a fence; `span` is all of it and `body` the text inside. Never raises.
+    """Parse the quiz of a fence; `span` is all of the fence and `body` the text inside.
 
-    It can be there along with diagnostics, and is then not to be published.
+    Never raises. A quiz that comes with diagnostics is not to be published.
     """
-    parsed = parse_json(body, span.first_line())
-    node = parsed.value
+    json = parse_json(body, span.first_line())
+    node = json.value
     if node is None:
-        return Parsed(None, sort_diagnostics(parsed.diagnostics))
+        return Parsed(None, sort_diagnostics(json.diagnostics))
     decoding = decode(node, QuizFile, "the quiz", JSON)
     prose = Prose.read(decoding.texts, texts)
-    found: list[Diagnostic] = [*parsed.diagnostics, *decoding.diagnostics, *prose.diagnostics]
+    diagnostics = [*json.diagnostics, *decoding.diagnostics, *prose.diagnostics]
     if not isinstance(node, ObjectNode):
-        return Parsed(None, sort_diagnostics(found))
+        return Parsed(None, sort_diagnostics(diagnostics))
     nodes = node.objects("questions")
-    found += _check_ids(nodes)
+    diagnostics += _check_ids(nodes)
     keys = _keys(nodes, decoding)
     questions: list[AnyQuestion] = []
-    for question in nodes:
-        found += _check(question, decoding)
-    for question in nodes:
-        # Where its JSON is wrong, nobody knows what its texts were meant to be.
-        garbled = any(question.span.contains(d.span) for d in parsed.diagnostics)
-        built = _question(question, keys.get(question, ""), decoding, prose)
-        questions += [_sound(built, found)] if built is not None and not garbled else []
+    for question_node in nodes:
+        diagnostics += _check(question_node, decoding)
+    for question_node in nodes:
+        # If its JSON is wrong, nobody knows what its texts were meant to be.
+        garbled = any(question_node.span.contains(d.span) for d in json.diagnostics)
+        question = _question(question_node, keys.get(question_node, ""), decoding, prose)
+        if question is not None and not garbled:
+            questions.append(_without_broken_lab(question, diagnostics))
     fields = decoding.value
-    id, title = (fields.id, fields.title) if fields is not None else (_id(node, found), "")
-    present = tuple(question.key for question in questions)
-    quiz = Quiz(span, id, node.place("id"), title, tuple(questions), present)
-    return Parsed(quiz, sort_diagnostics(found))
+    id, title = (fields.id, fields.title) if fields is not None else (_id(node, diagnostics), "")
+    question_keys = tuple(question.key for question in questions)
+    quiz = Quiz(span, id, node.place("id"), title, tuple(questions), question_keys)
+    return Parsed(quiz, sort_diagnostics(diagnostics))
 
 
-def _id(node: ObjectNode, found: list[Diagnostic]) -> str:
-    """The id of a quiz with mistakes; empty where the id is one of them."""
-    given = node.get("id")
-    wrong = any(given is not None and d.span == given.mark for d in found)
-    return given.value if isinstance(given, StringNode) and not wrong else ""
+def _id(node: ObjectNode, diagnostics: list[Diagnostic]) -> str:
+    """Return the id of a quiz with mistakes; empty if the id is one of them."""
+    id = node.get("id")
+    if not isinstance(id, StringNode) or any(d.span == id.mark for d in diagnostics):
+        return ""
+    return id.value
 
 
-def _sound(question: AnyQuestion, found: list[Diagnostic]) -> AnyQuestion:
-    """A question without its simulation where that has mistakes: it would be tried with them."""
+def _without_broken_lab(question: AnyQuestion, diagnostics: list[Diagnostic]) -> AnyQuestion:
+    """Take away a question's simulation if it has mistakes, so that no trial runs it."""
     if not isinstance(question, ChoiceQuestion) or question.sim is None:
         return question
-    wrong = any(question.sim.span.contains(diagnostic.span) for diagnostic in found)
-    return replace(question, sim=None) if wrong else question
+    broken = any(question.sim.span.contains(diagnostic.span) for diagnostic in diagnostics)
+    return replace(question, sim=None) if broken else question
 
 
 def _keys(nodes: tuple[ObjectNode, ...], decoding: Decoding[QuizFile]) -> dict[ObjectNode, str]:
-    """The key of each question: its id, or that of its text, which must not be another's id."""
-    fields = ((node, decoding.structs.get(node)) for node in nodes)
-    known = [(node, one) for node, one in fields if isinstance(one, AnyFields)]
-    given = {node: one.id for node, one in known if one.id is not None}
-    others = [(node, one) for node, one in known if node not in given]
-    kinds = ((str(one.__struct_config__.tag), one.q) for _, one in others)
-    keys = unique_keys(kinds, given.values())
-    return given | {node: key for (node, _), key in zip(others, keys, strict=True)}
+    """Map each question to its key: its id, or one made of its text that is nobody's id."""
+    structs = ((node, decoding.structs.get(node)) for node in nodes)
+    questions = [(node, fields) for node, fields in structs if isinstance(fields, AnyFields)]
+    ids = {node: fields.id for node, fields in questions if fields.id is not None}
+    nameless = [(node, fields) for node, fields in questions if node not in ids]
+    texts = ((str(fields.__struct_config__.tag), fields.q) for _, fields in nameless)
+    keys = unique_keys(texts, ids.values())
+    return ids | {node: key for (node, _), key in zip(nameless, keys, strict=True)}
 
 
 # ---------------------------------------------------------------------------------------- checks
 
 
 def _check_ids(nodes: tuple[ObjectNode, ...]) -> Iterator[Diagnostic]:
-    given = [node.get("id") for node in nodes]
-    named = [(id.value, id.span) for id in given if isinstance(id, StringNode)]
+    ids = [node.get("id") for node in nodes]
+    places = [(id.value, id.span) for id in ids if isinstance(id, StringNode)]
     help = "a learner's answer is kept under it; give each question its own, or none"
     message = "the question id `{}` is used twice in this quiz"
-    yield from check_unique(named, "question-id-repeated", message, help=help)
+    yield from check_unique(places, "question-id-repeated", message, help=help)
 
 
 def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnostic]:
@@ -154,12 +156,12 @@ def _check_choices(node: ObjectNode, fields: MultipleChoice | Predict) -> Iterat
     yield from _check_distinct(node, "options", "two options are the same: `{}`")
     count = len(fields.options)
     spans = [item.span for item in node.items("answer")] or [node.place("answer")]
-    named = list(zip(fields.answers, spans, strict=True))
-    for number, span in named:
+    answers = list(zip(fields.answers, spans, strict=True))
+    for number, span in answers:
         if not 0 <= number < count:
             message = f"there is no option {number}: they are numbered 0 to {count - 1}"
             yield diagnose("quiz-answer", span, message)
-    yield from check_unique(named, "quiz-answer", "the option {} is named twice")
+    yield from check_unique(answers, "quiz-answer", "the option {} is named twice")
     if fields.feedback is not None and len(fields.feedback) != count:
         texts = "1 text" if len(fields.feedback) == 1 else f"{len(fields.feedback)} texts"
         message = f"`feedback` has {texts} for {count} options"
@@ -168,8 +170,8 @@ def _check_choices(node: ObjectNode, fields: MultipleChoice | Predict) -> Iterat
 
 
 def _check_distinct(node: ObjectNode, name: str, message: str) -> Iterator[Diagnostic]:
-    named = ((item.value.strip(), item.span) for item in node.strings(name))
-    yield from check_unique(named, "field-value", message)
+    texts = ((item.value.strip(), item.span) for item in node.strings(name))
+    yield from check_unique(texts, "field-value", message)
 
 
 # ------------------------------------------------------------------------------------- questions
@@ -205,9 +207,9 @@ def _question(
             )
         case Numeric():
             answer: Node | None = node.get("answer")
-            written = answer.raw if answer is not None else ""
+            answer_text = answer.raw if answer is not None else ""
             tolerance = TOLERANCE * abs(fields.answer) if fields.tol is None else fields.tol
-            return NumericQuestion(*common, fields.answer, written, tolerance, fields.unit)
+            return NumericQuestion(*common, fields.answer, answer_text, tolerance, fields.unit)
         case Open():
             return OpenQuestion(*common, prose.blocks(node.get("reference")))
         case OutputFields():

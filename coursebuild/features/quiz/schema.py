@@ -1,11 +1,12 @@
 """The fields of a `quiz` fence.
 
 Entry point: `QuizFile`. The decoder checks a fence against it, and the JSON Schema for editors is
-made from it; what no declaration of types can say (an answer that is one of the options) is checked
-in `quiz`.
+made from it; `parse` checks what no declaration of types can say (that an answer is one of the
+options).
 """
 
-# Annotations are no texts here: msgspec would evaluate each again in every struct that inherits it.
+# No `from __future__ import annotations` here: msgspec would evaluate each annotation, a text then,
+# again in every struct that inherits it.
 
 from typing import Annotated, TypeAlias
 
@@ -15,7 +16,7 @@ from coursebuild.core.model.fields import Blocks, Inlines, NotNegative, Optional
 from coursebuild.features.lab.schema import SimLab, Step
 
 Index: TypeAlias = Annotated[int, Meta(extra_json_schema={"minimum": 0})]
-"""Of an option; that it is one is checked in `quiz`."""
+"""The index of an option; `parse` checks that there is such an option."""
 Options: TypeAlias = Annotated[tuple[Inlines, ...], Meta(min_length=2)]
 Answer: TypeAlias = Index | Annotated[tuple[Index, ...], Meta(min_length=1)]
 
@@ -30,7 +31,7 @@ QuestionId: TypeAlias = Annotated[
 
 
 class Common(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What every question has."""
+    """The fields that every question has."""
 
     q: Annotated[Blocks, Meta(description="the question")]
     id: Annotated[
@@ -45,8 +46,8 @@ class Common(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     hints: Annotated[tuple[Blocks, ...], Meta(description="revealed one by one")] = ()
 
 
-class Chosen(Common, frozen=True, kw_only=True):
-    """What every question with options has."""
+class WithOptions(Common, frozen=True, kw_only=True):
+    """The fields that every question with options has."""
 
     options: Annotated[Options, Meta(description="what to choose from")]
     answer: Annotated[
@@ -64,11 +65,11 @@ class Chosen(Common, frozen=True, kw_only=True):
         return self.answer if isinstance(self.answer, tuple) else (self.answer,)
 
 
-class MultipleChoice(Chosen, frozen=True, kw_only=True, tag_field="kind", tag="mcq"):
+class MultipleChoice(WithOptions, frozen=True, kw_only=True, tag_field="kind", tag="mcq"):
     """A question with options; with a list of answers all of them must be chosen."""
 
 
-class Predict(Chosen, frozen=True, kw_only=True, tag_field="kind", tag="predict"):
+class Predict(WithOptions, frozen=True, kw_only=True, tag_field="kind", tag="predict"):
     """A prediction: what shows the answer opens once the learner has committed to one."""
 
     sim: Annotated[SimLab | None, Meta(description="the simulation that shows the answer")] = None
