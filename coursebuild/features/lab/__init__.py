@@ -29,7 +29,7 @@ from coursebuild.features.lab.schema import SimLab, refine_schema
 
 
 def start(context: TrialContext) -> TrialRun:
-    """Trials of labs; what they need is loaded where there are some."""
+    """Start the trials of labs; their engines are imported only here."""
     from coursebuild.features.lab.trial import LabTrials
 
     return LabTrials(context)

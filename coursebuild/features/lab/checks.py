@@ -1,4 +1,4 @@
-"""Labs against the course: the kind exists, the model exists, and what the lab names in it.
+"""Checks labs against the course: their kind, their model and the names in it must exist.
 
 Entry points: `check_labs`; `check_model_names`, once models are compiled.
 """
@@ -10,20 +10,20 @@ from collections.abc import Callable, Iterable, Iterator
 from coursebuild.core.model import Course, Document, FeatureBlock, document_blocks
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.features.lab.model import TRIED, Lab
+from coursebuild.features.lab.model import BUILT_IN_KINDS, Lab
 
 _FOLDER = "content/labs/"
 
 
 def lab_kinds(course: Course) -> frozenset[str]:
-    """Those that there are, and each `content/labs/NAME.js` that the course brings."""
-    names = (path.removeprefix(_FOLDER) for path in course.files if path.startswith(_FOLDER))
-    own = (name.removesuffix(".js") for name in names if name.endswith(".js"))
-    return frozenset((*TRIED, *(name for name in own if "/" not in name)))
+    """The built-in kinds, and one for each `content/labs/NAME.js` of the course."""
+    files = (path.removeprefix(_FOLDER) for path in course.files if path.startswith(_FOLDER))
+    kinds = (file.removesuffix(".js") for file in files if file.endswith(".js"))
+    return frozenset((*BUILT_IN_KINDS, *(kind for kind in kinds if "/" not in kind)))
 
 
 def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
-    """Unknown kinds and models of the labs in some documents."""
+    """Report unknown kinds and models of the labs in some documents."""
     kinds = lab_kinds(course)
     models = {model.name for model in course.models}
     for lab in labs_in(documents):
@@ -45,7 +45,7 @@ def labs_in(documents: Iterable[Document]) -> Iterator[Lab]:
 def check_model_names(
     course: Course, facts_of: Callable[[FeatureBlock], ModelFacts | None]
 ) -> Iterator[Diagnostic]:
-    """Keyframes and sites that the models of labs do not have."""
+    """Report keyframes and sites that the models of labs do not have."""
     for lab in labs_in(course.documents):
         facts = facts_of(lab)
         if facts is not None:
@@ -58,10 +58,10 @@ def _check_names(lab: Lab, facts: ModelFacts) -> Iterator[Diagnostic]:
         have = f"it has {len(facts.keyframes) or 'none'}"
         message = f"the model has no keyframe {key}: {have}, counted from 0"
         yield diagnose("lab-name", lab.place(("key",)), message)
-    for field, what, name, names in (
+    for field, element, name, names in (
         ("key", "keyframe", key, [name for name in facts.keyframes if name]),
         ("trail", "site", lab.fields.trail, facts.sites),
     ):
         if isinstance(name, str) and name not in names:
-            message, help = f"the model has no {what} `{name}`", did_you_mean(name, names)
+            message, help = f"the model has no {element} `{name}`", did_you_mean(name, names)
             yield diagnose("lab-name", lab.place((field,)), message, help=help)

@@ -7,9 +7,9 @@ Entry points: `compile_lab(lab, name)`, `pieces(lab)`.
    `value`. A module is strict, so a misspelt assignment is an error and no new global.
 2. The same functions serve the browser's worker (`code`, a module) and the trial (`literal`, an
    expression). A page needs no `eval`, so its policy can forbid it.
-3. A piece is put into the module only when it parses by itself and as the function that it becomes
-   (`pieces` gives what to try), so that no piece can end its function and begin another, and none
-   keeps the others from loading.
+3. A piece is put into the module only if it parses both by itself and as its function (`pieces`
+   yields both), so that no piece can end its function and begin another, and none keeps the others
+   from loading.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ class LabCode(Struct, frozen=True):
 
     entry: Entry
     form: Literal["statements", "setter", "expression", "target"]
-    """Statements are run, a setter's read `value`; an expression gives a value; a target is
-    assigned to."""
+    """Statements are run; so is a setter, which reads `value`; an expression has a value; a target
+    can be assigned to."""
     code: str
 
     @property
     def function(self) -> str:
-        """It as it stands in the module, a function."""
+        """The piece as a function, as it stands in the module."""
         # A line end closes a comment with which a piece may end.
         match self.form:
             case "target":
@@ -59,20 +59,20 @@ class LabCode(Struct, frozen=True):
 
 
 class LabModule(Struct, frozen=True):
-    """A lab, ready to be run."""
+    """A lab as an engine runs it."""
 
     name: str
     """Unique in the course and stable: `4.2-lab-1`."""
     code: str
     """An ES module."""
     literal: str
-    """The same as a JavaScript expression, for an engine without modules."""
+    """The code as a JavaScript expression, for an engine without modules."""
     config: str
-    """What is data, as JSON."""
+    """The data, as JSON."""
 
 
 def pieces(lab: Lab) -> Iterator[LabCode]:
-    """Every piece of code of a lab, in the order of its fields."""
+    """Yield every piece of code of a lab, in the order of its fields."""
     for name in ("setup", "controller"):
         if code := getattr(lab.fields, name):
             yield LabCode((name,), "statements", code)
@@ -96,7 +96,7 @@ def pieces(lab: Lab) -> Iterator[LabCode]:
 
 
 def compile_lab(lab: Lab, name: str) -> LabModule:
-    """The module of a lab whose pieces all parse by themselves."""
+    """Make the module of a lab whose pieces all parse by themselves."""
     members = tuple(_members(lab))
     code = "".join(f"export const {member} = {text};\n" for member, text in members)
     literal = "{" + ", ".join(f"{member}: {text}" for member, text in members) + "}"
@@ -140,13 +140,13 @@ _FIELDS = (
     *("title", "model", "key", "height", "camera", "toggles", "overlays", "forceScale"),
     *("autoplay", "stopAt", "trail", "seed"),
 )
-"""What is said of a lab as the author says it, but that overlays become a list."""
+"""Fields of a lab that are passed on as written; only overlays become a list."""
 _PLOT = ("ylabel", "xlabel", "window", "ymin", "ymax", "height", "refLines")
-"""The same of a plot."""
+"""Fields of a plot that are passed on as written."""
 
 
 def config_json(lab: Lab, name: str) -> str:
-    """What the page, the worker and the trial need to know besides code, as JSON."""
+    """Write as JSON what the page, the worker and the trial need besides code."""
     fields = lab.fields
     config = {"id": name} | {field: getattr(fields, field) for field in _FIELDS}
     config |= {
@@ -168,7 +168,7 @@ def config_json(lab: Lab, name: str) -> str:
 
 
 def _log_data(fields: SimLab, log: tuple[LogEntry, ...]) -> Iterator[tuple[float | str, ...]]:
-    """Each act: its time, the number of the control and, but for a button, the value."""
+    """Yield each act: its time, the number of its control and, except for a button, the value."""
     numbers = {control.label: i for i, control in enumerate(fields.controls)}
     for entry in log:
         if isinstance(entry.do, str):
@@ -178,7 +178,7 @@ def _log_data(fields: SimLab, log: tuple[LogEntry, ...]) -> Iterator[tuple[float
 
 
 def _overlays(fields: SimLab) -> list[str]:
-    """The overlays that start on."""
+    """Return the overlays that start on."""
     overlays = fields.overlays
     if isinstance(overlays, Overlays):
         return [name for name in Overlays.__struct_fields__ if getattr(overlays, name)]
@@ -190,14 +190,14 @@ _CONTROL = {
     "value": None, "digits": None, "options": (), "param": None, "init": False, "reset": False,
     "play": False,
 }  # fmt: skip
-"""What is said of a control of each kind."""
+"""Fields of a control, of whatever kind, and their defaults."""
 
 
 def _control_data(control: Control) -> dict[str, Any]:
-    given = to_builtins(control)
+    fields = to_builtins(control)
     if isinstance(control, Select):
-        given["value"] = control.start
-    return {name: given.get(name, default) for name, default in _CONTROL.items()}
+        fields["value"] = control.start
+    return {name: fields.get(name, default) for name, default in _CONTROL.items()}
 
 
 def _plot_data(plot: Plot) -> dict[str, Any]:

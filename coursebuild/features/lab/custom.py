@@ -1,8 +1,8 @@
-"""Labs of the kinds that a course brings: what their own code needs, published as it is.
+"""Labs of a course's own kinds: what their code needs is published as it is.
 
 Entry point: `custom_lab`. The code is `content/labs/KIND.js`; docs/explanation/how-labs-run.md
-is its manual. What such a lab does only its code knows, so it is not tried; that its model exists
-and compiles is checked.
+is its manual. Only its code knows what such a lab does, so there is no trial; but its model must
+exist and compile.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from coursebuild.features.lab.models import model_of_course, saved_model
 def custom_lab(
     context: TrialContext, native: NativeEngine, trial: Trial, lab: Lab
 ) -> tuple[TrialResult | None, list[Diagnostic]]:
-    """A lab with its code, its data and, where its JSON has a `model`, that as an MJB file."""
+    """Publish a lab with its code, its data and, if its JSON has a `model`, that as an MJB file."""
     code = f"content/labs/{lab.kind}.js"
     if code not in context.course.files:
-        return None, []  # which is told at the kind
+        return None, []  # reported at the kind
     data = json.loads(lab.config)
     name = data.get("model")
     mjb = b""
@@ -36,7 +36,7 @@ def custom_lab(
             help = did_you_mean(name, [m.name for m in context.course.models])
             return None, [diagnose("lab-model", lab.span.first_line(), message, help=help)]
         if context.models[name].error:
-            return None, []  # which is told at the model
+            return None, []  # reported at the model
         mjb = saved_model(context, native, model)
     config = {"id": trial.name, "kind": lab.kind, "title": lab.fields.title, "data": data}
     output = LabOutput(

@@ -2,7 +2,7 @@
 
 Entry point: `publish_labs(results, assets)`.
 
-Every file has a hash of its content in its name, so that a browser may keep it for ever. Addresses
+Every file has a hash of its content in its name, so that a browser may cache it for ever. Addresses
 inside a lab's configuration are relative to it: all of its files lie in one folder.
 """
 
@@ -21,56 +21,56 @@ _FOLDER = "assets/labs"
 
 
 class LabRecord(Struct, frozen=True):
-    """What a page shows of a lab before it starts, on paper and without JavaScript."""
+    """What a page shows of a lab on paper, without JavaScript, and before the lab starts."""
 
     size: tuple[int, int]
-    """Of the picture, width and height in pixels."""
+    """Width and height of the picture, pixels."""
     scale: tuple[float, float]
-    """Length of the bar that shows the picture's scale, m and pixels."""
+    """Length of the bar that shows the picture's scale: in m, and in pixels."""
     time: float
     """Simulated time of the picture, s."""
     readouts: tuple[tuple[str, str], ...]
-    """Label and value at the end of the main run."""
+    """Labels and values at the end of the main run."""
     end: float
     """Simulated time of the readouts and of the end of the plots, s."""
     plots: tuple[Markup, ...]
-    """SVG elements, one a plot."""
+    """One SVG element for each plot."""
 
 
 class LabOutput(Struct, frozen=True):
-    """What the page of a lab needs."""
+    """What a page needs to show and run a lab."""
 
     module: str
     """The lab's code as an ES module."""
     config: str
     """The lab's data as JSON."""
     mjb: bytes = b""
-    """Its model."""
+    """The model."""
     record: LabRecord | None = None
     picture: bytes = b""
-    """PNG with a clear ground, where there is a record."""
+    """PNG on a transparent ground, if there is a record."""
     script: tuple[str, str] | None = None
-    """A Python script that does the same, its name and text: `{{control:N}}` in it stands for the
+    """Name and text of a Python script that does the same; `{{control:N}}` in it stands for the
     value of control N."""
 
 
-class ShownLab(Struct, frozen=True):
-    """A lab that runs."""
+class PublishedLab(Struct, frozen=True):
+    """A lab that pages can run."""
 
     name: str
     config: str
-    """Site path, as of `script`."""
+    """Site path, like `script`."""
     script: str
-    """The page's half of labs, shared by all."""
+    """The script that runs on the page, the same for all labs."""
     record: LabRecord | None
     picture: str
-    """Site path; empty where there is no record."""
-    tried: int
+    """Site path; empty if there is no record."""
+    attempt_count: int
     parity: str
 
 
 def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
-    """Name everything that the labs need; nothing where there are none."""
+    """Publish everything that the labs need."""
     if not results.trials:
         return PublishedTrials()
     files: dict[str, OutputFile] = {}
@@ -83,18 +83,18 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
     script = publish("lab.js", assets.file("js/lab.js"))
     worker = publish("worker.js", assets.file("js/lab-worker.js"))
     wasm = publish("mujoco.wasm", assets.file("mujoco/mujoco.wasm"))
-    shown = {}
+    labs = {}
     for trial in results.trials:
         if not isinstance(trial.output, LabOutput):
             continue
         name, lab = trial.line.name, trial.output
         data = json.loads(lab.config)
-        edited = "xml" in data  # which the page compiles, in a worker that ends with it
+        is_editable = "xml" in data  # the page compiles the model, in a worker of its own
         # Labs of the same model share its file.
         parts = {
             "module": publish(f"{name}.js", lab.module.encode()),
-            "mjb": "" if edited else publish(f"{data.get('model') or name}.mjb", lab.mjb),
-            "worker": f"{worker}#{name}" if edited else worker,
+            "mjb": "" if is_editable else publish(f"{data.get('model') or name}.mjb", lab.mjb),
+            "worker": f"{worker}#{name}" if is_editable else worker,
             "wasm": wasm,
         }
         addresses = {key: path.removeprefix(f"{_FOLDER}/") for key, path in parts.items()}
@@ -104,7 +104,7 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
         text = json.dumps(config, ensure_ascii=False, separators=(",", ":"))
         picture = publish(f"{name}.png", lab.picture) if lab.record is not None else ""
         address = publish(f"{name}.json", text.encode())
-        shown[name] = ShownLab(
+        labs[name] = PublishedLab(
             name, address, script, lab.record, picture, trial.line.tried, trial.line.parity
         )
-    return PublishedTrials(shown, tuple(files.values()))
+    return PublishedTrials(labs, tuple(files.values()))

@@ -1,4 +1,4 @@
-"""What the trial of a lab depends on besides its model's files; this needs neither engine.
+"""What the trial of a lab depends on besides its model's files; computed without an engine.
 
 Entry points: `lab_trials(course)`, `trial_inputs(trial)`.
 """
@@ -17,49 +17,49 @@ from coursebuild.core.text.source import key_of
 from coursebuild.features.lab.checks import labs_in
 from coursebuild.features.lab.compile import LabModule, compile_lab
 from coursebuild.features.lab.engines.files import engine_digest, lab_digest
-from coursebuild.features.lab.gallery import own_labs
-from coursebuild.features.lab.model import TRIED, Lab
+from coursebuild.features.lab.gallery import gallery_labs
+from coursebuild.features.lab.model import BUILT_IN_KINDS, Lab
 
 SECONDS = 60.0
-"""Processor time that a trial may take."""
-_UNTRIED = ("id", "title", "model", "height", "toggles")
-"""Data that no trial depends on."""
+"""Limit of a trial, in seconds of processor time."""
+_DISPLAY_FIELDS = ("id", "title", "model", "height", "toggles")
+"""Data of a lab on which no trial depends."""
 
 
 def lab_trials(course: Course) -> Iterator[Trial]:
-    """Every lab of a course, in order; then those of models that have none in a text."""
+    """Yield every lab of a course, in order; then those made for models that no text shows."""
     for owner, document in course.owned_documents:
         for number, lab in enumerate(labs_in((document,)), 1):
             yield Trial(f"{owner.id}-lab-{number}", owner.id, lab)
-    for model, lab in own_labs(course):
+    for model, lab in gallery_labs(course):
         yield Trial(f"model-{model.name.replace('/', '-')}", model.name, lab)
 
 
 def trial_inputs(trial: Trial) -> Inputs | None:
-    """Those of a lab; `None` for one of the course's own kinds, which is not run."""
+    """Return the inputs of a lab's trial; `None` if the lab is of the course's own kinds."""
     lab = trial.block
-    if not isinstance(lab, Lab) or lab.kind not in TRIED:
+    if not isinstance(lab, Lab) or lab.kind not in BUILT_IN_KINDS:
         return None
     return inputs_of(lab, compile_lab(lab, trial.name))
 
 
 def inputs_of(lab: Lab, module: LabModule) -> Inputs:
-    """What the trial of a lab depends on besides the files of its model."""
+    """Return what the trial of a lab depends on besides the files of its model."""
     text = key_of(
-        json.dumps(tried_data(module)),
+        json.dumps(trial_data(module)),
         module.literal,
         f"{lab.verify.seconds}/{lab.verify.rtol is None}",
         lab.xml.text if lab.xml is not None else f"models/{lab.fields.model}.xml",
     )
-    around = (
+    conditions = (
         ("MuJoCo", engine_version()),
         ("how a lab is repeated natively", lab_digest("engines/native_worker.py")[:12]),
         ("the browser's engine and its trial", engine_digest()[:12]),
     )
-    return Inputs(f"lab {module.name}", text, (), SECONDS, (), around)
+    return Inputs(f"lab {module.name}", text, (), SECONDS, (), conditions)
 
 
-def tried_data(module: LabModule) -> dict[str, Any]:
-    """What of a lab's data its trial is given."""
+def trial_data(module: LabModule) -> dict[str, Any]:
+    """Return the data of a lab without what no trial depends on."""
     config: dict[str, Any] = json.loads(module.config)
-    return {name: value for name, value in config.items() if name not in _UNTRIED}
+    return {name: value for name, value in config.items() if name not in _DISPLAY_FIELDS}

@@ -1,10 +1,10 @@
-"""JavaScript of labs, parsed by tree-sitter.
+"""Parses the JavaScript of labs, with tree-sitter.
 
 Entry points: `parse(code)`; `parse_statements(code)` and `parse_expression(code)`, for code that is
-to be translated; for what is in a node `walk`, `field`, `children`, `text_of`, `string_value`,
+to be translated; to read nodes, `walk`, `field`, `children`, `text_of`, `string_value`,
 `template_parts`, `dotted_name`.
 
-The code has been parsed by V8 before, so what is wrong JavaScript need not be explained here.
+V8 has parsed the code before, so mistakes in the JavaScript need no explanation here.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from tree_sitter import Language, Node, Parser
 
 
 class UntranslatableError(Exception):
-    """JavaScript that has no counterpart in Python here; the text says what."""
+    """JavaScript that this tool cannot write as Python; the text quotes it."""
 
 
-def refusal(node: Node, what: str = "") -> UntranslatableError:
-    """The error of a piece of code, named by its first line."""
-    return UntranslatableError(f"{what}`{text_of(node).splitlines()[0]}`")
+def refusal(node: Node, kind: str = "") -> UntranslatableError:
+    """Make the error for a piece of code, which it names by the first line."""
+    return UntranslatableError(f"{kind}`{text_of(node).splitlines()[0]}`")
 
 
 _ESCAPE = re.compile(
@@ -40,19 +40,19 @@ def _parser() -> Parser:
 
 
 def parse(code: str) -> Node:
-    """A piece of code, whatever is wrong with it."""
+    """Parse a piece of code, even one with mistakes."""
     return _parser().parse(code.encode("utf-8", "replace")).root_node
 
 
 def walk(node: Node) -> Iterator[Node]:
-    """A node and all inside of it that has a name."""
+    """Yield a node and all named nodes inside it."""
     yield node
     for child in node.named_children:
         yield from walk(child)
 
 
 def parse_statements(code: str) -> list[Node]:
-    """The statements of a piece of code.
+    """Parse a piece of code into its statements.
 
     Raises:
         UntranslatableError: the code cannot be parsed.
@@ -66,7 +66,7 @@ def parse_statements(code: str) -> list[Node]:
 
 
 def parse_expression(code: str) -> Node:
-    """The expression that a piece of code is.
+    """Parse a piece of code that is one expression.
 
     Raises:
         UntranslatableError: the code cannot be parsed, or is no single expression.
@@ -80,12 +80,12 @@ def parse_expression(code: str) -> Node:
 
 
 def children(node: Node) -> list[Node]:
-    """The named nodes inside of a node, without comments."""
+    """Return the named children of a node, without comments."""
     return [child for child in node.named_children if child.type != "comment"]
 
 
 def field(node: Node, name: str) -> Node:
-    """A part of a node that is always there, without parentheses around it."""
+    """Return a part that every node of the type has, without parentheses around it."""
     child = node.child_by_field_name(name)
     assert child is not None, f"{node.type} without {name}"
     return _without_parentheses(child)
@@ -98,7 +98,7 @@ def _without_parentheses(node: Node) -> Node:
 
 
 def arguments(call: Node) -> list[Node]:
-    """The arguments of a call."""
+    """Return the arguments of a call."""
     node = field(call, "arguments")
     if node.type != "arguments":
         raise UntranslatableError("a template behind a name or a value")
@@ -106,7 +106,7 @@ def arguments(call: Node) -> list[Node]:
 
 
 def array_items(array: Node) -> list[Node]:
-    """The items of an array."""
+    """Return the items of an array."""
     signs = [child.type for child in array.children if child.type != "comment"]
     if any(second == "," and first in ("[", ",") for first, second in pairwise(signs)):
         raise UntranslatableError("an array with holes")
@@ -114,33 +114,33 @@ def array_items(array: Node) -> list[Node]:
 
 
 def text_of(node: Node) -> str:
-    """A node as it is written."""
+    """Return the source text of a node."""
     assert node.text is not None
     return node.text.decode()
 
 
 def dotted_names(node: Node) -> tuple[Node, ...]:
-    """The names of `model.opt.timestep`, one by one; nothing where a node is something else."""
+    """Return the nodes of the names in `model.opt.timestep`; none if the node is something else."""
     if node.type == "identifier":
         return (node,)
     if node.type != "member_expression" or node.child_by_field_name("optional_chain") is not None:
         return ()
-    whole = dotted_names(field(node, "object"))
-    return (*whole, field(node, "property")) if whole else ()
+    owner = dotted_names(field(node, "object"))
+    return (*owner, field(node, "property")) if owner else ()
 
 
 def dotted_name(node: Node) -> tuple[str, ...]:
-    """The same as texts."""
+    """Return the names of `model.opt.timestep` as texts."""
     return tuple(map(text_of, dotted_names(node)))
 
 
 def string_value(node: Node) -> str:
-    """What a string holds."""
+    """Return the value of a string."""
     return "".join(_fragment(child) for child in node.named_children)
 
 
 def template_parts(template: Node) -> list[str | Node]:
-    """The texts and the expressions of a template, in order."""
+    """Return the texts and the expressions of a template, in order."""
     parts: list[str | Node] = []
     for child in template.named_children:
         if child.type != "template_substitution":
@@ -182,10 +182,10 @@ class CountingLoop(Struct, frozen=True):
 
 
 def counting_loop(node: Node) -> CountingLoop:
-    """What a `for` loop counts.
+    """Read a `for` loop that counts.
 
     Raises:
-        UntranslatableError: it does something else.
+        UntranslatableError: it does anything else.
     """
     refusal = UntranslatableError("a `for` loop that does not count")
     begin, test = field(node, "initializer"), field(node, "condition")

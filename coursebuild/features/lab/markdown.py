@@ -25,29 +25,30 @@ if TYPE_CHECKING:
 
 
 def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
-    """A lab as it was recorded, with a link to where it runs."""
+    """Write a lab as its trial recorded it, with a link to where it runs."""
     words, view = writer.words, page_view(writer.page, lab)
     parts = [f"**{words('lab.label')}: {escape_marks(view.title)}**"]
     if view.recorded is not None:
         parts += _recorded(writer, view.recorded)
     if lab.goal:
         parts.append(f"**{words('lab.goal')}:** {writer.inlines(lab.goal)}")
-    parts.append(_about(writer, view))
+    parts.append(_describe(writer, view))
     if lab.kind == MJCF and lab.xml is not None:
         parts.append(fence("xml", lab.xml.text))
     if view.controls:
         rows = [(escape_line(label), escape_line(values)) for label, values in view.controls]
         parts.append(table((words("lab.control"), words("lab.range")), rows))
-    shows = _shows(writer, view)
-    parts.append(
-        "\n".join(f"- {escape_marks(name)}: {escape_marks(', '.join(of))}" for name, of in shows)
+    displays = (
+        f"- {escape_marks(name)}: {escape_marks(', '.join(labels))}"
+        for name, labels in _list_displays(writer, view)
     )
+    parts.append("\n".join(displays))
     parts += [writer.blocks(lab.note), link(words("exports.run_lab"), writer.live)]
     return "\n\n".join(filter(None, parts))
 
 
 def _recorded(writer: MarkdownWriter, recorded: RecordedView) -> Iterator[str]:
-    """The picture, and the readouts at the end."""
+    """Write the picture, and the readouts at the end."""
     yield picture(recorded.alt, writer.locate(recorded.picture))
     if readouts := recorded.record.readouts:
         yield f"{escape_marks(recorded.at)}:"
@@ -55,22 +56,22 @@ def _recorded(writer: MarkdownWriter, recorded: RecordedView) -> Iterator[str]:
         yield table((writer.words("lab.readouts"), ""), rows)
 
 
-def _about(writer: MarkdownWriter, view: LabView) -> str:
-    """What is simulated, and from where to where."""
+def _describe(writer: MarkdownWriter, view: LabView) -> str:
+    """Say what is simulated, from which start, and until when."""
     words = writer.words
-    about = f"{words('lab.static_xml')}."
+    text = f"{words('lab.static_xml')}."
     if view.model is not None:
         name = link(escape_marks(view.model), writer.locate(view.model_href))
-        about = f"{words('lab.static')} {name}."
+        text = f"{words('lab.static')} {name}."
     if view.start:
-        about += f" {words('lab.start')} {code_span(view.start)}."
+        text += f" {words('lab.start')} {code_span(view.start)}."
     if view.stop is not None:
-        about += f" {words('lab.stops', t=view.stop)}"
-    return about
+        text += f" {words('lab.stops', t=view.stop)}"
+    return text
 
 
-def _shows(writer: MarkdownWriter, view: LabView) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """What the lab shows while it runs: what it is called, and its parts."""
+def _list_displays(writer: MarkdownWriter, view: LabView) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield what the lab shows while it runs: its name, and its parts."""
     texts = writer.page.renderer.words
     if view.readouts and view.recorded is None:
         yield texts("lab.readouts"), view.readouts

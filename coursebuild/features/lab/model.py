@@ -1,4 +1,4 @@
-"""Labs: what a reader plays with.
+"""A lab as a value.
 
 Entry point: `Lab`.
 """
@@ -15,17 +15,17 @@ from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.lab.schema import SimLab, Verify
 
 SIMLAB = "simlab"
-"""The kind of a lab that names none."""
+"""The kind of a lab that does not name one."""
 MJCF = "mjcf"
-"""That of a lab whose model the reader edits."""
-TRIED = (SIMLAB, MJCF)
-"""Kinds that are tried; all others are a course's own."""
+"""The kind of a lab whose model the reader edits."""
+BUILT_IN_KINDS = (SIMLAB, MJCF)
+"""The kinds that have trials; any other kind is a course's own."""
 START = "if (model.nkey > 0) mj.mj_resetDataKeyframe(model, data, 0);"
-"""The `setup` of labs that say nothing of it: they start from the model's first keyframe."""
+"""A `setup` that starts from the model's first keyframe, for labs whose author writes none."""
 Entry: TypeAlias = tuple[str | int, ...]
-"""The way to a value inside the lab's JSON: `("controls", 2, "set")`."""
-_NAMED_BY = {"controls": ("set", "apply", "run", "label"), "expect": ("expr", "diverges")}
-"""By which of its values an object in a list is pointed at."""
+"""The path to a value inside the lab's JSON: `("controls", 2, "set")`."""
+_POINTED_FIELDS = {"controls": ("set", "apply", "run", "label"), "expect": ("expr", "diverges")}
+"""The fields at which a diagnostic of an object in a list points; the first there is."""
 
 
 class Lab(FeatureBlock, frozen=True):
@@ -35,47 +35,47 @@ class Lab(FeatureBlock, frozen=True):
     """`simlab`, `mjcf`, or the name of a kind that the course adds."""
     kind_span: Span
     config: str
-    """JSON on one line, which of some kinds only their own code understands; or MJCF as written."""
+    """JSON on one line, which only the kind's own code may understand; or MJCF as written."""
     fields: SimLab
-    """What the author says; of a kind of the course's own, what labs of every kind have."""
+    """What the author wrote; for a course's own kind, only the fields that all labs have."""
     note: tuple[Block, ...] = ()
     goal: tuple[Inline, ...] = ()
-    """The text of its goal."""
+    """The text of the goal."""
     xml: Excerpt | None = None
     places: tuple[tuple[Entry, Span], ...] = ()
-    """Where each value of the JSON stands."""
+    """The place of each value in the JSON."""
     code: tuple[tuple[Entry, Excerpt], ...] = ()
     """The pieces of JavaScript in it."""
 
     @property
     def is_of_text(self) -> bool:
-        """Whether an author wrote it; if not, it is that of a model which no text shows."""
+        """Whether it stands in a text; if not, it was made for a model that no text shows."""
         return not self.span.path.startswith("models/")
 
     @property
     def verify(self) -> Verify:
-        """How much of it is run."""
+        """How much of it the trial runs."""
         return self.fields.verify or Verify()
 
     def place(self, entry: Entry) -> Span:
-        """Where an entry stands: the value itself, or the nearest around it that is known."""
+        """Return the place of an entry's value, or of the nearest one around it."""
         places = dict(self.places)
-        inner = _NAMED_BY.get(str(entry[0]), ()) if len(entry) == 2 else ()
-        ways = [(*entry, name) for name in inner]
-        ways += [entry[:end] for end in range(len(entry), 0, -1)]
-        known = (places[way] for way in ways if way in places)
-        return next(known, self.span).first_line()
+        fields = _POINTED_FIELDS.get(str(entry[0]), ()) if len(entry) == 2 else ()
+        paths = [(*entry, name) for name in fields]
+        paths += [entry[:end] for end in range(len(entry), 0, -1)]
+        spans = (places[path] for path in paths if path in places)
+        return next(spans, self.span).first_line()
 
     def child_blocks(self) -> tuple[Block, ...]:
-        """Its note."""
+        """The note."""
         return self.note
 
     def child_inlines(self) -> tuple[Inline, ...]:
-        """The text of its goal."""
+        """The text of the goal."""
         return self.goal
 
     def progress_keys(self) -> tuple[str, tuple[str, ...]] | None:
-        """Of its goal: another condition is another goal."""
+        """The key of the goal, which changes with the goal's condition."""
         goal = self.fields.goal
         if goal is None:
             return None
@@ -85,7 +85,7 @@ class Lab(FeatureBlock, frozen=True):
         return key, (key,)
 
     def tasks(self) -> int:
-        """To try it."""
+        """One: to try it."""
         return 1
 
     def summary(self) -> Lab:
@@ -93,11 +93,11 @@ class Lab(FeatureBlock, frozen=True):
         return replace(self, note=(), goal=())
 
     def models(self) -> tuple[str, ...]:
-        """The model that it names."""
+        """The name of its model, if it names one."""
         return () if self.fields.model is None else (self.fields.model,)
 
     def mjcf(self) -> Excerpt | None:
-        """The model that it holds itself."""
+        """The model that it holds, if it holds one."""
         return self.xml
 
     def is_docked(self) -> bool:

@@ -13,24 +13,24 @@ from coursebuild.features.lab.model import Lab
 
 
 def model_of_lab(context: TrialContext, lab: Lab) -> Source | None:
-    """A lab's model; `None` for one that does not compile, as is told already."""
+    """Return a lab's model; `None` if it does not compile, which is reported already."""
     if lab.xml is not None:
         return Source("models/.lab.xml", lab.xml.text)
-    compiled = context.models.get(name := lab.fields.model or "")
-    return model_of_course(context, name) if compiled and compiled.facts else None
+    compilation = context.models.get(name := lab.fields.model or "")
+    return model_of_course(context, name) if compilation and compilation.facts else None
 
 
 def model_of_course(context: TrialContext, name: str) -> Source | None:
-    """A model of the course; `None` where there is none of this name."""
+    """Return the model of the course with this name, or `None`."""
     return next((m.source for m in context.course.models if m.name == name), None)
 
 
 def saved_model(context: TrialContext, native: NativeEngine, model: Source) -> bytes:
-    """A model as an MJB file, from the store where nothing that it is made of has changed."""
+    """Return a model as an MJB file; from the store if nothing in it has changed."""
     store, key = context.memory.store, model_key(context.root, model.path, model.text)
-    saved = store.get("mjb", key, bytes)
-    if saved is None:
-        saved = native.save(model.path, model.text)
+    mjb = store.get("mjb", key, bytes)
+    if mjb is None:
+        mjb = native.save(model.path, model.text)
         if model_key(context.root, model.path, model.text) == key:  # it was not edited meanwhile
-            store.put("mjb", key, saved)
-    return saved
+            store.put("mjb", key, mjb)
+    return mjb

@@ -1,6 +1,6 @@
-"""What the code of a lab names: `data.qps`, `math.sin` or `data.qpos[5]`, and is not there.
+"""Names in the code of a lab that do not exist, such as `data.qps`, `math.sin` or `data.qpos[5]`.
 
-Entry points: `references(lab)`; `name_diagnostics(references, found)`, once the engine has looked
+Entry points: `references(lab)`; `name_diagnostics(references, replies)`, once the engine has looked
 them up (`site/js/lab/trial/names.js`).
 """
 
@@ -18,38 +18,38 @@ from coursebuild.features.lab.compile import pieces
 from coursebuild.features.lab.javascript import dotted_names, parse, text_of, walk
 from coursebuild.features.lab.model import Lab
 
-_FREE = ("ctx", "value", "globalThis")
-"""What may have any names."""
+_OPEN_OBJECTS = ("ctx", "value", "globalThis")
+"""Objects that may have any members."""
 _SIZES = {"qpos": "nq", "qvel": "nv", "qacc": "nv", "ctrl": "nu", "act": "na"}
 """Arrays whose length is a size of the model."""
 
 
-class NamedPart(Struct, frozen=True):
+class NameReference(Struct, frozen=True):
     """A name with dots in the code of a lab, or an element of what it names."""
 
     path: tuple[str, ...]
     places: tuple[Span, ...]
-    """Of each part of the path."""
+    """The place of each part of the path."""
     index: int | None = None
-    """The number in brackets behind it."""
+    """The number in brackets after it."""
     element: Span | None = None
-    """Of all of it, brackets included."""
+    """The place of all of it, brackets included."""
 
 
-def references(lab: Lab) -> list[NamedPart]:
-    """All that the pieces of a lab name outside of themselves."""
+def references(lab: Lab) -> list[NameReference]:
+    """List the names that the pieces of a lab use and do not declare themselves."""
     code = dict(lab.code)
     texts = (code[piece.entry] for piece in pieces(lab) if piece.entry in code)
-    return [one for text in texts for one in _references(text)]
+    return [reference for text in texts for reference in _references(text)]
 
 
-def _references(code: Excerpt) -> Iterator[NamedPart]:
-    written = code.text.encode("utf-8", "replace")
+def _references(code: Excerpt) -> Iterator[NameReference]:
+    data = code.text.encode("utf-8", "replace")
     nodes = list(walk(parse(code.text)))
-    own = {text_of(name) for node in nodes for name in _declared(node)}
+    declared_names = {text_of(name) for node in nodes for name in _declarations(node)}
 
     def place(node: Node) -> Span:
-        start, end = (len(written[:at].decode()) for at in (node.start_byte, node.end_byte))
+        start, end = (len(data[:at].decode()) for at in (node.start_byte, node.end_byte))
         return code.span(start, end)
 
     for node in nodes:
@@ -57,18 +57,18 @@ def _references(code: Excerpt) -> Iterator[NamedPart]:
         path = tuple(map(text_of, parts))
         outer = node.parent
         goes_on = outer is not None and outer.type == "member_expression"
-        if len(path) < 2 or path[0] in (*own, *_FREE) or goes_on:
+        if len(path) < 2 or path[0] in (*declared_names, *_OPEN_OBJECTS) or goes_on:
             continue
         places = tuple(map(place, parts))
         index = outer.child_by_field_name("index") if outer is not None else None
         if outer is not None and index is not None and text_of(index).isdecimal():
-            yield NamedPart(path, places, int(text_of(index)), place(outer))
+            yield NameReference(path, places, int(text_of(index)), place(outer))
         else:
-            yield NamedPart(path, places)
+            yield NameReference(path, places)
 
 
-def _declared(node: Node) -> Iterator[Node]:
-    """The names that a node gives to something of its own."""
+def _declarations(node: Node) -> Iterator[Node]:
+    """Yield the names that a node declares."""
     if node.type in ("formal_parameters", "array_pattern", "object_pattern"):
         yield from node.named_children
     for field in ("name", "parameter", "left"):
@@ -78,19 +78,19 @@ def _declared(node: Node) -> Iterator[Node]:
 
 
 def name_diagnostics(
-    named: Sequence[NamedPart], found: Sequence[dict[str, Any]]
+    references: Sequence[NameReference], replies: Sequence[dict[str, Any]]
 ) -> Iterator[Diagnostic]:
-    """What does not exist; `found` is what the engine says of each."""
-    for reference, one in zip(named, found, strict=True):
-        path, length, at = reference.path, one.get("length"), one.get("at")
+    """Report the names that do not exist, as the engine's reply to each says."""
+    for reference, reply in zip(references, replies, strict=True):
+        path, length, at = reference.path, reply.get("length"), reply.get("at")
         if at is not None:
             owner = ".".join(path[:at])
-            what = f"`{owner}` has no `{path[at]}`" if owner else f"there is no `{path[0]}`"
-            help = did_you_mean(path[at], one["names"])
-            yield diagnose("lab-name", reference.places[at], what, help=help)
+            message = f"`{owner}` has no `{path[at]}`" if owner else f"there is no `{path[0]}`"
+            help = did_you_mean(path[at], reply["names"])
+            yield diagnose("lab-name", reference.places[at], message, help=help)
         elif length is not None and reference.index is not None and reference.index >= length:
             assert reference.element is not None
             size = _SIZES.get(path[-1]) if path[0] == "data" else None
-            has = f"`{size}` is {length}" if size else f"the array has {length} numbers"
-            what = f"`{'.'.join(path)}[{reference.index}]` does not exist: {has}"
-            yield diagnose("lab-name", reference.element, what, help="numbers count from 0")
+            extent = f"`{size}` is {length}" if size else f"the array has {length} numbers"
+            message = f"`{'.'.join(path)}[{reference.index}]` does not exist: {extent}"
+            yield diagnose("lab-name", reference.element, message, help="numbers count from 0")

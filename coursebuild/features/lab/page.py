@@ -1,8 +1,8 @@
-"""Labs as a page shows them before they run: what they are, what can be changed, what is shown.
+"""Labs as a page shows them before they run: their subject, controls, displays and recording.
 
-Entry points: `draw_lab(page, block)`, `index_lab`; `page_view` and `lab_view`, what is shown. No
-control is drawn that does nothing: the page's script puts the live instrument into `data-lab` when
-it starts, and reads its configuration there.
+Entry points: `draw_lab(page, block)`, `index_lab`; `page_view` and `lab_view`, the values of the
+template. No control is drawn, as none would work yet: the page's script puts the live instrument
+into `data-lab` when it starts, and reads its configuration there.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from coursebuild.core.pages.qr import qr_svg
 from coursebuild.core.pages.quantities import number
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.urls import Place
-from coursebuild.features.lab.files import LabRecord, ShownLab
+from coursebuild.features.lab.files import LabRecord, PublishedLab
 from coursebuild.features.lab.model import MJCF, Lab
 from coursebuild.features.lab.schema import Control, Plot, Select, Slider
 
@@ -29,15 +29,17 @@ if TYPE_CHECKING:
 
 
 class RecordedView(Struct, frozen=True):
-    """What the trial recorded, and what is said of it."""
+    """What the trial recorded, with its words."""
 
     record: LabRecord
     picture: str
     alt: str
     length: str
-    """Of the bar that shows the scale of the picture."""
+    """Length of the bar that shows the scale of the picture."""
     at: str
-    proven: str
+    """When the readouts were taken."""
+    verification: str
+    """How the build has checked the lab."""
 
 
 class LabView(Struct, frozen=True):
@@ -46,8 +48,7 @@ class LabView(Struct, frozen=True):
     kind: str
     title: str
     key: str
-    """Its name in the course, as of `config` and `script` (addresses); empty where it cannot run.
-    """
+    """Its name in the course; like `config` and `script` (addresses), empty if it cannot run."""
     config: str
     script: str
     model: str | None
@@ -55,18 +56,18 @@ class LabView(Struct, frozen=True):
     start: str | None
     stop: str | None
     controls: tuple[tuple[str, str], ...]
-    """Labels; range or options, and what it is at first, in words."""
+    """Labels; range or options, and the initial value, in words."""
     readouts: tuple[str, ...]
     plots: tuple[tuple[str, tuple[str, ...]], ...]
-    """Axes, and the lines with those that are for reference."""
+    """Axes, and the names of lines and reference lines."""
     overlays: tuple[str, ...]
     recorded: RecordedView | None
 
 
 def draw_lab(page: PageContext, block: Lab) -> Markup:
-    """A lab in its static form."""
+    """Draw a lab in its static form."""
     view, words, address = page_view(page, block), page.renderer.words, ""
-    if view.key and page.inputs.address:  # from paper to the lab, where its place is known
+    if view.key and page.inputs.address:  # leads from paper to the lab
         address = f"{page.inputs.address}#{quote(view.key)}"
     return page.template(
         "lab/lab.html",
@@ -83,18 +84,18 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
 
 
 def page_view(page: PageContext, block: Lab) -> LabView:
-    """A lab of a document on its page."""
-    found, model = page.inputs.trials.get(block.span.start), block.fields.model
-    live = found if isinstance(found, ShownLab) else None
+    """The view of a lab of a document on its page."""
+    trial, model = page.inputs.trials.get(block.span.start), block.fields.model
+    live = trial if isinstance(trial, PublishedLab) else None
     view = lab_view(page.renderer.words, page.place, block, live, page.inputs.engine)
     href = "" if model is None else page.href(ModelTarget(model))
     return replace(view, model_href=href, start=_start(page, block))
 
 
 def lab_view(
-    words: Strings, place: Place, block: Lab, live: ShownLab | None, engine: str
+    words: Strings, place: Place, block: Lab, live: PublishedLab | None, engine: str
 ) -> LabView:
-    """A lab as seen from a place; `live` is what is shown of its trial."""
+    """The view of a lab for the page at a place; `live` is the lab as it was published."""
     fields = block.fields
     title = fields.title or words("lab.untitled")
     return LabView(
@@ -123,12 +124,12 @@ def _source(page: PageContext, block: Lab) -> Markup:
     return page.template("blocks/code.html", language="xml", html=html)
 
 
-def lab_picture(block: Lab, shown: Struct | None) -> Picture | None:
-    """What the trial recorded; `None` where it did not come to its end."""
-    if not isinstance(shown, ShownLab) or shown.record is None:
+def lab_picture(block: Lab, lab: Struct | None) -> Picture | None:
+    """Return the picture that the trial recorded; `None` if it did not come to its end."""
+    if not isinstance(lab, PublishedLab) or lab.record is None:
         return None
-    width, height = shown.record.size
-    return Picture(shown.picture, width, height, block.fields.title, shown.name)
+    width, height = lab.record.size
+    return Picture(lab.picture, width, height, block.fields.title, lab.name)
 
 
 def index_lab(reader: IndexReader, lab: Lab) -> None:
@@ -146,9 +147,9 @@ def index_lab(reader: IndexReader, lab: Lab) -> None:
 
 
 def _recorded(
-    words: Strings, place: Place, title: str, live: ShownLab | None, engine: str
+    words: Strings, place: Place, title: str, live: PublishedLab | None, engine: str
 ) -> RecordedView | None:
-    """What the trial recorded; `None` where it did not come to its end."""
+    """Describe what the trial recorded; `None` if it did not come to its end."""
     record = live.record if live is not None else None
     if live is None or record is None:
         return None
@@ -158,12 +159,12 @@ def _recorded(
         words("lab.picture", title=title, t=number(record.time, 4)),
         f"{number(record.scale[0])} m",
         words("lab.at", t=number(round(record.end, 3))),
-        words("lab.proven", engine=engine, tried=str(live.tried), parity=live.parity),
+        words("lab.proven", engine=engine, tried=str(live.attempt_count), parity=live.parity),
     )
 
 
 def _start(page: PageContext, block: Lab) -> str | None:
-    """The name of the keyframe that the lab starts from."""
+    """Return the name of the keyframe that the lab starts from."""
     key = block.fields.key
     if key is None or isinstance(key, str):
         return key
@@ -172,7 +173,7 @@ def _start(page: PageContext, block: Lab) -> str | None:
 
 
 def _values(words: Strings, control: Control) -> str:
-    """What a control can be set to, and what it is at first."""
+    """Say what a control can be set to, and its initial value."""
     match control:
         case Slider():
             values = _range(words, control)
@@ -192,7 +193,7 @@ def _range(words: Strings, slider: Slider) -> str:
 
 
 def _plot(words: Strings, plot: Plot) -> tuple[str, tuple[str, ...]]:
-    """A plot in words."""
+    """Describe a plot: its axes, and the names of its lines."""
     title = words(
         "lab.plot",
         ylabel=plot.ylabel or words("lab.value"),

@@ -1,9 +1,9 @@
-"""What hangs together inside a `simlab`.
+"""Checks how the fields of a `simlab` fit together.
 
-Entry points: `check_lab(node, structs)`; `check_steps`, of a field that presses and sets controls.
+Entry points: `check_lab(node, structs)`; `check_steps`, for a field that presses and sets controls.
 
-Each part is checked as far as its own fields are right, so that one misspelt field does not hide
-what is wrong elsewhere.
+Every part whose own fields are right is checked, so that a misspelt field does not hide what is
+wrong elsewhere.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.features.lab.schema import Button, Expect, Plot, Select, SimLab, Slider
 
 Structs = Mapping[ObjectNode, Struct]
-Known = Mapping[str, Struct | None]
-"""The controls of a lab by their labels; `None`: its fields are wrong."""
+Controls = Mapping[str, Struct | None]
+"""The controls of a lab by their labels; `None` for one whose fields are wrong."""
 
 
 def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
-    """Everything that the types of the fields cannot say."""
+    """Check everything that the types of the fields cannot say."""
     yield from require_one_of(node, SimLab, ("model", "xml"))
     for name in ("toggles", "overlays"):
         strings = [(item.value, item.span) for item in node.strings(name)]
         yield from check_unique(strings, "field-value", "the overlay `{}` is named twice")
-    controls = node.objects("controls")
-    labels = [(c.get("label"), structs.get(c)) for c in controls]
-    named = [(label, struct) for label, struct in labels if isinstance(label, StringNode)]
-    spans = [(label.value, label.span) for label, _ in named]
+    control_nodes = node.objects("controls")
+    pairs = [(c.get("label"), structs.get(c)) for c in control_nodes]
+    labelled = [(label, struct) for label, struct in pairs if isinstance(label, StringNode)]
+    spans = [(label.value, label.span) for label, _ in labelled]
     yield from check_unique(spans, "field-value", "two controls are called `{}`")
-    for control in controls:
+    for control in control_nodes:
         match structs.get(control):
             case Slider() as slider:
                 yield from require_one_of(control, Slider, ("set", "apply", "param"))
@@ -48,12 +48,12 @@ def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
         struct = structs.get(plot)
         if isinstance(struct, Plot):
             yield from _check_axis(plot, struct)
-    known = {label.value: struct for label, struct in named}
+    controls = {label.value: struct for label, struct in labelled}
     for claim in node.objects("expect"):
-        yield from _check_expect(claim, known, structs)
+        yield from _check_expect(claim, controls, structs)
     goal = node.get("goal")
     if isinstance(goal, ObjectNode):
-        yield from _check_log(goal, known)
+        yield from _check_log(goal, controls)
 
 
 def _check_axis(node: ObjectNode, plot: Plot) -> Iterator[Diagnostic]:
@@ -82,15 +82,15 @@ def _check_select(node: ObjectNode, select: Select) -> Iterator[Diagnostic]:
     yield from check_unique(labels, "field-value", "two options are called `{}`")
     values = [(o[1], pair[1].span) for o, pair in zip(select.options, pairs, strict=True)]
     yield from check_unique(values, "field-value", "two options have the value `{}`")
-    given = node.get("value")
-    if select.value is not None and given is not None:
-        yield from _check_choice(given, "value", select.value, select)
+    value = node.get("value")
+    if select.value is not None and value is not None:
+        yield from _check_choice(value, "value", select.value, select)
 
 
 def _check_choice(
     node: Node, name: str, value: float | str, select: Select
 ) -> Iterator[Diagnostic]:
-    if any(value == known for _, known in select.options):
+    if any(value == option for _, option in select.options):
         return
     texts = {label: v if isinstance(v, str) else f"{v:g}" for label, v in select.options}
     help = f"the options have {', '.join(f'`{text}`' for text in texts.values())}"
@@ -100,7 +100,7 @@ def _check_choice(
     yield diagnose("field-value", node.mark, message, help=help)
 
 
-def _check_expect(node: ObjectNode, known: Known, structs: Structs) -> Iterator[Diagnostic]:
+def _check_expect(node: ObjectNode, controls: Controls, structs: Structs) -> Iterator[Diagnostic]:
     claim = structs.get(node)
     if not isinstance(claim, Expect):
         return
@@ -115,25 +115,25 @@ def _check_expect(node: ObjectNode, known: Known, structs: Structs) -> Iterator[
         message = f"`max` must be at least `min`, which is {claim.min:g}"
         yield diagnose("field-value", node.place("max"), message)
     if (after := node.get("after")) is not None:
-        yield from check_steps(after, "after", known)
+        yield from check_steps(after, "after", controls)
 
 
-def check_steps(node: Node, name: str, known: Known) -> Iterator[Diagnostic]:
-    """The field `name`: what is done with the controls, one thing or a list of them."""
+def check_steps(node: Node, name: str, controls: Controls) -> Iterator[Diagnostic]:
+    """Check the field `name`: what is done with the controls, one step or a list of them."""
     if isinstance(node, ArrayNode):
         for i, step in enumerate(node.items):
-            yield from _check_step(step, f"{name}[{i}]", known)
+            yield from _check_step(step, f"{name}[{i}]", controls)
     else:
-        yield from _check_step(node, name, known)
+        yield from _check_step(node, name, controls)
 
 
-def _check_log(goal: ObjectNode, known: Known) -> Iterator[Diagnostic]:
-    """What is done to reach a goal: by controls that there are, and in order."""
+def _check_log(goal: ObjectNode, controls: Controls) -> Iterator[Diagnostic]:
+    """Check the log of a goal: its controls exist, and its times are in order."""
     before = 0.0
     for entry in goal.objects("log"):
         step, time = entry.get("do"), entry.get("t")
         if step is not None:
-            yield from _check_step(step, "do", known)
+            yield from _check_step(step, "do", controls)
         if isinstance(time, NumberNode):
             if time.value < before:
                 message = f"`t` must be at least that of the entry before, {before:g}"
@@ -141,31 +141,31 @@ def _check_log(goal: ObjectNode, known: Known) -> Iterator[Diagnostic]:
             before = time.value
 
 
-def _check_step(node: Node, name: str, known: Known) -> Iterator[Diagnostic]:
-    """One thing to do; messages call it `name`."""
+def _check_step(node: Node, name: str, controls: Controls) -> Iterator[Diagnostic]:
+    """Check one step; messages call it `name`."""
     match node:
         case StringNode():
-            yield from _check_pressed(node, known)
+            yield from _check_button(node, controls)
         case ObjectNode():
             if not node.members:
                 yield diagnose("field-value", node.mark, f"`{name}` names no control")
             for member in node.members:
-                if isinstance(known.get(member.key.value), Button):
+                if isinstance(controls.get(member.key.value), Button):
                     alone = "write" if len(node.members) == 1 else "press it in a step of its own:"
                     help = f'{alone} `"{member.key.value}"`'
                     message = f"`{member.key.value}` is a button and has no value"
                     yield diagnose("lab-name", member.key.span, message, help=help)
                 else:
-                    yield from _check_moved(member.key, member.value, known)
+                    yield from _check_setting(member.key, member.value, controls)
         case _:
             pass
 
 
-def _check_pressed(label: StringNode, known: Known) -> Iterator[Diagnostic]:
-    buttons = [name for name, struct in known.items() if isinstance(struct, Button | None)]
+def _check_button(label: StringNode, controls: Controls) -> Iterator[Diagnostic]:
+    buttons = [name for name, struct in controls.items() if isinstance(struct, Button | None)]
     if label.value in buttons:
         return
-    if label.value in known:
+    if label.value in controls:
         message = f"`{label.value}` is no button"
         help = f'give the value that it is set to: `{{"{label.value}": …}}`'
     else:
@@ -174,13 +174,13 @@ def _check_pressed(label: StringNode, known: Known) -> Iterator[Diagnostic]:
     yield diagnose("lab-name", label.span, message, help=help)
 
 
-def _check_moved(label: StringNode, value: Node, known: Known) -> Iterator[Diagnostic]:
-    if label.value not in known:
-        names = [name for name, struct in known.items() if not isinstance(struct, Button)]
+def _check_setting(label: StringNode, value: Node, controls: Controls) -> Iterator[Diagnostic]:
+    if label.value not in controls:
+        names = [name for name, struct in controls.items() if not isinstance(struct, Button)]
         message = f"the lab has no control `{label.value}`"
         yield diagnose("lab-name", label.span, message, help=did_you_mean(label.value, names))
         return
-    match known[label.value]:
+    match controls[label.value]:
         case Slider() as slider:
             if not isinstance(value, NumberNode):
                 message = f"`{label.value}` is a slider: its value is a number"

@@ -1,7 +1,7 @@
-"""What an engine replies when it has tried a lab.
+"""The reply of the browser's engine to the trial of a lab.
 
-Entry points: `read_reply`, `reply_bytes`; `Parity`; `unpack_arrays`, of arrays that are base64 in a
-reply. docs/explanation/how-labs-run.md says what a reply means.
+Entry points: `read_reply`, `reply_bytes`; `Parity`; `unpack_arrays`, for arrays in base64.
+docs/explanation/how-labs-run.md says what a reply means.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from coursebuild.features.lab.model import Entry
 
 _KINDS = {"f64": "<f8", "f32": "<f4", "i32": "<i4", "u32": "<u4", "u8": "u1"}
 _LARGEST = 1 << 28
-"""Bytes of a reply."""
+"""Bytes of the longest reply that is read."""
 PARITY_RTOL = 1e-9
-"""How far (relative) the two engines may be apart over the first second, unless a lab says."""
+"""Relative difference allowed between the engines in the first second, unless a lab says."""
 
 Count: TypeAlias = Annotated[int, Meta(ge=0, lt=1 << 53)]
 Number: TypeAlias = int | float
@@ -37,66 +37,68 @@ class MainPicture(TypedDict):
 
 
 class MainPlots(TypedDict):
-    """What its plots show at the end."""
+    """What the plots of the lab show at the end."""
 
     times: list[Number]
     plots: list[list[list[Number | None]]]
 
 
 class Parity(Struct, frozen=True, kw_only=True):
-    """How native MuJoCo repeats it."""
+    """How closely native MuJoCo repeats the main run."""
 
     unrepeated: str = ""
-    """Why it cannot; then all else says nothing."""
+    """Why it cannot; if set, the other fields mean nothing."""
     steps: Count = 0
     timestep: Number = 0
-    """s."""
+    """Seconds."""
     first: Count | None = None
     """The first step after which the states differ; `None`: bit-identical."""
     relative: Number = 0
-    """Largest difference relative to the largest number of the state, where it counts."""
+    """Largest difference over the largest number of the state, in the steps that are compared."""
     exact: bool = False
-    """Whether nothing in the model can differ between two machines, not even in the last bit."""
+    """Whether the model gives the same bits on every machine."""
 
-    def allowed(self, rtol: float | None) -> float:
-        """The relative difference that is allowed: the lab's own, or what its model may have."""
+    def tolerance(self, rtol: float | None) -> float:
+        """The relative difference that is allowed: the lab's `rtol`, or the model's default."""
         if rtol is not None:
             return rtol
         return 0.0 if self.exact else PARITY_RTOL
 
-    def within(self, rtol: float | None) -> bool:
-        """Whether the difference is allowed; one of 0 allows none of any size."""
-        allowed = self.allowed(rtol)
-        return self.first is None or (allowed > 0 and self.relative <= allowed)
+    def is_within_tolerance(self, rtol: float | None) -> bool:
+        """Whether the difference is allowed; a tolerance of 0 allows no difference at all."""
+        tolerance = self.tolerance(rtol)
+        return self.first is None or (tolerance > 0 and self.relative <= tolerance)
 
     def describe(self) -> str:
-        """For people."""
+        """Describe the comparison in words."""
         if self.unrepeated:
             return f"not compared with native MuJoCo: {self.unrepeated}"
         if self.first is None:
             return f"bit-identical to native MuJoCo over {self.steps} steps"
-        same = f"bit-identical to native MuJoCo for {self.first - 1} of {self.steps} steps"
-        return f"{same}, then within {self.relative:.0e}" if self.relative > 0 else same
+        text = f"bit-identical to native MuJoCo for {self.first - 1} of {self.steps} steps"
+        return f"{text}, then within {self.relative:.0e}" if self.relative > 0 else text
 
 
 class MainRecord(TypedDict):
-    """What an exported script is held against."""
+    """What the run of an exported script is compared with."""
 
     steps: Count
     last: Count
+    """Checksum of the last state."""
     near: Count
+    """The step whose state is recorded."""
     state: list[Number]
 
 
 class ResetDifference(TypedDict):
-    """What a reset does not lead back to the start, and the entry that should."""
+    """What differs from the start after a reset, and the entry that should reset it."""
 
     what: str
     entry: Entry
 
 
 class MainRun(TypedDict):
-    """What the main run recorded. What is drawn of it is checked by drawing it."""
+    """What the main run recorded. Drawing it checks the parts typed `Any`."""
 
     steps: Count
     timestep: Number
@@ -113,9 +115,9 @@ class MainRun(TypedDict):
 
 
 class Attempt(Struct, frozen=True):
-    """Something that a reader can do."""
+    """Something that a reader can do, and that the trial does."""
 
-    what: str = ""
+    description: str = msgspec.field(name="what", default="")
 
 
 FailureKind: TypeAlias = Annotated[
@@ -135,39 +137,39 @@ class TrialFailure(Struct, frozen=True):
     time: Number | None = msgspec.field(name="at", default=None)
     """Simulated time, s."""
     during: Attempt | None = None
-    """What was being tried."""
+    """The attempt in which it went wrong."""
 
 
 class TrialReply(Struct, frozen=True):
-    """A reply. `main` is what the main run recorded, `None` where it did not come to its end."""
+    """A reply; `main` is `None` if the main run did not come to its end."""
 
     version: str
-    tried: tuple[Attempt, ...]
+    attempts: tuple[Attempt, ...] = msgspec.field(name="tried")
     failures: tuple[TrialFailure, ...]
     main: MainRun | None
     seconds: Annotated[float, Meta(ge=0)] = 0.0
     """How long the trial took."""
-    made: Moment = 0
+    timestamp: Moment = msgspec.field(name="made", default=0)
     steps_per_second: Count | None = msgspec.field(name="stepsPerSecond", default=None)
 
 
 def read_reply(data: bytes) -> TrialReply:
-    """The reply that was kept as bytes.
+    """Read a reply from the bytes in which it is stored.
 
     Raises:
-        ValueError, zlib.error: they hold none.
+        ValueError, zlib.error: they hold no reply.
     """
-    text = zlib.decompressobj().decompress(data, _LARGEST)  # which is no JSON where it is cut
+    text = zlib.decompressobj().decompress(data, _LARGEST)  # if this cuts it, it is no JSON
     return msgspec.convert(json.loads(text), TrialReply)
 
 
 def reply_bytes(reply: dict[str, Any]) -> bytes:
-    """A reply as it is kept."""
+    """Return a reply as the bytes in which it is stored."""
     return zlib.compress(json.dumps(reply).encode())
 
 
 def unpack_arrays(value: Any) -> Any:
-    """The value with arrays in place of base64."""
+    """Return a value with arrays in place of base64."""
     if isinstance(value, list):
         return [unpack_arrays(item) for item in value]
     if not isinstance(value, dict):

@@ -1,12 +1,12 @@
 """The fields of a `lab` fence.
 
-Entry points: `SimLab` (a live MuJoCo simulation), `CommonLab` (what labs of every kind have). The
-decoder checks a fence against them, and the JSON Schema for editors is made from `SimLab`; how
-fields hang together (`min` below `max`, an `expect` that names a control) is checked in
-`relations`.
+Entry points: `SimLab` (a live MuJoCo simulation), `CommonLab` (the fields of labs of every kind).
+The decoder checks a fence against them, and the JSON Schema for editors is made from `SimLab`;
+`relations` checks how fields fit together (`min` below `max`, an `expect` that names a control).
 """
 
-# Annotations are no texts here: msgspec would evaluate each again in every struct that inherits it.
+# No `from __future__ import annotations` here: msgspec would evaluate each annotation, a text then,
+# again in every struct that inherits it.
 
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 
@@ -98,7 +98,7 @@ class Slider(SettingFields, frozen=True, kw_only=True, tag_field="type", tag="sl
 
     @property
     def start(self) -> float:
-        """Where it starts."""
+        """The value with which it starts."""
         return self.value
 
 
@@ -114,7 +114,7 @@ class Select(SettingFields, frozen=True, kw_only=True, tag_field="type", tag="se
 
     @property
     def start(self) -> Scalar:
-        """Where it starts."""
+        """The value with which it starts."""
         return self.options[0][1] if self.value is None else self.value
 
 
@@ -194,14 +194,14 @@ class Expect(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def steps(self) -> tuple[Step, ...]:
-        """What is done before, in order; none: the claim is of the lab as it starts."""
+        """What is done before, in order; empty if the claim is about the lab as it starts."""
         if self.after is None:
             return ()
         return self.after if isinstance(self.after, tuple) else (self.after,)
 
     @property
     def controls(self) -> frozenset[str]:
-        """Labels of the controls that are used before."""
+        """The labels of the controls used in those steps."""
         return frozenset(
             label for step in self.steps for label in ((step,) if isinstance(step, str) else step)
         )
@@ -285,7 +285,7 @@ class SimLab(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def refine_schema(definitions: dict[str, Any]) -> None:
-    """Add to a JSON Schema what the types do not say: a lab has a model in one of two ways."""
+    """Add to a JSON Schema what the types do not say: a lab has either `model` or `xml`."""
     if "Slider" in definitions:  # the tag that an author may leave out
         definitions["Slider"]["required"].remove("type")
     if "SimLab" in definitions:

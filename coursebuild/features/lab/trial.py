@@ -1,16 +1,16 @@
-"""Trying every lab of a course: models → V8 and native MuJoCo → results and diagnostics.
+"""Trials of all labs of a course: models → V8 and native MuJoCo → results and diagnostics.
 
 Entry point: `LabTrials`.
 
 1. Each lab's model is compiled natively and saved; the same bytes go to the browser.
 2. Each piece of its code must parse; then the trial takes the lab through everything that a reader
    can do with it, in the engine that the browser has.
-3. The main run is repeated natively and compared; for a build, what it recorded becomes the static
+3. The main run is repeated natively and compared; for a build, its recording becomes the static
    form.
-4. The script that the page offers is run natively and compared with it too.
+4. The script that the page offers is run natively and compared with the main run too.
 
-Saved models, trials and pictures are kept, each by the hash of all that it depends on, so that
-where nothing has changed neither engine is started.
+Saved models, trials and pictures are stored by the hash of all that they depend on, so that neither
+engine is started if nothing has changed.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ from coursebuild.features.lab.custom import custom_lab
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.files import lab_digest
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
-from coursebuild.features.lab.export.trial import LabExport, exported, recorded
+from coursebuild.features.lab.export.trial import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.files import LabOutput
-from coursebuild.features.lab.inputs import SECONDS, inputs_of, tried_data
-from coursebuild.features.lab.model import MJCF, TRIED, Lab
+from coursebuild.features.lab.inputs import SECONDS, inputs_of, trial_data
+from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, Lab
 from coursebuild.features.lab.models import model_of_lab, saved_model
 from coursebuild.features.lab.names import name_diagnostics, references
 from coursebuild.features.lab.reply import MainRun, TrialReply, read_reply, reply_bytes
@@ -55,11 +55,11 @@ _PARITY_SECONDS = 1.0
 """Simulated time over which the size of a difference counts, unless a lab says how much is allowed.
 """
 _TRANSIENT = ("timeout", "engine")
-"""Kinds of failure that may not happen again: a trial that ends in one is not kept."""
+"""Kinds of failure that may not happen again: a trial that ends in one is not stored."""
 
 
 class Engines:
-    """The browser's engine and the native one; each is started when it is first needed."""
+    """The browser's engine and the native one; each starts when it is first needed."""
 
     def __init__(self, root: Path, memory: int = MEMORY) -> None:
         self.native = NativeEngine(root, memory=memory)
@@ -75,65 +75,67 @@ class Engines:
             self.native.__exit__(*error)
 
     def stop(self) -> None:
-        """From another thread: end what runs, and let nothing begin."""
+        """End what runs, and let nothing begin; called from another thread."""
         self.browser.stop()
         self.native.interrupt()
 
 
 class LabTrials:
-    """Trials of labs whose models compile; a lab in which something is wrong is left out."""
+    """Trials of labs whose models compile; a lab that has diagnostics already is left out."""
 
     def __init__(
         self, context: TrialContext, engines: Engines | None = None, seconds: float = SECONDS
     ) -> None:
-        """`seconds`: processor time that a trial may take."""
+        """`seconds`: the processor time that a trial may take."""
         self._context, self._seconds = context, seconds
         self._engines = engines or Engines(context.root, context.course.limits.memory)
 
     def run(self, trials: Sequence[Trial]) -> TrialOutcome:
-        """Try them in turn, and end the engines."""
+        """Run the trials in turn, and end the engines."""
         results: list[TrialResult] = []
-        found: list[Diagnostic] = []
+        diagnostics: list[Diagnostic] = []
         with self._engines:
             for trial in trials:
-                result, diagnostics = self._try(trial)
+                result, lab_diagnostics = self._try_lab(trial)
                 results += () if result is None else (result,)
-                found += diagnostics
-        return tuple(results), tuple(found)
+                diagnostics += lab_diagnostics
+        return tuple(results), tuple(diagnostics)
 
-    def _try(self, trial: Trial) -> tuple[TrialResult | None, list[Diagnostic]]:
+    def _try_lab(self, trial: Trial) -> tuple[TrialResult | None, list[Diagnostic]]:
         context, engines, lab = self._context, self._engines, trial.block
         assert isinstance(lab, Lab)
         if any(lab.span.contains(diagnostic.span) for diagnostic in context.diagnostics):
             return None, []
         if not (lab.is_of_text or context.static):
-            return None, []  # which nothing is claimed of, and nobody looks at
-        if lab.kind not in TRIED:
+            return None, []  # it claims nothing, and no page is made of it
+        if lab.kind not in BUILT_IN_KINDS:
             return custom_lab(context, engines.native, trial, lab)
         model = model_of_lab(context, lab)
         if model is None:
             return None, []
-        result, found = _Attempt(context, engines, self._seconds, trial, lab, model).run()
-        return result, found if lab.is_of_text else []
+        lab_trial = _LabTrial(context, engines, self._seconds, trial, lab, model)
+        result, diagnostics = lab_trial.run()
+        return result, diagnostics if lab.is_of_text else []
 
     def stop(self) -> None:
-        """From another thread: end what runs, and let nothing begin."""
+        """End what runs, and let nothing begin; called from another thread."""
         self._engines.stop()
 
 
-class _Findings(Struct, frozen=True):
+class _Evaluation(Struct, frozen=True):
     """What follows from the reply of a trial."""
 
     reply: TrialReply
     failures: tuple[Diagnostic, ...]
-    """What the lab cannot be shown with."""
+    """Diagnostics with which the lab cannot be published."""
     remarks: tuple[Diagnostic, ...]
+    """Diagnostics with which it can."""
     output: LabOutput
     """Without its model and its script."""
 
 
-class _Attempt(Struct, frozen=True):
-    """Trying one lab."""
+class _LabTrial(Struct, frozen=True):
+    """The trial of one lab."""
 
     context: TrialContext
     engines: Engines
@@ -143,126 +145,126 @@ class _Attempt(Struct, frozen=True):
     model: Source
 
     def run(self) -> tuple[TrialResult | None, list[Diagnostic]]:
-        """What became of it, and what is wrong."""
-        began = time.monotonic()
+        """Run the trial, or read the reply of an earlier one, and evaluate it."""
+        start = time.monotonic()
         lab = self.lab
         module = compile_lab(lab, self.trial.name)
         inputs = inputs_of(lab, module)
         try:
             mjb = saved_model(self.context, self.engines.native, self.model)
             key = fingerprint((inputs.text, inputs.conditions, mjb))
-            read = functools.partial(self._read, module, key)
-            findings = self.context.memory.store.get("labs", key, read, shared=True)
-            cached = findings is not None
-            if findings is None:
-                mistakes = self._mistakes(mjb)
-                if mistakes:
-                    return self._failed(module, began), mistakes
-                findings = read(self._try(module, mjb, key))
+            evaluate = functools.partial(self._evaluate_reply, module, key)
+            evaluation = self.context.memory.store.get("labs", key, evaluate, shared=True)
+            is_cached = evaluation is not None
+            if evaluation is None:
+                diagnostics = self._check_code(mjb)
+                if diagnostics:
+                    return self._failed_result(module, start), diagnostics
+                evaluation = evaluate(self._try(module, mjb, key))
         except NativeError as error:
-            wrong = diagnose("lab-engine", lab.place(()), f"native MuJoCo {error}")
-            return self._failed(module, began), [wrong]
-        reply, found = findings.reply, findings.failures
-        offer = LabExport(None) if found else self._export(reply)
+            diagnostic = diagnose("lab-engine", lab.place(()), f"native MuJoCo {error}")
+            return self._failed_result(module, start), [diagnostic]
+        reply, failures = evaluation.reply, evaluation.failures
+        export = LabExport(None) if failures else self._export(reply)
         path, text = self.model.path, self.model.text
-        own = () if lab.xml is not None else (path,)
+        model_path = () if lab.xml is not None else (path,)
         self.context.memory.note_trial(
             inputs,
-            (*own, *model_files(self.context.root, path, text)),
-            ok=not found,
+            (*model_path, *model_files(self.context.root, path, text)),
+            ok=not failures,
             lasting=_is_lasting(reply),
             seconds=reply.seconds,
-            timestamp=reply.made,
+            timestamp=reply.timestamp,
         )
         line = TrialLine(
             name=module.name,
             title=lab.fields.title,
             lesson=self.trial.owner,
-            status="failed" if found else "ok",
-            seconds=reply.seconds if cached else time.monotonic() - began,
+            status="failed" if failures else "ok",
+            seconds=reply.seconds if is_cached else time.monotonic() - start,
             steps_per_second=reply.steps_per_second,
-            tried=len(reply.tried),
-            parity=_parity_text(reply, offer),
+            tried=len(reply.attempts),
+            parity=_parity_text(reply, export),
             fill=None if reply.main is None else reply.main["fill"],
-            cached=cached,
-            unexported=offer.reason,
+            cached=is_cached,
+            unexported=export.reason,
         )
-        output = replace(findings.output, mjb=mjb, script=offer.script)
-        return TrialResult(lab.span, line, output), [*found, *findings.remarks]
+        output = replace(evaluation.output, mjb=mjb, script=export.script)
+        return TrialResult(lab.span, line, output), [*failures, *evaluation.remarks]
 
-    def _read(self, module: LabModule, key: str, data: bytes) -> _Findings:
-        """All that follows from a reply that is kept.
+    def _evaluate_reply(self, module: LabModule, key: str, data: bytes) -> _Evaluation:
+        """Evaluate a stored reply.
 
-        Where it is none, which somebody may have put there, something is raised.
+        Raises an exception if the bytes hold no reply: anybody can write to a shared store.
         """
         from coursebuild.features.lab.picture.static import lab_record
 
         lab, reply = self.lab, read_reply(data)
         if reply.main is None and not reply.failures:
-            raise ValueError("a lab starts, or it is said why not")
+            raise ValueError("a reply without a main run has a failure")
         failures = tuple(failure_diagnostics(lab, reply)) if lab.is_of_text else ()
         remarks, main = tuple(remark_diagnostics(lab, reply)), reply.main
-        output = LabOutput(module.code, _framed(module.config, main))
+        output = LabOutput(module.code, _add_camera(module.config, main))
         if self.context.static and not failures and main is not None:
-            picture = self._picture(key, main)
+            picture = self._draw_picture(key, main)
             output = replace(output, record=lab_record(lab, main), picture=picture)
-        return _Findings(reply, failures, remarks, output)
+        return _Evaluation(reply, failures, remarks, output)
 
-    def _failed(self, module: LabModule, began: float) -> TrialResult:
-        """A lab that could not be tried."""
-        seconds = time.monotonic() - began
+    def _failed_result(self, module: LabModule, start: float) -> TrialResult:
+        """Make the result of a lab that could not be tried."""
+        seconds = time.monotonic() - start
         title = self.lab.fields.title
         line = TrialLine(module.name, title, self.trial.owner, "failed", seconds)
         return TrialResult(self.lab.span, line, LabOutput(module.code, module.config))
 
-    def _mistakes(self, mjb: bytes) -> list[Diagnostic]:
-        """What no engine could run, and what the code names and is not there."""
+    def _check_code(self, mjb: bytes) -> list[Diagnostic]:
+        """Report code that no engine could run; if there is none, names that do not exist."""
         browser, code = self.engines.browser, tuple(pieces(self.lab))
-        wrong = browser.mistakes(code)
-        found = [
-            code_diagnostic(self.lab, piece, text)
-            for piece, text in zip(code, wrong, strict=True)
-            if text is not None
+        messages = browser.check_code(code)
+        diagnostics = [
+            code_diagnostic(self.lab, piece, message)
+            for piece, message in zip(code, messages, strict=True)
+            if message is not None
         ]
-        if found:
-            return found
-        named = references(self.lab)
-        paths = [reference.path for reference in named]
-        return list(name_diagnostics(named, browser.look_up(paths, mjb, self.seconds)))
+        if diagnostics:
+            return diagnostics
+        names = references(self.lab)
+        replies = browser.look_up([name.path for name in names], mjb, self.seconds)
+        return list(name_diagnostics(names, replies))
 
     def _try(self, module: LabModule, mjb: bytes, key: str) -> bytes:
-        """The reply of the trial, with the comparison in place of what it was made from."""
+        """Run the trial, and replace its recorded states by their comparison with a native run."""
         request = {
-            "config": tried_data(module),
+            "config": trial_data(module),
             "code": module.literal,
             "seconds": self.lab.verify.seconds,
         }
-        began = time.monotonic()
+        start = time.monotonic()
         reply = self.engines.browser.trial(request, mjb, self.seconds)
         main = reply["main"]
         if main is not None and main["parity"] is not None:
-            main["recorded"] = recorded(main["parity"], self._horizon(main))
-            main["parity"] = self._compared(main, mjb)
-        reply["seconds"] = round(time.monotonic() - began, 4)
+            main["recorded"] = record_for_export(main["parity"], self._horizon(main))
+            main["parity"] = self._compare_natively(main, mjb)
+        reply["seconds"] = round(time.monotonic() - start, 4)
         reply["made"] = int(time.time())
         data = reply_bytes(reply)
         if _is_lasting(read_reply(data)):
             self.context.memory.store.put("labs", key, data, shared=True)
         return data
 
-    def _compared(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any]:
-        """How the main run compares with native MuJoCo, or why it cannot be repeated."""
+    def _compare_natively(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any]:
+        """Compare the main run with native MuJoCo, or say why it cannot be repeated."""
         run = main["parity"]
         if main["diverged"]:
-            run["steps"] -= 1  # what is beyond all numbers may differ
+            run["steps"] -= 1  # the last state, which is not finite, may differ
         if run["steps"] == 0:
             return {"unrepeated": "it takes no step"}
         if run["modelChanged"]:
             return {"unrepeated": "its controller changes the model"}
         if not run["complete"]:
             return {"unrepeated": "its controller writes more than can be kept"}
-        compared = self.engines.native.parity(mjb, run, self._horizon(main))
-        return {**compared, "steps": run["steps"]}
+        parity = self.engines.native.parity(mjb, run, self._horizon(main))
+        return {**parity, "steps": run["steps"]}
 
     def _horizon(self, main: dict[str, Any]) -> int:
         """The step up to which the size of a difference counts."""
@@ -272,41 +274,41 @@ class _Attempt(Struct, frozen=True):
         return min(steps, max(1, round(_PARITY_SECONDS / float(main["timestep"]))))
 
     def _export(self, trial: TrialReply) -> LabExport:
-        """The script that does what the lab does."""
+        """Write the script that does what the lab does."""
         if trial.main is None or self.lab.kind == MJCF:
             return LabExport(None)
-        return exported(self.context, self.engines.native, self.trial, self.lab, trial.main)
+        return export_lab(self.context, self.engines.native, self.trial, self.lab, trial.main)
 
-    def _picture(self, key: str, main: MainRun) -> bytes:
-        """The start of the main run, drawn."""
+    def _draw_picture(self, key: str, main: MainRun) -> bytes:
+        """Draw the start of the main run."""
         from coursebuild.features.lab.picture.static import draw_picture
 
-        drawn = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
+        picture_key = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
         store = self.context.memory.store
-        return store.get_or_create("pictures", drawn, lambda: draw_picture(self.lab, main))
+        return store.get_or_create("pictures", picture_key, lambda: draw_picture(self.lab, main))
 
 
-def _framed(config: str, main: MainRun | None) -> str:
-    """A lab's data with the camera that its trial has found."""
+def _add_camera(config: str, main: MainRun | None) -> str:
+    """Add to a lab's data the camera and the scene's extent that its trial worked out."""
     if main is None:
         return config
     camera = {name: main["scene"]["camera"][name] for name in Camera.__struct_fields__}
     data = {**json.loads(config), "camera": camera, "floor": main["scene"]["floor"]}
     data["arrows"] = main["arrows"]
-    if "xml" in data:  # which the reader may change, to one that this camera does not suit
+    if "xml" in data:  # the reader may change the model to one that this camera does not suit
         data["extent"] = main["scene"]["extent"]
     return json.dumps(data, ensure_ascii=False, separators=(",", ":"))
 
 
 def _is_lasting(reply: TrialReply) -> bool:
-    """Whether the same trial would have the same result another time."""
+    """Whether the same trial would have the same result next time."""
     return all(failure.kind not in _TRANSIENT for failure in reply.failures)
 
 
-def _parity_text(reply: TrialReply, offer: LabExport) -> str:
-    run = reply.main["parity"] if reply.main is not None else None
-    if run is None:
+def _parity_text(reply: TrialReply, export: LabExport) -> str:
+    parity = reply.main["parity"] if reply.main is not None else None
+    if parity is None:
         return ""
-    if run.unrepeated and offer.script is not None:
+    if parity.unrepeated and export.script is not None:
         return "compared with native MuJoCo as its Python export"
-    return run.describe()
+    return parity.describe()

@@ -1,4 +1,4 @@
-"""What a trial found, as diagnostics at the entries of the lesson.
+"""The reply of a trial as diagnostics at the entries of the lab.
 
 Entry points: `failure_diagnostics` and `remark_diagnostics` of a lab and its trial;
 `code_diagnostic`.
@@ -34,8 +34,8 @@ _RULES = {
 }
 
 
-def _named(lab: Lab, entry: Entry) -> str:
-    """An entry in words, by the name that a reader of the page knows."""
+def _entry_name(lab: Lab, entry: Entry) -> str:
+    """Name an entry as a reader of the page knows it."""
     match entry:
         case ("controls", int(i), *_) if i < len(lab.fields.controls):
             control = lab.fields.controls[i]
@@ -55,11 +55,11 @@ def _named(lab: Lab, entry: Entry) -> str:
 
 
 def code_diagnostic(lab: Lab, piece: LabCode, message: str) -> Diagnostic:
-    """A piece of code that cannot be part of a lab."""
+    """Report a piece of code that cannot be part of a lab."""
     message = message[:1].lower() + message[1:].rstrip(".")
-    what = f"{_named(lab, piece.entry)} has code that cannot run: {message}"
+    message = f"{_entry_name(lab, piece.entry)} has code that cannot run: {message}"
     help = _PYTHON_HELP if _PYTHON.search(piece.code) else _HELP[piece.form]
-    return diagnose("lab-code", lab.place(piece.entry), what, help=help)
+    return diagnose("lab-code", lab.place(piece.entry), message, help=help)
 
 
 _PYTHON = re.compile(r"\b(and|or|not)\b| if .* else ")
@@ -78,7 +78,7 @@ _HELP = {
 
 
 def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """What a lab cannot be shown with: failures, another engine, and what it says in vain."""
+    """Report what a lab cannot be published with: failures, other engines, untrue fields."""
     yield from _failures(lab, trial)
     if trial.version != engine_version():
         message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
@@ -89,24 +89,26 @@ def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 
 
 def remark_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """What is to be said of a lab that can be shown."""
+    """Report what is to be said of a lab that can be published."""
     yield from _deep(lab, trial)
     yield from _reset(lab, trial)
     yield from _far(lab, trial)
 
 
 def _failures(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Each failure of a trial, at its entry.
+    """Report each failure of a trial at its entry.
 
-    What MuJoCo says of the main run it says again of every act; once is enough.
+    MuJoCo warns of the main run again in every attempt; to report it once is enough.
     """
-    told = [f for f in trial.failures if f.kind != _DEEP and not _is_claimed(lab, f)]
-    always = {f.kind for f in told if f.entry == () and f.kind in _OF_MUJOCO}
-    yield from (_failure(lab, f) for f in told if f.entry == () or f.kind not in always)
+    failures = [f for f in trial.failures if f.kind != _DEEP and not _is_claimed(lab, f)]
+    of_main_run = {f.kind for f in failures if f.entry == () and f.kind in _OF_MUJOCO}
+    for failure in failures:
+        if failure.entry == () or failure.kind not in of_main_run:
+            yield _failure(lab, failure)
 
 
 def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
-    """Whether the lab claims that it diverges there: with these controls, or as it starts."""
+    """Whether the simulation diverges there, and the lab claims that it does."""
     if failure.kind != _DIVERGED:
         return False
     claims = [claim for claim in lab.fields.expect if claim.diverges]
@@ -126,91 +128,94 @@ _OF_MUJOCO = ("warning", _DIVERGED)
 
 
 def _deep(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Bodies that lie deep in each other, and are not to; once where the main run has some."""
+    """Report bodies that lie deep in each other; only once if the main run has some."""
     if not lab.verify.deep:
         failures = [f for f in trial.failures if f.kind == _DEEP]
-        always = [f for f in failures if f.entry == ()]
-        yield from (_failure(lab, failure) for failure in always or failures)
+        of_main_run = [f for f in failures if f.entry == ()]
+        yield from (_failure(lab, failure) for failure in of_main_run or failures)
 
 
 def _shallow(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """That no bodies lie deep in each other, though the lab says that they are to."""
+    """Report a lab that says `deep` without need."""
     if lab.verify.deep and not any(failure.kind == _DEEP for failure in trial.failures):
-        what = "the lab says `deep`, and no bodies lay deep in each other"
+        message = "the lab says `deep`, and no bodies lay deep in each other"
         span = lab.place(("verify", "deep"))
-        yield diagnose("lab-shallow", span, what, help="take `deep` away")
+        yield diagnose("lab-shallow", span, message, help="take `deep` away")
 
 
 def _far(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """That what moves is small in the picture, because of the lab's own camera."""
+    """Report a camera of the lab's own that shows what moves too small."""
     main = trial.main
     if main is None or (fill := main["fill"]) is None or (most := main["mostFill"]) is None:
         return
     if fill < _SMALL and fill < most / 2:
-        what = (
+        message = (
             f"what moves fills {100 * fill:.2g} % of the picture, and could fill {100 * most:.2g} %"
         )
         help = "without `distance` and `target` the camera fits the motion"
-        yield diagnose("lab-far", lab.place(("camera",)), what, help=help)
+        yield diagnose("lab-far", lab.place(("camera",)), message, help=help)
 
 
 _SMALL = 0.1
 
 
 def _failure(lab: Lab, failure: TrialFailure) -> Diagnostic:
-    during = "" if failure.during is None else failure.during.what
-    tried = f"while trying: {during}" if during not in ("", "start") else ""
+    during = "" if failure.during is None else failure.during.description
+    label = f"while trying: {during}" if during not in ("", "start") else ""
     text, help = _explain(lab, failure)
     span = lab.place(failure.entry)
     if lab.xml is not None and failure.kind == "engine":
         line = error_line(failure.message or "", lab.xml.text)
         span = line_span(lab.xml, line, 0, span)
-    return diagnose(_RULES[failure.kind], span, text, label=tried, help=help)
+    return diagnose(_RULES[failure.kind], span, text, label=label, help=help)
 
 
 def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
-    """What is wrong, and what helps."""
-    name = _named(lab, failure.entry)
-    when = f" at t = {failure.time:.6g} s" if failure.time else ""
+    """Say what is wrong, and what helps."""
+    name = _entry_name(lab, failure.entry)
+    time = f" at t = {failure.time:.6g} s" if failure.time else ""
     message = (failure.message or "something that has no text").rstrip(".")
     match failure.kind:
         case "throws":
-            known = _OF_MATH.search(message)
-            help = f"did you mean `Math.{known[1].replace('pi', 'PI')}`?" if known else ""
-            return f"{name} throws{when}: {message}", help
+            function = _OF_MATH.search(message)
+            help = f"did you mean `Math.{function[1].replace('pi', 'PI')}`?" if function else ""
+            return f"{name} throws{time}: {message}", help
         case "nan":
             help = (
                 "where there is to be no value, give `null`" if failure.entry[0] != "expect" else ""
             )
-            return f"{name} {message}{when}", help
+            return f"{name} {message}{time}", help
         case "type":
             return f"{name} {message}", ""
         case "warning":
-            return f"MuJoCo warns{when}: {message}", ""
+            return f"MuJoCo warns{time}: {message}", ""
         case "diverged":
             help = (
                 "try a smaller timestep, another integrator, or a narrower range; if it is to "
-                f"diverge, claim so: {_written(lab, 'diverges')}"
+                f"diverge, claim so: {_how_to_write(lab, 'diverges')}"
             )
-            return f"the simulation diverges{when}: {message}", help
+            return f"the simulation diverges{time}: {message}", help
         case "deep":
             help = (
                 "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts "
                 "(`solref`), or a narrower range; if they are to lie so, say so: "
-                f"{_written(lab, 'deep')}"
+                f"{_how_to_write(lab, 'deep')}"
             )
-            return f"bodies lie deep in each other{when}: {message}", help
+            return f"bodies lie deep in each other{time}: {message}", help
         case "expect":
             expr = lab.fields.expect[int(failure.entry[1])].expr
-            what = f"`{_short(expr)}` {message}" if expr is not None else message
-            return f"the claim does not hold: {what}", ""
+            reason = f"`{_shorten(expr)}` {message}" if expr is not None else message
+            return f"the claim does not hold: {reason}", ""
         case "goal" if failure.entry[-1] == "log":
             help = "reach it in the preview (`coursebuild serve`), and take what `Copy log` gives"
             return f"the log does not reach the goal {message}", help
         case "goal":
             return f"the goal is reached {message}", "ask for something that has to be done"
         case "timeout" if message == "did not finish in time":
-            return f"trying {name} takes too long", f"run less of it: {_written(lab, 'seconds')}"
+            return (
+                f"trying {name} takes too long",
+                f"run less of it: {_how_to_write(lab, 'seconds')}",
+            )
         case "timeout":
             return f"{name} {message}", "look for a loop or a list without an end"
         case "shared":
@@ -222,22 +227,22 @@ def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
                 if lab.kind == MJCF and "opening file" in message
                 else ""
             )
-            said = readable_error(message.replace("MuJoCo Error: ", ""))
-            return f"the browser's engine says: {said}", help
+            error = readable_error(message.replace("MuJoCo Error: ", ""))
+            return f"the browser's engine says: {error}", help
         case _:
             return message, ""
 
 
 def _reset(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """A reset after the main run that led to another state than that of the start."""
-    found = trial.main["resetDiffers"] if trial.main is not None else None
-    if found is None:
+    """Report a reset after the main run that did not lead back to the start."""
+    difference = trial.main["resetDiffers"] if trial.main is not None else None
+    if difference is None:
         return
-    entry = found["entry"]
-    message = f"a reset does not lead back to the start: `{found['what']}` differs"
+    entry = difference["entry"]
+    message = f"a reset does not lead back to the start: `{difference['what']}` differs"
     match entry:
         case ("controls", int(i), *_) if not getattr(lab.fields.controls[i], "init", False):
-            help = f'{_named(lab, entry)} is not applied again; give it `"init": true`'
+            help = f'{_entry_name(lab, entry)} is not applied again; give it `"init": true`'
         case _:
             help = (
                 "chance from `lib.random()` begins anew with each reset, from `Math.random()` it "
@@ -248,23 +253,23 @@ def _reset(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 
 
 def _parity(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
-    """A difference between the engines that is larger than allowed."""
-    if parity.within(lab.verify.rtol):
+    """Report a difference between the engines that is larger than allowed."""
+    if parity.is_within_tolerance(lab.verify.rtol):
         return
     time = (parity.first or 0) * parity.timestep
-    allowed = parity.allowed(lab.verify.rtol)
+    tolerance = parity.tolerance(lab.verify.rtol)
     yield diagnose(
         "lab-parity",
         lab.place(("verify", "rtol")),
         f"the browser's engine and native MuJoCo differ from step {parity.first} on "
-        f"(t = {time:.6g} s), by up to {parity.relative:.1e} of the state, where {allowed:g} is "
+        f"(t = {time:.6g} s), by up to {parity.relative:.1e} of the state, where {tolerance:g} is "
         "allowed",
         help="a controller that changes `model` while it runs cannot be repeated natively; where "
-        f"the motion is chaotic say how far it may part: {_written(lab, 'parity')}",
+        f"the motion is chaotic say how far it may part: {_how_to_write(lab, 'parity')}",
     )
 
 
-_WRITTEN = {
+_SPELLINGS = {
     "diverges": ('"expect": [{"t": …, "diverges": true}]', "diverges=…"),
     "deep": ('"verify": {"deep": true}', "deep"),
     "seconds": ('"verify": {"seconds": …}', "seconds=…"),
@@ -272,11 +277,11 @@ _WRITTEN = {
 }
 
 
-def _written(lab: Lab, what: str) -> str:
-    """How a lab says something: in its JSON, or by keys of its fence."""
-    return f"`{_WRITTEN[what][lab.kind == MJCF]}`"
+def _how_to_write(lab: Lab, setting: str) -> str:
+    """Show how a lab's author writes a setting: in the JSON, or as keys of the fence."""
+    return f"`{_SPELLINGS[setting][lab.kind == MJCF]}`"
 
 
-def _short(code: str) -> str:
+def _shorten(code: str) -> str:
     line = " ".join(code.split())
     return line if len(line) <= 60 else line[:59] + "…"

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def export(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
-    """The files of the package; without quizzes installed it says what is missing."""
+    """Yield the files of the package."""
     from coursebuild.features.qti.package import package_files
 
     return package_files(context)

@@ -1,10 +1,11 @@
-"""Drawn HTML as the part of XHTML that QTI 2.1 allows.
+"""Turns the HTML of pages into the part of XHTML that QTI 2.1 allows.
 
-Entry points: `Flow(link, picture)`, and its `blocks` and `line`; `lost` says what was not kept.
+Entry points: `Flow(link, picture)`, and its `blocks` and `line`; `losses` says what was not kept.
 
 QTI 2.1 has the text of XHTML (information model, chapter "Content Model"), pictures, links, tables
-and MathML, and nothing that moves, plays or asks. An element that it does not have is opened where
-only its content counts (a box, a mark of highlighted code), or left out and told in `lost`.
+and MathML, and nothing that moves, plays or asks. Of an element that it does not
+have, only the content is kept (of a box, of a mark of highlighted code), or the element is left out
+and listed in `losses`.
 """
 
 from __future__ import annotations
@@ -32,84 +33,87 @@ _NEVER_IN_PRE = frozenset("big small sub sup".split())
 _HEADINGS = frozenset("h1 h2 h3 h4 h5 h6 address".split())
 _EMPHASIS = frozenset("ins mark u".split())
 _STRUCK = frozenset("del s strike".split())
-_GONE = frozenset("area base col dialog link meta param script source style template title".split())
-"""What shows nothing by itself."""
+_HIDDEN = frozenset(
+    "area base col dialog link meta param script source style template title".split()
+)
+"""Elements that show nothing by themselves."""
 _ACTIVE = frozenset(
     "applet audio button canvas datalist embed iframe input keygen map meter object optgroup option"
     " output progress select svg textarea track video".split()
 )
 _ANCHOR = "anchor"
-"""The class of links of headings to themselves, which a page adds for its own readers."""
+"""The class of a heading's link to itself, which only a page needs."""
 _NUMBER = re.compile(r"[0-9]{1,5}")
 
 
 class Flow:
-    """Brings texts into the package, one after the other."""
+    """Converts texts for the package, one after the other."""
 
     def __init__(
         self, link: Callable[[str], str | None], picture: Callable[[str], str | None]
     ) -> None:
-        """`link` and `picture` say where an address on the drawn page leads in the package.
+        """`link` and `picture` turn an address on the page into one in the package.
 
-        They give `None` where it leads nowhere.
+        They return `None` if there is none.
         """
         self._link_of = link
         self._picture_of = picture
-        self.lost: list[str] = []
-        """What was not kept, a sentence each, without repeats."""
+        self.losses: list[str] = []
+        """What was not kept, one sentence each, without repeats."""
 
     def blocks(self, html: str) -> list[Element]:
-        """Blocks: what an item's body, an option or a feedback may hold."""
-        return list(self._blocks(_joined(parse_html(html))))
+        """Convert blocks, which an item's body, an option or a feedback may hold."""
+        return list(self._blocks(_join_formulas(parse_html(html))))
 
     def line(self, html: str) -> list[Element | str]:
-        """A line of text: what a paragraph may hold."""
-        return list(self._line(_joined(parse_html(html))))
+        """Convert a line of text, which a paragraph may hold."""
+        return list(self._line(_join_formulas(parse_html(html))))
 
-    def _lose(self, what: str) -> None:
-        if what not in self.lost:
-            self.lost.append(what)
+    def lose(self, loss: str) -> None:
+        """Note what is not kept."""
+        if loss not in self.losses:
+            self.losses.append(loss)
 
     # --- blocks
 
     def _blocks(self, content: Iterable[HtmlContent]) -> Iterator[Element]:
-        """Blocks, with a paragraph around each run of lines between them."""
+        """Convert blocks, and put a paragraph around each run of lines between them."""
         run: list[HtmlContent] = []
         for child in content:
             if isinstance(child, HtmlElement) and _is_block(child):
-                yield from self._with_text("p", run)
+                yield from self._text_block("p", run)
                 run = []
                 yield from self._block(child)
             else:
                 run.append(child)
-        yield from self._with_text("p", run)
+        yield from self._text_block("p", run)
 
-    def _with_text(self, name: str, run: Sequence[HtmlContent]) -> Iterator[Element]:
-        """A block of one line, where there is something in it."""
-        made = element(name, {}, *self._line(run))
-        if len(made) or (made.text or "").strip():
-            yield made
+    def _text_block(self, name: str, content: Sequence[HtmlContent]) -> Iterator[Element]:
+        """Yield a block that holds one line, unless the line is empty."""
+        block = element(name, {}, *self._line(content))
+        if len(block) or (block.text or "").strip():
+            yield block
 
     def _block(self, node: HtmlElement) -> Iterator[Element]:
         name = node.name
         if name in _HEADINGS:
-            yield from self._with_text(name, node.children)
+            yield from self._text_block(name, node.children)
         elif name == "pre":
-            made = element("pre", {}, *self._line(node.children, pre=True))
-            _trim(made)
-            yield made
+            code = element("pre", {}, *self._line(node.children, pre=True))
+            _trim_line_ends(code)
+            yield code
         elif name == "hr":
             yield element("hr")
         elif name in ("ul", "ol"):
             yield from self._list(node)
         elif name == "dl":
-            parts = [self._holder(one.name, one) for one in node.nearest("dt", "dd")]
+            parts = [self._container(part.name, part) for part in node.nearest("dt", "dd")]
             yield from [element("dl", {}, *parts)] if parts else ()
         elif name == "table":
             yield from self._table(node)
         else:
             if name == "details":
-                self._lose("`<details>` is open")
+                self.lose("`<details>` is open")
             inner = list(self._blocks(node.children))
             if name == "blockquote" and inner:
                 yield element("blockquote", {}, *inner)
@@ -118,27 +122,27 @@ class Flow:
 
     def _list(self, node: HtmlElement) -> Iterator[Element]:
         if node.attributes.get("start", "1") != "1" or "reversed" in node.attributes:
-            self._lose("a numbered list counts from 1")
+            self.lose("a numbered list counts from 1")
         items = [
-            self._holder("li", one if _is_item(one) else HtmlElement("li", {}, [one]))
-            for one in node.children
-            if not isinstance(one, str) or one.strip()
+            self._container("li", child if _is_item(child) else HtmlElement("li", {}, [child]))
+            for child in node.children
+            if not isinstance(child, str) or child.strip()
         ]
         yield from [element(node.name, {}, *items)] if items else ()
 
-    def _holder(
+    def _container(
         self, name: str, node: HtmlElement, attributes: dict[str, str] | None = None
     ) -> Element:
-        """What may hold lines as well as blocks; a term holds a line alone."""
-        made = element(name, attributes)
+        """Make an element that may hold blocks or a line; a term (`dt`) can only hold a line."""
+        container = element(name, attributes)
         if name != "dt" and any(map(_is_block, node.elements)):
-            add(made, *self._blocks(node.children))
+            add(container, *self._blocks(node.children))
         else:
-            add(made, *self._line(node.children))
-        return made
+            add(container, *self._line(node.children))
+        return container
 
     def _table(self, node: HtmlElement) -> Iterator[Element]:
-        """A table with one head at most and a body, which QTI requires; captions stand before."""
+        """Make a table with one head at most and a body, which QTI requires; captions go first."""
         head: list[Element] = []
         body: list[Element] = []
         for child in sorted(node.elements, key=lambda child: child.name == "tfoot"):
@@ -156,13 +160,14 @@ class Flow:
             yield element("table", {}, top, element("tbody", {}, *body))
 
     def _cell(self, cell: HtmlElement) -> Element:
-        kept = {k: v for k, v in cell.attributes.items() if k in ("colspan", "rowspan")}
-        kept = {key: value for key, value in kept.items() if _NUMBER.fullmatch(value)}
+        attributes = _numbers(cell, ("colspan", "rowspan"))
         scope = cell.attributes.get("scope", "")
         if scope in ("row", "col", "rowgroup", "colgroup"):
-            kept["scope"] = scope
-        aligned = [c for c in sorted(cell.classes) if c in ("align-center", "align-right")]
-        return self._holder(cell.name, cell, kept | ({"class": aligned[0]} if aligned else {}))
+            attributes["scope"] = scope
+        alignments = [c for c in sorted(cell.classes) if c in ("align-center", "align-right")]
+        if alignments:
+            attributes["class"] = alignments[0]
+        return self._container(cell.name, cell, attributes)
 
     # --- lines
 
@@ -177,7 +182,7 @@ class Flow:
 
     def _inline(self, node: HtmlElement, pre: bool) -> Iterator[Element | str]:
         name, inner = node.name, node.children
-        if name in _GONE or _ANCHOR in node.classes:
+        if name in _HIDDEN or _ANCHOR in node.classes:
             return
         if name == "math":
             yield mathml(node)
@@ -193,14 +198,14 @@ class Flow:
         elif name == "a":
             yield from self._link(node, pre)
         elif name in _STRUCK:
-            self._lose("crossed-out text is marked by a class, which some platforms do not show")
+            self.lose("crossed-out text is marked by a class, which some platforms do not show")
             yield element("span", {"class": STRUCK}, *self._line(inner, pre=pre))
         elif name in _EMPHASIS:
             yield element("em", {}, *self._line(inner, pre=pre))
         elif name == "input" and node.attributes.get("type", "").lower() == "checkbox":
             yield "☑" if "checked" in node.attributes else "☐"
         elif name in _ACTIVE:
-            self._lose(f"`<{name}>` has no place in QTI and is left out")
+            self.lose(f"`<{name}>` has no place in QTI and is left out")
         else:
             yield from self._line(inner, pre=pre)
 
@@ -208,10 +213,9 @@ class Flow:
         source, alt = node.attributes.get("src", ""), node.attributes.get("alt", "")
         place = self._picture_of(source)
         if place is None:
-            self._lose(f"the picture `{source}` is replaced by its words")
+            self.lose(f"the picture `{source}` is replaced by its words")
             return alt
-        size = {k: v for k, v in node.attributes.items() if k in ("height", "width")}
-        size = {key: value for key, value in size.items() if _NUMBER.fullmatch(value)}
+        size = _numbers(node, ("height", "width"))
         return element("img", {"src": place, "alt": alt} | dict(sorted(size.items())))
 
     def _link(self, node: HtmlElement, pre: bool) -> Iterator[Element | str]:
@@ -222,48 +226,54 @@ class Flow:
             yield element("a", {"href": place}, *inner)
             return
         if address:
-            why = "" if urlsplit(address).scheme else ", as the course has no `base_url`"
-            self._lose(f"the link to `{address}` is text{why}")
+            reason = "" if urlsplit(address).scheme else ", as the course has no `base_url`"
+            self.lose(f"the link to `{address}` is text{reason}")
         yield from inner
 
 
-def _trim(made: Element) -> None:
-    """Take away the line ends at the end of a block of code."""
-    while len(made) and not (made[-1].tail or "").strip("\n"):
-        made[-1].tail = None
-        made = made[-1]
-    if len(made):
-        made[-1].tail = (made[-1].tail or "").rstrip("\n")
+def _numbers(node: HtmlElement, names: Sequence[str]) -> dict[str, str]:
+    """Return those of some attributes of an element that are whole numbers."""
+    attributes = node.attributes.items()
+    return {k: value for k, value in attributes if k in names and _NUMBER.fullmatch(value)}
+
+
+def _trim_line_ends(code: Element) -> None:
+    """Remove the line ends at the end of a block of code."""
+    while len(code) and not (code[-1].tail or "").strip("\n"):
+        code[-1].tail = None
+        code = code[-1]
+    if len(code):
+        code[-1].tail = (code[-1].tail or "").rstrip("\n")
     else:
-        made.text = (made.text or "").rstrip("\n")
+        code.text = (code.text or "").rstrip("\n")
 
 
 def _is_block(node: HtmlElement) -> bool:
     """Whether an element is, or holds, a block."""
-    if node.name == "math" or node.name in _ACTIVE or node.name in _GONE:
+    if node.name == "math" or node.name in _ACTIVE or node.name in _HIDDEN:
         return False
     return node.name in _BLOCKS or any(map(_is_block, node.elements))
 
 
-def _joined(content: Iterable[HtmlContent]) -> list[HtmlContent]:
-    """Content in which formulas that were cut so that a line may break in them are whole again."""
-    made: list[HtmlContent] = []
-    for child in _without_spans(content):
-        last = made[-1] if made else None
+def _join_formulas(content: Iterable[HtmlContent]) -> list[HtmlContent]:
+    """Join the parts of formulas that a page cuts so that a line may break in them."""
+    nodes: list[HtmlContent] = []
+    for child in _unwrap_spans(content):
+        last = nodes[-1] if nodes else None
         if isinstance(child, HtmlElement):
-            child = HtmlElement(child.name, child.attributes, _joined(child.children))
-            if _is_in_line(child) and isinstance(last, HtmlElement) and _is_in_line(last):
-                made[-1] = HtmlElement("math", last.attributes, [*last.children, *child.children])
+            child = HtmlElement(child.name, child.attributes, _join_formulas(child.children))
+            if _is_inline_math(child) and isinstance(last, HtmlElement) and _is_inline_math(last):
+                nodes[-1] = HtmlElement("math", last.attributes, [*last.children, *child.children])
                 continue
-        made.append(child)
-    return made
+        nodes.append(child)
+    return nodes
 
 
-def _without_spans(content: Iterable[HtmlContent]) -> Iterator[HtmlContent]:
-    """Content without boxes that say nothing by themselves."""
+def _unwrap_spans(content: Iterable[HtmlContent]) -> Iterator[HtmlContent]:
+    """Replace each `span`, which says nothing by itself, by its children."""
     for child in content:
         if isinstance(child, HtmlElement) and child.name == "span":
-            yield from _without_spans(child.children)
+            yield from _unwrap_spans(child.children)
         else:
             yield child
 
@@ -272,6 +282,6 @@ def _is_item(content: HtmlContent) -> TypeGuard[HtmlElement]:
     return isinstance(content, HtmlElement) and content.name == "li"
 
 
-def _is_in_line(node: HtmlElement) -> bool:
+def _is_inline_math(node: HtmlElement) -> bool:
     """Whether an element is a formula in a line of text."""
     return node.name == "math" and node.attributes.get("display") != "block"

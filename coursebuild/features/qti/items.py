@@ -2,7 +2,7 @@
 
 Entry point: `quiz_items(page, quiz, course)`.
 
-A quiz's texts are drawn as its page draws them, and brought into what QTI allows (`flow`). Names
+The texts of a quiz are drawn as on its page, and converted to what QTI allows (`flow`). Names
 are those of the IMS QTI 2.1 Assessment Test, Section, and Item Information Model, 2012; the
 template `item.jinja` holds them. Response processing says which feedback is shown: that of each
 option that was chosen, and the explanation.
@@ -38,11 +38,11 @@ from coursebuild.features.quiz.page import letter, output_line, shuffle, unit_ht
 STYLE = "style.css"
 _TEMPLATE = Path(__file__).with_name("item.jinja")
 _NAME = 32
-"""Characters that an identifier should have at most, for systems that keep no more."""
+"""The most characters of an identifier: some systems keep no more."""
 
 
 class QuestionItem(Struct, frozen=True):
-    """A question as an item."""
+    """A question, written as an item."""
 
     identifier: str
     data: bytes
@@ -51,22 +51,22 @@ class QuestionItem(Struct, frozen=True):
 
 
 class QuizItems(Struct, frozen=True):
-    """A quiz as items."""
+    """A quiz, written as items."""
 
     identifier: str
     title: str
     items: tuple[QuestionItem, ...]
     losses: tuple[tuple[Span, str], ...]
-    """Something of a question that an item cannot hold, or why there is no item."""
+    """What an item cannot hold of its question, or why a question has no item."""
 
 
 def quiz_items(page: PageContext, quiz: Quiz, course: Course) -> QuizItems:
-    """A quiz as items, and what could not be kept."""
+    """Write a quiz as items."""
     items, losses = [], []
     for number, question in enumerate(quiz.questions, 1):
         writer = _Writer(page, quiz, number, course)
         item = writer.item(question)
-        losses += [(question.span, loss) for loss in writer.flow.lost]
+        losses += [(question.span, loss) for loss in writer.flow.losses]
         items += [item] if item is not None else []
     name = identifier("quiz.", quiz.id, most=_NAME)
     return QuizItems(name, quiz.title or quiz.id, tuple(items), tuple(losses))
@@ -85,7 +85,7 @@ class _Writer:
         self.flow = Flow(self._link, self._picture)
 
     def item(self, question: AnyQuestion) -> QuestionItem | None:
-        """The item, or nothing where the question has no answer."""
+        """Write the item; `None` if the question has no answer."""
         response = self._response(question)
         if response is None:
             return None
@@ -104,22 +104,23 @@ class _Writer:
             ],
             "feedback": [],
         }
-        data = render_xml(_TEMPLATE, **values | response | {"explanation": self._said(question)})
+        values |= response | {"explanation": self._explanation(question)}
+        data = render_xml(_TEMPLATE, **values)
         return QuestionItem(name, data, tuple(self.pictures))
 
-    def _said(self, question: AnyQuestion) -> Markup:
-        """What everyone is told in the end."""
-        said = self._reference(question) if isinstance(question, OpenQuestion) else Markup()
-        said += self._blocks(question.explain)
+    def _explanation(self, question: AnyQuestion) -> Markup:
+        """What every learner reads after an answer, right or wrong."""
+        html = self._reference(question) if isinstance(question, OpenQuestion) else Markup()
+        html += self._blocks(question.explain)
         if isinstance(question, ChoiceQuestion) and question.sim is not None:
             address = self._link(f"#{self.quiz.anchor(question.key)}")
             if address is None:
-                self.flow.lost.append("its simulation is on its page alone, and left out")
+                self.flow.lose("its simulation is on its page alone, and left out")
             else:
                 link = element("a", {"href": address}, self.words("package.simulation"))
-                said += markup([element("p", {}, link)])
-                self.flow.lost.append("its simulation is on its page alone, and the item links it")
-        return said
+                html += markup([element("p", {}, link)])
+                self.flow.lose("its simulation is on its page alone, and the item links it")
+        return html
 
     # --- texts
 
@@ -130,7 +131,7 @@ class _Writer:
         return markup(self.flow.line(self.page.inlines(inlines)))
 
     def _link(self, address: str) -> str | None:
-        """An address on the page for someone who has the package alone, if there is one."""
+        """Turn an address on the page into one for the package; `None` if there is none."""
         parts = urlsplit(address)
         if parts.scheme or parts.netloc:
             return address if parts.scheme in ("http", "https", "mailto") else None
@@ -141,7 +142,7 @@ class _Writer:
         return f"{self.course.base_url.rstrip('/')}/{urls.encode(path)}{rest}"
 
     def _picture(self, address: str) -> str | None:
-        """Where the picture at an address on the page is in the package, if it can be there."""
+        """Turn a picture's address on the page into one in the package; `None` if there is none."""
         parts = urlsplit(address)
         if parts.scheme == "data":
             return address
@@ -158,7 +159,7 @@ class _Writer:
     # --- kinds of questions
 
     def _response(self, question: AnyQuestion) -> dict[str, Any] | None:
-        """What differs between the kinds: the response, the right ones, how it is asked for."""
+        """The values of the template that depend on the kind; `None` if the answer is unknown."""
         match question:
             case ChoiceQuestion():
                 options = [(letter(index), option) for index, option in enumerate(question.options)]
@@ -169,7 +170,7 @@ class _Writer:
                     "right": [letter(index) for index in question.answers],
                     "task": self.words("package.choose_all") if question.several else "",
                     "options": [(name, self._line(option.text)) for name, option in options],
-                    "feedback": [(name, self._blocks(said)) for name, said in feedback],
+                    "feedback": [(name, self._blocks(blocks)) for name, blocks in feedback],
                 }
             case NumericQuestion():
                 unit = self.flow.line(unit_html(question.unit)) if question.unit else []
@@ -189,14 +190,14 @@ class _Writer:
                     "cardinality": "single", "base": "string", "right": [], "reference": reference
                 }  # fmt: skip
             case OrderQuestion():
-                shown = shuffle(len(question.items), f"{self.quiz.id}/{self.number}")
-                names = {index: letter(place) for place, index in enumerate(shown)}
+                order = shuffle(len(question.items), f"{self.quiz.id}/{self.number}")
+                names = {index: letter(place) for place, index in enumerate(order)}
                 return {
                     "cardinality": "ordered",
                     "base": "identifier",
                     "right": [names[index] for index in range(len(names))],
                     "task": self.words("package.order"),
-                    "options": [(names[i], self._line(question.items[i])) for i in shown],
+                    "options": [(names[i], self._line(question.items[i])) for i in order],
                 }
             case _:
                 assert_never(question)
@@ -204,7 +205,7 @@ class _Writer:
     def _output(self, question: OutputQuestion) -> dict[str, Any] | None:
         answer = output_line(self.page, question)
         if answer is None:
-            self.flow.lost.append("it is left out: its script was not run, so nobody knows the key")
+            self.flow.lose("it is left out: its script was not run, so nobody knows the key")
             return None
         return {
             "cardinality": "single",
@@ -221,5 +222,5 @@ class _Writer:
 
 
 def _double(value: float) -> str:
-    """As XML Schema writes a number, digit by digit; zero has no sign."""
+    """Write a number as XML Schema does, with all its digits; zero has no sign."""
     return repr(float(value) + 0.0)

@@ -2,8 +2,8 @@
 
 Entry point: `mathml(node)`, from the tree of a drawn formula.
 
-What browsers draw from is MathML Core with classes and styles of the site. What MathML 2.0 has no
-name for is left out where it only says how something looks, and its content stays.
+Pages hold MathML Core with classes and styles of the site. Elements and attributes that MathML 2.0
+does not have are left out, and their content stays.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _ATTRIBUTES = {
     "mtd": "rowspan columnspan rowalign columnalign",
 }
 _ALIGNED = {"tml-left": "left", "tml-right": "right"}
-"""Columns that the site's style sheet aligns."""
+"""Classes of columns that the site's style sheet aligns."""
 _EMPTY = frozenset({"mspace", "mprescripts", "none"})
 _WORDS = frozenset({"mi", "mn", "mo", "mtext", "ms"})
 _COLOUR = re.compile(r"(?:^|;)\s*color\s*:\s*(#[0-9a-fA-F]{3,6}|[a-zA-Z]+)\s*(?:;|$)")
@@ -56,46 +56,48 @@ _LENGTH = re.compile(r"[+-]?\d*\.?\d+(?:%|em|ex|px|in|cm|mm|pt|pc)?|\w+mathspace
 
 
 def mathml(node: HtmlElement) -> Element:
-    """A formula, with the prefix `m`."""
-    made = element("m:math", _kept(node, "math"))
-    _fill(made, node, "math")
-    return made
+    """Convert a formula; its elements have the prefix `m`."""
+    return _convert_as(node, "math")
 
 
-def _made(node: HtmlElement) -> Element:
+def _convert(node: HtmlElement) -> Element:
     name = node.name if node.name in _ATTRIBUTES and node.name != "math" else "mrow"
-    made = element(f"m:{name}", _kept(node, name))
-    _fill(made, node, name)
+    formula = _convert_as(node, name)
     if "border:" in node.attributes.get("style", ""):
-        return element("m:menclose", {"notation": "box"}, made)
-    return made
+        return element("m:menclose", {"notation": "box"}, formula)
+    return formula
 
 
-def _fill(made: Element, node: HtmlElement, name: str) -> None:
+def _convert_as(node: HtmlElement, name: str) -> Element:
+    """Make an element of this name with the attributes and the content of a node."""
+    formula = element(f"m:{name}", _attributes(node, name))
     for child in node.children:
         if isinstance(child, str):
             if name in _WORDS:
-                add(made, child)
+                add(formula, child)
         elif child.name == "annotation" or name in _EMPTY:
             continue
         elif child.name == "semantics":
-            add(made, *(_made(c) for c in child.elements if not c.name.startswith("annotation")))
+            parts = (c for c in child.elements if not c.name.startswith("annotation"))
+            add(formula, *map(_convert, parts))
         elif name not in _WORDS:
-            add(made, _made(child))
+            add(formula, _convert(child))
         else:
-            add(made, child.text)
+            add(formula, child.text)
+    return formula
 
 
-def _kept(node: HtmlElement, name: str) -> dict[str, str]:
-    allowed = _ATTRIBUTES[name].split()
-    kept = {key: value for key, value in node.attributes.items() if key in allowed}
+def _attributes(node: HtmlElement, name: str) -> dict[str, str]:
+    """Return the attributes of a node that MathML 2.0 has for an element of this name."""
+    names = _ATTRIBUTES[name].split()
+    attributes = {key: value for key, value in node.attributes.items() if key in names}
     if name == "mtd":
         for mark in sorted(node.classes & _ALIGNED.keys()):
-            kept["columnalign"] = _ALIGNED[mark]
+            attributes["columnalign"] = _ALIGNED[mark]
     colour = _COLOUR.search(node.attributes.get("style", ""))
-    if colour is not None and "mathcolor" in allowed:
-        kept["mathcolor"] = colour[1]
+    if colour is not None and "mathcolor" in names:
+        attributes["mathcolor"] = colour[1]
     for key in ("width", "height", "depth", "lspace", "rspace"):
-        if key in kept and not _LENGTH.fullmatch(kept[key]):
-            del kept[key]
-    return dict(sorted(kept.items()))
+        if key in attributes and not _LENGTH.fullmatch(attributes[key]):
+            del attributes[key]
+    return dict(sorted(attributes.items()))

@@ -29,7 +29,7 @@ _STYLE_SHEET = f"""\
 
 
 def package_files(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
-    """The files, none where no question has an answer; and what items cannot hold."""
+    """Yield the files, none if no question has an answer, and report what items cannot hold."""
     quizzes: list[QuizItems] = []
     for quiz in _quizzes(context):
         for span, loss in quiz.losses:
@@ -42,9 +42,9 @@ def package_files(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
             for item in quiz.items:
                 yield OutputFile(f"items/{item.identifier}.xml", item.data)
     if quizzes:
-        shown = {path for quiz in quizzes for item in quiz.items for path in item.pictures}
+        pictures = {path for quiz in quizzes for item in quiz.items for path in item.pictures}
         for path in context.course.files:
-            if urls.file_path(path) in shown:
+            if urls.file_path(path) in pictures:
                 read = functools.partial(context.read, path)
                 yield CachedFile(urls.file_path(path), "", read)
         yield OutputFile(STYLE, _STYLE_SHEET.encode())
@@ -59,7 +59,7 @@ def package_files(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
 
 
 def _quizzes(context: ExportContext) -> Iterator[QuizItems]:
-    """All quizzes, in the order of the course."""
+    """Write all quizzes, in the order of the course."""
     for owner in context.course.owners:
         summary = owner.document
         if summary and any(isinstance(block, Quiz) for block in document_blocks(summary)):

@@ -4,9 +4,9 @@ Entry point: `package_files(context)`.
 
 A platform opens `sco/LESSON.html`, which shows the page of the lesson in a frame and speaks to the
 platform for it (`site/js/scorm.js`). So one visit lasts while the learner follows links from page
-to page, and the pages are those of the site, byte for byte. Each written lesson is a SCO; all files
-that are not one lesson's own are one asset that the SCOs depend on (SCORM 1.2 Content Aggregation
-Model, section 2.3). A planned lesson has nothing to open, and is none.
+to page, and the pages are those of the site, byte for byte. Each written lesson is a SCO, and the
+files that belong to no single lesson are one asset on which the SCOs depend (SCORM 1.2 Content
+Aggregation Model, section 2.3). A planned lesson has nothing to open, and is no SCO.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from coursebuild.core.pages.xml import identifier, render_xml
 
 _COPIES = (".br", ".gz")
 _MACHINES = (urls.ROBOTS, urls.SITEMAP, urls.NOT_FOUND, urls.WORKER, urls.FILES)
-"""Files for servers and crawlers, and what keeps a site without a network: a platform's pages are
-not this site's to keep."""
+"""Files for servers and crawlers, and the service worker's, which could not cache a platform's
+pages."""
 
 
 def package_files(context: ExportContext) -> Iterator[SiteFile]:
-    """The files of the site, a page that opens each lesson, and the manifest."""
+    """Yield the files of the site, a page that opens each lesson, and the manifest."""
     files: list[SiteFile] = [file for path, file in context.site().items() if _is_packed(path)]
     script = page_script(context.assets.file("js/scorm.js"))
     files.append(OutputFile("sco/scorm.css", context.assets.file("css/scorm.css")))
     files.append(OutputFile("sco/scorm.js", script))
     yield from files
-    for lesson in _written(context.course.lessons):
+    for lesson in _written_lessons(context.course.lessons):
         yield OutputFile(_start_path(lesson), _start_page(context, lesson))
     manifest = _manifest(context.course, sorted(file.path for file in files))
     yield OutputFile("imsmanifest.xml", manifest)
@@ -46,7 +46,7 @@ def _is_packed(path: str) -> bool:
     return path not in _MACHINES and not (path.startswith("assets/") and path.endswith(_COPIES))
 
 
-def _written(lessons: Iterable[Lesson]) -> list[Lesson]:
+def _written_lessons(lessons: Iterable[Lesson]) -> list[Lesson]:
     return [lesson for lesson in lessons if lesson.document is not None]
 
 
@@ -70,19 +70,20 @@ def _start_page(context: ExportContext, lesson: Lesson) -> bytes:
 
 
 def _manifest(course: Course, paths: Iterable[str]) -> bytes:
-    """What there is to open, and what each of it needs, within the lengths that IMS allows."""
-    own = {f"lessons/{x.id}-{x.slug}": (x, [_start_path(x)]) for x in _written(course.lessons)}
+    """Write the manifest: the lessons, and the files of each, within the lengths IMS allows."""
+    lessons = _written_lessons(course.lessons)
+    lesson_files = {f"lessons/{x.id}-{x.slug}": (x, [_start_path(x)]) for x in lessons}
     shared: list[str] = []
     for path in paths:
-        lesson = own.get(path.rpartition(".")[0])
+        lesson = lesson_files.get(path.rpartition(".")[0])
         (shared if lesson is None else lesson[1]).append(path)
-    levels = ((level, _written(level.lessons)) for level in course.levels)
+    levels = ((level, _written_lessons(level.lessons)) for level in course.levels)
     return render_xml(
         Path(__file__).with_name("manifest.jinja"),
         course=course,
         language=course.language or "en",
         levels=[(level, lessons) for level, lessons in levels if lessons],
-        own=own.values(),
+        lesson_files=lesson_files.values(),
         shared=shared,
         identifier=identifier,
         encode=urls.encode,

@@ -15,9 +15,9 @@ from support.lab_values import Bench, make_lab
 Form: TypeAlias = Literal["statements", "setter", "expression", "target"]
 
 
-def mistakes(bench: Bench, given: list[tuple[Form, str]]) -> list[str | None]:
-    """Why pieces of code cannot be part of a lab."""
-    return bench.browser.mistakes([LabCode(("x",), form, code) for form, code in given])
+def check_code(bench: Bench, pieces: list[tuple[Form, str]]) -> list[str | None]:
+    """Say of each piece of code why it cannot be part of a lab; `None` if it can."""
+    return bench.browser.check_code([LabCode(("x",), form, code) for form, code in pieces])
 
 
 BREAKING_OUT: list[tuple[Form, str]] = [
@@ -80,10 +80,14 @@ FINE: list[tuple[Form, str]] = [
 
 @pytest.mark.engine
 def test_only_what_is_a_piece_by_itself_is_taken(bench: Bench) -> None:
-    told = mistakes(bench, BREAKING_OUT)
-    assert [one for one, why in zip(BREAKING_OUT, told, strict=True) if why is None] == []
-    told = mistakes(bench, FINE)
-    assert [one for one, why in zip(FINE, told, strict=True) if why is not None] == []
+    messages = check_code(bench, BREAKING_OUT)
+    assert [
+        piece for piece, message in zip(BREAKING_OUT, messages, strict=True) if message is None
+    ] == []
+    messages = check_code(bench, FINE)
+    assert [
+        piece for piece, message in zip(FINE, messages, strict=True) if message is not None
+    ] == []
 
 
 @pytest.mark.engine
@@ -95,7 +99,7 @@ def test_no_piece_is_run_when_it_is_looked_at(bench: Bench) -> None:
         ("target", f"ctx[{mark}]"),
         ("statements", "if (globalThis.ran) throw 'it ran'"),
     ]
-    assert mistakes(bench, runs) == [None] * len(runs)
+    assert check_code(bench, runs) == [None] * len(runs)
     assert bench.trial(make_lab(setup=runs[-1][1], verify={"seconds": 0.01}))["failures"] == []
 
 
@@ -140,9 +144,9 @@ def test_a_module_and_its_literal_do_what_its_pieces_say_and_are_strict(tmp_path
     console.log(JSON.stringify([use(m), use({module.literal}), thrown]))
     """
     (tmp_path / "main.mjs").write_text(main, encoding="utf-8")
-    done = subprocess.run(["node", "main.mjs"], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout) == [USED, USED, "ReferenceError"]
+    process = subprocess.run(["node", "main.mjs"], cwd=tmp_path, capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
+    assert json.loads(process.stdout) == [USED, USED, "ReferenceError"]
 
 
 def test_data_is_json_without_the_code() -> None:

@@ -1,4 +1,4 @@
-"""The browser's engine in this process: what hangs, eats memory or breaks it is told, and goes."""
+"""The browser's engine in this process: code that hangs, eats memory or breaks it is reported."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
         yield bench
 
 
-def told(reply: dict[str, Any]) -> list[tuple[Any, str, str]]:
+def failures_of(reply: dict[str, Any]) -> list[tuple[Any, str, str]]:
     return [(tuple(f["entry"]), f["kind"], f.get("message", "")) for f in reply["failures"]]
 
 
@@ -47,9 +47,9 @@ def test_endless_loop_is_told_at_its_entry_and_the_next_lab_is_tried(bench: Benc
     ]
     for fields, entry in labs:
         reply = bench.trial(make_lab(verify={"seconds": 0.02}, **fields), seconds=0.5)
-        assert told(reply) == [(entry, "timeout", "ran for more than 0.5 s")]
+        assert failures_of(reply) == [(entry, "timeout", "ran for more than 0.5 s")]
         assert (reply["main"], reply["version"]) == (None, engine_version())
-    assert told(bench.trial(make_lab())) == []
+    assert failures_of(bench.trial(make_lab())) == []
 
 
 def test_code_that_never_returns_is_told_long_before_a_lab_that_simulates_much(
@@ -59,9 +59,11 @@ def test_code_that_never_returns_is_told_long_before_a_lab_that_simulates_much(
     with Bench(tmp_path) as bench:
         bench.browser = LabEngine(patience=0.5)
         stuck = bench.trial(make_lab(verify={"seconds": 0.02}, controls=[button]), seconds=600.0)
-        assert told(stuck) == [(("controls", 0, "run"), "timeout", "ran for more than 0.5 s")]
+        assert failures_of(stuck) == [
+            (("controls", 0, "run"), "timeout", "ran for more than 0.5 s")
+        ]
         slow = bench.trial(make_lab(verify={"seconds": 1e9}), seconds=1.5)
-        assert told(slow) == [((), "timeout", "did not finish in time")]
+        assert failures_of(slow) == [((), "timeout", "did not finish in time")]
 
 
 def test_memory_that_runs_out_takes_no_other_lab_along(tmp_path: Path) -> None:
@@ -69,8 +71,8 @@ def test_memory_that_runs_out_takes_no_other_lab_along(tmp_path: Path) -> None:
     with Bench(tmp_path) as bench:
         bench.browser = LabEngine(memory=160)
         reply = bench.trial(make_lab(setup=eat))
-        assert told(reply) == [(("setup",), "timeout", "took more than 160 MiB")]
-        assert told(bench.trial(make_lab())) == []
+        assert failures_of(reply) == [(("setup",), "timeout", "took more than 160 MiB")]
+        assert failures_of(bench.trial(make_lab())) == []
 
 
 def test_code_that_takes_all_memory_or_breaks_the_engine_is_told_and_goes(bench: Bench) -> None:
@@ -86,12 +88,12 @@ def test_code_that_takes_all_memory_or_breaks_the_engine_is_told_and_goes(bench:
         "model.delete()",
     ):
         reply = bench.trial(make_lab(setup=code), seconds=300.0)
-        kinds = {kind for _, kind, _ in told(reply)}
+        kinds = {kind for _, kind, _ in failures_of(reply)}
         assert kinds and kinds <= {"throws", "engine"} and reply["main"] is None, code
-        assert told(bench.trial(make_lab())) == [], code
+        assert failures_of(bench.trial(make_lab())) == [], code
     reply = bench.browser.trial(request(make_lab()), b"no model at all" * 100, 120.0)
-    assert [kind for _, kind, _ in told(reply)] == ["engine"]
-    assert told(bench.trial(make_lab())) == []
+    assert [kind for _, kind, _ in failures_of(reply)] == ["engine"]
+    assert failures_of(bench.trial(make_lab())) == []
 
 
 def test_code_that_changes_what_all_labs_share_is_told_and_undone(bench: Bench) -> None:
@@ -105,20 +107,20 @@ def test_code_that_changes_what_all_labs_share_is_told_and_undone(bench: Bench) 
         ("Reflect.ownKeys = Map.prototype.get = JSON.stringify = null", None),
         ("globalThis.trial = null", "`trial`"),
     ):
-        ((entry, kind, message),) = told(bench.trial(make_lab(setup=code)))
+        ((entry, kind, message),) = failures_of(bench.trial(make_lab(setup=code)))
         assert (entry, kind) == (("setup",), "shared"), code
         assert name is None or message == name
         reply = bench.trial(ordinary)
-        assert told(reply) == [], code
+        assert failures_of(reply) == [], code
         assert reply["main"]["pictures"][0]["readouts"] == ["undefined 1"], code
 
 
 def test_lab_sets_no_timers(bench: Bench) -> None:
     for code in ("setTimeout(() => {}, 10)", "ctx.later = setTimeout(() => {})"):
-        ((entry, kind, message),) = told(bench.trial(make_lab(setup=code)))
+        ((entry, kind, message),) = failures_of(bench.trial(make_lab(setup=code)))
         assert (entry, kind) == (("setup",), "throws")
         assert message == "Error: a lab sets no timers: they would ring in the next one"
-    assert told(bench.trial(make_lab(setup="ctx.can = typeof setTimeout"))) == []
+    assert failures_of(bench.trial(make_lab(setup="ctx.can = typeof setTimeout"))) == []
 
 
 def test_nothing_of_one_trial_is_left_for_the_next(bench: Bench) -> None:
@@ -149,7 +151,7 @@ def test_memory_does_not_grow_from_trial_to_trial(bench: Bench) -> None:
 def test_engine_that_is_stopped_from_another_thread_tries_no_more(tmp_path: Path) -> None:
     with Bench(tmp_path) as bench:
         mjb = bench.native.save("models/x.xml", BALL)
-        bench.browser.mistakes([])
+        bench.browser.check_code([])
         threading.Timer(0.2, bench.browser.stop).start()
         with pytest.raises(StoppedError):
             bench.browser.trial(request(make_lab(setup=LOOP)), mjb, 600.0)
@@ -158,7 +160,7 @@ def test_engine_that_is_stopped_from_another_thread_tries_no_more(tmp_path: Path
     never = LabEngine()
     never.stop()
     with pytest.raises(StoppedError):
-        never.mistakes([])
+        never.check_code([])
 
 
 def test_an_interrupt_ends_a_trial_and_the_process() -> None:
@@ -168,12 +170,12 @@ def test_an_interrupt_ends_a_trial_and_the_process() -> None:
         "from pathlib import Path\n"
         "from support.lab_values import *\n"
         "with Bench(Path('.')) as bench:\n"
-        "    bench.browser.mistakes([])\n"
+        "    bench.browser.check_code([])\n"
         "    mjb = bench.native.save('models/x.xml', BALL)\n"
-        "    asked = request(make_lab(setup='for (;;) ;'))\n"
+        "    trial_request = request(make_lab(setup='for (;;) ;'))\n"
         "    try:\n"
         "        print('ready', flush=True)\n"
-        "        bench.browser.trial(asked, mjb, 600.0)\n"
+        "        bench.browser.trial(trial_request, mjb, 600.0)\n"
         "    except KeyboardInterrupt: print('interrupted')\n"
     )
     process = subprocess.Popen(
@@ -189,8 +191,8 @@ def test_an_interrupt_ends_a_trial_and_the_process() -> None:
         before = processor_time(process.pid)
         wait_until(lambda: processor_time(process.pid) > before + 30, "the trial's loop")
         os.kill(process.pid, signal.SIGINT)
-        said, errors = process.communicate()
-    assert (said, errors, process.returncode) == ("interrupted\n", "", 0)
+        output, errors = process.communicate()
+    assert (output, errors, process.returncode) == ("interrupted\n", "", 0)
 
 
 def test_damaged_engine_is_told_and_a_sound_one_starts_again(
@@ -208,4 +210,4 @@ def test_damaged_engine_is_told_and_a_sound_one_starts_again(
         damaged.setattr(files, "assets_dir", lambda: folder)
         with pytest.raises(EffectError, match=r"the browser.s engine does not start: .*Compile"):
             bench.trial(make_lab())
-    assert told(bench.trial(make_lab())) == []
+    assert failures_of(bench.trial(make_lab())) == []

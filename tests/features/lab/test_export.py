@@ -19,7 +19,7 @@ from coursebuild.features.lab.export.script import (
     ExportMetadata,
     export_script,
     file_name,
-    filled,
+    fill_in_values,
     initial_values,
 )
 from coursebuild.features.lab.trial import Engines
@@ -143,13 +143,13 @@ def test_script_is_offered_where_it_does_what_the_lab_does_and_a_reason_where_no
     options = Options(root=tmp_path, jobs=1, quiet=True)
     engines = Engines(tmp_path)
     engines.native = NativeEngine(tmp_path, seconds=2.0)
-    results, found = try_labs(make_course("".join(fences)), options, engines)
-    assert [d.rule for d in found if d.rule != "lab-reset"] == ["lab-expect"]
+    results, diagnostics = try_labs(make_course("".join(fences)), options, engines)
+    assert [d.rule for d in diagnostics if d.rule != "lab-reset"] == ["lab-expect"]
     lines = [result.line for result in results]
     assert [line.unexported for line in lines[: len(OFFERED)]] == [""] * len(OFFERED)
     assert lines[2].parity == "compared with native MuJoCo as its Python export"
-    why = "its controller changes the model"
-    assert lines[len(OFFERED) + 2].parity == f"not compared with native MuJoCo: {why}"
+    parity = "not compared with native MuJoCo: its controller changes the model"
+    assert lines[len(OFFERED) + 2].parity == parity
     for (lab, reason), result in zip(WITHHELD, results[len(OFFERED) :], strict=True):
         assert result.output.script is None
         assert result.line.unexported.startswith(reason), (lab, result.line.unexported)
@@ -161,24 +161,24 @@ def test_script_is_offered_where_it_does_what_the_lab_does_and_a_reason_where_no
 
 
 def run(path: Path, *values: object) -> str:
-    """What a script prints with these values in place of the marks."""
+    """Run a script with these values in place of the marks, and return what it prints."""
     text = path.read_text()
     for i, value in enumerate(values):
         text = text.replace(f"{{{{control:{i}}}}}", repr(value))
     path.write_text(text)
     command = [sys.executable, "-W", "error", str(path)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, capture_output=True, text=True, env=environment)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    process = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert process.returncode == 0, process.stderr
+    return process.stdout
 
 
 @pytest.mark.site
 def test_scripts_that_the_site_offers_print_what_lesson_4_2_says(
     built_courses: BuiltCourses, tmp_path: Path
 ) -> None:
-    found = (built_courses["real"].root / "public/assets/labs").glob("*-lab-*.json")
-    offers = {path.name: json.loads(path.read_text()).get("exportPython", {}) for path in found}
+    paths = (built_courses["real"].root / "public/assets/labs").glob("*-lab-*.json")
+    offers = {path.name: json.loads(path.read_text()).get("exportPython", {}) for path in paths}
     assert None not in offers.values() and {} in offers.values()
     ours = [offers[name] for name in sorted(offers) if name.startswith("4.2-lab-")]
     # One more is of a kind of the course's own.
@@ -199,7 +199,7 @@ def test_a_script_reads_well(tmp_path: Path) -> None:
     export = export_script(lab, METADATA)
     assert isinstance(export, Export)
     assert export.buttons == ("kick", "again")
-    text = filled(export, initial_values(lab))
+    text = fill_in_values(export, initial_values(lab))
     assert '"""A \'lab\' with / everything: a lab of lesson 1.1, “First”, as a script.\n' in text
     assert "# The control “gain” (N m), from 0 to 4\nGAIN = 2\n" in text
     assert "\nINTEGRATOR = 1\n" in text and '\nMODE = "free"\n' in text
@@ -208,12 +208,12 @@ def test_a_script_reads_well(tmp_path: Path) -> None:
     ruff = [sys.executable, "-m", "ruff"]
     path = tmp_path / "lab.py"
     path.write_text(text)
-    done = subprocess.run(
+    process = subprocess.run(
         [*ruff, "check", "--isolated", "--line-length", "130", "--select", "E,F", str(path)],
         capture_output=True,
         text=True,
     )
-    assert done.returncode == 0, done.stdout
+    assert process.returncode == 0, process.stdout
 
 
 @pytest.mark.parametrize(
@@ -252,6 +252,6 @@ def test_the_page_fills_a_script_as_the_build_does() -> None:
     text = "\n".join(f"{{{{control:{i}}}}}" for i in values)
     theirs = isolate.call("fill", json.dumps([text, list(values.values())]), 10.0).splitlines()
     isolate.close()
-    ours = filled(Export("x.py", text, ()), values).splitlines()
+    ours = fill_in_values(Export("x.py", text, ()), values).splitlines()
     assert [eval(line) for line in theirs] == [eval(line) for line in ours] == [*values.values()]
     assert theirs[0] == ours[0] == "1"

@@ -39,7 +39,7 @@ def refusal(code: str) -> str:
     return str(refused.value)
 
 
-MADE: dict[str, Callable[[str], str]] = {
+TRANSLATORS: dict[str, Callable[[str], str]] = {
     "statements": python,
     "expressions": lambda code: translate_expression(code, FIELDS),
     "code without a counterpart in Python is refused": refusal,
@@ -47,12 +47,12 @@ MADE: dict[str, Callable[[str], str]] = {
 
 
 def test_code_becomes_python_or_is_refused(rewriting: bool) -> None:
-    def made(case: Case) -> str:
+    def translate_pieces(case: Case) -> str:
         pieces = case.input.rstrip("\n").split("\n\n")
-        into = MADE[case.title]
-        return "\n".join(f"{code}\n{indent(into(code), '    ')}\n" for code in pieces)
+        translate = TRANSLATORS[case.title]
+        return "\n".join(f"{code}\n{indent(translate(code), '    ')}\n" for code in pieces)
 
-    check_cases(Path(__file__).with_name("translated.md"), made, rewriting=rewriting)
+    check_cases(Path(__file__).with_name("translated.md"), translate_pieces, rewriting=rewriting)
 
 
 def test_what_only_concerns_the_page_is_left_out_of_buttons() -> None:

@@ -1,4 +1,4 @@
-"""Which edits of a lab count: those of what its trial depends on."""
+"""Edits of a lab count if its trial depends on them, and only then."""
 
 from __future__ import annotations
 
@@ -44,17 +44,18 @@ EDITS = [
 
 
 def inputs_of(text: str) -> Inputs:
-    """What the trial of the lab of a lesson depends on besides files."""
-    found = trial_inputs(Trial("1.2-lab-1", "1.2", lab_of(text)))
-    assert found is not None
-    return found
+    """Return what the trial of a lesson's lab depends on besides files."""
+    inputs = trial_inputs(Trial("1.2-lab-1", "1.2", lab_of(text)))
+    assert inputs is not None
+    return inputs
 
 
 def test_an_edit_counts_exactly_where_a_trial_depends_on_it() -> None:
     text = f"Text.\n\n```lab simlab\n{LAB}\n```\n"
     before = inputs_of(text)
-    changed = [edit for edit in (*NEUTRAL, *EDITS) if inputs_of(text.replace(*edit, 1)) != before]
-    assert changed == EDITS
-    around = dict(before.conditions)
-    assert around["MuJoCo"] == engine_version()
-    assert engine_digest().startswith(around["the browser's engine and its trial"])
+    edits = (*NEUTRAL, *EDITS)
+    effective_edits = [edit for edit in edits if inputs_of(text.replace(*edit, 1)) != before]
+    assert effective_edits == EDITS
+    conditions = dict(before.conditions)
+    assert conditions["MuJoCo"] == engine_version()
+    assert engine_digest().startswith(conditions["the browser's engine and its trial"])

@@ -1,4 +1,4 @@
-"""Native MuJoCo beside the browser's engine: whatever differs is found.
+"""Native MuJoCo compared with the browser's engine: whatever differs is found.
 
 `tests/site/test_parity.py` has models that use much of the engine and move alike in both.
 """
@@ -38,12 +38,12 @@ def recorded(bench: Bench) -> dict[str, Any]:
     controller = "data.ctrl[0] = 0.1 * sim.time; if (ctx.n++ === 100) data.qvel[1] += 0.1"
     setup, xml = "ctx.n = 0", HEAP.format("RK4")
     lab = make_lab(xml=xml, setup=setup, controller=controller, verify={"seconds": 1})
-    found = bench.parity(lab)
-    run = found["run"]
+    comparison = bench.parity(lab)
+    run = comparison["run"]
     assert run["complete"] and not run["modelChanged"]
-    assert (found["first"], found["relative"]) == (None, 0)
-    assert (run["steps"], found["timestep"]) == (500, 0.002)
-    return found
+    assert (comparison["first"], comparison["relative"]) == (None, 0)
+    assert (run["steps"], comparison["timestep"]) == (500, 0.002)
+    return comparison
 
 
 def test_only_what_slides_has_no_right_to_differ(bench: Bench) -> None:
@@ -56,8 +56,8 @@ def test_only_what_slides_has_no_right_to_differ(bench: Bench) -> None:
         ('type="hinge"', "", False),
     ):
         lab = make_lab(xml=SLIDING.format(joint, actuator), verify={"seconds": 0.1})
-        found = bench.parity(lab)
-        assert (found["exact"], found["first"] is None or not exact) == (exact, True)
+        comparison = bench.parity(lab)
+        assert (comparison["exact"], comparison["first"] is None or not exact) == (exact, True)
 
 
 def test_what_the_lab_changed_in_the_model_is_changed_natively_too(bench: Bench) -> None:
@@ -73,16 +73,16 @@ def test_what_the_lab_changed_in_the_model_is_changed_natively_too(bench: Bench)
         ],
         verify={"seconds": 1},
     )
-    found = bench.parity(lab)
-    assert found["run"]["mjb"] is not None
-    assert (found["timestep"], found["run"]["steps"]) == (0.004, 250)
-    assert found["relative"] <= 1e-9, found["first"]  # things turn, by sines
+    comparison = bench.parity(lab)
+    assert comparison["run"]["mjb"] is not None
+    assert (comparison["timestep"], comparison["run"]["steps"]) == (0.004, 250)
+    assert comparison["relative"] <= 1e-9, comparison["first"]  # things turn, by sines
 
 
 def test_model_that_does_not_move_is_the_same(bench: Bench) -> None:
     xml = "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
-    found = bench.parity(make_lab(xml=xml, verify={"seconds": 0.1}))
-    assert (found["first"], found["relative"], found["run"]["width"]) == (None, 0, 0)
+    comparison = bench.parity(make_lab(xml=xml, verify={"seconds": 0.1}))
+    assert (comparison["first"], comparison["relative"], comparison["run"]["width"]) == (None, 0, 0)
 
 
 # --- a difference is found
@@ -96,8 +96,8 @@ def packed(array: np.ndarray, like: dict[str, str]) -> dict[str, str]:
     return {**like, "data": base64.b64encode(array.tobytes()).decode()}
 
 
-def altered(run: dict[str, Any], step: int, i: int, change: Callable[[float], float]) -> Any:
-    """The run as if the browser's engine had come to another number at this step (from 1)."""
+def alter(run: dict[str, Any], step: int, i: int, change: Callable[[float], float]) -> Any:
+    """Change a number of the browser's engine at this step, from 1."""
     states = numbers(run["states"], "<f8").reshape(-1, run["width"])
     sums = numbers(run["checksums"], "<u4")
     states[step - 1, i] = change(states[step - 1, i])
@@ -121,23 +121,25 @@ def test_difference_is_found_where_it_begins_with_its_size(
         (9, lambda _: math.nan, 1e300, 1e300),
         (9, lambda _: math.inf, 1e300, 1e300),
     ):
-        found = bench.native.parity(recorded["mjb"], altered(recorded["run"], step, 0, change), 500)
-        assert (found["first"], found["at"]) == (step, step)
-        assert low <= found["relative"] <= high
+        comparison = bench.native.parity(
+            recorded["mjb"], alter(recorded["run"], step, 0, change), 500
+        )
+        assert (comparison["first"], comparison["at"]) == (step, step)
+        assert low <= comparison["relative"] <= high
     first_state = numbers(recorded["run"]["states"], "<f8")[: recorded["run"]["width"]]
     zero = first_state.tolist().index(0.0)
-    signed = altered(recorded["run"], 1, zero, lambda x: -x)
-    found = bench.native.parity(recorded["mjb"], signed, 500)
-    assert (found["first"], found["relative"]) == (1, 0), "the sign of a zero has no size"
+    signed = alter(recorded["run"], 1, zero, lambda x: -x)
+    comparison = bench.native.parity(recorded["mjb"], signed, 500)
+    assert (comparison["first"], comparison["relative"]) == (1, 0), "the sign of a zero has no size"
 
 
 def test_difference_after_the_horizon_has_no_size_and_one_state_at_least_is_compared(
     bench: Bench, recorded: dict[str, Any]
 ) -> None:
-    run = altered(recorded["run"], 300, 0, lambda x: x + 1.0)
+    run = alter(recorded["run"], 300, 0, lambda x: x + 1.0)
     after, at = (bench.native.parity(recorded["mjb"], run, horizon) for horizon in (299, 300))
     assert (after["first"], after["relative"]) == (300, 0) and at["relative"] > 0.1
-    run = altered(recorded["run"], 100, 0, lambda x: x + 1.0)
+    run = alter(recorded["run"], 100, 0, lambda x: x + 1.0)
     states = numbers(run["states"], "<f8").reshape(-1, run["width"])[99::100]
     seldom = {**run, "stride": 100, "states": packed(states.ravel(), run["states"])}
     assert bench.native.parity(recorded["mjb"], seldom, 10)["relative"] > 0.1
@@ -150,12 +152,12 @@ def test_another_start_write_or_model_is_found(bench: Bench, recorded: dict[str,
     values = numbers(run["writes"]["values"], "<f8")
     values[200] += 1e-6
     writes = {**run["writes"], "values": packed(values, run["writes"]["values"])}
-    (written,) = numbers(run["writes"]["steps"], "<i4")[200:201]
-    other = base64.b64encode(bench.native.save("models/x.xml", HEAP.format("Euler"))).decode()
+    (step,) = numbers(run["writes"]["steps"], "<i4")[200:201]
+    euler_model = base64.b64encode(bench.native.save("models/x.xml", HEAP.format("Euler"))).decode()
     for change, first in (
         ({"start": packed(start, run["start"])}, 1),
-        ({"writes": writes}, written + 1),
-        ({"mjb": {"type": "u8", "data": other}}, 1),
+        ({"writes": writes}, step + 1),
+        ({"mjb": {"type": "u8", "data": euler_model}}, 1),
     ):
         assert bench.native.parity(recorded["mjb"], {**run, **change}, 500)["first"] == first
 
@@ -166,14 +168,14 @@ def test_another_start_write_or_model_is_found(bench: Bench, recorded: dict[str,
 def test_model_is_saved_to_the_same_bytes_wherever_the_course_lies(tmp_path: Path) -> None:
     xml = """<mujoco><asset><mesh name="m" file="m.obj"/></asset><worldbody>
       <geom type="mesh" mesh="m"/><include file="part.xml"/></worldbody></mujoco>"""
-    found = set()
+    files = set()
     for name in ("a", "a much longer näme"):
         (tmp_path / name / "models").mkdir(parents=True)
         (tmp_path / name / "models/m.obj").write_text(TETRAHEDRON)
         (tmp_path / name / "models/part.xml").write_text("<mujoco><geom size='1'/></mujoco>")
         with NativeEngine(tmp_path / name) as native:
-            found |= {native.save(f"models/{file}.xml", xml) for file in ("x", ".lab")}
-    assert len(found) == 1
+            files |= {native.save(f"models/{file}.xml", xml) for file in ("x", ".lab")}
+    assert len(files) == 1
 
 
 def test_request_after_one_that_fails_or_takes_too_long_is_answered(

@@ -56,9 +56,9 @@ COMPLETE = r"""{
 
 
 def test_a_complete_lab() -> None:
-    parsed = parse(COMPLETE)
-    assert parsed.diagnostics == ()
-    lab = parsed.value
+    parsed_lab = parse(COMPLETE)
+    assert parsed_lab.diagnostics == ()
+    lab = parsed_lab.value
     assert lab is not None
     assert lab.span.text == f"```lab simlab\n{COMPLETE}\n```"
     assert (lab.kind, lab.kind_span.text) == ("simlab", "simlab")
@@ -98,9 +98,9 @@ def test_the_least_that_a_lab_needs() -> None:
 
 def test_of_another_kind_only_what_all_have_is_checked() -> None:
     body = '{"title": "T", "note": "N", "height": 100, "points": [[1, 2]], "model": 3}'
-    parsed = parse(body, "graph")
-    assert parsed.diagnostics == ()
-    lab = parsed.value
+    parsed_lab = parse(body, "graph")
+    assert parsed_lab.diagnostics == ()
+    lab = parsed_lab.value
     assert lab is not None
     assert (lab.kind, lab.config, lab.fields) == ("graph", body, SimLab(title="T", height=100))
     assert len(lab.note) == 1
@@ -122,8 +122,8 @@ def test_a_model_that_readers_edit() -> None:
     assert (lab.kind, lab.xml.text, lab.xml.span().line) == ("mjcf", "<mujoco/>\n", 2)
     assert (fields.title, fields.height, lab.is_docked()) == ("A ball", 100, True)
     assert (lab.verify, fields.expect) == (Verify(2.0, 1e-6, True), (Expect(3.0, diverges=True),))
-    wrong = parse("<mujoco/>", "mjcf height=\udc80").diagnostics
-    assert "fence-key-value" in {one.rule for one in wrong}, "half a character"
+    diagnostics = parse("<mujoco/>", "mjcf height=\udc80").diagnostics
+    assert "fence-key-value" in {diagnostic.rule for diagnostic in diagnostics}, "half a character"
 
 
 @settings(max_examples=60)
@@ -135,9 +135,9 @@ def test_any_edit_of_a_good_text_is_read_or_told(data: st.DataObject) -> None:
     )
     mutated = COMPLETE[:at] + piece + COMPLETE[at + data.draw(st.integers(0, 12)) :]
     for kind in ("simlab", "graph"):
-        parsed = parse(mutated, kind)
-        assert (parsed.value is None) == bool(parsed.diagnostics)
-        orders = [d.order for d in parsed.diagnostics]
+        parsed_lab = parse(mutated, kind)
+        assert (parsed_lab.value is None) == bool(parsed_lab.diagnostics)
+        orders = [d.order for d in parsed_lab.diagnostics]
         assert orders == sorted(orders)
 
 
@@ -158,8 +158,8 @@ def test_any_value_in_any_place_is_taken_or_told(data: st.DataObject) -> None:
             place[key] = new  # type: ignore[index]
             break
         place = inner
-    parsed = parse(json.dumps(value, ensure_ascii=False, indent=1))
-    assert (parsed.value is None) == bool(parsed.diagnostics)
-    if parsed.value is not None:
-        for control in parsed.value.fields.controls:
+    parsed_lab = parse(json.dumps(value, ensure_ascii=False, indent=1))
+    assert (parsed_lab.value is None) == bool(parsed_lab.diagnostics)
+    if parsed_lab.value is not None:
+        for control in parsed_lab.value.fields.controls:
             assert not isinstance(control, Slider) or control.min <= control.value <= control.max

@@ -1,6 +1,6 @@
 """Pictures without a graphics processor: what hides what, what cannot be drawn, and the file.
 
-That they look like MuJoCo's own is tested in `tests/browser/test_drawing.py`.
+`tests/browser/test_drawing.py` tests that they look like MuJoCo's own.
 """
 
 from __future__ import annotations
@@ -99,10 +99,10 @@ def test_colours_stay_in_range() -> None:
 
 
 def test_a_pattern_far_away_is_its_mean_colour() -> None:
-    """And not a noise of squares that happen to be hit."""
+    """It is not a noise of squares that samples happen to hit."""
     squares = np.kron([[255, 0], [0, 255]], np.ones((8, 8))).astype(np.uint8)
-    given = {"type": 0, "width": 16, "height": 16, "channels": 1, "data": squares.ravel()}
-    texture = texture_of(given)
+    record = {"type": 0, "width": 16, "height": 16, "channels": 1, "data": squares.ravel()}
+    texture = texture_of(record)
     assert texture is not None
     mapping = TextureMapping(texture, "plane", (300, 300, 1.0), (600, 600), uniform=False)
     floor = solid("plane", size=(300, 300, 1), rgba=(1, 1, 1, 1))
@@ -123,15 +123,15 @@ def test_many_small_triangles_look_as_few_large_ones() -> None:
         for v, f in ((grid.reshape(-1, 3), grid_faces(65, 65)), (corners, coarse))
     ]
     assert np.array_equal(covered(pictures[0]), covered(pictures[1]))
-    both = [p[covered(p)].astype(int) for p in pictures]
-    assert np.abs(both[0] - both[1]).max() <= 12  # brightness is worked out at corners
+    colours = [p[covered(p)].astype(int) for p in pictures]
+    assert np.abs(colours[0] - colours[1]).max() <= 12  # brightness is worked out at corners
 
 
 @pytest.mark.parametrize("rgba", [RED, (1.0, 0.0, 0.0, 0.5)])
 def test_what_is_nowhere_is_left_out(rgba: tuple[float, float, float, float]) -> None:
-    here = solid("sphere", size=(0.3,), rgba=GREEN)
+    visible = solid("sphere", size=(0.3,), rgba=GREEN)
     nowhere = (math.nan, math.inf, -math.inf, 1e300, 1e15)
-    gone = [
+    lost_solids = [
         *(solid(at=(value, 0, 0), rgba=rgba) for value in nowhere),
         solid(rotation=np.full((3, 3), math.nan), rgba=rgba),
         solid(size=(math.nan, 1, 1), rgba=rgba),
@@ -139,7 +139,9 @@ def test_what_is_nowhere_is_left_out(rgba: tuple[float, float, float, float]) ->
     ]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert np.array_equal(draw((*gone, here), FRONT, SIZE), draw((here,), FRONT, SIZE))
+        assert np.array_equal(
+            draw((*lost_solids, visible), FRONT, SIZE), draw((visible,), FRONT, SIZE)
+        )
 
 
 @settings(max_examples=25, deadline=None)

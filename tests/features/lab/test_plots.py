@@ -25,15 +25,17 @@ def plot(*names: str, dash: Any = False, **fields: Any) -> Plot:
     return Plot(traces, **{"ylabel": "y (m)", "xlabel": "time (s)", **fields})
 
 
-def drawn(
+def draw_plot(
     traces: Sequence[Sequence[float | None]],
     times: Sequence[float] | None = None,
-    what: Plot | None = None,
-    **how: Any,
+    spec: Plot | None = None,
+    **options: Any,
 ) -> ElementTree.Element:
-    """The plot, which must be well-formed XML with all that is drawn inside of it."""
-    shown = what or plot(*(f"t{i}" for i in range(len(traces))))
-    svg = plot_svg(shown, times or [float(i) for i in range(len(traces[0]))], traces, **how)
+    """Draw a plot; it must be well-formed XML, and all that it shows inside its frame."""
+    chosen_plot = spec or plot(*(f"t{i}" for i in range(len(traces))))
+    svg = plot_svg(
+        chosen_plot, times or [float(i) for i in range(len(traces[0]))], traces, **options
+    )
     root = ElementTree.fromstring(svg)
     _, _, width, height = (float(x) for x in root.attrib["viewBox"].split())
     for x, y in points(root):
@@ -54,13 +56,13 @@ def points(root: ElementTree.Element) -> list[tuple[float, float]]:
 
 
 def texts(root: ElementTree.Element, cls: str | None = None) -> list[str]:
-    found = (t for t in root.iter("text") if cls is None or cls in t.attrib.get("class", ""))
-    return [text.text or "" for text in found]
+    elements = (t for t in root.iter("text") if cls is None or cls in t.attrib.get("class", ""))
+    return [text.text or "" for text in elements]
 
 
 class TestTicks:
     @pytest.mark.parametrize(
-        ("low", "high", "wanted"),
+        ("low", "high", "expected"),
         [
             (0, 1, "0.0 0.2 0.4 0.6 0.8 1.0"),
             (-1, 1, "−1.0 −0.5 0.0 0.5 1.0"),
@@ -75,22 +77,22 @@ class TestTicks:
             (0, 900000, "0 200000 400000 600000 800000"),
         ],
     )
-    def test_texts(self, low: float, high: float, wanted: str) -> None:
-        assert " ".join(tick_texts(ticks(low, high))) == wanted
+    def test_texts(self, low: float, high: float, expected: str) -> None:
+        assert " ".join(tick_texts(ticks(low, high))) == expected
 
     @settings(max_examples=200)
     @given(st.floats(-1e12, 1e12), st.floats(1e-6, 1e12), st.integers(2, 8))
     def test_they_lie_in_the_range_and_tell_themselves_apart(
-        self, low: float, span: float, about: int
+        self, low: float, span: float, count: int
     ) -> None:
         high = low + span
-        found = ticks(low, high, about)
-        assert 1 <= len(found) <= 2 * about + 2
+        values = ticks(low, high, count)
+        assert 1 <= len(values) <= 2 * count + 2
         slack = 1e-6 * span + 1e-9 * abs(low)
-        assert all(low - slack <= value <= high + slack for value in found)
-        assert found == sorted(found)
-        if len(set(found)) == len(found) and abs(low) < 1e9 * span:
-            assert len(set(tick_texts(found))) == len(found)
+        assert all(low - slack <= value <= high + slack for value in values)
+        assert values == sorted(values)
+        if len(set(values)) == len(values) and abs(low) < 1e9 * span:
+            assert len(set(tick_texts(values))) == len(values)
 
     def test_no_range(self) -> None:
         assert ticks(5, 5) == [5]
@@ -121,21 +123,21 @@ def test_any_samples_become_a_plot(
     label: str,
     narrow: bool,
 ) -> None:
-    what = plot(
+    spec = plot(
         label, ymin=ymin, ymax=ymax, window=window, ylabel=label, refLines=(RefLine(0.5, label),)
     )
-    drawn([values], what=what, narrow=narrow)
+    draw_plot([values], spec=spec, narrow=narrow)
 
 
 def test_what_is_no_number_interrupts_the_line() -> None:
-    root = drawn([[1.0, 2.0, math.nan, 3.0, None, 4.0, 5.0, 6.0]])
+    root = draw_plot([[1.0, 2.0, math.nan, 3.0, None, 4.0, 5.0, 6.0]])
     (line,) = lines(root)
     assert [m[1] or m[4] for m in MOVE.finditer(line)] == ["M", "L", "M", "h0", "M", "L", "L"]
     assert 'stroke-linecap="round"' in ElementTree.tostring(root).decode()
 
 
 def test_one_sample_is_a_point() -> None:
-    root = drawn([[3.0]], [7.5])
+    root = draw_plot([[3.0]], [7.5])
     assert re.fullmatch(r"M[\d.]+ [\d.]+h0", lines(root)[0])
     assert texts(root, "lab-name") == ["t0"]
     assert plot_svg(plot("a"), [], [[]]) == "", "nothing is drawn of nothing"
@@ -143,64 +145,64 @@ def test_one_sample_is_a_point() -> None:
 
 def test_a_window_shows_the_end() -> None:
     times = [i / 10 for i in range(101)]
-    root = drawn([times], times, plot("a", window=2.0))
+    root = draw_plot([times], times, plot("a", window=2.0))
     assert lines(root)[0].count("L") == 20
     assert texts(root)[-4:-2] != ["0.0"] and "8.0" in texts(root) and "7.5" not in texts(root)
 
 
 def test_a_line_is_cut_at_the_frame() -> None:
-    what = plot("a", ymin=0.0, ymax=1.0)
-    root = drawn([[0.5, 5.0, 5.0, 0.5, -4.0, 0.5]], what=what)
-    found = points(root)
-    top, bottom = min(y for _, y in found), max(y for _, y in found)
+    spec = plot("a", ymin=0.0, ymax=1.0)
+    root = draw_plot([[0.5, 5.0, 5.0, 0.5, -4.0, 0.5]], spec=spec)
+    path = points(root)
+    top, bottom = min(y for _, y in path), max(y for _, y in path)
     assert (top, bottom) == (24.0, 172.0)
     assert [m[1] for m in MOVE.finditer(lines(root)[0])] == ["M", "L", "M", "L", "L", "M", "L"]
     # From 0.5 to 5 in a step: the frame ends a ninth of the way on.
-    step = (found[-1][0] - found[0][0]) / 5
-    assert found[1][0] - found[0][0] == pytest.approx(step / 9, abs=0.11)
+    step = (path[-1][0] - path[0][0]) / 5
+    assert path[1][0] - path[0][0] == pytest.approx(step / 9, abs=0.11)
 
 
 def test_a_line_outside_is_not_drawn_and_its_name_is() -> None:
-    root = drawn([[5.0, 6.0, 7.0]], what=plot("far", ymin=0.0, ymax=1.0))
+    root = draw_plot([[5.0, 6.0, 7.0]], spec=plot("far", ymin=0.0, ymax=1.0))
     assert lines(root) == [""]
     assert texts(root, "lab-name") == ["far"]
 
 
 def test_limits_are_kept_to_the_letter() -> None:
-    root = drawn([[1.0, 2.0]], what=plot("a", ymin=-7.0, ymax=7.0))
+    root = draw_plot([[1.0, 2.0]], spec=plot("a", ymin=-7.0, ymax=7.0))
     grid = [p for p in root.iter("path") if p.attrib["class"] == "lab-grid"]
     assert texts(root)[: len(grid)] == ["−5", "0", "5"]
 
 
 def test_names_of_lines_do_not_overlap_and_long_ones_get_room() -> None:
     for value in (0.0, 1.0, 0.5):
-        root = drawn([[0.0, value]] + [[value, value]] * 7 + [[1.0, 1.0 - value]])
+        root = draw_plot([[0.0, value]] + [[value, value]] * 7 + [[1.0, 1.0 - value]])
         names = (t for t in root.iter("text") if "lab-name" in t.get("class", ""))
         places = sorted(float(name.attrib["y"]) for name in names)
         assert len(places) == 9
         assert min(b - a for a, b in pairwise(places)) >= 12.9
-    short, long = (drawn([[0.0, 1.0]], what=plot(name)) for name in ("a", "angular momentum"))
+    short, long = (draw_plot([[0.0, 1.0]], spec=plot(name)) for name in ("a", "angular momentum"))
     assert points(short)[-1][0] - points(long)[-1][0] > 80
 
 
 def test_wide_ticks_get_room_and_times_do_not_touch() -> None:
-    left = [points(drawn([[0.0, top]]))[0][0] for top in (1.0, 123456.0, 1e-13)]
+    left = [points(draw_plot([[0.0, top]]))[0][0] for top in (1.0, 123456.0, 1e-13)]
     assert left[0] < left[1]
     assert all(x >= 8 + 6.2 * 3 for x in left)
     times = [1e5 + i / 1000 for i in range(100)]
-    root = drawn([times], times, narrow=True)
-    placed = [t for t in root.iter("text") if "y" in t.attrib]
-    y = max(float(t.attrib["y"]) for t in placed) - 17
-    shown = [t for t in placed if float(t.attrib["y"]) == pytest.approx(y, abs=2)]
-    places = sorted((float(t.attrib["x"]), len(t.text or "")) for t in shown)
+    root = draw_plot([times], times, narrow=True)
+    labels = [t for t in root.iter("text") if "y" in t.attrib]
+    y = max(float(t.attrib["y"]) for t in labels) - 17
+    time_labels = [t for t in labels if float(t.attrib["y"]) == pytest.approx(y, abs=2)]
+    places = sorted((float(t.attrib["x"]), len(t.text or "")) for t in time_labels)
     assert len(places) > 1
-    for (x, n), (other, _) in pairwise(places):
-        assert other - x > 6.2 * n
+    for (x, n), (next_x, _) in pairwise(places):
+        assert next_x - x > 6.2 * n
 
 
 def test_lines_differ_by_more_than_colour_unless_the_author_says_how() -> None:
-    def dashes(what: Plot | None = None, count: int = 1) -> list[str | None]:
-        paths = drawn([[0.0, 1.0]] * count, what=what).iter("path")
+    def dashes(spec: Plot | None = None, count: int = 1) -> list[str | None]:
+        paths = draw_plot([[0.0, 1.0]] * count, spec=spec).iter("path")
         return [p.get("stroke-dasharray") for p in paths if "lab-trace" in p.attrib["class"]]
 
     assert len(set(dashes(count=5))) == 5
@@ -210,14 +212,14 @@ def test_lines_differ_by_more_than_colour_unless_the_author_says_how() -> None:
 
 def test_reference_lines_inside_the_range_only() -> None:
     lines = (RefLine(0.5, "half"), RefLine(3.0, "three"), RefLine(1.0, "top"))
-    found = texts(drawn([[0.0, 1.0]], what=plot("a", ymin=0.0, ymax=1.0, refLines=lines)))
-    assert "half" in found and "top" in found and "three" not in found
+    labels = texts(draw_plot([[0.0, 1.0]], spec=plot("a", ymin=0.0, ymax=1.0, refLines=lines)))
+    assert "half" in labels and "top" in labels and "three" not in labels
 
 
 def test_texts_are_escaped() -> None:
     nasty = '<b> & "x" \u2028 </svg><script> \x00\x07\ufffe'
-    root = drawn([[0.0, 1.0]], what=plot(nasty, ylabel=nasty, xlabel=nasty))
-    kept = '<b> & "x" \u2028 </svg><script> '
-    assert texts(root, "lab-name") == [kept]
-    assert kept in root.attrib["aria-label"]
+    root = draw_plot([[0.0, 1.0]], spec=plot(nasty, ylabel=nasty, xlabel=nasty))
+    clean = '<b> & "x" \u2028 </svg><script> '
+    assert texts(root, "lab-name") == [clean]
+    assert clean in root.attrib["aria-label"]
     assert not list(root.iter("script"))

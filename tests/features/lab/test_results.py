@@ -24,7 +24,7 @@ LOST = """<mujoco><option timestep="1"/><worldbody><body>
 """It diverges."""
 
 
-class Built(NamedTuple):
+class BuiltSite(NamedTuple):
     """A course with a lab in which everything holds, and one whose reset leads elsewhere."""
 
     folder: Folder
@@ -40,26 +40,26 @@ class Built(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Built:
+def site(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> BuiltSite:
     root = tmp_path_factory.mktemp("built") / "course"
     folder = course(root, stores, "## A lab\n\n" + fence(RIGHT), "## A\n\n" + fence(RESETS))
     folder.write("models/a/still.xml", STILL)
     folder.write("models/lost.xml", LOST)
     report = checked(folder, status=0)
-    done = folder.main("build")
-    assert done.status == 0, done.out + done.err
-    return Built(folder, report)
+    build = folder.main("build")
+    assert build.status == 0, build.out + build.err
+    return BuiltSite(folder, report)
 
 
-def test_a_lab_in_which_everything_holds(built: Built) -> None:
-    lab, _ = built.report["labs"]
+def test_a_lab_in_which_everything_holds(site: BuiltSite) -> None:
+    lab, _ = site.report["labs"]
     assert {k: lab[k] for k in ("name", "title", "lesson", "status", "tried", "cached")} == {
         "name": "1.2-lab-1", "title": "All of it", "lesson": "1.2", "status": "ok",
         "tried": 1 + 3 + 3 + 2 + 1 + 6, "cached": False,
     }  # fmt: skip
     assert lab["parity"] == "bit-identical to native MuJoCo over 500 steps"
     assert lab["steps_per_second"] > 100
-    text = built.folder.main("check", "1.2").out
+    text = site.folder.main("check", "1.2").out
     assert re.search(
         r"^ok       1\.2-lab-1  [\d,]+ steps/s, 16 things tried, "
         r"bit-identical to native MuJoCo over 500 steps, what moves fills 0\.2 %, "
@@ -70,27 +70,28 @@ def test_a_lab_in_which_everything_holds(built: Built) -> None:
     assert "1 lab tried" in text
 
 
-def test_a_lab_whose_reset_leads_elsewhere_is_warned_of_and_published(built: Built) -> None:
-    again = checked(built.folder, status=0)
-    for report, cached in ((built.report, False), (again, True)):
-        (found,) = report["diagnostics"]
-        assert (found["rule"], found["severity"], found["line"]) == ("lab-reset", "warning", 5)
-        assert [(lab["status"], lab["cached"]) for lab in report["labs"]] == [("ok", cached)] * 2
-    assert '<div class="lab-static">' in built.page("1.3")
-    only = checked(built.folder, "1.3")
+def test_a_lab_whose_reset_leads_elsewhere_is_warned_of_and_published(site: BuiltSite) -> None:
+    second_report = checked(site.folder, status=0)
+    for report, is_cached in ((site.report, False), (second_report, True)):
+        (diagnostic,) = report["diagnostics"]
+        fields = [diagnostic[name] for name in ("rule", "severity", "line")]
+        assert fields == ["lab-reset", "warning", 5]
+        assert [(lab["status"], lab["cached"]) for lab in report["labs"]] == [("ok", is_cached)] * 2
+    assert '<div class="lab-static">' in site.page("1.3")
+    only = checked(site.folder, "1.3")
     assert [lab["name"] for lab in only["labs"]] == ["1.3-lab-1"]
 
 
-def test_a_page_shows_what_the_trial_recorded(built: Built) -> None:
-    text = built.page("1.2")
+def test_a_page_shows_what_the_trial_recorded(site: BuiltSite) -> None:
+    text = site.page("1.2")
     assert text.count('<svg class="lab-plot"') == 1
     assert "<dt>state</dt><dd>late</dd>" in text
     assert "bit-identical to native MuJoCo over 500 steps" in text
-    assert len(list(built.public.glob("assets/labs/1.2-lab-1.*.png"))) == 1
+    assert len(list(site.public.glob("assets/labs/1.2-lab-1.*.png"))) == 1
 
 
-def test_models_are_live_on_their_pages_and_seen_in_the_gallery(built: Built) -> None:
-    models = built.public / "models"
+def test_models_are_live_on_their_pages_and_seen_in_the_gallery(site: BuiltSite) -> None:
+    models = site.public / "models"
     for name, lab in (("ball", "1.2-lab-1"), ("a/still", "model-a-still"), ("lost", "model-lost")):
         page = (models / f"{name}.html").read_text("utf-8")
         assert page.index(f'data-lab="{lab}"') < page.index('id="used"') < page.index('id="facts"')

@@ -38,15 +38,15 @@ def test_a_rope_whose_ends_meet_is_a_ball() -> None:
 
 def test_a_smooth_surface_has_the_mean_normal_of_its_faces() -> None:
     ridge = np.array([(0.0, -1, 0), (0, 1, 0), (-1, 0, -1), (1, 0, -1)])
-    found = smooth_surface(ridge, np.array([(0, 1, 2), (1, 0, 3)]))
-    assert found.normals[0] == pytest.approx((0, 0, 1))
-    assert found.normals[3] == pytest.approx((math.sqrt(0.5), 0, math.sqrt(0.5)))
+    shape = smooth_surface(ridge, np.array([(0, 1, 2), (1, 0, 3)]))
+    assert shape.normals[0] == pytest.approx((0, 0, 1))
+    assert shape.normals[3] == pytest.approx((math.sqrt(0.5), 0, math.sqrt(0.5)))
 
 
 def test_an_edge_is_sharp_where_the_face_is_turned_far() -> None:
     up = np.tile((0.0, 0.0, 1.0), (1, 3, 1))
-    for turned, sharp in ((0.3, False), (0.6, False), (0.7, True), (1.5, True)):
-        corners = np.array([[(0.0, 0, 0), (1, 0, 0), (0, math.cos(turned), math.sin(turned))]])
-        expected = (0, -math.sin(turned), math.cos(turned)) if sharp else (0, 0, 1)
-        assert sharpen(corners, up)[0, 1] == pytest.approx(expected), turned
+    for angle, sharp in ((0.3, False), (0.6, False), (0.7, True), (1.5, True)):
+        corners = np.array([[(0.0, 0, 0), (1, 0, 0), (0, math.cos(angle), math.sin(angle))]])
+        expected = (0, -math.sin(angle), math.cos(angle)) if sharp else (0, 0, 1)
+        assert sharpen(corners, up)[0, 1] == pytest.approx(expected), angle
     assert np.array_equal(sharpen(np.zeros((1, 3, 3)), up), up), "no face, no normal of it"

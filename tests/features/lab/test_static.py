@@ -63,16 +63,16 @@ def solids(main: dict[str, Any]) -> list[Solid]:
 
 
 @pytest.fixture(scope="module")
-def everything(bench: Bench) -> tuple[Any, dict[str, Any]]:
+def rich_scene(bench: Bench) -> tuple[Any, dict[str, Any]]:
     return main_of(bench, xml=EVERYTHING, overlays=["frames", "com"], toggles=["frames"])
 
 
-def test_all_geoms_have_their_shape_and_place(everything: tuple[Any, dict[str, Any]]) -> None:
-    found = solids(everything[1])
-    scene = everything[1]["scene"]
+def test_all_geoms_have_their_shape_and_place(rich_scene: tuple[Any, dict[str, Any]]) -> None:
+    drawn_solids = solids(rich_scene[1])
+    scene = rich_scene[1]["scene"]
     visible = [g for g in scene["geoms"] if g["group"] <= 2]
     assert Counter(g["type"] for g in visible) == Counter([0, 1, 2, 3, 4, 5, 6, 7, 7, 2, 2])
-    plane, hills, ball, capsule, ellipsoid, cylinder, box, first, second = found[:9]
+    plane, hills, ball, capsule, ellipsoid, cylinder, box, first, second = drawn_solids[:9]
     assert plane.plane and plane.mirror == 0 and box.mirror == pytest.approx(0.3)
     assert plane.texture is not None and (plane.texture.repeat, plane.texture.uniform) == (
         (4, 4),
@@ -91,32 +91,34 @@ def test_all_geoms_have_their_shape_and_place(everything: tuple[Any, dict[str, A
     assert [ball.position[0], box.position[0]] == pytest.approx([0, 4], abs=1e-5)
     for mesh, size in ((first, 1.0), (second, 2.0)):
         corners = mesh.surface.vertices[mesh.surface.faces]
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        volume = np.einsum("ij,ij->", corners[:, 0], across) / 6
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        volume = np.einsum("ij,ij->", corners[:, 0], normals) / 6
         assert volume == pytest.approx(size**3 / 6, rel=1e-5), "outward, and the right mesh"
         world = mesh.surface.vertices @ mesh.rotation.T + mesh.position
         assert np.ptp(world, axis=0) == pytest.approx((size, size, size), abs=1e-5)
 
 
-def test_what_the_visualizer_adds_is_there(everything: tuple[Any, dict[str, Any]]) -> None:
-    found = solids(everything[1])
-    green = [s for s in found if s.rgba[:3] == (0, 1, 0)]
+def test_what_the_visualizer_adds_is_there(rich_scene: tuple[Any, dict[str, Any]]) -> None:
+    drawn_solids = solids(rich_scene[1])
+    green = [s for s in drawn_solids if s.rgba[:3] == (0, 1, 0)]
     assert green, "the tendon"
     ends = [s.surface.vertices @ s.rotation.T + s.position for s in green]
     points = np.concatenate(ends)
     assert points.min(axis=0) == pytest.approx((0, 3, 2), abs=0.05)
     assert points.max(axis=0) == pytest.approx((1, 3, 2.2), abs=0.05)
     frames = [
-        s for s in found if s.rgba[:3] != (0, 1, 0) and s.position[1] == pytest.approx(3, abs=0.2)
+        s
+        for s in drawn_solids
+        if s.rgba[:3] != (0, 1, 0) and s.position[1] == pytest.approx(3, abs=0.2)
     ]
     assert len(frames) > 4, "frames and centres of mass of the bodies a and b"
-    hidden = [s for s in found if s.position[0] == pytest.approx(9)]
+    hidden = [s for s in drawn_solids if s.position[0] == pytest.approx(9)]
     assert all(np.ptp(s.surface.vertices) < 1.5 for s in hidden), "marks of it, and not its box"
 
 
-def test_broken_rows_of_a_frame_are_left_out(everything: tuple[Any, dict[str, Any]]) -> None:
-    scene = unpack_arrays(everything[1]["scene"])
-    frame = unpack_arrays(everything[1]["pictures"][0]["frame"]).copy()
+def test_broken_rows_of_a_frame_are_left_out(rich_scene: tuple[Any, dict[str, Any]]) -> None:
+    scene = unpack_arrays(rich_scene[1]["scene"])
+    frame = unpack_arrays(rich_scene[1]["pictures"][0]["frame"]).copy()
     whole = len(list(scene_solids(scene, frame)))
     start = scene["layout"]["geoms"]
     for i, value in ((2, math.nan), (3, math.inf), (4, -math.inf)):
@@ -201,8 +203,8 @@ def test_record_has_values_as_text_and_a_picture_whose_size_follows_the_lab() ->
     }
     readouts = [{"label": "r", "expr": "1", "digits": digits} for _, digits, _ in VALUES]
     heights = (80, 260, 480, 2000, 300)
-    made = [lab_record(make_lab(height=h, readouts=readouts), main) for h in heights]
-    assert made[0].readouts == tuple(("r", text) for _, _, text in VALUES)
+    records = [lab_record(make_lab(height=h, readouts=readouts), main) for h in heights]
+    assert records[0].readouts == tuple(("r", text) for _, _, text in VALUES)
     sizes = [(640, 160), (640, 347), (640, 480), (640, 480), (640, 400)]
-    assert [one.size for one in made] == sizes
-    assert made[-1].scale == (0.5, pytest.approx(100)), "2 m are 400 pixels high"
+    assert [record.size for record in records] == sizes
+    assert records[-1].scale == (0.5, pytest.approx(100)), "2 m are 400 pixels high"

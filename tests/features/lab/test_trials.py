@@ -1,4 +1,4 @@
-"""When labs are tried: what is kept of a trial, and what runs beside it."""
+"""When labs are tried, what is stored of a trial, and what runs at the same time."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ LAB = """{"title": "T", "model": "ball", "height": 80, "setup": "ctx.a = 1",
  "readouts": [{"label": "r", "expr": "ctx.a"}], "verify": {"seconds": 0.2}}"""
 
 
-def cached(folder: Folder) -> list[bool]:
-    """Of each lab: whether it was not tried again; in parts, so that the labs are looked at."""
+def are_cached(folder: Folder) -> list[bool]:
+    """Whether each lab was taken from the store; `--shard` makes the command look at the labs."""
     return [lab["cached"] for lab in checked(folder, "--shard", "1/1", status=0)["labs"]]
 
 
 @pytest.fixture(scope="module")
-def kept(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
-    """A course with a lab whose trial is kept, and whose model has another file as a part."""
+def tried_course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+    """A course with a lab whose trial is stored, and whose model includes another file."""
     root = tmp_path_factory.mktemp("kept") / "course"
     folder = course(root, stores, "## A lab\n\n" + fence(LAB))
     include = '<include file="part.xml"/><worldbody>'
@@ -59,31 +59,31 @@ def kept(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     # With a light there is no floor to draw, which takes longest.
     part = '<mujoco><worldbody><light pos="0 0 3"/></worldbody></mujoco>'
     folder.write("models/part.xml", part)
-    assert cached(folder) == [False]
+    assert are_cached(folder) == [False]
     return folder
 
 
 def test_lab_is_tried_again_after_an_edit_of_its_model_or_damage_of_what_is_kept(
-    kept: Folder,
+    tried_course: Folder,
 ) -> None:
-    kept.replace("models/ball.xml", 'mass="1"', 'mass="2"')
-    assert cached(kept) == [False]
+    tried_course.replace("models/ball.xml", 'mass="1"', 'mass="2"')
+    assert are_cached(tried_course) == [False]
     for kind in ("labs", "mjb"):
-        for entry in (kept.root / ".coursebuild" / kind).iterdir():
+        for entry in (tried_course.root / ".coursebuild" / kind).iterdir():
             entry.write_bytes(entry.read_bytes()[:-1])
-    assert cached(kept) == [False]
-    assert cached(kept) == [True]
+    assert are_cached(tried_course) == [False]
+    assert are_cached(tried_course) == [True]
 
 
 class NoBrowser(LabEngine):
-    """Stands for an engine that would have to try the lab."""
+    """An engine that must not be needed to try the lab."""
 
-    def mistakes(self, pieces: Sequence[LabCode]) -> list[str | None]:
+    def check_code(self, pieces: Sequence[LabCode]) -> list[str | None]:
         raise MissedError
 
 
 class NoNative(NativeEngine):
-    """One that runs no script."""
+    """An engine that runs no script."""
 
     def script(self, request: dict[str, Any]) -> dict[str, Any]:
         raise NativeError("is not run")
@@ -95,46 +95,48 @@ class MissedError(Exception):
 
 @pytest.mark.filterwarnings("ignore:.* encountered:RuntimeWarning")
 @pytest.mark.parametrize("count", [15, pytest.param(500, marks=pytest.mark.slow)])
-def test_poisoned_trials_are_one_that_can_be_shown_or_told(kept: Folder, count: int) -> None:
-    """A trial is believed as a whole: its page is drawn of it, or it is tried again.
+def test_poisoned_trials_are_one_that_can_be_shown_or_told(
+    tried_course: Folder, count: int
+) -> None:
+    """A stored reply is used as a whole, for its page, or the lab is tried again.
 
-    A sound one is shown with its script, and no engine is asked.
+    A sound reply gives a page with a script, and starts no engine.
     """
-    shutil.rmtree(kept.root / ".coursebuild/labs")
-    assert cached(kept) == [False]
-    (entry,) = (kept.root / ".coursebuild/labs").iterdir()
+    shutil.rmtree(tried_course.root / ".coursebuild/labs")
+    assert are_cached(tried_course) == [False]
+    (entry,) = (tried_course.root / ".coursebuild/labs").iterdir()
     name = f"labs/{entry.name}"
     sound = entry.read_bytes()
-    whole = unsealed(name, sound)
-    assert whole is not None
-    course, ball = load_course(kept.root), kept.text("models/ball.xml")
-    models = {"ball": compile_all(kept.root, [("models/ball.xml", ball)])[0]}
-    engines = Engines(kept.root)
-    engines.browser, engines.native = NoBrowser(), NoNative(kept.root)
-    told: list[str] = []
+    reply = unsealed(name, sound)
+    assert reply is not None
+    course, ball = load_course(tried_course.root), tried_course.text("models/ball.xml")
+    models = {"ball": compile_all(tried_course.root, [("models/ball.xml", ball)])[0]}
+    engines = Engines(tried_course.root)
+    engines.browser, engines.native = NoBrowser(), NoNative(tried_course.root)
+    messages: list[str] = []
     outcomes = Counter[str]()
     bombs = (zlib.compress(data, 1) for data in (b" " * (1 + (1 << 28)), b"[" * 100_000))
-    text = zlib.decompress(whole)
-    nothing = json.dumps({**json.loads(text), "main": None}).encode()
-    texts = map(zlib.compress, (text[:-1], nothing, *poisoned(text, count)))
-    for data in (whole, *bombs, *texts):
+    text = zlib.decompress(reply)
+    without_main = json.dumps({**json.loads(text), "main": None}).encode()
+    texts = map(zlib.compress, (text[:-1], without_main, *poisoned(text, count)))
+    for data in (reply, *bombs, *texts):
         entry.write_bytes(sealed(name, data))
-        shutil.rmtree(kept.root / ".coursebuild/pictures", ignore_errors=True)
-        memory = Memory(kept.root, Memo(kept.root))
-        told.clear()
-        memory.store.listen(told.append)
-        context = TrialContext(kept.root, course, models, memory, static=True)
+        shutil.rmtree(tried_course.root / ".coursebuild/pictures", ignore_errors=True)
+        memory = Memory(tried_course.root, Memo(tried_course.root))
+        messages.clear()
+        memory.store.listen(messages.append)
+        context = TrialContext(tried_course.root, course, models, memory, static=True)
         try:
-            ((result,), wrong) = LabTrials(context, engines).run(lab_trials(course))
+            ((result,), diagnostics) = LabTrials(context, engines).run(lab_trials(course))
         except MissedError:
-            assert [line[:26] for line in told] == [f"the entry {name[:16]}"]
+            assert [line[:26] for line in messages] == [f"the entry {name[:16]}"]
             assert not entry.exists()
             outcomes["missed"] += 1
         else:
             assert isinstance(result.output, LabOutput)
-            assert not told and json.loads(result.output.config)
-            assert wrong or result.output.picture.startswith(b"\x89PNG")
-            assert data is not whole or result.output.script
+            assert not messages and json.loads(result.output.config)
+            assert diagnostics or result.output.picture.startswith(b"\x89PNG")
+            assert data is not reply or result.output.script
             outcomes["shown"] += 1
     assert min(outcomes.values()) > count / 20, outcomes
     entry.write_bytes(sound)
@@ -147,12 +149,13 @@ def test_failure_of_a_lab_is_kept_and_one_that_took_too_long_is_not(tmp_path: Pa
     course = make_course(fences, models={"ball": BALL})
     models = {"ball": compile_all(tmp_path, [("models/ball.xml", BALL)])[0]}
     options = Options(root=tmp_path, jobs=1, quiet=True)
-    found = []
+    outcomes = []
     with closing(OpenEngines(tmp_path)) as engines:
         for seconds in (0.2, 60.0):
-            results, wrong = try_labs(course, options, engines, models, seconds=seconds)
-            found.append(([d.rule for d in wrong], [result.line.cached for result in results]))
-    assert found == [
+            results, diagnostics = try_labs(course, options, engines, models, seconds=seconds)
+            rules = [diagnostic.rule for diagnostic in diagnostics]
+            outcomes.append((rules, [result.line.cached for result in results]))
+    assert outcomes == [
         (["lab-throws", "lab-timeout"], [False, False]),
         (["lab-throws"], [True, False]),
     ]
@@ -167,13 +170,13 @@ def test_error_in_a_trial_ends_the_command_and_hangs_nothing(
     folder = course(tmp_path / "course", stores, "## A\n\n" + fence(LAB))
     error: Exception = EffectError("MuJoCo cannot be loaded: no library x")
 
-    def broken(*_: object) -> None:
+    def fail(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr(NativeEngine, "save", broken)
-    done = folder.main("check")
-    assert done.status == 1
-    assert "coursebuild: MuJoCo cannot be loaded: no library x" in done.err
+    monkeypatch.setattr(NativeEngine, "save", fail)
+    check = folder.main("check")
+    assert check.status == 1
+    assert "coursebuild: MuJoCo cannot be loaded: no library x" in check.err
     wait_until_alone(folder)
     error = ZeroDivisionError()  # a mistake of the tool's own
     with pytest.raises(ZeroDivisionError):
@@ -182,43 +185,43 @@ def test_error_in_a_trial_ends_the_command_and_hangs_nothing(
 
 
 def native_processes() -> list[int]:
-    """Of MuJoCo's, those that this process started."""
-    found = []
-    for number in Path(f"/proc/{os.getpid()}/task").glob("*/children"):
-        for child in number.read_text().split():
+    """Return the ids of the processes of native MuJoCo that this process started."""
+    ids = []
+    for file in Path(f"/proc/{os.getpid()}/task").glob("*/children"):
+        for child in file.read_text().split():
             if b"native_worker" in Path(f"/proc/{child}/cmdline").read_bytes():
-                found.append(int(child))
-    return found
+                ids.append(int(child))
+    return ids
 
 
 def test_native_mujoco_that_dies_is_told_at_the_lab(
     tmp_path: Path, stores: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    original, others = NativeEngine.parity, {*native_processes()}
+    original, earlier_processes = NativeEngine.parity, {*native_processes()}
 
-    def dies(engine: NativeEngine, *arguments: Any) -> Any:
-        (process,) = {*native_processes()} - others
+    def kill_and_compare(engine: NativeEngine, *arguments: Any) -> Any:
+        (process,) = {*native_processes()} - earlier_processes
         os.kill(process, signal.SIGKILL)
         return original(engine, *arguments)
 
-    monkeypatch.setattr(NativeEngine, "parity", dies)
+    monkeypatch.setattr(NativeEngine, "parity", kill_and_compare)
     folder = course(tmp_path / "course", stores, "## A\n\n" + fence(LAB))
-    (found,) = checked(folder, status=1)["diagnostics"]
-    assert (found["rule"], found["line"]) == ("lab-engine", 3)
-    assert found["message"] == "native MuJoCo crashed (SIGKILL)"
+    (diagnostic,) = checked(folder, status=1)["diagnostics"]
+    assert (diagnostic["rule"], diagnostic["line"]) == ("lab-engine", 3)
+    assert diagnostic["message"] == "native MuJoCo crashed (SIGKILL)"
     monkeypatch.undo()
-    assert cached(folder) == [False]
+    assert are_cached(folder) == [False]
 
 
 @pytest.mark.parametrize(
-    ("number", "status", "where"), [(signal.SIGINT, 130, "lab"), (signal.SIGTERM, 143, "script")]
+    ("number", "status", "running"), [(signal.SIGINT, 130, "lab"), (signal.SIGTERM, 143, "script")]
 )
 def test_signal_ends_labs_and_scripts_at_once_and_leaves_nothing(
-    tmp_path: Path, stores: Path, number: int, status: int, where: str
+    tmp_path: Path, stores: Path, number: int, status: int, running: str
 ) -> None:
     """The code of the second lab never returns; its time is over after a minute."""
     script = "from pathlib import Path\nPath('running').touch()\n"
-    script += "import time\ntime.sleep(600)\n" if where == "script" else ""
+    script += "import time\ntime.sleep(600)\n" if running == "script" else ""
     fine = '{"model": "ball", "verify": {"seconds": 0.1}}'
     endless = '{"model": "ball", "controller": "for (;;) ;"}'
     lesson = "## A\n\n" + block("a.py", script, info="timeout=600") + fence(fine) + fence(endless)

@@ -98,8 +98,9 @@ def test_what_is_so_from_the_start_is_told_once() -> None:
         TrialFailure(("controls", 1), "warning", "badctrl", 1.5, Attempt("b")),
         TrialFailure(("controls", 2, "run"), "throws", "x", 1.5, Attempt("c")),
     )
-    told = failure_diagnostics(make_lab(LINES), TrialReply(engine_version(), (), failures, None))
-    assert [d.rule for d in told] == ["lab-diverged", "lab-warning", "lab-throws"]
+    reply = TrialReply(engine_version(), (), failures, None)
+    diagnostics = failure_diagnostics(make_lab(LINES), reply)
+    assert [d.rule for d in diagnostics] == ["lab-diverged", "lab-warning", "lab-throws"]
 
 
 def test_parity_in_words() -> None:
@@ -113,7 +114,7 @@ def test_parity_in_words() -> None:
 
 
 def test_difference_from_native_mujoco_is_allowed_as_the_lab_or_its_model_says() -> None:
-    for relative, rtol, exact, allowed in (
+    for relative, rtol, exact, expected in (
         (1e-10, None, False, True),
         (1e-8, None, False, False),
         (1e-8, 1e-7, False, True),
@@ -124,9 +125,9 @@ def test_difference_from_native_mujoco_is_allowed_as_the_lab_or_its_model_says()
         (1e-16, None, True, False),
         (1e-16, 1e-12, True, True),
     ):
-        differs = Parity(first=3, relative=relative, exact=exact)
-        assert differs.within(rtol) is allowed, (relative, rtol, exact)
-        assert Parity(exact=exact).within(rtol)
+        parity = Parity(first=3, relative=relative, exact=exact)
+        assert parity.is_within_tolerance(rtol) is expected, (relative, rtol, exact)
+        assert Parity(exact=exact).is_within_tolerance(rtol)
 
 
 def test_failure_without_a_message_is_told() -> None:
@@ -137,16 +138,17 @@ def test_failure_without_a_message_is_told() -> None:
         "main": None,
     }
     trial = read_reply(reply_bytes(reply))
-    assert (trial.tried, trial.steps_per_second) == ((Attempt("start"),), None)
-    (told,) = failure_diagnostics(make_lab(LINES), trial)
-    assert told.message == "the lab throws: something that has no text"
+    assert (trial.attempts, trial.steps_per_second) == ((Attempt("start"),), None)
+    (diagnostic,) = failure_diagnostics(make_lab(LINES), trial)
+    assert diagnostic.message == "the lab throws: something that has no text"
 
 
 def test_what_only_the_browsers_engine_says_of_an_edited_model_is_told_at_its_line() -> None:
     lab = lab_of('```lab mjcf\n<mujoco>\n  <include file="part.xml"/>\n</mujoco>\n```\n')
     message = "XML Error: Error opening file 'part.xml'\nElement 'include', line 2\n\n"
     failure = TrialFailure((), "engine", message, None, Attempt("start"))
-    (told,) = failure_diagnostics(lab, TrialReply(engine_version(), (), (failure,), None))
-    assert (told.rule, told.span.text) == ("lab-engine", '<include file="part.xml"/>')
-    said = "the browser's engine says: error opening file 'part.xml' in <include>"
-    assert (told.message, "beside which there are no files" in told.help) == (said, True)
+    (diagnostic,) = failure_diagnostics(lab, TrialReply(engine_version(), (), (failure,), None))
+    assert (diagnostic.rule, diagnostic.span.text) == ("lab-engine", '<include file="part.xml"/>')
+    wording = "the browser's engine says: error opening file 'part.xml' in <include>"
+    assert diagnostic.message == wording
+    assert "beside which there are no files" in diagnostic.help

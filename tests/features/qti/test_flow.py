@@ -1,4 +1,4 @@
-"""HTML brought into what QTI allows: whatever it is, the result is valid, and keeps the words."""
+"""HTML converted to what QTI allows: whatever it is, the result is valid and keeps the words."""
 
 from __future__ import annotations
 
@@ -58,10 +58,10 @@ def item(flow: Flow, html: str) -> bytes:
 
 
 def check(html: str) -> Flow:
-    used = flow()
-    data = item(used, html)
+    converter = flow()
+    data = item(converter, html)
     assert mistakes(data) == [], html
-    return used
+    return converter
 
 
 def test_hostile_html_becomes_a_valid_item() -> None:
@@ -75,17 +75,16 @@ def test_any_text_becomes_a_valid_item(html: str) -> None:
 
 
 def blocks(html: str) -> str:
-    used = flow()
     return "".join(
         re.sub(r' xmlns:m="[^"]*"', "", etree.tostring(node, encoding="unicode"))
-        for node in (etree.fromstring(bare(made)) for made in used.blocks(html))
+        for node in (etree.fromstring(bare(block)) for block in flow().blocks(html))
     )
 
 
-def bare(made: Element) -> bytes:
-    data = markup([made]).encode()
-    declared = rb'\1 xmlns:m="http://www.w3.org/1998/Math/MathML"'
-    return re.sub(rb"(<[a-z:0-9]+)", declared, data, count=1)
+def bare(node: Element) -> bytes:
+    data = markup([node]).encode()
+    declaration = rb'\1 xmlns:m="http://www.w3.org/1998/Math/MathML"'
+    return re.sub(rb"(<[a-z:0-9]+)", declaration, data, count=1)
 
 
 def test_html_becomes_the_nearest_that_qti_allows() -> None:
@@ -121,10 +120,10 @@ def test_html_becomes_the_nearest_that_qti_allows() -> None:
         ("<math><semantics><mrow><mi>x</mi></mrow><annotation>x</annotation></semantics></math>",
          "<p><m:math><m:mrow><m:mi>x</m:mi></m:mrow></m:math></p>"),
     ]  # fmt: skip
-    assert [blocks(html) for html, _ in cases] == [made for _, made in cases]
+    assert [blocks(html) for html, _ in cases] == [expected for _, expected in cases]
 
 
-def test_html_that_qti_cannot_hold_is_told() -> None:
+def test_html_that_qti_cannot_hold_is_listed_as_loss() -> None:
     cases: list[tuple[str, list[str]]] = [
         ("<video src='a'>words</video>", ["`<video>` has no place in QTI and is left out"]),
         ("<canvas></canvas><canvas></canvas>", ["`<canvas>` has no place in QTI and is left out"]),
@@ -138,14 +137,14 @@ def test_html_that_qti_cannot_hold_is_told() -> None:
         ("<p style='color:red' onclick='x()' id=y>a</p>", []),
         ("<script>alert(1)</script><style>p{}</style><!-- no -->", []),
     ]  # fmt: skip
-    assert [check(html).lost for html, _ in cases] == [lost for _, lost in cases]
+    assert [check(html).losses for html, _ in cases] == [losses for _, losses in cases]
 
 
 @given(st.lists(PIECES, max_size=14).map("".join))
 def test_any_formula_is_of_mathml(html: str) -> None:
     """Nesting as Temml gives it; what an author nests is the author's."""
-    made = flow().line("<math><mrow><mi>x</mi></mrow></math>" + html.replace("<m", "<x"))
-    formulas = [part for part in made if not isinstance(part, str) and part.tag == "m:math"]
+    parts = flow().line("<math><mrow><mi>x</mi></mrow></math>" + html.replace("<m", "<x"))
+    formulas = [part for part in parts if not isinstance(part, str) and part.tag == "m:math"]
     assert formulas
-    for one in formulas:
-        assert formula_mistakes(etree.fromstring(bare(one))) == []
+    for formula in formulas:
+        assert formula_mistakes(etree.fromstring(bare(formula))) == []

@@ -29,9 +29,9 @@ SPACES = {"q": QTI, "m": MATHML}
 
 
 def export(folder: Folder, *arguments: str) -> Done:
-    done = folder.main("export", "qti", *arguments)
-    assert done.status == 0, done.out + done.err
-    return done
+    command = folder.main("export", "qti", *arguments)
+    assert command.status == 0, command.out + command.err
+    return command
 
 
 def package(folder: Folder) -> dict[str, bytes]:
@@ -73,13 +73,13 @@ def zoo_items(qti: Package) -> dict[str, etree._Element]:
 
 
 def shape(node: etree._Element, path: str) -> list[str]:
-    """Texts or attributes."""
-    found = node.xpath(path, namespaces=SPACES)
-    return [part if isinstance(part, str) else "".join(part.itertext()) for part in found]
+    """Return the texts or attributes at a path."""
+    nodes = node.xpath(path, namespaces=SPACES)
+    return [part if isinstance(part, str) else "".join(part.itertext()) for part in nodes]
 
 
-def right(one: etree._Element) -> list[str]:
-    return shape(one, "//q:correctResponse/q:value")
+def right(item: etree._Element) -> list[str]:
+    return shape(item, "//q:correctResponse/q:value")
 
 
 def test_package_of_every_kind_of_question_is_whole(
@@ -90,29 +90,29 @@ def test_package_of_every_kind_of_question_is_whole(
     assert "wrote 14 files to quizzes-qti.zip, " in qti.done.out
     check(qti.files)
     bases = "//q:responseDeclaration/@baseType"
-    assert {name: shape(one, bases) for name, one in zoo_items.items()} == {
+    assert {name: shape(item, bases) for name, item in zoo_items.items()} == {
         "mcq": ["identifier"], "several": ["identifier"], "predict": ["identifier"],
         "numeric": ["float"], "zero": ["float"], "large": ["float"], "output": ["string"],
         "marks": ["string"], "open": ["string"], "order": ["identifier"],
     }  # fmt: skip
     assert qti.files["files/lessons/sketch.svg"] == SVG.encode()
-    titles = [one.get("title") for one in zoo_items.values()]
+    titles = [item.get("title") for item in zoo_items.values()]
     assert titles == [f"Check: Question {n}" for n in range(1, 11)]
 
 
 def test_item_of_a_choice_holds_all_that_its_question_says(
     zoo_items: dict[str, etree._Element],
 ) -> None:
-    one = zoo_items["mcq"]
-    assert right(one) == ["B"]
-    assert shape(one, "//q:choiceInteraction/@maxChoices") == ["1"]
-    assert shape(one, "//q:simpleChoice") == ["1 < 2", "two", "three"]
-    assert shape(one, "//q:infoControl/@title") == ["Hint 1", "Hint 2"]
-    assert shape(one, "//q:modalFeedback/@identifier") == ["A", "C", "EXPLANATION"]
-    assert shape(one, "//q:itemBody/q:pre") == ["if x < 1:\n    y = '&'"]
-    assert shape(one, "//q:itemBody//q:img/@src") == ["../files/lessons/sketch.svg"]
-    assert shape(one, "//q:itemBody//q:td/@class") == ["align-center", "align-right"]
-    assert shape(one, "//q:itemBody/q:ul/q:li") == ["☑ done", "☐ not"]
+    choice = zoo_items["mcq"]
+    assert right(choice) == ["B"]
+    assert shape(choice, "//q:choiceInteraction/@maxChoices") == ["1"]
+    assert shape(choice, "//q:simpleChoice") == ["1 < 2", "two", "three"]
+    assert shape(choice, "//q:infoControl/@title") == ["Hint 1", "Hint 2"]
+    assert shape(choice, "//q:modalFeedback/@identifier") == ["A", "C", "EXPLANATION"]
+    assert shape(choice, "//q:itemBody/q:pre") == ["if x < 1:\n    y = '&'"]
+    assert shape(choice, "//q:itemBody//q:img/@src") == ["../files/lessons/sketch.svg"]
+    assert shape(choice, "//q:itemBody//q:td/@class") == ["align-center", "align-right"]
+    assert shape(choice, "//q:itemBody/q:ul/q:li") == ["☑ done", "☐ not"]
     several = zoo_items["several"]
     assert right(several) == ["A", "C"]
     assert shape(several, "//q:responseDeclaration/@cardinality") == ["multiple"]
@@ -123,33 +123,33 @@ def test_item_of_a_choice_holds_all_that_its_question_says(
 def test_item_of_a_number_has_its_tolerance_and_unit(
     zoo_items: dict[str, etree._Element],
 ) -> None:
-    for name, value, within in (
+    for name, value, margin in (
         ("numeric", 0.08, 1e-4), ("zero", 0.0, 0.5), ("large", 6.02e23, 0.02 * 6.02e23)
     ):  # fmt: skip
         assert [float(text) for text in right(zoo_items[name])] == [value]
         [tolerance] = shape(zoo_items[name], "//q:equal/@tolerance")
-        assert [float(text) for text in tolerance.split()] == pytest.approx([within, within])
+        assert [float(text) for text in tolerance.split()] == pytest.approx([margin, margin])
     assert shape(zoo_items["numeric"], "//q:p[q:textEntryInteraction]") == [" kg m2"]
     assert shape(zoo_items["numeric"], "//q:sup") == ["2"]
 
 
 def test_items_of_outputs_texts_and_orders(zoo_items: dict[str, etree._Element]) -> None:
-    one = zoo_items["output"]
-    assert (right(one), right(zoo_items["marks"])) == (["drift  +6.6 %"], ["<b>&amp;"])
-    assert shape(one, "//q:stringMatch/@caseSensitive") == ["true"]
-    assert "What does examples/fall.py print in line 1 of its output?" in shape(one, "//q:p")
-    one = zoo_items["open"]
-    assert right(one) == [] and shape(one, "//q:responseCondition") == []
-    assert shape(one, "//q:rubricBlock/@view") == ["scorer"]
-    assert shape(one, "//q:rubricBlock/q:p[1]") == ["A good answer"]
-    [said] = shape(one, "//q:modalFeedback")
-    assert said.startswith("A good answer") and said.endswith("Because.")
-    one = zoo_items["order"]
-    names = shape(one, "//q:simpleChoice/@identifier")
-    texts = dict(zip(names, shape(one, "//q:simpleChoice"), strict=True))
-    assert [texts[name] for name in right(one)] == ["first", "second", "3", "fourth"]
-    assert right(one) != sorted(right(one)) and names == sorted(names), "it is not given away"
-    assert shape(one, "//q:responseDeclaration/@cardinality") == ["ordered"]
+    item = zoo_items["output"]
+    assert (right(item), right(zoo_items["marks"])) == (["drift  +6.6 %"], ["<b>&amp;"])
+    assert shape(item, "//q:stringMatch/@caseSensitive") == ["true"]
+    assert "What does examples/fall.py print in line 1 of its output?" in shape(item, "//q:p")
+    item = zoo_items["open"]
+    assert right(item) == [] and shape(item, "//q:responseCondition") == []
+    assert shape(item, "//q:rubricBlock/@view") == ["scorer"]
+    assert shape(item, "//q:rubricBlock/q:p[1]") == ["A good answer"]
+    [feedback] = shape(item, "//q:modalFeedback")
+    assert feedback.startswith("A good answer") and feedback.endswith("Because.")
+    item = zoo_items["order"]
+    names = shape(item, "//q:simpleChoice/@identifier")
+    texts = dict(zip(names, shape(item, "//q:simpleChoice"), strict=True))
+    assert [texts[name] for name in right(item)] == ["first", "second", "3", "fourth"]
+    assert right(item) != sorted(right(item)) and names == sorted(names), "it is not given away"
+    assert shape(item, "//q:responseDeclaration/@cardinality") == ["ordered"]
 
 
 # --- hard cases
@@ -170,14 +170,14 @@ FORMULAS = (
 )
 
 
-def test_package_of_hard_cases_is_whole_and_its_losses_are_told(make_course: Make) -> None:
-    """What a page cannot hold either is a mistake of the author's, and not tried here."""
+def test_package_of_hard_cases_is_whole_and_its_losses_are_reported(make_course: Make) -> None:
+    """Text that a page cannot hold either is a mistake of the author's, and not tried here."""
     hostile = [
         {**ANY["mcq"], "q": text, "explain": text, "hints": [text], "label": text[:40],
          "options": [text, "b"], "answer": 0, "feedback": [text, text]}
         for text in HOSTILE if text not in REFUSED
     ]  # fmt: skip
-    formulas = {**ANY["zero"], "q": f"Inline ${FORMULAS}$ and\n\n$${FORMULAS}$$"}
+    formula_question = {**ANY["zero"], "q": f"Inline ${FORMULAS}$ and\n\n$${FORMULAS}$$"}
     twice = [ANY["zero"], {**ANY["zero"], "q": "Again?"}]
     folder = make_course(
         GOOD
@@ -185,7 +185,7 @@ def test_package_of_hard_cases_is_whole_and_its_losses_are_told(make_course: Mak
         + quiz("unknown", ANY["output"], ANY["zero"])
         + quiz("hostile", *hostile, title='<i>"T" & co</i>')
         + quiz("warned", *({**ANY["zero"], "q": text} for text in WARNED))
-        + quiz("formulas", formulas)
+        + quiz("formulas", formula_question)
         + "".join(quiz(id, *twice) for id in IDS)
     )
     folder.write("content/pages/about.md", "## About\n\n" + quiz("page", ANY["mcq"]))
@@ -196,28 +196,28 @@ def test_package_of_hard_cases_is_whole_and_its_losses_are_told(make_course: Mak
         '[security]\nhtml = "trusted"\n\n'
         '[[page]]\nid = "about"\ntitle = "About"\nfile = "content/pages/about.md"\n\n[[level]]',
     )
-    done = export(folder)
+    command = export(folder)
     files = entries(folder.root / ZIP)
     check(files)
-    said = "it is left out: its script was not run, so nobody knows the key", *WARNED.values()
-    reduced = "this question is not whole in the QTI package: "
-    assert [one for one in said if f"{reduced}{one}" not in done.out] == []
+    losses = "it is left out: its script was not run, so nobody knows the key", *WARNED.values()
+    message = "this question is not whole in the QTI package: "
+    assert [loss for loss in losses if f"{message}{loss}" not in command.out] == []
     assert len(items(files, "quiz.unknown")) == 1
     assert len(items(files, "quiz.hostile")) == len(hostile) > 15
     assert etree.fromstring(files["tests/quiz.hostile.xml"]).get("title") == '<i>"T" & co</i>'
     assert "tests/quiz.page.xml" in files and "files/pages/sketch.svg" in files
-    names = [one.get("identifier") for one in items(files)]
+    names = [item.get("identifier") for item in items(files)]
     assert len(set(names)) == len(names)
-    wanted = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,31}")
-    every = [*names, *(path.rpartition("/")[2][:-4] for path in files if "s/quiz." in path)]
-    assert [name for name in every if not wanted.fullmatch(name)] == []
-    [one] = items(files, "quiz.formulas")
-    found = one.findall(f".//{{{MATHML}}}math")
-    assert len(found) == 2, "a formula that a page cuts in pieces is whole"
-    assert not [key for math in found for node in math.iter() for key in node.attrib
+    short_name = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,31}")
+    all_names = [*names, *(path.rpartition("/")[2][:-4] for path in files if "s/quiz." in path)]
+    assert [name for name in all_names if not short_name.fullmatch(name)] == []
+    [item] = items(files, "quiz.formulas")
+    formulas = item.findall(f".//{{{MATHML}}}math")
+    assert len(formulas) == 2, "a formula that a page cuts in pieces is whole"
+    assert not [key for math in formulas for node in math.iter() for key in node.attrib
                 if key in ("class", "style") or key.startswith("data-")]  # fmt: skip
-    assert "mathcolor" in {key for node in found[0].iter() for key in node.attrib}
-    assert [n.get("notation") for n in found[0].iter(f"{{{MATHML}}}menclose")] == [
+    assert "mathcolor" in {key for node in formulas[0].iter() for key in node.attrib}
+    assert [n.get("notation") for n in formulas[0].iter(f"{{{MATHML}}}menclose")] == [
         "box", "updiagonalstrike"
     ]  # fmt: skip
     folder.replace(

@@ -25,8 +25,8 @@ KIND = "{http://www.adlnet.org/xsd/adlcp_rootv1p2}scormtype"
 
 def package(folder: Folder) -> dict[str, bytes]:
     """The package, in which everything is as it must be."""
-    done = folder.main("export", "scorm")
-    assert done.status == 0, done.out + done.err
+    command = folder.main("export", "scorm")
+    assert command.status == 0, command.out + command.err
     files = entries(folder.root / ZIP)
     check(files)
     return files
@@ -35,8 +35,8 @@ def package(folder: Folder) -> dict[str, bytes]:
 def check(files: dict[str, bytes]) -> None:
     manifest = files["imsmanifest.xml"]
     assert mistakes(scorm_schema(), manifest) == []
-    listed = set(referred(manifest))
-    assert listed == set(files) - {"imsmanifest.xml"}
+    paths = set(referred(manifest))
+    assert paths == set(files) - {"imsmanifest.xml"}
     root = etree.fromstring(manifest)
     resources = {node.get("identifier"): node for node in root.iter(f"{CP}resource")}
     for item in root.iter(f"{CP}item"):
@@ -77,31 +77,31 @@ def test_files_that_a_platform_has_no_use_for_are_left_out(scorm: Package) -> No
     assert {path for path in left_out if not path.endswith((".br", ".gz"))} == {
         "404.html", "files.json", "robots.txt", "service-worker.js"
     }  # fmt: skip
-    same = [path for path in files if path in site]
-    assert [path for path in same if files[path] != site[path]] == [], "pages are the site's"
-    assert len(same) == len(files) - 5, "the manifest, two lessons' starts and what starts share"
+    common = [path for path in files if path in site]
+    assert [path for path in common if files[path] != site[path]] == [], "pages are the site's"
+    assert len(common) == len(files) - 5, "the manifest, two lessons' starts and what starts share"
     assert len([path for path in files if path.endswith(".wasm")]) == 1
 
 
 def test_no_address_leads_nowhere(scorm: Package) -> None:
     files = scorm.files
-    without = {**files, "404.html": b""}
-    broken = list(check_links((OutputFile(p, d) for p, d in without.items()), ""))
-    assert [(found.page, found.url) for found in broken] == []
+    with_error_page = {**files, "404.html": b""}
+    broken = list(check_links((OutputFile(p, d) for p, d in with_error_page.items()), ""))
+    assert [(link.page, link.url) for link in broken] == []
     for path in (path for path in files if path.startswith("sco/") and path.endswith(".html")):
         for address in addresses(files[path].decode()):
             assert posixpath.normpath(f"sco/{unquote(address)}") in files
 
 
 def addresses(html: str) -> list[str]:
-    found: list[str] = []
+    hrefs: list[str] = []
 
     class Reader(HTMLParser):
         def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-            found.extend(value or "" for key, value in attrs if key in ("href", "src", "data-src"))
+            hrefs.extend(value or "" for key, value in attrs if key in ("href", "src", "data-src"))
 
     Reader().feed(html)
-    return [urlsplit(address).path for address in found]
+    return [urlsplit(address).path for address in hrefs]
 
 
 def test_package_with_hostile_titles_in_arabic_follows_edits(make_course: Make) -> None:

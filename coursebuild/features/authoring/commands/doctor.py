@@ -99,7 +99,7 @@ def _mujoco(_: Path) -> Iterator[Probe]:
 def _lab_engine(_: Path) -> Iterator[Probe]:
     try:
         with LabEngine() as engine:
-            engine.mistakes(())
+            engine.check_code(())
             yield Probe(f"MuJoCo {engine.version} of the browser, in V8, for labs", True)
     except EffectError as error:
         yield Probe(error.message, False, error.help or "install coursebuild again")

@@ -1,10 +1,10 @@
 """The browser's MuJoCo in this process: V8 runs the same WebAssembly file and the same lab code.
 
-Entry points: `LabEngine.trial`, `LabEngine.mistakes`. See docs/explanation/how-labs-run.md for
-what is asked and answered.
+Entry points: `LabEngine.trial`, `LabEngine.check_code`. docs/explanation/how-labs-run.md describes
+requests and replies.
 
-The engine is started when it is first needed, and again after a trial that ran too long or took too
-much memory: such a trial is told as what it is, and takes no other along.
+The engine starts when it is first needed, and again after a trial that ran too long or took too
+much memory, so that such a trial fails alone.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from coursebuild.features.lab.engines.files import script_path, wasm_path
 
 _START_SECONDS = 60.0
 _PATIENCE = 5.0
-"""Seconds for which a piece of lab code may run at once: the reader's lab stands still as long."""
+"""Seconds that one call of lab code may take; the reader's lab would stand still as long."""
 _PIECES = Path(__file__).with_name("pieces.js")
 
 
 class LabEngine:
-    """Tries labs, one after the other; a context manager for use in one thread."""
+    """Runs trials, one after the other; a context manager for use in one thread."""
 
     def __init__(self, memory: int = MEMORY, patience: float = _PATIENCE) -> None:
         """`memory`: MiB of JavaScript objects; WebAssembly's memory comes on top.
 
-        `patience`: seconds of processor time for which a trial need not get on.
+        `patience`: seconds of processor time that a trial may take without progress.
         """
         self._memory = memory << 20
         self._patience = patience
@@ -54,66 +54,66 @@ class LabEngine:
             self._isolate = None
 
     def stop(self) -> None:
-        """From another thread: end what runs, and what comes after, by a `StoppedError` there."""
+        """End what runs, and what comes after, by a `StoppedError`; called from another thread."""
         self._stopped = True
         if (isolate := self._isolate) is not None:
             isolate.stop()
 
-    def mistakes(self, pieces: Sequence[LabCode]) -> list[str | None]:
-        """For each piece of code: why it cannot be part of a lab, or `None`."""
-        isolate = self._ready()
-        asked = [{"code": p.code, "form": p.form, "text": p.function} for p in pieces]
-        reply = isolate.call("parsePieces", json.dumps(asked), _START_SECONDS)
-        found: list[str | None] = json.loads(reply)
-        return found
+    def check_code(self, pieces: Sequence[LabCode]) -> list[str | None]:
+        """Say of each piece of code why it cannot be part of a lab; `None` if it can."""
+        isolate = self._running_isolate()
+        request = [{"code": p.code, "form": p.form, "text": p.function} for p in pieces]
+        reply = isolate.call("parsePieces", json.dumps(request), _START_SECONDS)
+        messages: list[str | None] = json.loads(reply)
+        return messages
 
     def look_up(
         self, paths: Sequence[tuple[str, ...]], mjb: bytes, seconds: float
     ) -> list[dict[str, Any]]:
-        """What there is of what lab code names, given its model."""
-        isolate = self._ready()
+        """Say of each name in lab code what exists of it, given the lab's model."""
+        isolate = self._running_isolate()
         isolate.fill("mjb", mjb)
         try:
-            found: list[dict[str, Any]] = json.loads(
-                isolate.call("lookUp", json.dumps(paths), seconds)
-            )
-        except (LimitError, ScriptError):  # which its trial tells
+            reply = isolate.call("lookUp", json.dumps(paths), seconds)
+        except (LimitError, ScriptError):  # its trial will report it
             self.close()
             return [{} for _ in paths]
-        return found
+        names: list[dict[str, Any]] = json.loads(reply)
+        return names
 
     def trial(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
-        """The reply to a trial's request; `seconds` of processor time is what it may take.
+        """Return the reply to a trial's request; it may take `seconds` of processor time.
 
-        A trial that had to be ended gives a reply with one failure, of the kind `timeout`, at the
-        entry whose code was running, or else at what was tried.
+        If the trial had to be ended, the reply has one failure, of the kind `timeout`, at the entry
+        whose code was running, or else at the entry of the attempt.
         """
-        isolate = self._ready()
+        isolate = self._running_isolate()
         try:
             isolate.fill("mjb", mjb)
             progress = Heartbeat(isolate.buffer("beats"), self._patience)
             text = isolate.call("trial", json.dumps(request), seconds, progress)
         except LimitError as error:
-            return self._ended(isolate, "timeout", str(error))
-        except ScriptError as error:  # lab code has broken what all share
-            return self._ended(isolate, "engine", f"the trial broke: {str(error).splitlines()[0]}")
+            return self._end(isolate, "timeout", str(error))
+        except ScriptError as error:  # lab code has broken something that all labs share
+            return self._end(isolate, "engine", f"the trial broke: {str(error).splitlines()[0]}")
         reply: dict[str, Any] = json.loads(text)
         if any(failure["kind"] in ("engine", "shared") for failure in reply["failures"]):
-            self.close()  # what ended or was changed cannot be trusted with the rest
+            self.close()  # an engine that failed or was changed may not run the other labs
         return reply
 
-    def _ended(self, isolate: Isolate, kind: str, message: str) -> dict[str, Any]:
+    def _end(self, isolate: Isolate, kind: str, message: str) -> dict[str, Any]:
+        """End the engine, and make the reply of the trial that it ran."""
         entry: list[str | int] = []
         with contextlib.suppress(LimitError, ScriptError):
-            told = json.loads(isolate.call("trying", "", _START_SECONDS))
-            entry = told["stuck"] or told["trying"]
-            if kind == "timeout" and told["stuck"] is None:
+            progress = json.loads(isolate.call("trying", "", _START_SECONDS))
+            entry = progress["stuck"] or progress["trying"]
+            if kind == "timeout" and progress["stuck"] is None:
                 message = "did not finish in time"
         self.close()
         failure = {"entry": entry, "kind": kind, "message": message, "at": None}
         return {"version": self.version, "main": None, "tried": [], "failures": [failure]}
 
-    def _ready(self) -> Isolate:
+    def _running_isolate(self) -> Isolate:
         if self._stopped:
             raise StoppedError
         isolate = self._isolate or self._start()
@@ -130,6 +130,6 @@ class LabEngine:
             self.version = isolate.call("booted", "", _START_SECONDS)
         except (LimitError, ScriptError) as error:
             self.close()
-            why = str(error).splitlines()[0]
-            raise EffectError(f"the browser's engine does not start: {why}") from None
+            reason = str(error).splitlines()[0]
+            raise EffectError(f"the browser's engine does not start: {reason}") from None
         return isolate

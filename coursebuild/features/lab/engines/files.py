@@ -1,7 +1,7 @@
 """The files that a trial runs besides the lab itself.
 
-Entry points: `wasm_path`, `script_path`, `engine_digest`, `lab_digest`. They are apart from
-`browser`, as who only asks for a digest needs no V8.
+Entry points: `wasm_path`, `script_path`, `engine_digest`, `lab_digest`. They are not in `browser`,
+so that a digest can be had without V8.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from coursebuild.core.files.resources import assets_dir
 
 
 def wasm_path() -> Path:
-    """MuJoCo, as browsers have it."""
+    """The path of MuJoCo for browsers."""
     return assets_dir() / "mujoco" / "mujoco.wasm"
 
 
 def script_path() -> Path:
-    """The script that tries labs."""
+    """The path of the script that runs trials in V8."""
     return assets_dir() / "js" / "lab-trial.js"
 
 
 @functools.cache
 def engine_digest() -> str:
-    """A hash of both."""
+    """Return a hash of both files."""
     digest = hashlib.sha256(wasm_path().read_bytes())
     digest.update(script_path().read_bytes())
     return digest.hexdigest()
@@ -34,5 +34,5 @@ def engine_digest() -> str:
 
 @functools.cache
 def lab_digest(*parts: str) -> str:
-    """A hash of parts of this feature's code, such as `picture` or `engines/native_worker.py`."""
+    """Return a hash of parts of this feature's code: `picture`, `engines/native_worker.py`."""
     return code_digest(*(f"coursebuild/features/lab/{part}" for part in parts))

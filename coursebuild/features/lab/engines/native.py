@@ -1,4 +1,4 @@
-"""MuJoCo natively, for labs: models as MJB files, and runs repeated beside WebAssembly's.
+"""Native MuJoCo for labs: saves models as MJB files, and repeats runs of the browser's engine.
 
 Entry point: `NativeEngine`, a context manager around a child process.
 """
@@ -14,7 +14,7 @@ from coursebuild.features.lab.engines import native_worker
 
 
 class NativeError(Exception):
-    """Native MuJoCo did not do what it was asked; the text says why."""
+    """Native MuJoCo could not do what a request asks; the text says why."""
 
 
 class NativeEngine(JsonChild):
@@ -22,8 +22,8 @@ class NativeEngine(JsonChild):
 
     Args:
         root: the course's folder.
-        seconds: what one model, or one run, may take.
-        memory: MiB that it may take.
+        seconds: processor time that one request may take.
+        memory: MiB that the child may take.
     """
 
     def __init__(self, root: Path, seconds: float = 120.0, memory: int = MEMORY) -> None:
@@ -32,19 +32,19 @@ class NativeEngine(JsonChild):
         self._limit = seconds
 
     def save(self, path: str, text: str) -> bytes:
-        """A model as an MJB file, of a text that stands, or would stand, at a path of the course.
+        """Compile a text as if it stood at a path of the course, and return the MJB file.
 
         The same text and files give the same bytes wherever the course lies.
 
         Raises:
-            NativeError: it does not compile (which has been found before), or the child died.
+            NativeError: it does not compile (which is reported before), or the child died.
             EffectError: MuJoCo cannot be loaded.
         """
         request = {"task": "save", "path": str(self._root / path), "text": text}
         return base64.b64decode(self._request(request)["mjb"])
 
     def parity(self, mjb: bytes, run: dict[str, Any], horizon: int) -> dict[str, Any]:
-        """A recorded run of the browser's engine, repeated: where and by how much it differs.
+        """Repeat a recorded run of the browser's engine; say where and by how much it differs.
 
         `run` is the `parity` part of a trial's reply; the size of a difference counts up to the
         step `horizon`.
@@ -57,10 +57,11 @@ class NativeEngine(JsonChild):
         return self._request({"task": "parity", "mjb": model, "run": run, "horizon": horizon})
 
     def script(self, request: dict[str, Any]) -> dict[str, Any]:
-        """What running an exported script natively gives, or its `failure` in words.
+        """Run an exported script natively, and return what it computes, or its `failure` in words.
 
-        `request` has its `path` in the course (nothing need be there), its `text`, its `buttons`,
-        `others` (the text with other values), and `near`, the step whose state is told.
+        `request` has the script's `path` in the course (nothing need be there), its `text`, its
+        `buttons`, `variants` (the text with other values), and `near`, the step whose state is
+        returned.
 
         Raises:
             NativeError: the child died.

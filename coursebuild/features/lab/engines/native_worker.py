@@ -1,12 +1,12 @@
-"""The child process that runs MuJoCo natively for labs: saves models, steps beside WebAssembly.
+"""The child process that runs native MuJoCo for labs: it saves models and repeats runs.
 
 Entry point: run as a file by `native`, in a temporary folder, where MuJoCo may leave its log.
 
-The protocol: JSON lines, binary data in base64. First this process says that it is ready; then it
-answers each request with one line. A request that takes more processor time than its limit ends
-this process by SIGPROF.
+The protocol: JSON lines, with binary data in base64. The first line says that this process is
+ready; then it answers each request with one line. A request that takes more processor time than its
+limit ends this process by SIGPROF.
 
-- `save`: compile a text (as if it stood at a path) and give the model as an MJB file.
+- `save`: compile a text (as if it stood at a path) and return the model as an MJB file.
 - `script`: run an exported script as its user would, and observe it.
 - `parity`: load an MJB file, set the state, step, and compare with the states that were recorded.
 """
@@ -65,8 +65,8 @@ def _array(numpy: Any, packed: Any) -> Any:
 def _parity(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
     """Repeat a run natively.
 
-    The checksum of each step tells the first that differs; the states recorded at every `stride`-th
-    step, up to the horizon, tell by how much.
+    The checksum of each step shows the first that differs; the states recorded at every `stride`-th
+    step, up to the horizon, show by how much.
     """
     run = request["run"]
     Path(_MODEL).write_bytes(base64.b64decode(request["mjb"]))
@@ -89,10 +89,11 @@ def _parity(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
             first = step + 1
         if first is None or (step + 1) % run["stride"] or step >= horizon:
             continue
-        mine = numpy.concatenate((data.qpos, data.qvel, data.act))
-        apart = _apart(numpy, mine, states[(step + 1) // run["stride"] - 1])
-        if apart > relative:
-            relative, at = apart, step + 1
+        state = numpy.concatenate((data.qpos, data.qvel, data.act))
+        recorded_state = states[(step + 1) // run["stride"] - 1]
+        difference = _relative_difference(numpy, state, recorded_state)
+        if difference > relative:
+            relative, at = difference, step + 1
     return {
         "first": first,
         "relative": relative,
@@ -107,10 +108,10 @@ def _checksum(data: Any) -> int:
 
 
 def _is_exact(mujoco: Any, model: Any) -> bool:
-    """Whether surely no function of the C library but the square root is evaluated in a step.
+    """Whether a step surely calls no function of the C library but the square root.
 
     Turning joints take sines and cosines, wrapped tendons their inverses, muscles and motors powers
-    and exponentials; everything else is arithmetic, which is the same to the bit on every machine.
+    and exponentials; everything else is arithmetic, which gives the same bits on every machine.
     """
     plain = (int(mujoco.mjtDyn.mjDYN_NONE), int(mujoco.mjtDyn.mjDYN_INTEGRATOR))
     return bool(
@@ -123,70 +124,70 @@ def _is_exact(mujoco: Any, model: Any) -> bool:
     )
 
 
-def _apart(numpy: Any, mine: Any, theirs: Any) -> float:
-    """The largest difference over the largest number, which counts as at least 1."""
-    if not (numpy.isfinite(mine).all() and numpy.isfinite(theirs).all()):
-        same = numpy.array_equal(mine, theirs, equal_nan=True)
-        return 0.0 if same else 1e300  # JSON has no infinity
-    if mine.size == 0:
+def _relative_difference(numpy: Any, native: Any, browser: Any) -> float:
+    """Return the largest difference over the largest number, or over 1 if that is larger."""
+    if not (numpy.isfinite(native).all() and numpy.isfinite(browser).all()):
+        is_equal = numpy.array_equal(native, browser, equal_nan=True)
+        return 0.0 if is_equal else 1e300  # JSON has no infinity
+    if native.size == 0:
         return 0.0
-    largest = max(float(numpy.abs(mine).max()), 1.0)
-    return float(numpy.abs(mine / largest - theirs / largest).max())
+    largest = max(float(numpy.abs(native).max()), 1.0)
+    return float(numpy.abs(native / largest - browser / largest).max())
 
 
 def _script(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
-    """Run a script's `main`, then its buttons, then it with other values of the controls."""
+    """Run a script's `main`, then its buttons, then its variants with other values of controls."""
     if importlib.util.find_spec("mjcourse") is None:
         sys.path.append(request["library"])
     try:
         path = request["path"]
-        told = _observed(_loaded(path, request["text"]), request["near"])
+        observations = _observe(_load(path, request["text"]), request["near"])
         for text, button in [
             *((request["text"], name) for name in request["buttons"]),
-            *((text, None) for text in request["others"]),
+            *((text, None) for text in request["variants"]),
         ]:
-            _tried(_loaded(path, text), button)
-    except (Exception, SystemExit) as error:  # whatever it does, it is the script that does it
+            _take_steps(_load(path, text), button)
+    except (Exception, SystemExit) as error:  # any exception is the script's
         return {"failure": f"{type(error).__name__}: {error}"}
-    return {"failure": "", **told}
+    return {"failure": "", **observations}
 
 
-def _loaded(path: str, text: str) -> Any:
+def _load(path: str, text: str) -> Any:
     module = types.ModuleType("lab_script")
     module.__file__ = path
     exec(compile(text, path, "exec"), module.__dict__)
     return module
 
 
-def _observed(module: Any, near: int) -> dict[str, Any]:
-    """What a script's `main` computes: its steps, its state, its readouts."""
-    told: dict[str, Any] = {"steps": 0, "state": []}
+def _observe(module: Any, recorded_step: int) -> dict[str, Any]:
+    """Run a script's `main`; return its steps, state after `recorded_step` and readouts."""
+    observations: dict[str, Any] = {"steps": 0, "state": []}
     step, simulate = module.step, module.simulate
 
-    def counted(model: Any, data: Any, *rest: Any) -> None:
+    def count_step(model: Any, data: Any, *rest: Any) -> None:
         step(model, data, *rest)
-        told["steps"] += 1
-        if told["steps"] == near:
-            told["state"] = [*data.qpos.tolist(), *data.qvel.tolist(), *data.act.tolist()]
+        observations["steps"] += 1
+        if observations["steps"] == recorded_step:
+            observations["state"] = [*data.qpos.tolist(), *data.qvel.tolist(), *data.act.tolist()]
 
-    def watched(model: Any, data: Any, *rest: Any) -> None:
-        told["start"] = _shown(module, model, data, *rest)
+    def record_simulation(model: Any, data: Any, *rest: Any) -> None:
+        observations["start"] = _readouts(module, model, data, *rest)
         simulate(model, data, *rest)
-        told["end"] = _shown(module, model, data, *rest)
-        told["last"] = _checksum(data)
+        observations["end"] = _readouts(module, model, data, *rest)
+        observations["last"] = _checksum(data)
 
-    module.step, module.simulate = counted, watched
+    module.step, module.simulate = count_step, record_simulation
     module.main()
-    return told
+    return observations
 
 
-def _shown(module: Any, *state: Any) -> list[list[Any]]:
-    found = module.readouts(*state)
-    return [[label, v if isinstance(v, str) else float(v)] for label, v, _ in found]
+def _readouts(module: Any, *state: Any) -> list[list[Any]]:
+    readouts = module.readouts(*state)
+    return [[label, v if isinstance(v, str) else float(v)] for label, v, _ in readouts]
 
 
-def _tried(module: Any, button: str | None) -> None:
-    """A few steps, after a button or with other values."""
+def _take_steps(module: Any, button: str | None) -> None:
+    """Take a few steps, after a button if one is given."""
     state = module.load()
     module.start(*state)
     if button is not None:
@@ -197,7 +198,7 @@ def _tried(module: Any, button: str | None) -> None:
 
 
 class _Writes:
-    """What a controller wrote into the state before each step."""
+    """What the lab's controller wrote into the state before each step."""
 
     def __init__(self, mujoco: Any, numpy: Any, model: Any, run: Any, signature: int) -> None:
         self.set_state, self.get_state = mujoco.mj_setState, mujoco.mj_getState

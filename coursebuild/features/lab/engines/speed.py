@@ -17,15 +17,15 @@ from coursebuild.features.lab.model import SIMLAB, Lab
 from coursebuild.features.lab.schema import SimLab
 
 _STEPS = 5000
-"""Of a run, at most."""
+"""The most steps of a run."""
 _RUNS = 8
-"""The first of them compile; the fastest counts."""
+"""The fastest counts: in the first ones V8 compiles."""
 
 
 def real_time_factor(
     root: Path, source: Source, key: int | None, run: tuple[float, float], seconds: float
 ) -> float | None:
-    """Simulated time over the time that it takes; `None` where no run came to an end.
+    """Measure simulated time over the time that it takes; `None` if no run came to its end.
 
     `run` is the simulated time and the timestep, s; each of several runs may take `seconds`.
     """

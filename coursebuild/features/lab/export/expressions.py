@@ -1,4 +1,4 @@
-"""Expressions of lab code, which is JavaScript, as Python.
+"""Translates expressions of lab code from JavaScript to Python.
 
 Entry points: `Expressions`, `engine_field`; see `translate`.
 """
@@ -35,7 +35,7 @@ RESERVED = ROOTS.union(
         load start reset step simulate readouts report main set_up control model_path
     """.split()
 )
-"""Names that every script may have, and nothing else in it."""
+"""Names that every script may use, and that nothing else in it may have."""
 _NUMPY = "sin cos tan sinh cosh tanh exp expm1 log log1p log2 log10 cbrt sqrt floor ceil trunc sign"
 _ARC = "sin cos tan sinh cosh tanh"
 _FUNCTIONS = {
@@ -61,7 +61,7 @@ _FUNCTIONS = {
     "lib.rad": "np.radians(...)",
     "lib.sitePos": "data.site(...).xpos.copy()",
 }
-"""Functions, with `...` for the arguments."""
+"""Functions in Python, with `...` for the arguments."""
 _CONSTANTS = {
     "PI": "math.pi",
     "E": "math.e",
@@ -79,27 +79,27 @@ _UNBOUNDED = {"NaN": "math.nan", "Infinity": "math.inf"}
 _FLAT = ".reshape(-1)"
 
 EngineField: TypeAlias = Literal["number", "array", "rows", "single"]
-"""A number, an array, one with rows (which has none in JavaScript), one of 32-bit numbers."""
+"""A number; an array; one with rows, which is flat in JavaScript; one of 32-bit numbers."""
 
 
 class Expressions:
     """Translates the expressions of a piece of code."""
 
     def __init__(self, fields: Collection[str], value: str | None, button: bool) -> None:
-        self.fields, self.given, self.button = fields, value, button
+        self.fields, self.value, self.button = fields, value, button
         self.scopes: list[set[str]] = []
         self.counters: set[str] = set()
 
     def part(self, node: Node, name: str) -> str:
-        """An expression that is part of a node."""
+        """Translate an expression that is part of a node."""
         return self.expression(field(node, name))
 
     def all(self, nodes: Iterable[Node]) -> str:
-        """Expressions with commas between them."""
+        """Translate expressions, and put commas between them."""
         return ", ".join(map(self.expression, nodes))
 
     def expression(self, node: Node) -> str:
-        """An expression for its value."""
+        """Translate an expression that is used for its value."""
         match node.type:
             case "number":
                 return _number(text_of(node))
@@ -140,17 +140,17 @@ class Expressions:
                 raise refusal(node)
 
     def binary(self, node: Node) -> str:
-        """Two operands with an operator between them."""
+        """Translate an operator with two operands."""
         operator, sides = operator_of(node), (field(node, "left"), field(node, "right"))
         if operator == "%":
             return f"np.fmod({self.all(sides)})"
         if operator not in _BINARY:
             raise UntranslatableError(f"`{operator}`")
-        read = self.text if _is_text(node) else self.expression
-        return f"({read(sides[0])} {_BINARY[operator]} {read(sides[1])})"
+        translate = self.text if _is_text(node) else self.expression
+        return f"({translate(sides[0])} {_BINARY[operator]} {translate(sides[1])})"
 
     def text(self, node: Node) -> str:
-        """A value as it is written into a text."""
+        """Translate an expression that becomes part of a text."""
         return self.expression(node) if _is_text(node) else f"str({self.expression(node)})"
 
     def is_variable(self, name: str) -> bool:
@@ -158,11 +158,11 @@ class Expressions:
         return any(python_name(name) in scope for scope in self.scopes)
 
     def name(self, name: str) -> str:
-        """A name without dots."""
+        """Translate a name without dots."""
         if self.is_variable(name):
             return python_name(name)
-        if name == "value" and self.given is not None:
-            return self.given
+        if name == "value" and self.value is not None:
+            return self.value
         if name in ("model", "data"):
             return name
         if name not in _UNBOUNDED:
@@ -170,22 +170,22 @@ class Expressions:
         return _UNBOUNDED[name]
 
     def member(self, node: Node) -> str:
-        """A name with dots."""
+        """Translate a name with dots."""
         path, name = dotted_name(node), text_of(field(node, "property"))
         match path:
             case ("sim", "time"):
                 return "data.time"
-            case ("ctx", own) if own in self.fields:
-                return f"ctx.{own}"
+            case ("ctx", variable) if variable in self.fields:
+                return f"ctx.{variable}"
             case ("Math", constant) if constant in _CONSTANTS:
                 return _CONSTANTS[constant]
             case ("mj", enumeration, member, "value") if enumeration.startswith("mjt"):
                 return f"mujoco.{enumeration}.{member}.value"
             case _:
                 pass
-        known = engine_field(path)
-        if known is not None:
-            return ".".join(path) + (_FLAT if known in ("rows", "single") else "")
+        kind = engine_field(path)
+        if kind is not None:
+            return ".".join(path) + (_FLAT if kind in ("rows", "single") else "")
         if name == "length":
             return f"{self.part(node, 'object')}.size"
         if name in ("kinetic", "potential", "total") and not path:
@@ -193,14 +193,14 @@ class Expressions:
         raise refusal(node)
 
     def element(self, node: Node) -> str:
-        """An element of an array; one with rows is counted through, as in JavaScript."""
+        """Translate an element of an array; one with rows is flat, as in JavaScript."""
         array = self.part(node, "object")
         if array.endswith(_FLAT):
             array = f"{array.removesuffix(_FLAT)}.flat"
         return f"{array}[{self.index(field(node, 'index'))}]"
 
     def index(self, node: Node) -> str:
-        """An expression as an index, which in Python must be a whole number by type."""
+        """Translate an index, which in Python must be an `int`."""
         text = ast.unparse(ast.parse(self.expression(node)))
         return text if self.is_whole(node) else f"int({text})"
 
@@ -221,25 +221,25 @@ class Expressions:
             case _:
                 return False
 
-    def ends(self, nodes: Iterable[Node]) -> str:
-        """From and to an index, or only from one."""
+    def bounds(self, nodes: Iterable[Node]) -> str:
+        """Translate the bounds of a slice, the second of which may be missing."""
         texts = [self.index(node) for node in nodes]
         return ":".join([*texts, ""][:2]) if texts else ""
 
     def call(self, node: Node) -> str:
-        """A call for its value."""
-        function, given = field(node, "function"), arguments(node)
+        """Translate a call that is used for its value."""
+        function, values = field(node, "function"), arguments(node)
         path = dotted_name(function)
         if ".".join(path) in _FUNCTIONS:
-            return _FUNCTIONS[".".join(path)].replace("...", self.all(given))
+            return _FUNCTIONS[".".join(path)].replace("...", self.all(values))
         if path[:1] == ("mj",) and hasattr(_mujoco(), path[-1]):
-            return f"mujoco.{path[-1]}({self.all(given)})"
+            return f"mujoco.{path[-1]}({self.all(values)})"
         match text_of(field(function, "property")) if "member" in function.type else "":
-            case "slice" | "subarray" as method if len(given) < 3:
-                part = f"{self.part(function, 'object')}[{self.ends(given) or ':'}]"
+            case "slice" | "subarray" as method if len(values) < 3:
+                part = f"{self.part(function, 'object')}[{self.bounds(values) or ':'}]"
                 return part + ".copy()" * (method == "slice")
-            case "toFixed" if all(digits.type == "number" for digits in given):
-                digits = self.all(given) or "0"
+            case "toFixed" if all(digits.type == "number" for digits in values):
+                digits = self.all(values) or "0"
                 return f"format({self.part(function, 'object')}, '.{digits}f')"
             case _:
                 raise refusal(function, "a call of ")
@@ -264,7 +264,7 @@ def _engine_fields() -> Mapping[tuple[str, ...], EngineField]:
 
 
 def engine_field(path: tuple[str, ...]) -> EngineField | None:
-    """What `("model", "opt", "gravity")` is; `None` for anything but numbers."""
+    """Say what `("model", "opt", "gravity")` is; `None` if it holds no numbers."""
     return _engine_fields().get(path)
 
 
@@ -276,7 +276,7 @@ def _kind(value: object) -> EngineField | None:
 
 
 def _mujoco() -> Any:
-    import mujoco  # only where a lab is translated anew
+    import mujoco  # late: only a lab that has changed is translated
 
     return mujoco
 
@@ -288,13 +288,13 @@ def _number(text: str) -> str:
 
 
 def python_name(name: str) -> str:
-    """A variable's name; the constants of a script are in capitals."""
-    is_taken = name in RESERVED or keyword.iskeyword(name) or name.isupper()
-    return f"{name}_" if is_taken else name
+    """Return a variable's name in Python, where names in capitals are the script's constants."""
+    is_in_use = name in RESERVED or keyword.iskeyword(name) or name.isupper()
+    return f"{name}_" if is_in_use else name
 
 
 def operator_of(node: Node) -> str:
-    """The sign of an expression with one."""
+    """Return the operator of an expression."""
     return text_of(field(node, "operator"))
 
 

@@ -1,10 +1,10 @@
 """A lab as a Python script that does natively what the lab does in the page.
 
-Entry points: `export_script(lab, metadata)`; `filled`, the script with values for its controls.
+Entry points: `export_script(lab, metadata)`; `fill_in_values`, for the values of its controls.
 
 The template `script.jinja` puts the translated pieces of the lab's code together in the order in
-which the lab's core runs them (docs/explanation/how-labs-run.md). `{{control:N}}` stands in the
-text for the value of control N; the page puts it in.
+which the lab runs them (docs/explanation/how-labs-run.md). In the text `{{control:N}}` stands for
+the value of control N, which the page fills in.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ _WIDTH = 88
 
 
 class ExportMetadata(Struct, frozen=True):
-    """What a script says of where it comes from, and how long it runs."""
+    """Where a script comes from, and how long it runs."""
 
     name: str
-    """Of the file: `lab_4_2_1.py`."""
+    """Name of the file: `lab_4_2_1.py`."""
     origin: str
-    """For people: `a lab of lesson 4.2, “Mass and inertia”`."""
+    """As in `a lab of lesson 4.2, “Mass and inertia”`."""
     course: str
     engine: str
     """Version of MuJoCo."""
@@ -51,7 +51,7 @@ class ExportMetadata(Struct, frozen=True):
 
 
 class Export(Struct, frozen=True):
-    """A script."""
+    """The script of a lab."""
 
     name: str
     text: str
@@ -61,12 +61,12 @@ class Export(Struct, frozen=True):
 
 
 def file_name(lab: str) -> str:
-    """The name of the script of a lab: `4.2-lab-1` → `lab_4_2_1.py`."""
+    """Return the file name of a lab's script: `4.2-lab-1` → `lab_4_2_1.py`."""
     return f"lab_{re.sub(r'[^a-z0-9]+', '_', lab.lower().replace('-lab-', '_')).strip('_')}.py"
 
 
-def filled(export: Export, values: Mapping[int, float | str]) -> str:
-    """The script with the controls at these values, as the page does it."""
+def fill_in_values(export: Export, values: Mapping[int, float | str]) -> str:
+    """Fill the values of the controls into a script, as the page does."""
 
     def literal(match: re.Match[str]) -> str:
         value = values[int(match[1])]
@@ -78,13 +78,13 @@ def filled(export: Export, values: Mapping[int, float | str]) -> str:
 
 
 def initial_values(lab: Lab) -> dict[int, float | str]:
-    """The values that the controls of a lab start with."""
+    """Return the values with which the controls of a lab start."""
     controls = enumerate(lab.fields.controls)
     return {i: control.start for i, control in controls if not isinstance(control, Button)}
 
 
 def export_script(lab: Lab, metadata: ExportMetadata) -> Export | str:
-    """The script of a lab, or why there is none."""
+    """Write the script of a lab, or say why there is none."""
     if lab.kind != SIMLAB:
         return "its kind has code of its own"
     if lab.xml is not None and "file" in lab.xml.text:
@@ -104,30 +104,31 @@ def _export(lab: Lab, metadata: ExportMetadata) -> Export:
         for i, control in enumerate(code.controls)
         if not isinstance(control, Button)
     }
-    pressed = {i: c for i, c in enumerate(code.controls) if isinstance(c, Button)}
+    buttons = {i: c for i, c in enumerate(code.controls) if isinstance(c, Button)}
     pieces = [code.setup, code.controller, *(setter for _, setter in setters.values())]
-    fields = context_fields([*pieces, *(button.run for button in pressed.values())])
+    fields = context_fields([*pieces, *(button.run for button in buttons.values())])
 
     constants: list[str] = []
-    applied: dict[str, list[str]] = {"param": [], "once": [], "again": []}
+    # Setters by the time at which the lab runs them.
+    settings: dict[str, list[str]] = {"param": [], "once": [], "again": []}
     for i, (control, setter) in setters.items():
         constants += [*_comment(control), f"{names[i]} = {{{{control:{i}}}}}"]
-        when = "param" if control.param is not None else "again" if control.init else "once"
-        applied[when] += translate_statements(setter, fields, names[i])
-    buttons = [
+        phase = "param" if control.param is not None else "again" if control.init else "once"
+        settings[phase] += translate_statements(setter, fields, names[i])
+    button_functions = [
         {
             "name": names[i],
-            "doc": f"The button “{_plain(button.label)}”.",
+            "doc": f"The button “{_one_line(button.label)}”.",
             "lines": translate_statements(button.run, fields, button=True),
         }
-        for i, button in pressed.items()
+        for i, button in buttons.items()
     ]
     values = (
         (json.dumps(readout.label, ensure_ascii=False), readout.expr, readout.digits)
         for readout in code.readouts
     )
     text = _template().render(
-        about=_about(lab, metadata),
+        introduction=_introduction(lab, metadata),
         seconds=_number(metadata.seconds),
         constants=constants,
         model=json.dumps(code.model),
@@ -136,14 +137,14 @@ def _export(lab: Lab, metadata: ExportMetadata) -> Export:
         keyframe=_keyframe(code.key),
         setup=translate_statements(code.setup, fields),
         controller=translate_statements(code.controller, fields),
-        applied=applied,
-        buttons=buttons,
-        resets="sim.reset" in "".join(button.run for button in pressed.values()),
+        settings=settings,
+        buttons=button_functions,
+        resets="sim.reset" in "".join(button.run for button in buttons.values()),
         readouts=[(label, translate_expression(e, fields), digits) for label, e, digits in values],
     )
     if len(_PLACE.findall(text)) != len(setters) or _HALF_CHARACTER.search(text):
         raise UntranslatableError("a text that no script can hold")
-    return Export(metadata.name, text, tuple(names[i] for i in pressed))
+    return Export(metadata.name, text, tuple(names[i] for i in buttons))
 
 
 @functools.cache
@@ -155,7 +156,7 @@ def _template() -> Template:
 
 
 def _names(controls: Sequence[Control]) -> list[str]:
-    """What each control is called in the script: constants in capitals, and functions."""
+    """Name the controls in the script: constants, in capitals, and functions for buttons."""
     names: list[str] = []
     for control in controls:
         is_button = isinstance(control, Button)
@@ -164,49 +165,49 @@ def _names(controls: Sequence[Control]) -> list[str]:
         if not name or name[0].isdigit():
             name = f"{'button' if is_button else 'control'}_{name}".strip("_")
         name = name if is_button else name.upper()
-        number, own = 2, name
-        while own in {*names, *RESERVED} or keyword.iskeyword(own):
-            own, number = f"{name}_{number}", number + 1
-        names.append(own)
+        number, unique_name = 2, name
+        while unique_name in {*names, *RESERVED} or keyword.iskeyword(unique_name):
+            unique_name, number = f"{name}_{number}", number + 1
+        names.append(unique_name)
     return names
 
 
 def _setter(control: Slider | Select) -> str:
-    """The code that a control runs with its `value`."""
+    """Return the code that a control runs with its `value`."""
     if control.set is not None:
         return f"({control.set}\n) = value"
     return control.apply or f"ctx.{control.param} = value"
 
 
 def _keyframe(key: int | str | None) -> str:
-    """The line that brings the data to the lab's keyframe."""
+    """Write the line that resets the data to the lab's keyframe."""
     if key is None:
         return "mujoco.mj_resetData(model, data)"
     number = str(key) if isinstance(key, int) else f"model.key({json.dumps(key)}).id"
     return f"mujoco.mj_resetDataKeyframe(model, data, {number})"
 
 
-def _about(lab: Lab, metadata: ExportMetadata) -> str:
-    """What the script is and how to run it."""
-    title = f"{_plain(lab.fields.title)}: " if lab.fields.title else ""
-    about = (
-        f"From the course “{_plain(metadata.course)}”, for MuJoCo {metadata.engine}. It starts and "
-        "steps as the lab in the page does, with the controls as they were there, and prints "
+def _introduction(lab: Lab, metadata: ExportMetadata) -> str:
+    """Say what the script is and how to run it."""
+    title = f"{_one_line(lab.fields.title)}: " if lab.fields.title else ""
+    origin = (
+        f"From the course “{_one_line(metadata.course)}”, for MuJoCo {metadata.engine}. It starts "
+        "and steps as the lab in the page does, with the controls as they were there, and prints "
         "the lab's readouts and the state at the end."
     )
-    where, run = metadata.name, "Run it with:"
+    path, usage = metadata.name, "Run it with:"
     if lab.xml is None:
-        where = f"examples/{metadata.name}"
-        run = f"The model is the course's: save this file as {where} there, and run it with:"
-    first = f"{title}{_plain(metadata.origin)}, as a script."
-    texts = (textwrap.fill(text, _WIDTH) for text in (first, about, run))
-    return "\n\n".join([*texts, f"    python {where}"])
+        path = f"examples/{metadata.name}"
+        usage = f"The model is the course's: save this file as {path} there, and run it with:"
+    first = f"{title}{_one_line(metadata.origin)}, as a script."
+    texts = (textwrap.fill(text, _WIDTH) for text in (first, origin, usage))
+    return "\n\n".join([*texts, f"    python {path}"])
 
 
 def _comment(control: Slider | Select) -> list[str]:
-    """What the constant of a control is."""
-    unit = f" ({_plain(control.unit)})" if control.unit else ""
-    text = f"The control “{_plain(control.label)}”{unit}"
+    """Write the comment above the constant of a control."""
+    unit = f" ({_one_line(control.unit)})" if control.unit else ""
+    text = f"The control “{_one_line(control.label)}”{unit}"
     if isinstance(control, Select):
         text += ", one of " + ", ".join(_option(*option) for option in control.options)
     else:
@@ -215,23 +216,23 @@ def _comment(control: Slider | Select) -> list[str]:
 
 
 def _option(label: str, value: float | str) -> str:
-    written = json.dumps(value) if isinstance(value, str) else _number(value)
-    return written if _plain(label) == written else f"{written} ({_plain(label)})"
+    literal = json.dumps(value) if isinstance(value, str) else _number(value)
+    return literal if _one_line(label) == literal else f"{literal} ({_one_line(label)})"
 
 
-def _plain(text: str) -> str:
-    """A text of the author in one line, for a comment."""
-    shown = "".join(c if c.isprintable() else " " for c in text)
-    return " ".join(shown.replace("\\", "/").replace('"', "'").split())
+def _one_line(text: str) -> str:
+    """Put a text of the author on one line, for a comment."""
+    printable = "".join(c if c.isprintable() else " " for c in text)
+    return " ".join(printable.replace("\\", "/").replace('"', "'").split())
 
 
 def _number(value: float) -> str:
-    """A number without `.0`."""
+    """Write a number without `.0`."""
     return str(int(value)) if value == int(value) else repr(value)
 
 
 def _long_text(text: str) -> str:
-    """A text of several lines as Python writes it."""
+    """Write a text of several lines as a literal of Python."""
     odd = any(not c.isprintable() and c != "\n" for c in text)
     if "\\" in text or '"""' in text or odd or text.endswith('"'):
         return repr(text)

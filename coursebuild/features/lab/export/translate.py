@@ -1,11 +1,11 @@
-"""Lab code, which is JavaScript, as Python.
+"""Translates lab code from JavaScript to Python.
 
-Entry points: `translate_statements`, `translate_expression`; `context_fields`, what `ctx` holds.
+Entry points: `translate_statements`, `translate_expression`; `context_fields`, the fields of `ctx`.
 
 Each construct becomes the plainest Python that does the same with the numbers of a simulation.
-There are no types: whether a script does what the lab does is found out by running it, and one
-that fails or differs is not offered. What has no such counterpart is refused. Expressions are put
-together with all parentheses; `ast.unparse` leaves those that are needed.
+As JavaScript has no types, only a run shows whether a script does what the lab does; one that fails
+or differs is not offered. Code without a counterpart is refused. Expressions are put together with
+all parentheses; `ast.unparse` removes those that are not needed.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ _AUGMENTED = ("+=", "-=", "*=", "/=", "**=", "&=", "|=", "^=")
 def translate_statements(
     code: str, fields: Collection[str], value: str | None = None, *, button: bool = False
 ) -> list[str]:
-    """The lines of statements; `value`: what `value` is in them.
+    """Translate statements into lines; `value` is the expression that `value` stands for.
 
-    In the code of a `button` what only concerns the page's clock is left out.
+    In the code of a `button`, calls that only concern the page's clock are left out.
 
     Raises:
         UntranslatableError: they cannot be translated.
@@ -57,7 +57,7 @@ def translate_statements(
 
 
 def translate_expression(code: str, fields: Collection[str]) -> str:
-    """An expression.
+    """Translate an expression.
 
     Raises:
         UntranslatableError: it cannot be translated.
@@ -67,40 +67,40 @@ def translate_expression(code: str, fields: Collection[str]) -> str:
 
 
 def context_fields(pieces: Iterable[str]) -> dict[str, str]:
-    """The fields of `ctx`, those that code assigns to, with what they hold before."""
-    found: dict[str, str] = {}
+    """Return the fields of `ctx` to which code assigns, with their initial values."""
+    fields: dict[str, str] = {}
     statements = (statement for code in pieces for statement in parse_statements(code))
     for node in (node for statement in statements for node in walk(statement)):
         if node.type == "assignment_expression":
             match dotted_name(field(node, "left")):
                 case ("ctx", name):
                     is_truth = field(node, "right").type in ("true", "false")
-                    found.setdefault(name, "False" if is_truth else "math.nan")
+                    fields.setdefault(name, "False" if is_truth else "math.nan")
                 case _:
                     pass
-    for name in found:
+    for name in fields:
         if keyword.iskeyword(name) or name.startswith("__") or not name.isidentifier():
             raise UntranslatableError(f"the name `ctx.{name}`")
-    return dict(sorted(found.items()))
+    return dict(sorted(fields.items()))
 
 
 class _Statements(Expressions):
     """Translates a piece of code."""
 
     def block(self, body: Iterable[Node]) -> Iterator[str]:
-        """Statements in a scope of their own."""
+        """Translate statements in a scope of their own."""
         self.scopes.append(set())
         for statement in body:
             yield from self.statement(statement)
         self.scopes.pop()
 
     def indented(self, body: Node) -> str:
-        """The body of an `if` or a loop."""
+        """Translate and indent the body of an `if` or a loop."""
         inner = children(body) if body.type == "statement_block" else [body]
         return textwrap.indent("\n".join(self.block(inner)) or "pass", "    ")
 
     def statement(self, node: Node) -> Iterator[str]:
-        """The lines of a statement."""
+        """Translate a statement into lines."""
         match node.type:
             case "empty_statement":
                 pass
@@ -125,29 +125,30 @@ class _Statements(Expressions):
                 yield from self.loop(node)
             case "break_statement" | "continue_statement" if not children(node):
                 yield node.type.removesuffix("_statement")
-            case "return_statement" if not (children(node) or self.given):
+            case "return_statement" if not (children(node) or self.value):
                 yield "return"
             case _:
                 raise refusal(node)
 
     def declaration(self, node: Node) -> str:
-        """`name = value` of a `const` or `let`."""
-        name, given = field(node, "name"), node.child_by_field_name("value")
-        if name.type != "identifier" or given is None:
+        """Translate `name = value` of a `const` or `let`."""
+        name, value = field(node, "name"), node.child_by_field_name("value")
+        if name.type != "identifier" or value is None:
             raise UntranslatableError(f"`{text_of(node)}` without a value")
-        value = self.part(node, "value")
-        return f"{self.declare(text_of(name))} = {value}"
+        text = self.part(node, "value")  # before its name is in scope
+        return f"{self.declare(text_of(name))} = {text}"
 
     def declare(self, name: str) -> str:
-        """A variable; its name in Python, where scopes are not nested."""
-        own = python_name(name)
-        if not own.isidentifier() or name in ROOTS or any(own in scope for scope in self.scopes):
+        """Declare a variable, and return its name in Python, where blocks are no scopes."""
+        variable = python_name(name)
+        is_in_use = name in ROOTS or any(variable in scope for scope in self.scopes)
+        if not variable.isidentifier() or is_in_use:
             raise UntranslatableError(f"a variable `{name}`")
-        self.scopes[-1].add(own)
-        return own
+        self.scopes[-1].add(variable)
+        return variable
 
     def loop(self, node: Node) -> Iterator[str]:
-        """A loop that counts."""
+        """Translate a loop that counts."""
         loop = counting_loop(node)
         limit = self.expression(loop.limit)
         if loop.inclusive:
@@ -163,10 +164,10 @@ class _Statements(Expressions):
         yield self.indented(field(node, "body"))
         self.scopes.pop()
 
-    # --- what is done
+    # --- effects
 
     def effect(self, node: Node) -> Iterator[str]:
-        """An expression for what it does."""
+        """Translate an expression that is used for its effect."""
         match node.type:
             case "assignment_expression":
                 targets = []
@@ -191,7 +192,7 @@ class _Statements(Expressions):
                 raise refusal(node)
 
     def target(self, node: Node) -> str:
-        """What can be assigned to."""
+        """Translate the target of an assignment."""
         match node.type:
             case "identifier" if self.is_variable(text_of(node)):
                 return python_name(text_of(node))
@@ -206,8 +207,8 @@ class _Statements(Expressions):
         raise refusal(node, "an assignment to ")
 
     def call_statement(self, node: Node) -> Iterator[str]:
-        """A call for what it does."""
-        function, given = field(node, "function"), arguments(node)
+        """Translate a call that is used for its effect."""
+        function, values = field(node, "function"), arguments(node)
         match dotted_name(function):
             case ("sim", "play" | "pause") if self.button:
                 return
@@ -220,16 +221,16 @@ class _Statements(Expressions):
             case _:
                 pass
         match text_of(field(function, "property")) if "member" in function.type else "":
-            case "fill" if len(given) in (1, 3):
-                array, value = self.part(function, "object"), self.expression(given[0])
-                yield f"{array}[{self.ends(given[1:]) or ':'}] = {value}"
-            case "set" if len(given) in (1, 2):
-                yield self.set(self.part(function, "object"), *given)
+            case "fill" if len(values) in (1, 3):
+                array, value = self.part(function, "object"), self.expression(values[0])
+                yield f"{array}[{self.bounds(values[1:]) or ':'}] = {value}"
+            case "set" if len(values) in (1, 2):
+                yield self.set(self.part(function, "object"), *values)
             case _:
                 raise refusal(function, "a call of ")
 
     def set(self, array: str, values: Node, offset: Node | None = None) -> str:
-        """`array.set(numbers, offset)`."""
+        """Translate `array.set(numbers, offset)`."""
         if values.type == "array":
             items = array_items(values)
             text, count = f"[{self.all(items)}]", str(len(items))
@@ -245,7 +246,7 @@ class _Statements(Expressions):
 
 
 def _in_sequence(node: Node) -> Iterator[Node]:
-    """The expressions of `a, b, c`."""
+    """Yield the expressions of `a, b, c`."""
     if node.type == "sequence_expression":
         for child in children(node):
             yield from _in_sequence(child)

@@ -1,8 +1,8 @@
-"""The script that a lab's page offers, run natively and held against the lab's trial.
+"""Runs the script that a lab's page offers, and compares it with the lab's trial.
 
-Entry points: `exported(…)`; `recorded(run, …)`, which keeps of a trial what is compared. A script
-whose result is not that of the lab, or that fails for any value that the page may put into it, is
-not offered.
+Entry points: `export_lab(…)`; `record_for_export(run, …)`, which records of a trial what is
+compared. A script is not offered if its result differs from the lab's, or if it fails for any value
+that the page may fill in.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from coursebuild.features.lab.export.script import (
     ExportMetadata,
     export_script,
     file_name,
-    filled,
+    fill_in_values,
     initial_values,
 )
 from coursebuild.features.lab.model import Lab
@@ -33,32 +33,32 @@ from coursebuild.features.lab.schema import Select, Slider
 
 _SECONDS = 5.0
 _MOST_STEPS = 20_000
-"""How long a trial's main run is, unless the lab says so."""
+"""Length of a trial's main run, unless the lab sets it: simulated seconds, and the most steps."""
 _RELATIVE = 1e-9
 _ABSOLUTE = 1e-12
-"""How far readouts of the same state may be apart."""
+"""Tolerances of readouts of the same state."""
 _INFINITE: dict[Any, str] = {math.inf: "∞", -math.inf: "−∞"}
-"""As the trial has them."""
+"""Infinite values as a trial's reply writes them."""
 
 
 class LabExport(Struct, frozen=True):
-    """What a page offers to download, or why there is nothing."""
+    """The script that a page offers to download, or why there is none."""
 
     script: tuple[str, str] | None
-    """Name of the file and its text, with `{{control:N}}` for values of controls."""
+    """Name and text of the file, with `{{control:N}}` for values of controls."""
     reason: str = ""
 
 
-def exported(
+def export_lab(
     context: TrialContext,
     native: NativeEngine,
     trial: Trial,
     lab: Lab,
     main: MainRun,
 ) -> LabExport:
-    """The script of a lab, from the store where the same was tried before.
+    """Write and try the script of a lab, or take it from the store.
 
-    `main` is the main run of its trial.
+    `main` is the main run of the lab's trial.
     """
     metadata = ExportMetadata(
         file_name(trial.name),
@@ -67,23 +67,23 @@ def exported(
         engine_version(),
         _seconds(lab, main),
     )
-    # The model is in it by what the trial recorded.
+    # The record stands for the model: a change that matters changes it, too.
     readouts = [picture["readouts"] for picture in main["pictures"]]
     code = lab_digest(".", "export/script.jinja")
     key = fingerprint((code, lab.config, metadata, main.get("recorded"), readouts))
     store = context.memory.store
-    found = store.get_value("exports", key, LabExport)
-    if found is not None:
-        return found
+    export = store.get_value("exports", key, LabExport)
+    if export is not None:
+        return export
     try:
-        offer = _offered(context.root, native, lab, metadata, main)
+        export = _try_export(context.root, native, lab, metadata, main)
     except NativeError as error:
         return LabExport(None, f"the script {error}")
-    store.put_value("exports", key, offer)
-    return offer
+    store.put_value("exports", key, export)
+    return export
 
 
-def _offered(
+def _try_export(
     root: Path,
     native: NativeEngine,
     lab: Lab,
@@ -95,15 +95,15 @@ def _offered(
         return LabExport(None, export)
     if main["diverged"]:
         return LabExport(None, "its simulation diverges")
-    kept = main.get("recorded")
-    if kept is None:
+    record = main.get("recorded")
+    if record is None:
         return LabExport(None, "the lab makes no step")
     request = {
         "path": str(root / "examples" / export.name),
-        "text": filled(export, initial_values(lab)),
-        "others": [filled(export, values) for values in _others(lab)],
+        "text": fill_in_values(export, initial_values(lab)),
+        "variants": [fill_in_values(export, values) for values in _control_variants(lab)],
         "buttons": list(export.buttons),
-        "near": kept["near"],
+        "near": record["near"],
     }
     run = native.script(request)
     if run["failure"]:
@@ -122,7 +122,7 @@ def _origin(course: Course, owner: str) -> str:
 
 
 def _seconds(lab: Lab, main: MainRun) -> float:
-    """Simulated time of the main run."""
+    """Return the simulated time of the main run."""
     stop = lab.fields.stopAt
     if lab.verify.seconds is not None:
         return lab.verify.seconds if stop is None else min(lab.verify.seconds, stop)
@@ -132,28 +132,28 @@ def _seconds(lab: Lab, main: MainRun) -> float:
     return seconds
 
 
-def _others(lab: Lab) -> list[dict[int, float | str]]:
-    """Values of the controls that a reader can choose, each control for itself."""
+def _control_variants(lab: Lab) -> list[dict[int, float | str]]:
+    """List values of all controls, with a single one at another value than at the start."""
     start = initial_values(lab)
-    found = []
+    variants = []
     for i, control in enumerate(lab.fields.controls):
         values: list[float | str] = []
         if isinstance(control, Slider):
             values = [control.min, control.max]
         elif isinstance(control, Select):
             values = [value for _, value in control.options]
-        found += [{**start, i: value} for value in values if value != start[i]]
-    return found
+        variants += [{**start, i: value} for value in values if value != start[i]]
+    return variants
 
 
-# --- what the script does, beside what the lab did
+# --- the script's run compared with the lab's
 
 
-def recorded(run: dict[str, Any], horizon: int) -> dict[str, Any] | None:
-    """What is kept of the main run of a trial, as JSON; `None` where no step was made.
+def record_for_export(run: dict[str, Any], horizon: int) -> dict[str, Any] | None:
+    """Record of a trial's main run what scripts are compared with; `None` if it made no step.
 
-    The state is the last one recorded before the step `horizon`, after which a difference in the
-    last bit may have grown.
+    The state is the last one recorded up to the step `horizon`: later, a difference in the last bit
+    may have grown.
     """
     steps, stride, width = run["steps"], run["stride"], run["width"]
     if steps < stride:
@@ -169,41 +169,42 @@ def recorded(run: dict[str, Any], horizon: int) -> dict[str, Any] | None:
 
 
 def _difference(main: MainRun, run: dict[str, Any], rtol: float) -> str | None:
-    """How a script's run differs from the main run of the trial, in words; `None` if it does not.
+    """Say how a script's run differs from the main run of the trial; `None` if it does not.
 
-    The state that was recorded may be apart by `rtol`, relative to its largest number, which counts
-    as at least 1. Where the end is the same to the last bit, its readouts are compared, too.
+    The states may differ by `rtol`, relative to the largest number, or to 1 if that is larger. If
+    the last states are the same to the bit, the readouts there are compared, too.
     """
-    kept = main["recorded"]
-    assert kept is not None, "where nothing was recorded, no script is offered"
-    if run["steps"] != kept["steps"]:
-        return f"it makes {run['steps']} steps, and the lab {kept['steps']}"
-    apart = _apart(run["state"], kept["state"])
-    if not apart <= rtol:
-        return f"its state after {kept['near']} steps is apart from the lab's by {apart:.1e}"
+    record = main["recorded"]
+    assert record is not None, "without a record no script is tried"
+    if run["steps"] != record["steps"]:
+        return f"it makes {run['steps']} steps, and the lab {record['steps']}"
+    difference = _relative_difference(run["state"], record["state"])
+    if not difference <= rtol:
+        return f"its state after {record['near']} steps is apart from the lab's by {difference:.1e}"
     first, last = main["pictures"][0], main["pictures"][-1]
-    found = _readouts(first["readouts"], run["start"], "start")
-    if found is None and run["last"] == kept["last"]:
-        found = _readouts(last["readouts"], run["end"], "end")
-    return found
+    reason = _compare_readouts(first["readouts"], run["start"], "start")
+    if reason is None and run["last"] == record["last"]:
+        reason = _compare_readouts(last["readouts"], run["end"], "end")
+    return reason
 
 
-def _apart(mine: Sequence[float], theirs: Sequence[float]) -> float:
-    if len(mine) != len(theirs):
+def _relative_difference(state: Sequence[float], lab_state: Sequence[float]) -> float:
+    if len(state) != len(lab_state):
         return math.inf
-    largest = max([1.0, *(abs(x) for x in theirs)])
-    return max([0.0, *(abs(a - b) / largest for a, b in zip(mine, theirs, strict=True))])
+    largest = max([1.0, *(abs(x) for x in lab_state)])
+    return max([0.0, *(abs(a - b) / largest for a, b in zip(state, lab_state, strict=True))])
 
 
-def _readouts(theirs: Any, mine: list[list[Any]], when: str) -> str | None:
-    for (label, value), known in zip(mine, theirs or (), strict=False):
-        if known is None:  # not a number, which is a gap
+def _compare_readouts(lab_values: Any, readouts: list[list[Any]], moment: str) -> str | None:
+    for (label, value), lab_value in zip(readouts, lab_values or (), strict=False):
+        if lab_value is None:  # it is not a number, and the lab shows nothing
             continue
         value = _INFINITE.get(value, value)
-        if isinstance(value, str) or isinstance(known, str):
-            same = value == known
+        if isinstance(value, str) or isinstance(lab_value, str):
+            is_same = value == lab_value
         else:
-            same = math.isclose(value, known, rel_tol=_RELATIVE, abs_tol=_ABSOLUTE)
-        if not same:
-            return f"its readout `{label}` is {value} at the {when}, and that of the lab {known}"
+            is_same = math.isclose(value, lab_value, rel_tol=_RELATIVE, abs_tol=_ABSOLUTE)
+        if not is_same:
+            lab_readout = f"that of the lab {lab_value}"
+            return f"its readout `{label}` is {value} at the {moment}, and {lab_readout}"
     return None

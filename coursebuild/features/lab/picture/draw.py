@@ -1,13 +1,13 @@
-"""A picture of a scene, drawn without a graphics processor.
+"""Draws a picture of a scene without a graphics processor.
 
 Entry point: `draw(solids, camera, size, light)` → pixels.
 
-1. Every solid's triangles are taken into the camera's frame (MuJoCo's free camera) and projected
-   (`raster.py`). Of each sample the nearest surface is kept, and what of it is there: place,
-   normal, texture coordinates. There are 2 × 2 samples a pixel.
-2. What is there is coloured by its texture and the light (`light.py`), and the first shiny plane or
-   box shows what its mirror image of the camera sees.
-3. What is seen through is mixed in afterwards, the farthest first, and the sky is put behind all.
+1. Every solid's triangles are brought into the camera's frame (MuJoCo's free camera) and projected
+   (`raster.py`). Each sample keeps the nearest surface, with its place, normal and texture
+   coordinates there. A pixel has 2 × 2 samples.
+2. The samples are coloured by texture and light (`light.py`), and the first shiny plane or box
+   shows what the camera's mirror image sees.
+3. Transparent solids are mixed in, the farthest first, and the sky is put behind all.
 
 The same input gives the same bytes: no clock, no threads, colours rounded at the end.
 """
@@ -21,23 +21,23 @@ from msgspec import Struct
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from coursebuild.features.lab.picture.light import Light, Material, shaded, studio
+from coursebuild.features.lab.picture.light import Light, Material, shade, studio
 from coursebuild.features.lab.picture.raster import NORMAL, POSITION, UV, Eye, GBuffer, rotate
 from coursebuild.features.lab.picture.shapes import Array, Surface
-from coursebuild.features.lab.picture.studio import Floor, edges
+from coursebuild.features.lab.picture.studio import Floor, draw_edges
 from coursebuild.features.lab.picture.textures import Texture, TextureMapping, sharpness, sky
 
 _SAMPLES = 2
 _NEAR = 0.01
-"""What is nearer to the camera than this part of its distance is not drawn."""
+"""Nearest distance that is drawn, as a part of the camera's distance from its target."""
 _OPAQUE, _CLEAR = 0.999, 0.001
 _FROM_BELOW = 0.5
-"""What is left of a plane that is seen from below, as in MuJoCo."""
+"""Factor of the opacity of a plane seen from below, as in MuJoCo."""
 _TOP = 0.5
 _AT_ONCE = 1 << 16
-"""Samples that are coloured together."""
+"""How many samples are coloured together."""
 _STEPS = 127
-"""From black to white: no eye tells more apart, and the file is a quarter smaller."""
+"""Shades from black to white: nobody can see more, and the file is a quarter smaller."""
 _PLAIN = Material()
 
 Samples = tuple[NDArray[np.int64], NDArray[np.int64]]
@@ -45,7 +45,7 @@ Samples = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 class Solid(Struct, frozen=True):
-    """A surface, where it stands and its looks."""
+    """A surface with its pose and its look."""
 
     surface: Surface
     position: Array
@@ -56,24 +56,24 @@ class Solid(Struct, frozen=True):
     material: Material = _PLAIN
     texture: TextureMapping | None = None
     plane: bool = False
-    """Whether it has an upper side, by which it is lit."""
+    """Whether it is a plane, which is lit by its upper side."""
     mirror: float | None = None
-    """Where its upper face is along its z axis, m, if that can reflect."""
+    """Height of its upper face along its z axis, m, if that face can reflect."""
     open: bool = False
-    """Whether both of its sides are outside."""
+    """Whether both of its sides are visible."""
     body: bool = False
-    """Whether it is a thing with an edge and a shadow."""
+    """Whether it has an edge and a shadow."""
     front: bool = False
     """Whether nothing covers it."""
 
-    def placed(self) -> Surface:
-        """Its surface in the world."""
+    def world_surface(self) -> Surface:
+        """Return its surface in world coordinates."""
         vertices = rotate(self.surface.vertices, self.rotation) + self.position
         return replace(self.surface, vertices=vertices, uv=None)
 
     @property
     def opaque(self) -> bool:
-        """Whether nothing is seen through it."""
+        """Whether nothing shows through it."""
         return self.rgba[3] >= _OPAQUE
 
 
@@ -93,12 +93,12 @@ class FreeCamera(Struct, frozen=True):
 
     @property
     def forward(self) -> Array:
-        """(3,), of length 1: where it looks."""
+        """(3,), of length 1: the direction in which it looks."""
         a, e = np.radians(self.azimuth), np.radians(self.elevation)
         return np.array((np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)))
 
     def eye(self, width: int, height: int) -> Eye:
-        """It with a screen of so many samples."""
+        """Return the eye of this camera with a screen of so many samples."""
         azimuth = np.radians(self.azimuth)
         right = np.array((np.sin(azimuth), -np.cos(azimuth), 0.0))
         axes = np.stack((right, np.cross(right, self.forward), self.forward))
@@ -116,27 +116,27 @@ def draw(
     background: Texture | None = None,
     floor: Floor | None = None,
 ) -> NDArray[np.uint8]:
-    """The picture: (height, width, 4) bytes, RGBA, clear where there is nothing.
+    """Draw a picture: (height, width, 4) bytes, RGBA, transparent where there is nothing.
 
-    `size` is (width, height) in pixels; without a light it is that of a model without lights;
-    `background` is the texture of a sky.
+    `size` is (width, height) in pixels; without `light` the light is that of a model without
+    lights; `background` is the texture of a sky.
     """
     width, height = size
     light = studio(camera.forward) if light is None else light
     canvas = _Canvas(camera.eye(width * _SAMPLES, height * _SAMPLES), light)
-    # A simulation that blew up throws things out of the world.
-    there = (s for s in solids if s.rgba[3] > _CLEAR and np.isfinite(s.position).all())
-    shown = [_seen_from(solid, canvas.eye) for solid in there]
-    mirror = next((solid for solid in shown if _reflects(solid, canvas.eye)), None)
-    reflected = None
+    # A diverged simulation throws things out of the world.
+    visible = (s for s in solids if s.rgba[3] > _CLEAR and np.isfinite(s.position).all())
+    scene = [_seen_from(solid, canvas.eye) for solid in visible]
+    mirror = next((solid for solid in scene if _reflects(solid, canvas.eye)), None)
+    reflection = None
     if mirror is not None:
-        reflected = _Canvas(_mirrored(mirror, camera.eye(width, height)), light)
-        reflected.paint([solid for solid in shown if solid is not mirror], None, None)
-    canvas.paint(shown, mirror, reflected, floor, lines=True)
+        reflection = _Canvas(_mirror_eye(mirror, camera.eye(width, height)), light)
+        reflection.paint([solid for solid in scene if solid is not mirror], None, None)
+    canvas.paint(scene, mirror, reflection, floor, lines=True)
     if background is not None:
         canvas.put_behind(background)
     mean = canvas.colour.reshape(height, _SAMPLES, width, _SAMPLES, 4).mean(axis=(1, 3))
-    # Colours were weighted with how much they cover.
+    # The colours are premultiplied with their coverage.
     mean[..., :3] /= np.where(mean[..., 3:] > 0, mean[..., 3:], 1.0)
     steps = np.rint(_STEPS * np.clip(mean, 0.0, 1.0))
     pixels: NDArray[np.uint8] = np.rint(255 / _STEPS * steps).astype(np.uint8)
@@ -144,7 +144,7 @@ def draw(
 
 
 def _seen_from(solid: Solid, eye: Eye) -> Solid:
-    """The solid as it shows itself to an eye."""
+    """Return the solid as an eye sees it: a plane is more transparent from below."""
     if not solid.plane or solid.rotation[:, 2] @ (eye.position - solid.position) >= 0:
         return solid
     red, green, blue, alpha = solid.rgba
@@ -158,8 +158,8 @@ def _reflects(solid: Solid, eye: Eye) -> bool:
     return bool(solid.rotation[:, 2] @ (eye.position - solid.position) > solid.mirror)
 
 
-def _mirrored(solid: Solid, eye: Eye) -> Eye:
-    """The image of an eye in the upper face of a solid."""
+def _mirror_eye(solid: Solid, eye: Eye) -> Eye:
+    """Return the image of an eye in the upper face of a solid."""
     normal = solid.rotation[:, 2]
     offset = float(normal @ solid.position) + (solid.mirror or 0.0)
     height = float(normal @ eye.position) - offset
@@ -174,25 +174,27 @@ class _Canvas:
     def __init__(self, eye: Eye, light: Light) -> None:
         self.eye, self.light = eye, light
         self.colour = np.zeros((eye.size[1], eye.size[0], 4))
-        """RGB times how much is covered, and how much is covered."""
+        """RGB, premultiplied with the coverage, and the coverage."""
 
     def paint(
         self,
         solids: Sequence[Solid],
         mirror: Solid | None,
-        reflected: _Canvas | None,
+        reflection: _Canvas | None,
         floor: Floor | None = None,
         *,
         lines: bool = False,
     ) -> None:
-        """Draw solids, with lines around them; `mirror` shows what is in `reflected`."""
+        """Draw solids, with lines around them; `mirror` shows `reflection`."""
         buffer = GBuffer(self.eye)
         opaque = [solid for solid in solids if solid.opaque and not solid.front]
-        self._paint_opaque(buffer, opaque, mirror, reflected)
+        self._paint_opaque(buffer, opaque, mirror, reflection)
         if lines and opaque:
-            edges(self.colour, buffer, np.array([solid.body for solid in opaque], dtype=bool))
+            draw_edges(self.colour, buffer, np.array([solid.body for solid in opaque], dtype=bool))
         if floor is not None:
-            floor.paint(self.colour, buffer, [solid.placed() for solid in solids if solid.body])
+            floor.paint(
+                self.colour, buffer, [solid.world_surface() for solid in solids if solid.body]
+            )
         for solid in sorted((s for s in solids if not s.opaque), key=self._depth, reverse=True):
             film = GBuffer(self.eye)
             film.depth = buffer.depth.copy()
@@ -209,64 +211,69 @@ class _Canvas:
         buffer: GBuffer,
         solids: Sequence[Solid],
         mirror: Solid | None,
-        reflected: _Canvas | None,
+        reflection: _Canvas | None,
     ) -> None:
         for i, solid in enumerate(solids):
             buffer.add(i, solid.surface, solid.position, solid.rotation, front=False)
         for i, solid in enumerate(solids):
-            self._colour(buffer, i, solid, reflected if solid is mirror else None)
+            self._colour(buffer, i, solid, reflection if solid is mirror else None)
 
     def put_behind(self, background: Texture) -> None:
-        """Fill what is not covered with a sky."""
+        """Fill what is not covered with the sky."""
         width, height = self.eye.size
-        for y, x in _in_parts(self.colour[..., 3] < 1):
+        for y, x in _batches(self.colour[..., 3] < 1):
             sight = np.column_stack(
                 (x + 0.5 - width / 2, height / 2 - y - 0.5, np.full(len(x), self.eye.focal))
             )
-            free = 1 - self.colour[y, x, 3:]
-            self.colour[y, x, :3] += free * sky(background, rotate(sight, self.eye.axes.T))
+            uncovered = 1 - self.colour[y, x, 3:]
+            self.colour[y, x, :3] += uncovered * sky(background, rotate(sight, self.eye.axes.T))
             self.colour[y, x, 3] = 1
 
     def _depth(self, solid: Solid) -> float:
         return float(self.eye.axes[2] @ (solid.position - self.eye.position))
 
-    def _colour(self, buffer: GBuffer, i: int, solid: Solid, reflected: _Canvas | None) -> None:
+    def _colour(self, buffer: GBuffer, i: int, solid: Solid, reflection: _Canvas | None) -> None:
         """Mix a solid of a buffer into the picture."""
         alpha = 1.0 if solid.opaque else solid.rgba[3]
-        for y, x in _in_parts(buffer.solid == i):
-            colour = self._shade(buffer, solid, reflected, (y, x))
+        for y, x in _batches(buffer.solid == i):
+            colour = self._shade(buffer, solid, reflection, (y, x))
             mixed = np.column_stack((np.clip(colour, 0.0, 1.0), np.ones(len(y))))
             self.colour[y, x] = alpha * mixed + (1 - alpha) * self.colour[y, x]
 
     def _shade(
-        self, buffer: GBuffer, solid: Solid, reflected: _Canvas | None, samples: Samples
+        self, buffer: GBuffer, solid: Solid, reflection: _Canvas | None, samples: Samples
     ) -> Array:
-        """The colours of a solid at samples that show it."""
+        """Return the colours of a solid at samples that show it."""
         attributes = buffer.attributes[samples].astype(float)
-        places, own = attributes[:, POSITION], attributes[:, NORMAL]
-        own = own / np.linalg.norm(own, axis=1).clip(1e-12)[:, None]
+        places, local_normals = attributes[:, POSITION], attributes[:, NORMAL]
+        local_normals = local_normals / _lengths(local_normals)
         points = rotate(places, solid.rotation) + solid.position
-        normals = rotate(own, solid.rotation)
+        normals = rotate(local_normals, solid.rotation)
         view = self.eye.position - points
-        toward = view / np.linalg.norm(view, axis=1).clip(1e-12)[:, None]
-        facing = (normals * toward).sum(axis=1)
+        toward_eye = view / _lengths(view)
+        facing = (normals * toward_eye).sum(axis=1)
         if not solid.plane:
             normals[facing < 0] *= -1
         texel = np.ones((1, 3))
         if solid.texture is not None:
             steps = buffer.depth[samples] / self.eye.focal * sharpness(facing)
-            texel = solid.texture.texels(places, own, attributes[:, UV], steps)
+            texel = solid.texture.texels(places, local_normals, attributes[:, UV], steps)
         base = np.array(solid.rgba[:3])
-        colour = shaded(self.light, solid.material, base, texel, (points, normals, toward))
-        if reflected is not None:
+        colour = shade(self.light, solid.material, base, texel, (points, normals, toward_eye))
+        if reflection is not None:
             y, x = samples
-            image = reflected.colour[y // _SAMPLES, x // _SAMPLES, :3]
-            colour += solid.material.reflectance * (own[:, 2:] > _TOP) * image
+            image = reflection.colour[y // _SAMPLES, x // _SAMPLES, :3]
+            colour += solid.material.reflectance * (local_normals[:, 2:] > _TOP) * image
         return colour
 
 
-def _in_parts(mask: NDArray[np.bool_]) -> Iterator[Samples]:
-    """The samples of a mask, not too many at once."""
+def _lengths(vectors: Array) -> Array:
+    """Return the lengths (n, 1) of vectors (n, 3), at least 1e-12."""
+    return np.asarray(np.linalg.norm(vectors, axis=1).clip(1e-12)[:, None])
+
+
+def _batches(mask: NDArray[np.bool_]) -> Iterator[Samples]:
+    """Yield the samples of a mask, not too many at once."""
     rows, columns = np.nonzero(mask)
     for start in range(0, len(rows), _AT_ONCE):
         part = slice(start, start + _AT_ONCE)

@@ -1,11 +1,11 @@
-"""How surfaces look in the light of a lab: by the law of the live view.
+"""The colours of surfaces in the light of a lab, by the formulas of the live view.
 
-Entry points: `shaded(...)`, the colours of points of a surface; `light_of(scene, frame, forward)`,
+Entry points: `shade(...)`, the colours of points of a surface; `light_of(scene, frame, forward)`,
 the light of a lab's scene; `material_of(scene, index)`.
 
 The live view (`lights.js` and `materials.js` of the page) draws with three.js's Blinn-Phong
-material, set so that it gives what MuJoCo's renderer gives. The formulas here are those, without
-shadows, which the live view leaves out, too, where there is no graphics processor.
+material, set to match MuJoCo's renderer. The formulas here are the same, without shadows, which the
+live view, too, leaves out if there is no graphics processor.
 """
 
 from __future__ import annotations
@@ -17,35 +17,36 @@ from msgspec import Struct
 
 from coursebuild.features.lab.picture.shapes import Array, unit
 
-_AMBIENT, _FRONT, _ABOVE = 0.35, 0.25, 0.6
-"""A model without lights: light from all sides, from the camera, and from above, where most comes
-from, so that no two sides of a box look alike."""
-_FROM_ABOVE = (0.25, -0.35, 0.9)
-_WITHOUT_LIGHTS = 0.5
-"""How strong highlights are there."""
+_AMBIENT, _FRONT, _TOP = 0.35, 0.25, 0.6
+"""Light of a model without lights: from all sides, from the camera, and most from above, so that no
+two sides of a box look alike."""
+_LAMP = (0.25, -0.35, 0.9)
+"""Direction of the light from above."""
+_STUDIO_GLOSS = 0.5
+"""Strength of highlights in a model without lights."""
 _SPECULAR, _SHININESS = 0.5, 0.5
-"""Of a geom without a material."""
+"""Defaults for a geom without a material."""
 _DIELECTRIC, _ROOM, _SHARPEST = 0.04, 0.5, 1024.0
 """See `materials.js`."""
 _SPOT, _DIRECTIONAL = 0, 1
 """mjtLightType."""
 _LIGHT = 7
-"""Floats of a light in a frame."""
+"""Numbers of a light in a frame."""
 _SOFT = 8.0
-"""The exponent up to which a spot light is soft from its middle on."""
+"""Up to this exponent a spot light fades from its middle on."""
 
 
 class PointLight(Struct, frozen=True):
-    """A light: of parallel rays, of a point, or of a cone."""
+    """A lamp with parallel rays, or at a point, in all directions or in a cone."""
 
     colour: Array
     """(3,), RGB."""
     direction: Array
     """(3,), of length 1: where it shines."""
     position: Array | None = None
-    """(3,), m; `None` where its rays are parallel."""
+    """(3,), m; `None` if its rays are parallel."""
     cone: tuple[float, float] | None = None
-    """Cosines at which a cone ends and from which on it is bright."""
+    """Cosines of the angles at which a cone ends, and at which it starts to fade."""
 
 
 class Light(Struct, frozen=True):
@@ -55,16 +56,16 @@ class Light(Struct, frozen=True):
     """(3,), RGB, from all sides."""
     point_lights: tuple[PointLight, ...]
     gloss: float
-    """How strong highlights are."""
+    """Strength of highlights."""
 
 
 class Material(Struct, frozen=True):
-    """How a surface takes light."""
+    """How a surface reflects light."""
 
     shininess: float = 128 * _SHININESS
     """Exponent of the highlight."""
     specular: float = _SPECULAR
-    """Strength of the highlight; of one with `metallic` or `roughness`, what it mirrors."""
+    """Strength of the highlight; with `metallic` or `roughness`, the share that is reflected."""
     emission: float = 0.0
     metallic: float = 0.0
     physical: bool = False
@@ -73,15 +74,15 @@ class Material(Struct, frozen=True):
 
 
 def material_of(scene: dict[str, Any], index: int) -> Material:
-    """A material of a scene; -1 is none."""
+    """Return a material of a scene; -1 is none."""
     if index < 0:
         return Material()
-    given = scene["materials"][index]
-    metallic, roughness = given["metallic"], given["roughness"]
-    exponent = max(1.0, 128 * given["shininess"])
-    emission, reflectance = given["emission"], given["reflectance"]
+    record = scene["materials"][index]
+    metallic, roughness = record["metallic"], record["roughness"]
+    exponent = max(1.0, 128 * record["shininess"])
+    emission, reflectance = record["emission"], record["reflectance"]
     if metallic < 0 and roughness < 0:
-        return Material(exponent, given["specular"], emission, reflectance=reflectance)
+        return Material(exponent, record["specular"], emission, reflectance=reflectance)
     if roughness >= 0:
         exponent = min(_SHARPEST, max(1.0, 2 / max(roughness, 1e-3) ** 4 - 2))
     metallic = min(1.0, max(0.0, metallic))
@@ -89,28 +90,29 @@ def material_of(scene: dict[str, Any], index: int) -> Material:
 
 
 def studio(forward: Array) -> Light:
-    """The light of a model without lights, for a camera that looks along `forward`."""
-    above = -np.array(_FROM_ABOVE) / np.linalg.norm(_FROM_ABOVE)
-    point_lights = (PointLight(np.full(3, _FRONT), forward), PointLight(np.full(3, _ABOVE), above))
-    return Light(np.full(3, _AMBIENT), point_lights, _WITHOUT_LIGHTS)
+    """Return the light of a model without lights, for a camera that looks along `forward`."""
+    down = -np.array(_LAMP) / np.linalg.norm(_LAMP)
+    point_lights = (PointLight(np.full(3, _FRONT), forward), PointLight(np.full(3, _TOP), down))
+    return Light(np.full(3, _AMBIENT), point_lights, _STUDIO_GLOSS)
 
 
 def light_of(scene: dict[str, Any], frame: Array, forward: Array) -> Light:
-    """The light of a scene in a frame that is seen along `forward` (of length 1)."""
+    """Return the light of a scene in a frame seen along `forward`, which has length 1."""
     lights, headlight = scene["lights"], scene["visual"]["headlight"]
     if not lights:
         return studio(forward)
-    shining = [*lights, headlight] if headlight["active"] else lights
+    sources = [*lights, headlight] if headlight["active"] else lights
     start = scene["layout"]["lights"]
     rows = [frame[start + _LIGHT * i : start + _LIGHT * (i + 1)] for i in range(len(lights))]
-    own = [_point_light(light, row) for light, row in zip(lights, rows, strict=True) if row[6] != 0]
+    active = [(light, row) for light, row in zip(lights, rows, strict=True) if row[6] != 0]
+    lamps = [_point_light(light, row) for light, row in active]
     if headlight["active"]:
-        own.append(PointLight(np.array(headlight["diffuse"]), forward))
-    diffuse = sum(sum(light["diffuse"]) for light in shining)
-    specular = sum(sum(light["specular"]) for light in shining)
+        lamps.append(PointLight(np.array(headlight["diffuse"]), forward))
+    diffuse = sum(sum(light["diffuse"]) for light in sources)
+    specular = sum(sum(light["specular"]) for light in sources)
     gloss = min(2.0, specular / diffuse) if diffuse > 0 else 0.0
-    ambient = np.sum([light["ambient"] for light in shining], axis=0)
-    return Light(ambient, tuple(lamp for lamp in own if np.isfinite(lamp.direction).all()), gloss)
+    ambient = np.sum([light["ambient"] for light in sources], axis=0)
+    return Light(ambient, tuple(lamp for lamp in lamps if np.isfinite(lamp.direction).all()), gloss)
 
 
 def _point_light(light: dict[str, Any], row: Array) -> PointLight:
@@ -126,15 +128,15 @@ def _point_light(light: dict[str, Any], row: Array) -> PointLight:
     return PointLight(colour, direction, position, (float(np.cos(angle)), float(np.cos(bright))))
 
 
-def shaded(
-    light: Light, material: Material, colour: Array, texel: Array, where: tuple[Array, Array, Array]
+def shade(
+    light: Light, material: Material, colour: Array, texel: Array, samples: tuple[Array, ...]
 ) -> Array:
-    """Colours (n, 3) of points of a surface.
+    """Compute the colours (n, 3) of points of a surface.
 
-    `colour` is (3,), `texel` (n, 3) or (1, 3) what a texture makes of it; `where` holds points
-    (n, 3), m, normals (n, 3) and the directions to the eye (n, 3), both of length 1.
+    `colour` is (3,), and a texture's `texel` (n, 3) or (1, 3) multiplies it; `samples` holds points
+    (n, 3), m, normals (n, 3) and directions to the eye (n, 3), both of length 1.
     """
-    points, normals, toward = where
+    points, normals, toward_eye = samples
     metallic = material.metallic
     matte = 1 - (1 - _ROOM) * metallic
     base = colour * matte * texel
@@ -148,8 +150,8 @@ def shaded(
     for lamp in light.point_lights:
         back, strength = _rays(lamp, points)
         facing = np.clip(_dot(normals, back), 0.0, None) * strength
-        half = unit(back + toward)
-        fresnel = np.exp2((-5.55473 * (vh := np.clip(_dot(toward, half), 0, 1)) - 6.98316) * vh)
+        half = unit(back + toward_eye)
+        fresnel = np.exp2((-5.55473 * (vh := np.clip(_dot(toward_eye, half), 0, 1)) - 6.98316) * vh)
         peak = (exponent + 2) / 8 * np.clip(_dot(normals, half), 0.0, 1.0) ** exponent
         shine = (mirrored * (1 - fresnel[:, None]) + fresnel[:, None]) * peak[:, None]
         total = total + lamp.colour * facing[:, None] * (base + shine)
@@ -157,7 +159,7 @@ def shaded(
 
 
 def _rays(lamp: PointLight, points: Array) -> tuple[Array, Array]:
-    """Directions from points to a lamp, and how much of its light comes there."""
+    """Return the directions from points to a lamp, and how much of its light reaches them."""
     if lamp.position is None:
         return -lamp.direction[None, :], np.ones(len(points))
     back = unit(lamp.position - points)
@@ -169,5 +171,5 @@ def _rays(lamp: PointLight, points: Array) -> tuple[Array, Array]:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    found: Array = (a * b).sum(axis=-1)
-    return found
+    product: Array = (a * b).sum(axis=-1)
+    return product

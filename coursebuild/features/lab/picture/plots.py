@@ -1,9 +1,9 @@
-"""A recorded plot as SVG: for paper, for readers without JavaScript, and before a lab starts.
+"""A recorded plot as SVG, for paper, for readers without JavaScript, and until a lab starts.
 
 Entry point: `plot_svg(plot, times, traces)`.
 
-Lines carry their names at their ends, and differ by dashes besides colour. Colours are classes that
-the style sheet defines for light and dark; the text takes the page's colour.
+Lines have their names at their ends, and differ in dashes as well as in colour. Colours are classes
+that the style sheet defines for light and dark pages; text has the page's colour.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ _LETTER = 6.2
 _DASHES = ("", "6 3", "2 3", "8 3 2 3", "1 4")
 _LABEL_GAP = 13.0
 _TICKS = 5
-"""About so many of values."""
+"""About how many ticks the axis of values has."""
 _LARGEST = 4e307
-"""What is beyond is drawn there, so that the range of an axis is finite."""
+"""Larger values are drawn here, so that the range of an axis is finite."""
 
 
 def plot_svg(
@@ -39,33 +39,33 @@ def plot_svg(
     *,
     narrow: bool = False,
 ) -> str:
-    """The plot as an `svg` element; values that are no finite numbers interrupt their line.
+    """Draw a plot as an `svg` element; values that are not finite interrupt their line.
 
-    A narrow one is for the margin: its text has the same size there. Empty where nothing was
-    recorded.
+    A narrow plot is for the margin: its text has the same size there. The result is empty if
+    nothing was recorded.
     """
     start = -math.inf if plot.window is None or not times else times[-1] - plot.window * (1 + 1e-9)
-    shown = [(t, i) for i, t in enumerate(times) if t >= start]
-    if not shown:
+    samples = [(t, i) for i, t in enumerate(times) if t >= start]
+    if not samples:
         return ""
-    low_t, high_t = shown[0][0], shown[-1][0]
-    drawn = [[(t, line[i]) for t, i in shown] for line in traces]
-    values = [v for points in drawn for _, v in points if _is_finite(v)]
+    low_t, high_t = samples[0][0], samples[-1][0]
+    lines = [[(t, line[i]) for t, i in samples] for line in traces]
+    values = [v for points in lines for _, v in points if _is_finite(v)]
     values += [line.y for line in plot.refLines]
     low, high = _range(values, plot.ymin, plot.ymax)
     labels = [trace.label for trace in plot.traces]
     frame = _frame(low_t, high_t if high_t > low_t else low_t + 1.0, low, high, labels, narrow)
-    lines: list[str] = []
+    paths: list[str] = []
     ends: list[tuple[float, str, int]] = []
-    for n, (trace, points) in enumerate(zip(plot.traces, drawn, strict=True)):
-        lines.append(_line(frame, points, n, _dash(trace, n)))
+    for n, (trace, points) in enumerate(zip(plot.traces, lines, strict=True)):
+        paths.append(_line(frame, points, n, _dash(trace, n)))
         last = next((v for _, v in reversed(points) if _is_finite(v)), None)
         if last is not None:
             ends.append((frame.y(last), trace.label, n))
     references = [
         _reference(frame, line.y, line.label) for line in plot.refLines if low <= line.y <= high
     ]
-    parts = [*_axes(frame, plot), *references, *lines, *_labels(frame, ends)]
+    parts = [*_axes(frame, plot), *references, *paths, *_labels(frame, ends)]
     title = f"{plot.ylabel} against {plot.xlabel}" if plot.ylabel else "plot"
     return (
         f'<svg class="lab-plot" viewBox="0 0 {frame.width:g} {_HEIGHT:g}" role="img" '
@@ -82,7 +82,7 @@ def _dash(trace: TraceFields, n: int) -> str:
 def _frame(
     low_t: float, high_t: float, low: float, high: float, labels: Sequence[str], narrow: bool
 ) -> _Frame:
-    """The frame, with room for the ticks at its left and the names of the lines at its right."""
+    """Make the frame, with room for ticks on the left and for the names of lines on the right."""
     width = _NARROW if narrow else _WIDE
     y = Scale(_HEIGHT - _BOTTOM, _TOP, low, high, logarithmic=False)
     longest = max(len(text) for _, text in y.ticks(_TICKS))
@@ -92,7 +92,7 @@ def _frame(
 
 
 class _Frame(Struct, frozen=True):
-    """From times and values to places."""
+    """The scales of times and values."""
 
     x: Scale
     y: Scale
@@ -118,7 +118,7 @@ def _axes(frame: _Frame, plot: Plot) -> list[str]:
     for y, text in frame.y.ticks(_TICKS):
         parts.append(f'<path class="lab-grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>')
         parts.append(f'<text x="{left - 6:.1f}" y="{y + 3.5:.1f}" text-anchor="end">{text}</text>')
-    for x, text in _fitting(frame.x):
+    for x, text in _time_ticks(frame.x):
         parts.append(f'<path class="lab-axis" d="M{x:.1f} {bottom:g}v4"/>')
         parts.append(f'<text x="{x:.1f}" y="{bottom + 16:g}" text-anchor="middle">{text}</text>')
     parts.append(f'<path class="lab-axis" d="M{left:.1f} {_TOP:g}V{bottom:g}H{right:.1f}"/>')
@@ -132,14 +132,14 @@ def _axes(frame: _Frame, plot: Plot) -> list[str]:
     return parts
 
 
-def _fitting(times: Scale) -> list[tuple[float, str]]:
-    """Ticks of the time, so many that their texts do not touch."""
-    for about in (6, 4, 3, 2):
-        found = times.ticks(about)
-        longest = max(len(text) for _, text in found)
-        if len(found) * (longest + 1.5) * _LETTER <= times.end - times.start:
-            return found
-    return found[:1]
+def _time_ticks(times: Scale) -> list[tuple[float, str]]:
+    """Return ticks of the time, few enough that their texts do not touch."""
+    for count in (6, 4, 3, 2):
+        ticks = times.ticks(count)
+        longest = max(len(text) for _, text in ticks)
+        if len(ticks) * (longest + 1.5) * _LETTER <= times.end - times.start:
+            return ticks
+    return ticks[:1]
 
 
 def _reference(frame: _Frame, y: float, label: str) -> str:
@@ -154,14 +154,14 @@ def _reference(frame: _Frame, y: float, label: str) -> str:
 def _line(frame: _Frame, points: Sequence[tuple[float, float | None]], n: int, dash: str) -> str:
     path: list[str] = []
     for run in _runs(points):
-        path += _drawn(frame, run)
+        path += _path_commands(frame, run)
     style = f' stroke-dasharray="{dash}"' if dash else ""
     style += ' stroke-linecap="round"' if "h0" in path else ""
     return f'<path class="lab-trace lab-trace-{n % 7 + 1}"{style} d="{"".join(path)}"/>'
 
 
 def _runs(points: Sequence[tuple[float, float | None]]) -> Iterator[list[tuple[float, float]]]:
-    """The stretches between values that are no finite numbers."""
+    """Yield the runs of points between values that are not finite."""
     for finite, run in groupby(points, key=lambda point: _is_finite(point[1])):
         if finite:
             yield [(t, min(max(v, -_LARGEST), _LARGEST)) for t, v in run if v is not None]
@@ -171,35 +171,40 @@ def _is_finite(value: float | None) -> TypeGuard[float]:
     return value is not None and math.isfinite(value)
 
 
-def _drawn(frame: _Frame, run: list[tuple[float, float]]) -> Iterator[str]:
-    """A stretch as path commands, cut at the frame's lower and upper edges."""
+def _path_commands(frame: _Frame, run: list[tuple[float, float]]) -> Iterator[str]:
+    """Yield the path of a run of points, cut at the frame's lower and upper edges."""
     if len(run) == 1:
         t, v = run[0]
         if frame.y.low <= v <= frame.y.high:
-            yield from (f"M{frame.x(t):.1f} {frame.y(v):.1f}", "h0")  # round ends make a point seen
+            yield from (
+                f"M{frame.x(t):.1f} {frame.y(v):.1f}",
+                "h0",
+            )  # round ends make a single point visible
         return
     pen = False
     for (t0, v0), (t1, v1) in pairwise(run):
-        begin, end = _within(frame, v0, v1)
+        begin, end = _clip_segment(frame, v0, v1)
         if begin > end:
             pen = False
             continue
         if not pen:
-            yield f"M{_between(frame, (t0, v0), (t1, v1), begin)}"
-        yield f"L{_between(frame, (t0, v0), (t1, v1), end)}"
+            yield f"M{_interpolate(frame, (t0, v0), (t1, v1), begin)}"
+        yield f"L{_interpolate(frame, (t0, v0), (t1, v1), end)}"
         pen = end == 1
 
 
-def _between(
-    frame: _Frame, first: tuple[float, float], second: tuple[float, float], part: float
+def _interpolate(
+    frame: _Frame, first: tuple[float, float], second: tuple[float, float], fraction: float
 ) -> str:
-    """A point of a segment, which is inside the frame but for rounding."""
-    t, v = (a + part * (b - a) if part < 1 else b for a, b in zip(first, second, strict=True))
+    """Write the point at a fraction of a segment; it is inside the frame, up to rounding."""
+    t, v = (
+        a + fraction * (b - a) if fraction < 1 else b for a, b in zip(first, second, strict=True)
+    )
     return f"{frame.x(t):.1f} {frame.y(v):.1f}"
 
 
-def _within(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:
-    """From where to where (0 to 1) a segment is inside the frame; the end first where nowhere."""
+def _clip_segment(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:
+    """Return the fractions between which a segment is inside the frame; start > end if none is."""
     if v0 == v1:
         return (0.0, 1.0) if frame.y.low <= v0 <= frame.y.high else (1.0, 0.0)
     # Halved, so that the difference of two large numbers is finite.
@@ -209,9 +214,9 @@ def _within(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:
 
 
 def _labels(frame: _Frame, ends: list[tuple[float, str, int]]) -> list[str]:
-    """Names at the ends of the lines, moved apart where they would overlap."""
-    wanted = [y for y, _, _ in sorted(ends)]
-    places = separate_labels(wanted, _LABEL_GAP, -math.inf, _HEIGHT - _BOTTOM)
+    """Write names at the ends of the lines, moved apart where they would overlap."""
+    heights = [y for y, _, _ in sorted(ends)]
+    places = separate_labels(heights, _LABEL_GAP, -math.inf, _HEIGHT - _BOTTOM)
     return [
         f'<text class="lab-name lab-name-{n % 7 + 1}" x="{frame.x.end + 6:.1f}" '
         f'y="{place + 3.5:.1f}">{_text(label)}</text>'

@@ -1,4 +1,4 @@
-"""Triangles on a screen: which surface is nearest at each sample, and what of it is there.
+"""Rasterizes triangles: finds the nearest surface at each sample, and its attributes there.
 
 Entry point: `GBuffer(eye).add(index, surface, position, rotation)`.
 """
@@ -14,27 +14,27 @@ from numpy.typing import NDArray
 from coursebuild.features.lab.picture.shapes import Array, Surface
 
 _FAR_AWAY = 1e12
-"""m; what is beyond, or nowhere, is not drawn: a simulation that blew up throws things out."""
+"""m; vertices beyond, or not finite, are not drawn: a diverged simulation throws things out."""
 _AT_ONCE = 1 << 18
-"""Samples that are looked at together, where no single triangle has more."""
+"""Samples that are processed together, unless a single triangle has more."""
 POSITION, NORMAL, UV, _ATTRIBUTES = slice(0, 3), slice(3, 6), slice(6, 8), 8
-"""What is kept of a surface at a sample, in the solid's own frame."""
+"""Columns of the attributes of a surface at a sample, in the solid's own frame."""
 
 
 class Eye(Struct, frozen=True):
-    """What a picture is seen with: a camera, or its image in a mirror."""
+    """A point of view: a camera, or its image in a mirror."""
 
     size: tuple[int, int]
     """Width and height of the screen, samples."""
     focal: float
     """Distance of the screen, samples."""
     near: float
-    """m; what is nearer is not seen."""
+    """m; nothing nearer is visible."""
     position: Array
     axes: Array
     """Rows: to the right, up and into the picture."""
     mirror: tuple[Array, float] | None = None
-    """Normal and offset of the mirror, behind which nothing is seen."""
+    """Normal and offset of the mirror, behind which nothing is visible."""
 
 
 class GBuffer:
@@ -50,16 +50,16 @@ class GBuffer:
     def add(
         self, index: int, surface: Surface, position: Array, rotation: Array, *, front: bool
     ) -> None:
-        """Draw a surface at its place in the world; `front`: only triangles seen from outside."""
+        """Draw a surface at a place in the world; `front`: only triangles seen from outside."""
         eye = self.eye
         with np.errstate(over="ignore", invalid="ignore"):
             world = rotate(surface.vertices, rotation) + position
-            seen = rotate(world - eye.position, eye.axes)
-        uv = np.zeros((len(seen), 2)) if surface.uv is None else surface.uv
-        # One row a vertex: its place in the camera's frame, and its attributes.
-        vertices = np.column_stack((seen, surface.vertices, surface.normals, uv))
-        known = np.all(np.abs(np.nan_to_num(vertices, nan=np.inf)) < _FAR_AWAY, axis=1)
-        triangles = vertices[surface.faces[np.all(known[surface.faces], axis=1)]]
+            in_view = rotate(world - eye.position, eye.axes)
+        uv = np.zeros((len(in_view), 2)) if surface.uv is None else surface.uv
+        # One row for each vertex: its place in the camera's frame, and its attributes.
+        vertices = np.column_stack((in_view, surface.vertices, surface.normals, uv))
+        is_finite = np.all(np.abs(np.nan_to_num(vertices, nan=np.inf)) < _FAR_AWAY, axis=1)
+        triangles = vertices[surface.faces[np.all(is_finite[surface.faces], axis=1)]]
         if front:
             a, b, c = triangles[..., :3].transpose(1, 0, 2)
             volume = np.einsum("ij,ij->i", a, np.cross(b, c))
@@ -68,15 +68,16 @@ class GBuffer:
             # What is linear on the surface is linear in 1/z on the screen.
             weights = shares / part[..., 2]
             depth = 1.0 / weights.sum(axis=1)
-            near = np.flatnonzero(depth < self.depth[y, x])
-            weights, depth, x, y = weights[near], depth[near], x[near], y[near]
-            attributes = np.einsum("sk,skc->sc", weights, part[near, :, 3:]) * depth[:, None]
+            nearest = np.flatnonzero(depth < self.depth[y, x])
+            weights, depth, x, y = weights[nearest], depth[nearest], x[nearest], y[nearest]
+            attributes = np.einsum("sk,skc->sc", weights, part[nearest, :, 3:]) * depth[:, None]
             if eye.mirror is not None:
                 normal, offset = eye.mirror
                 height = attributes[:, POSITION] @ (rotation.T @ normal) + position @ normal
-                above = height > offset
-                depth, attributes, x, y = depth[above], attributes[above], x[above], y[above]
-            # The nearest is written last, and so remains.
+                front_side = height > offset
+                depth, attributes = depth[front_side], attributes[front_side]
+                x, y = x[front_side], y[front_side]
+            # The nearest is written last, and so it stays.
             order = np.argsort(-depth, kind="stable")
             at = y[order], x[order]
             self.depth[at] = depth[order]
@@ -84,17 +85,17 @@ class GBuffer:
             self.attributes[at] = attributes[order]
 
     def _clip(self, triangles: Array) -> Array:
-        """The parts of triangles (n, 3, columns) in front of the camera."""
-        behind = (triangles[..., 2] <= self.eye.near).sum(axis=1)
-        parts = [triangles[behind == 0]]
-        for triangle in triangles[(behind > 0) & (behind < 3)]:
+        """Cut triangles (n, 3, columns) at the near plane, and return the parts beyond it."""
+        hidden_corners = (triangles[..., 2] <= self.eye.near).sum(axis=1)
+        parts = [triangles[hidden_corners == 0]]
+        for triangle in triangles[(hidden_corners > 0) & (hidden_corners < 3)]:
             polygon = []
-            for here, there in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
-                a, b = here[2] - self.eye.near, there[2] - self.eye.near
+            for first, second in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+                a, b = first[2] - self.eye.near, second[2] - self.eye.near
                 if a > 0:
-                    polygon.append(here)
+                    polygon.append(first)
                 if (a > 0) != (b > 0):
-                    polygon.append(here + (there - here) * (a / (a - b)))
+                    polygon.append(first + (second - first) * (a / (a - b)))
             parts += [
                 np.array([[polygon[0], polygon[k], polygon[k + 1]]])
                 for k in range(1, len(polygon) - 1)
@@ -104,9 +105,9 @@ class GBuffer:
     def _fragments(
         self, triangles: Array
     ) -> Iterator[tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]]:
-        """The samples that triangles cover.
+        """Yield the samples that triangles cover.
 
-        Of each its triangle, the shares of this one's corners in it, its column and its row.
+        Each has its triangle, the shares of the triangle's corners in it, its column and its row.
         """
         width, height = self.eye.size
         scale = self.eye.focal / triangles[..., 2]
@@ -119,34 +120,34 @@ class GBuffer:
         ends = np.cumsum(counts)
         start = 0
         while start < len(counts):
-            done = ends[start - 1] if start else 0
-            end = max(int(np.searchsorted(ends, done + _AT_ONCE, side="right")), start + 1)
-            which = np.repeat(np.arange(start, end), counts[start:end])
-            place = np.arange(len(which)) - (ends - counts - done)[which]
-            x, y = left[which] + place % columns[which], top[which] + place // columns[which]
-            shares, inside = _cover(px[which].T, py[which].T, x + 0.5, y + 0.5)
-            yield triangles[which[inside]], shares.T[inside], x[inside], y[inside]
+            offset = ends[start - 1] if start else 0
+            end = max(int(np.searchsorted(ends, offset + _AT_ONCE, side="right")), start + 1)
+            index = np.repeat(np.arange(start, end), counts[start:end])
+            place = np.arange(len(index)) - (ends - counts - offset)[index]
+            x, y = left[index] + place % columns[index], top[index] + place // columns[index]
+            shares, inside = _cover(px[index].T, py[index].T, x + 0.5, y + 0.5)
+            yield triangles[index[inside]], shares.T[inside], x[inside], y[inside]
             start = end
 
 
 def _span(places: Array, size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """From and to which sample of a row or a column triangles reach."""
+    """Return the range of samples of a row or column that triangles reach."""
     low = np.clip(np.floor(places.min(axis=1)), 0, size)
     high = np.clip(np.floor(places.max(axis=1)) + 1, 0, size)
     return low.astype(np.int64), high.astype(np.int64)
 
 
 def rotate(vectors: Array, matrix: Array) -> Array:
-    """Each vector times the matrix, without the threads and kernels of a linear algebra library."""
-    found: Array = np.einsum("ij,kj->ik", vectors, matrix)
-    return found
+    """Multiply vectors by a matrix, without a linear algebra library, whose bits may vary."""
+    rotated: Array = np.einsum("ij,kj->ik", vectors, matrix)
+    return rotated
 
 
 def _cover(px: Array, py: Array, gx: Array, gy: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Shares of a triangle's three corners in samples, and whether these are inside.
+    """Return the shares of a triangle's three corners in samples, and whether these are inside.
 
-    A sample on the edge between two triangles belongs to one of them, or a transparent surface
-    would have seams.
+    A sample on the edge between two triangles belongs to only one of them: otherwise a transparent
+    surface would have seams.
     """
     area = (px[1] - px[0]) * (py[2] - py[0]) - (px[2] - px[0]) * (py[1] - py[0])
     turn = np.sign(area)
@@ -155,7 +156,7 @@ def _cover(px: Array, py: Array, gx: Array, gy: Array) -> tuple[Array, NDArray[n
     for a, b in ((1, 2), (2, 0), (0, 1)):
         edge = turn * ((px[a] - gx) * (py[b] - gy) - (px[b] - gx) * (py[a] - gy))
         right, down = turn * (px[b] - px[a]), turn * (py[b] - py[a])
-        owned = (down > 0) | ((down == 0) & (right > 0))
-        inside &= (edge > 0) | ((edge == 0) & owned)
+        owns_edge = (down > 0) | ((down == 0) & (right > 0))
+        inside &= (edge > 0) | ((edge == 0) & owns_edge)
         shares.append(edge / np.where(turn == 0, 1.0, np.abs(area)))
     return np.stack(shares), inside

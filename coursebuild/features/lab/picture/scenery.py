@@ -1,4 +1,4 @@
-"""What a static picture of a lab shows, from what its trial recorded.
+"""The solids of a lab's static picture, made from the record of its trial.
 
 Entry point: `scene_solids(scene, frame)`.
 """
@@ -34,33 +34,33 @@ RGBA = tuple[float, float, float, float]
 _KINDS: tuple[Kind, ...] = (
     *("plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"),
 )
-"""By their numbers in mjtGeom."""
+"""Indexed by mjtGeom."""
 _ARROWS = (100, 101, 102)
 _HEAD_WIDTH = 1.75
-"""Of an arrow, in widths of its shaft; those of the second kind have none."""
+"""Of an arrow's head, in widths of its shaft; arrows of the second kind have none."""
 _IN_FRONT = -2
-"""In the place of a data id: see `arrows.js` of the live view."""
+"""A data id that marks what nothing covers: see `arrows.js` of the live view."""
 _VISIBLE = (0, 1, 2)
-"""Groups that MuJoCo shows by itself."""
+"""Groups that MuJoCo shows by default."""
 _GEOM, _DECORATION = 19, 24
-"""Floats of a geom and of a decoration in a frame."""
+"""Numbers of a geom and of a decoration in a frame."""
 _ENDLESS = 40.0
 """Extents of the model to which a plane without a size reaches, as in the live view."""
 _UNSET = (0.5, 0.5, 0.5, 1.0)
-"""A flex or skin of this colour has its material's."""
+"""A flex or skin of this colour takes its material's."""
 _TURNS, _ROUND, _STRAIGHT, _WIRE = 9, 14, 0.08, 0.16
 _STEEL, _IRON = (0.56, 0.58, 0.62, 1.0), (0.4, 0.41, 0.44, 1.0)
 _PIN = 0.011
-"""Of springs and of the pins of hinges, as in `marks.js` of the live view."""
+"""Sizes of springs and of the pins of hinges, as in `marks.js` of the live view."""
 
 
 def scene_solids(scene: dict[str, Any], frame: Array) -> Iterator[Solid]:
-    """What a picture of a frame shows: geoms, sites, and what MuJoCo's visualizer adds."""
+    """Make the solids of a frame: geoms, sites, and what MuJoCo's visualizer adds."""
     return _Scene(scene, np.asarray(frame, dtype=float)).solids()
 
 
 class _Scene:
-    """A scene with what its geoms share."""
+    """A scene, with the data that its geoms share."""
 
     def __init__(self, scene: dict[str, Any], frame: Array) -> None:
         self.scene, self.frame, self.layout = scene, frame, scene["layout"]
@@ -69,8 +69,8 @@ class _Scene:
         self.textures = [texture_of(texture) for texture in scene["textures"]]
 
     def solids(self) -> Iterator[Solid]:
-        """Everything that is to be seen."""
-        found: list[Solid | None] = []
+        """Make all solids."""
+        solids: list[Solid | None] = []
         for part in ("geoms", "sites"):
             for i, item in enumerate(self.scene[part]):
                 if item["group"] in _VISIBLE:
@@ -80,16 +80,16 @@ class _Scene:
                     solid = self._solid(item["type"], data, row, material, index)
                     if solid is not None and part == "geoms" and not solid.plane:
                         solid = replace(solid, body=True)
-                    found.append(solid)
-        found += self._soft()
-        found += self._marks()
+                    solids.append(solid)
+        solids += self._soft_bodies()
+        solids += self._marks()
         start = self.layout["trail"] + 3 * int(self.frame[2])
         for i in range(int(self.frame[1])):
-            found.append(self._decoration(self._row(start + _DECORATION * i, _DECORATION)))
-        return (solid for solid in found if solid is not None)
+            solids.append(self._decoration(self._row(start + _DECORATION * i, _DECORATION)))
+        return (solid for solid in solids if solid is not None)
 
     def _marks(self) -> Iterator[Solid]:
-        """Springs and pins."""
+        """Make springs and pins."""
         for spring in self.scene["springs"]:
             starts = (self.layout["geoms"] + _GEOM * spring[end] for end in ("from", "to"))
             a, b = (self._row(start, 3) for start in starts)
@@ -109,9 +109,9 @@ class _Scene:
         size: tuple[float, float, float],
         *,
         endless: bool = False,
-        given: bool = False,
+        has_uv: bool = False,
     ) -> TextureMapping | None:
-        """How the texture of a material lies on a geom; -1 is no material."""
+        """Map the texture of a material to a geom; -1 is no material."""
         material: dict[str, Any] = self.scene["materials"][index] if index >= 0 else {"texture": -1}
         texture = self.textures[material["texture"]] if material["texture"] >= 0 else None
         if texture is None or texture.role == SKY:
@@ -121,14 +121,15 @@ class _Scene:
         elif kind in ("capsule", "cylinder"):
             size = (size[0], size[0], size[1])
         u, v = material["texrepeat"]
-        return TextureMapping(texture, kind, size, (u, v), material["texuniform"], endless, given)
+        uniform = material["texuniform"]
+        return TextureMapping(texture, kind, size, (u, v), uniform, endless, has_uv)
 
     def _decoration(self, row: Array) -> Solid | None:
         kind, data, size = int(row[0]), int(row[1]), row[4:7]
         name = _KINDS[kind] if kind < len(_KINDS) else ""
-        if name in ("capsule", "cylinder"):  # the visualizer's have their half-length last
+        if name in ("capsule", "cylinder"):  # the visualizer puts the half-length last
             size = size[[0, 2, 2]]
-        if name in ("mesh", "sdf"):  # it counts a mesh and its hull, which have the same shape here
+        if name in ("mesh", "sdf"):  # it counts meshes and their hulls, which look the same here
             data //= 2
         row = np.concatenate((row[7:19], size, row[19:24]))
         return self._solid(kind, data, row, Material(emission=float(row[-1])))
@@ -136,15 +137,15 @@ class _Scene:
     def _solid(
         self, kind: int, data: int, row: Array, material: Material, index: int = -1
     ) -> Solid | None:
-        """A geom; `index` is that of its material, which may have a texture."""
+        """Make the solid of a geom; `index` is that of its material, which may have a texture."""
         if not np.isfinite(row[:15]).all():
-            return None  # the simulation blew up
+            return None  # the simulation diverged
         position, rotation = row[:3], row[3:12].reshape(3, 3)
         size = (float(row[12]), float(row[13]), float(row[14]))
         rgba = _rgba(row[15:19])
         if kind in _ARROWS:
             head = 1.0 if kind == _ARROWS[1] else _HEAD_WIDTH
-            pointer = arrow(size[0], size[2] / 2, head=head, both=kind == _ARROWS[2])
+            pointer = arrow(size[0], size[2] / 2, head=head, double=kind == _ARROWS[2])
             front = data == _IN_FRONT
             return Solid(pointer, position, rotation, rgba, material, front=front)
         if kind >= len(_KINDS):
@@ -152,29 +153,29 @@ class _Scene:
         name = _KINDS[kind]
         endless = name == "plane" and min(size[:2]) <= 0
         shapes = self.fields if name == "hfield" else self.meshes
-        given = shapes[data] if 0 <= data < len(shapes) else None
-        shape = self._endless_plane(row) if endless else surface(name, size, given)
+        mesh = shapes[data] if 0 <= data < len(shapes) else None
+        shape = self._endless_plane(row) if endless else surface(name, size, mesh)
         if shape is None:
             return None
-        given_uv = shape.uv is not None
-        texture = self._texture(index, name, size, endless=endless, given=given_uv)
+        has_uv = shape.uv is not None
+        texture = self._texture(index, name, size, endless=endless, has_uv=has_uv)
         mirror = {"plane": 0.0, "box": size[2]}.get(name)
         plane = name == "plane"
         return Solid(shape, position, rotation, rgba, material, texture, plane, mirror)
 
     def _endless_plane(self, row: Array) -> Surface:
-        """A plane without a size, around what the camera looks at."""
+        """Make a plane without a size, around the camera's target."""
         far = _ENDLESS * self.scene["extent"]
         half = np.where(row[12:14] > 0, row[12:14], far)
         shape = surface("plane", (float(half[0]), float(half[1])))
         assert shape is not None
         target = np.array(self.scene["camera"]["target"], dtype=float)
-        there = (target - row[:3]) @ row[3:12].reshape(3, 3)
-        middle = np.where(row[12:14] > 0, 0.0, there[:2])
+        local_target = (target - row[:3]) @ row[3:12].reshape(3, 3)
+        middle = np.where(row[12:14] > 0, 0.0, local_target[:2])
         return Surface(shape.vertices + np.append(middle, 0.0), shape.normals, shape.faces)
 
-    def _soft(self) -> Iterator[Solid]:
-        """Flexes and skins: their vertices are in the frame, in the world."""
+    def _soft_bodies(self) -> Iterator[Solid]:
+        """Make flexes and skins, whose vertices are in the frame, in world coordinates."""
         for part, start, floats in (("flexes", "flex", 3), ("skins", "skin", 6)):
             for item in self.scene[part]:
                 first = self.layout[start] + floats * item["start"]
@@ -184,13 +185,13 @@ class _Scene:
                 shape = _flex(item, rows) if part == "flexes" else _skin(item, rows)
                 index, texture = item["material"], None
                 if shape.uv is not None:
-                    texture = self._texture(index, "mesh", (1.0, 1.0, 1.0), given=True)
-                where = np.zeros(3), np.eye(3)
+                    texture = self._texture(index, "mesh", (1.0, 1.0, 1.0), has_uv=True)
+                pose = np.zeros(3), np.eye(3)
                 rgba = item["rgba"]
                 if index >= 0 and tuple(rgba) == _UNSET:
                     rgba = self.scene["materials"][index]["rgba"]
                 material = material_of(self.scene, index)
-                yield Solid(shape, *where, _rgba(rgba), material, texture, open=True)
+                yield Solid(shape, *pose, _rgba(rgba), material, texture, open=True)
 
 
 def _rgba(values: Any) -> RGBA:
@@ -207,29 +208,29 @@ def _flex(item: dict[str, Any], points: Array) -> Surface:
 
 
 def _skin(item: dict[str, Any], rows: Array) -> Surface:
-    uv = item["texcoords"]
+    texcoords = item["texcoords"]
     faces = np.asarray(item["faces"], dtype=np.int64).reshape(-1, 3)
-    given = None if uv is None else np.asarray(uv, dtype=float).reshape(-1, 2)
-    return Surface(rows[:, :3], rows[:, 3:], faces, given)
+    uv = None if texcoords is None else np.asarray(texcoords, dtype=float).reshape(-1, 2)
+    return Surface(rows[:, :3], rows[:, 3:], faces, uv)
 
 
 def _mesh(mesh: dict[str, Any]) -> Surface:
-    """A mesh with the normals of its file, smooth as the live view has them."""
+    """Make the surface of a mesh with the normals of its file, smooth as in the live view."""
 
-    def take(values: str, which: str, width: int) -> Array:
+    def corner_rows(values: str, indices: str, width: int) -> Array:
         rows = np.asarray(mesh[values], dtype=float).reshape(-1, width)
-        found: Array = rows[np.asarray(mesh[which], dtype=np.int64)]
-        return found
+        corners: Array = rows[np.asarray(mesh[indices], dtype=np.int64)]
+        return corners
 
-    corners = take("vertices", "faces", 3).reshape(-1, 3, 3)
-    normals = sharpen(corners, take("normals", "faceNormals", 3).reshape(-1, 3, 3))
-    uv = None if mesh["texcoords"] is None else take("texcoords", "faceTexcoords", 2)
+    corners = corner_rows("vertices", "faces", 3).reshape(-1, 3, 3)
+    normals = sharpen(corners, corner_rows("normals", "faceNormals", 3).reshape(-1, 3, 3))
+    uv = None if mesh["texcoords"] is None else corner_rows("texcoords", "faceTexcoords", 2)
     faces = np.arange(3 * len(corners)).reshape(-1, 3)
     return Surface(corners.reshape(-1, 3), normals.reshape(-1, 3), faces, uv)
 
 
 def _height_field(field: dict[str, Any]) -> Surface:
-    """A height field: its surface, and its four sides down to its floor."""
+    """Make a height field: its upper surface, and its four sides down to its base."""
     rows, columns = field["rows"], field["columns"]
     half_x, half_y, top, base = field["size"]
     x, y = np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows)
@@ -246,20 +247,20 @@ def _height_field(field: dict[str, Any]) -> Surface:
 
 
 def _coil(a: Array, b: Array, radius: float) -> Solid:
-    """A spring between two points."""
+    """Make a spring between two points."""
     z = unit(b - a)
     x = unit(np.array((-z[1], z[0], 0.0)) if abs(z[2]) < 0.9 else np.array((0.0, -z[2], z[1])))
     t = np.linspace(0.0, 1.0, _TURNS * _ROUND + 1)[:, None]
-    wide = radius * np.clip((np.minimum(t, 1 - t) - _STRAIGHT) / _STRAIGHT, 0.0, 1.0)
+    coil_radius = radius * np.clip((np.minimum(t, 1 - t) - _STRAIGHT) / _STRAIGHT, 0.0, 1.0)
     angle = 2 * np.pi * _TURNS * t
-    points = a + t * (b - a) + wide * (np.cos(angle) * x + np.sin(angle) * np.cross(z, x))
+    points = a + t * (b - a) + coil_radius * (np.cos(angle) * x + np.sin(angle) * np.cross(z, x))
     steps = np.arange(len(points))
     ends = np.column_stack((steps[:-1], steps[1:]))
     return Solid(ropes(points, ends, _WIRE * radius), np.zeros(3), np.eye(3), _STEEL)
 
 
 def _pin(position: Array, axis: Array, distance: float) -> Solid:
-    """The pin of a hinge, for a camera at a distance."""
+    """Make the pin of a hinge, for a camera at a distance."""
     half = 2.2 * _PIN * distance * axis
     surface = ropes(
         np.stack((position - half, position + half)), np.array([[0, 1]]), _PIN * distance

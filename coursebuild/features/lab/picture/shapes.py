@@ -2,9 +2,9 @@
 
 Entry points: `surface(kind, size, mesh)`; `flat_surface`, `smooth_surface` and `ropes` of points.
 
-Sizes are MuJoCo's: half-lengths for a box, radius and half-length of the axis for a cylinder and a
-capsule, semi-axes for an ellipsoid. Vertices are shared only where the surface is smooth, so that
-normals at the vertices shade round things round and edges sharp.
+Sizes are MuJoCo's: half-lengths of a box, radius and half-length of the axis of a cylinder and a
+capsule, semi-axes of an ellipsoid. Triangles share vertices only where the surface is smooth, so
+that normals at the vertices make curves look smooth and edges sharp.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ Kind: TypeAlias = Literal[
     "plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"
 ]
 
-_AROUND = 28
-"""Segments around a round thing."""
+_SEGMENTS = 28
+"""Around a round surface."""
 _FAR = 30.0
-"""Half-length (m) at which a plane without a size ends in a picture."""
-_AROUND_ROPE = 12
+"""Half-length, m, of a plane without a size."""
+_ROPE_SEGMENTS = 12
 _HEAD_LENGTH = 3.0
-"""Of an arrow, in radii of its shaft."""
+"""Of an arrow's head, in radii of its shaft."""
 _SMOOTH = 0.8
-"""Cosine between a face and its vertex's normal from which on the edge is not sharp."""
+"""Least cosine between the normals of a face and of its vertex at an edge that is not sharp."""
 
 
 class Surface(Struct, frozen=True):
@@ -42,11 +42,11 @@ class Surface(Struct, frozen=True):
     faces: NDArray[np.int64]
     """(m, 3), counter-clockwise seen from outside."""
     uv: Array | None = None
-    """(n, 2), texture coordinates of a file."""
+    """(n, 2), texture coordinates from a file."""
 
 
 def surface(kind: Kind, size: tuple[float, ...], mesh: Surface | None = None) -> Surface | None:
-    """The surface of a geom; `None` for a mesh that is not given."""
+    """Make the surface of a geom; `None` for a mesh that is missing."""
     match kind:
         case "mesh" | "sdf" | "hfield":
             return mesh
@@ -62,58 +62,60 @@ def surface(kind: Kind, size: tuple[float, ...], mesh: Surface | None = None) ->
             profile = np.array([hub[0], rim[0], *rim, rim[1], hub[1]])
             return _revolve(profile, np.repeat([(0.0, 1.0), (1.0, 0.0), (0.0, -1.0)], 2, axis=0))
         case "capsule":
-            return _capsule(size[0], size[1], _AROUND)
+            return _capsule(size[0], size[1], _SEGMENTS)
         case "sphere" | "ellipsoid":
-            ball = _capsule(1.0, 0.0, _AROUND)
+            ball = _capsule(1.0, 0.0, _SEGMENTS)
             axes = np.array(size[:3] if kind == "ellipsoid" else (size[0],) * 3)
             return Surface(ball.normals * axes, unit(ball.normals / axes), ball.faces)
 
 
-def arrow(radius: float, length: float, *, head: float, both: bool) -> Surface:
-    """An arrow along z from the origin, or to both sides of it; `head` in widths of its shaft."""
-    tip, wide = min(_HEAD_LENGTH * radius, length / 2), head * radius
+def arrow(radius: float, length: float, *, head: float, double: bool) -> Surface:
+    """Make an arrow along z from the origin, or to both sides of it; `head` in shaft widths."""
+    tip, brim = min(_HEAD_LENGTH * radius, length / 2), head * radius
     neck = length - tip
-    upper = [(0.0, length), (wide, neck), (wide, neck), (radius, neck), (radius, neck)]
-    normals = [(tip, wide), (tip, wide), (0.0, -1.0), (0.0, -1.0), (1.0, 0.0)]
-    if both:
-        lower, under = [(r, -z) for r, z in upper[::-1]], [(r, -z) for r, z in normals[::-1]]
+    upper = [(0.0, length), (brim, neck), (brim, neck), (radius, neck), (radius, neck)]
+    normals = [(tip, brim), (tip, brim), (0.0, -1.0), (0.0, -1.0), (1.0, 0.0)]
+    if double:
+        lower = [(r, -z) for r, z in upper[::-1]]
+        lower_normals = [(r, -z) for r, z in normals[::-1]]
     else:
-        lower, under = [(radius, 0.0), (radius, 0.0), (0.0, 0.0)], [(1.0, 0.0), *[(0.0, -1.0)] * 2]
-    return _revolve(np.array(upper + lower), unit(np.array(normals + under)))
+        lower = [(radius, 0.0), (radius, 0.0), (0.0, 0.0)]
+        lower_normals = [(1.0, 0.0), (0.0, -1.0), (0.0, -1.0)]
+    return _revolve(np.array(upper + lower), unit(np.array(normals + lower_normals)))
 
 
 def flat_surface(vertices: Array, faces: NDArray[np.int64]) -> Surface:
-    """A mesh shaded flat: every triangle has vertices of its own."""
+    """Make a mesh with flat shading: every triangle has vertices of its own."""
     corners = vertices[faces]
-    normals = np.repeat(unit(_across(corners)), 3, axis=0)
+    normals = np.repeat(unit(_area_normals(corners)), 3, axis=0)
     return Surface(corners.reshape(-1, 3), normals, np.arange(3 * len(faces)).reshape(-1, 3))
 
 
 def smooth_surface(vertices: Array, faces: NDArray[np.int64]) -> Surface:
-    """A mesh whose normals are the mean of those of the faces around, by their area."""
+    """Make a mesh whose normals average those of the adjacent faces, weighted by area."""
     normals = np.zeros_like(vertices)
-    np.add.at(normals, faces, _across(vertices[faces])[:, None])
+    np.add.at(normals, faces, _area_normals(vertices[faces])[:, None])
     return Surface(vertices, unit(normals), faces)
 
 
 def sharpen(corners: Array, normals: Array) -> Array:
-    """Normals (m, 3, 3) of triangles' corners (m, 3, 3): the face's where they are far off."""
-    face = unit(_across(corners))[:, None]
+    """Replace normals (m, 3, 3) of corners (m, 3, 3) by the face's where they differ much."""
+    face = unit(_area_normals(corners))[:, None]
     sharp = (face * normals).sum(axis=2, keepdims=True) < _SMOOTH
-    known = np.any(face != 0, axis=2, keepdims=True)
-    found: Array = np.where(sharp & known, face, normals)
-    return found
+    has_area = np.any(face != 0, axis=2, keepdims=True)
+    sharpened: Array = np.where(sharp & has_area, face, normals)
+    return sharpened
 
 
 def ropes(points: Array, ends: NDArray[np.int64], radius: float) -> Surface:
-    """Lines between points (n, 3), `ends` (m, 2) of each, of a radius and round at the ends."""
+    """Make round lines between points (n, 3); `ends` (m, 2) holds the indices of their ends."""
     parts = []
     for a, b in points[ends]:
-        along = b - a if np.any(a != b) else np.array((0.0, 0.0, 1.0))
-        z = unit(along)
+        direction = b - a if np.any(a != b) else np.array((0.0, 0.0, 1.0))
+        z = unit(direction)
         x = unit(np.cross(z, np.eye(3)[np.abs(z).argmin()]))
         axes = np.stack((x, np.cross(z, x), z))
-        capsule = _capsule(radius, float(np.linalg.norm(b - a)) / 2, _AROUND_ROPE)
+        capsule = _capsule(radius, float(np.linalg.norm(b - a)) / 2, _ROPE_SEGMENTS)
         middle = (a + b) / 2
         parts.append(
             Surface(capsule.vertices @ axes + middle, capsule.normals @ axes, capsule.faces)
@@ -122,7 +124,7 @@ def ropes(points: Array, ends: NDArray[np.int64], radius: float) -> Surface:
 
 
 def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
-    """Several surfaces, none of which has texture coordinates, as one."""
+    """Join surfaces without texture coordinates into one."""
     starts = np.cumsum([0, *(len(part.vertices) for part in surfaces[:-1])])
     return Surface(
         np.concatenate([part.vertices for part in surfaces]),
@@ -132,7 +134,7 @@ def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
 
 
 def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
-    """Two triangles for each cell of a grid of vertices."""
+    """Make two triangles for each cell of a grid of vertices."""
     index = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
     first = np.stack((a, b, c), axis=-1).reshape(-1, 3)
@@ -140,13 +142,13 @@ def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
     return np.concatenate((first, second))
 
 
-def _across(corners: Array) -> Array:
-    """Normals of triangles (m, 3, 3), twice their area long."""
+def _area_normals(corners: Array) -> Array:
+    """Return the normals of triangles (m, 3, 3), with twice their area as length."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def unit(vectors: Array) -> Array:
-    """Vectors of length 1; those of length 0 stay."""
+    """Scale vectors to length 1; those of length 0 stay."""
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(lengths > 0, lengths, 1.0)
 
@@ -171,12 +173,12 @@ def _capsule(radius: float, half: float, segments: int) -> Surface:
     return _revolve(profile, normals, segments)
 
 
-def _revolve(profile: Array, normals: Array, segments: int = _AROUND) -> Surface:
-    """A profile, from top to bottom, around z: (distance from z, height) of its points."""
-    around = np.linspace(0.0, 2 * np.pi, segments + 1)
+def _revolve(profile: Array, normals: Array, segments: int = _SEGMENTS) -> Surface:
+    """Revolve a profile, points (distance from z, height) from top to bottom, around z."""
+    angles = np.linspace(0.0, 2 * np.pi, segments + 1)
 
     def turn(rows: Array) -> Array:
-        x, y = np.outer(rows[:, 0], np.cos(around)), np.outer(rows[:, 0], np.sin(around))
+        x, y = np.outer(rows[:, 0], np.cos(angles)), np.outer(rows[:, 0], np.sin(angles))
         z = np.repeat(rows[:, 1:], segments + 1, axis=1)
         return np.stack((x, y, z), axis=-1).reshape(-1, 3)
 

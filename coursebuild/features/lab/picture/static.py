@@ -26,56 +26,56 @@ from coursebuild.features.lab.reply import MainRun, unpack_arrays
 
 _WIDTH = 640
 _USUAL = 1.6
-"""Width of a view over its height."""
+"""Width of a usual view over its height."""
 _FROM_AFAR = 1000.0
 _BAR = 0.2
-"""The most of the picture's width that the bar of its scale takes."""
+"""The largest part of the picture's width that the scale bar takes."""
 _LARGE = 1e9
-"""From here on numbers are shown as powers of ten, as in the live lab."""
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+"""From here on numbers are written with powers of ten, as in the live lab."""
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def draw_picture(lab: Lab, main: MainRun) -> bytes:
-    """The start of the main run of a lab's trial, as PNG."""
+    """Draw the start of the main run of a lab's trial, as PNG."""
     scene = unpack_arrays(main["scene"])
     frame = unpack_arrays(main["pictures"][0]["frame"])
-    seen = _camera(lab, scene["camera"])
-    light = light_of(scene, np.asarray(frame, dtype=float), seen.forward)
+    camera = _camera(lab, scene["camera"])
+    light = light_of(scene, np.asarray(frame, dtype=float), camera.forward)
     skies = (texture_of(t) for t in scene["textures"] if t["type"] == SKY)
     solids = tuple(scene_solids(scene, frame))
     floor = None
     if scene["floor"] is not None and not scene["lights"]:
-        floor = Floor(scene["floor"], seen.distance, seen.target)
-    return png(draw(solids, seen, _size(lab), light, next(skies, None), floor))
+        floor = Floor(scene["floor"], camera.distance, camera.target)
+    return png(draw(solids, camera, _size(lab), light, next(skies, None), floor))
 
 
-def _camera(lab: Lab, camera: dict[str, Any]) -> FreeCamera:
-    distance, fovy = camera["distance"], camera["fovy"]
-    if camera["orthographic"]:  # whose `fovy` is a length: the same seen from far away
+def _camera(lab: Lab, record: dict[str, Any]) -> FreeCamera:
+    distance, fovy = record["distance"], record["fovy"]
+    if record["orthographic"]:  # its `fovy` is a length; from far away the view is the same
         distance *= _FROM_AFAR
         fovy = math.degrees(2 * math.atan(fovy / 2 / distance))
-    else:  # a narrow picture shows all of its width
+    else:  # a narrow picture shows the full width
         width, height = _size(lab)
         wider = max(1.0, _USUAL * height / width)
         fovy = math.degrees(2 * math.atan(wider * math.tan(math.radians(fovy) / 2)))
-    target = tuple(camera["target"])
-    return FreeCamera(camera["azimuth"], camera["elevation"], distance, target, fovy)
+    target = tuple(record["target"])
+    return FreeCamera(record["azimuth"], record["elevation"], distance, target, fovy)
 
 
-def _scale(lab: Lab, camera: dict[str, Any]) -> tuple[float, float]:
-    """A round length, m, and how long it is in the picture, pixels, at what the camera looks at."""
-    seen, (width, height) = _camera(lab, camera), _size(lab)
-    metre = height / (2 * seen.distance * math.tan(math.radians(seen.fovy) / 2))
+def _scale(lab: Lab, camera: FreeCamera) -> tuple[float, float]:
+    """Return a round length, m, and its length in the picture, pixels, at the camera's target."""
+    width, height = _size(lab)
+    metre = height / (2 * camera.distance * math.tan(math.radians(camera.fovy) / 2))
     length = round_length(_BAR * width / metre)
     return length, length * metre
 
 
 def png(pixels: NDArray[np.uint8]) -> bytes:
-    """An RGBA picture as a PNG file, with the same bytes each time."""
+    """Write an RGBA picture as a PNG file, with the same bytes each time."""
     opaque = bool((pixels[..., 3] == 255).all())
     height, width = pixels.shape[:2]
     rows = pixels[..., : 3 if opaque else 4].reshape(height, -1)
-    # Each row as its difference from the one above, which is PNG's filter 2.
+    # Each row becomes its difference from the row above: PNG's filter 2.
     filtered = np.diff(rows, axis=0, prepend=np.zeros_like(rows[:1]))
     filtered = np.column_stack((np.full(height, 2, np.uint8), filtered))
     header = struct.pack(">IIBBBBB", width, height, 8, 2 if opaque else 6, 0, 0, 0)
@@ -87,12 +87,12 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
 
 
 def _size(lab: Lab) -> tuple[int, int]:
-    """Width and height of a lab's picture, pixels."""
+    """Return the width and height of a lab's picture, pixels."""
     return (_WIDTH, max(160, min(round(_WIDTH * lab.fields.height / 480), 480)))
 
 
 def lab_record(lab: Lab, main: MainRun) -> LabRecord:
-    """What a page shows of a lab whose trial's main run is `main`."""
+    """Make the record of a lab from the main run of its trial."""
     first, last = main["pictures"][0], main["pictures"][-1]
     recorded = main["plots"]
     plots = tuple(
@@ -100,21 +100,21 @@ def lab_record(lab: Lab, main: MainRun) -> LabRecord:
         for plot, traces in zip(lab.fields.plots, recorded["plots"], strict=True)
     )
     readouts = tuple(
-        (readout.label, _shown(value, readout.digits))
+        (readout.label, _format_value(value, readout.digits))
         for readout, value in zip(lab.fields.readouts, last["readouts"] or (), strict=False)
     )
-    scale = _scale(lab, main["scene"]["camera"])
+    scale = _scale(lab, _camera(lab, main["scene"]["camera"]))
     return LabRecord(_size(lab), scale, first["time"], readouts, last["time"], plots)
 
 
-def _shown(value: Any, digits: int) -> str:
+def _format_value(value: Any, digits: int) -> str:
     if isinstance(value, str):
         return value
     if not isinstance(value, int | float):
         return "\u2013"
     if abs(value) >= _LARGE:
         mantissa, exponent = f"{value:.{max(2, digits)}e}".split("e")
-        return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}".replace("-", "\u2212")
+        return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}".replace("-", "\u2212")
     text = f"{value:.{digits}f}"
     if float(text) == 0:
         text = text.lstrip("-")

@@ -1,6 +1,6 @@
-"""What a model stands on in a picture: a floor with a grid, shadows on it, lines around bodies.
+"""The surroundings of a model in a picture: a floor with a grid and shadows, lines around bodies.
 
-Entry points: `Floor.paint`, `edges`. They are those of the live view (`studio.js` of the page).
+Entry points: `Floor.paint`, `draw_edges`. They match the live view (`studio.js` of the page).
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ _CELLS, _REACH, _LIFT = 10, 2.2, 0.0005
 _GREY, _EDGE_GREY = 0.5, 0.42
 _SHADOW, _POINTS, _WIDTH = 0.32, 10, 0.08
 _GOLDEN = np.pi * (3 - np.sqrt(5))
-"""Points at such angles lie evenly on a disc."""
-_ABOVE = (0.25, -0.35, 0.9)
+"""Points at multiples of this angle lie evenly on a disc."""
+_LAMP = (0.25, -0.35, 0.9)
+"""Direction of the light that throws the shadows."""
 _EDGE_SAMPLES = 2
 _NEAR = 1e-3
 
@@ -30,11 +31,11 @@ class Floor(Struct, frozen=True):
     height: float
     """m."""
     distance: float
-    """Of the camera from what it looks at, m."""
+    """Distance of the camera from its target, m."""
     target: tuple[float, float, float]
 
     def paint(self, colour: Array, buffer: GBuffer, bodies: Sequence[Surface]) -> None:
-        """Mix it into colours (rows, columns, RGB and alpha) where nothing is before it."""
+        """Mix it into colours (rows, columns, RGB and alpha) where nothing covers it."""
         eye, height = buffer.eye, self.height + self._lift / 2
         width, rows = eye.size
         x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2, rows / 2 - np.arange(rows) - 0.5)
@@ -44,13 +45,13 @@ class Floor(Struct, frozen=True):
             far = (height - eye.position[2]) / rays[..., 2]
             place = eye.position[:2] + far[..., None] * rays[..., :2]
         depth = far * eye.focal
-        seen = (far > 0) & (depth < buffer.depth * (1 + _NEAR)) & np.isfinite(place).all(axis=2)
-        place = np.where(seen[..., None], place, 0.0)
+        visible = (far > 0) & (depth < buffer.depth * (1 + _NEAR)) & np.isfinite(place).all(axis=2)
+        place = np.where(visible[..., None], place, 0.0)
         offset = np.linalg.norm((place - self.target[:2]) / (_REACH * self.distance), axis=2)
         fade = np.clip(1 - offset, 0, None) ** 2
         cell = round_length(0.8 * self.distance / _CELLS)
         line = np.maximum(0.55 * _lines(place / cell), _lines(place / (5 * cell)))
-        _mix(colour, _GREY, seen * fade * (0.06 + 0.5 * line))
+        _mix(colour, _GREY, visible * fade * (0.06 + 0.5 * line))
         if bodies:
             _mix(colour, 0.0, 1 - (1 - _SHADOW) ** self._shade(eye, bodies, buffer.depth))
 
@@ -59,53 +60,53 @@ class Floor(Struct, frozen=True):
         return _LIFT * self.distance
 
     def _shade(self, eye: Eye, bodies: Sequence[Surface], depth: Array) -> Array:
-        """The part of the light that does not come to each sample."""
+        """Return the part of the light that does not reach each sample."""
         whole = join_surfaces(bodies)
         height = self.height + self._lift
         shade = np.zeros_like(depth)
         for i in range(_POINTS):
             angle, radius = _GOLDEN * i, _WIDTH * np.sqrt((i + 0.5) / _POINTS)
-            slope = radius * np.array((np.cos(angle), np.sin(angle))) + _ABOVE[:2]
-            over = whole.vertices[:, 2:] - height
-            flat = whole.vertices[:, :2] - over * slope / _ABOVE[2]
+            slope = radius * np.array((np.cos(angle), np.sin(angle))) + _LAMP[:2]
+            elevation = whole.vertices[:, 2:] - height
+            flat = whole.vertices[:, :2] - elevation * slope / _LAMP[2]
             vertices = np.column_stack((flat, np.full(len(flat), height)))
             film = GBuffer(eye)
-            laid = Surface(vertices, whole.normals, whole.faces)
-            film.add(0, laid, np.zeros(3), np.eye(3), front=False)
+            shadow = Surface(vertices, whole.normals, whole.faces)
+            film.add(0, shadow, np.zeros(3), np.eye(3), front=False)
             shade += (film.solid >= 0) & (film.depth < depth * (1 + _NEAR))
         return shade / _POINTS
 
 
-def edges(colour: Array, buffer: GBuffer, bodies: NDArray[np.bool_]) -> None:
-    """Draw lines around bodies, on what is behind them; `bodies` says which solids have them."""
-    found = np.zeros(buffer.solid.shape, bool)
+def draw_edges(colour: Array, buffer: GBuffer, bodies: NDArray[np.bool_]) -> None:
+    """Draw lines around bodies, on what is behind them; `bodies` says which solids are bodies."""
+    edge = np.zeros(buffer.solid.shape, bool)
     body = np.where(buffer.solid >= 0, bodies[buffer.solid], False)
     reach = range(-_EDGE_SAMPLES, _EDGE_SAMPLES + 1)
     for dy, dx in ((dy, dx) for dy in reach for dx in reach if dx * dx + dy * dy <= 4):
-        near = np.roll(body, (dy, dx), axis=(0, 1))
-        other = np.roll(buffer.solid, (dy, dx), axis=(0, 1)) != buffer.solid
-        before = np.roll(buffer.depth, (dy, dx), axis=(0, 1)) < buffer.depth
-        found |= near & other & before
-    _mix(colour, _EDGE_GREY, found.astype(float))
+        is_body = np.roll(body, (dy, dx), axis=(0, 1))
+        differs = np.roll(buffer.solid, (dy, dx), axis=(0, 1)) != buffer.solid
+        is_nearer = np.roll(buffer.depth, (dy, dx), axis=(0, 1)) < buffer.depth
+        edge |= is_body & differs & is_nearer
+    _mix(colour, _EDGE_GREY, edge.astype(float))
 
 
 def round_length(length: float) -> float:
-    """The length 1, 2 or 5 times a power of ten that is next below."""
+    """Round a length down to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(length))
     return float(power * next(n for n in (5, 2, 1) if n * power <= length))
 
 
 def _lines(place: Array) -> Array:
-    """How much of a line of a grid of 1 is at places (rows, columns, 2)."""
-    wide = sum(np.abs(np.gradient(place, axis=axis)) for axis in (0, 1))
-    wide = np.maximum(wide, 1e-6)
-    near = np.abs((place - 0.5) % 1 - 0.5) / wide
-    line = np.clip(1 - near, 0, 1) * np.clip(0.5 / wide - 0.5, 0, 1)
-    found: Array = line.max(axis=2)
-    return found
+    """Return how strong the lines of a grid of cell size 1 are at places (rows, columns, 2)."""
+    width = sum(np.abs(np.gradient(place, axis=axis)) for axis in (0, 1))
+    width = np.maximum(width, 1e-6)
+    distance = np.abs((place - 0.5) % 1 - 0.5) / width
+    line = np.clip(1 - distance, 0, 1) * np.clip(0.5 / width - 0.5, 0, 1)
+    strength: Array = line.max(axis=2)
+    return strength
 
 
 def _mix(colour: Array, grey: float, alpha: Array) -> None:
-    """Lay a grey over colours that are weighted with how much they cover."""
+    """Lay a grey over premultiplied colours."""
     cover = alpha[..., None]
     colour[:] = cover * np.array((grey, grey, grey, 1.0)) + (1 - cover) * colour

@@ -1,9 +1,9 @@
 """Textures of a lab's static picture.
 
-Entry points: `texture_of(given)` from the record of a trial; `TextureMapping.texels`, `sky`.
+Entry points: `texture_of(record)`, from the record of a trial; `TextureMapping.texels`, `sky`.
 
-Texture coordinates are those of the live view (`geometry.js` and `materials.js` of the page),
-worked out anew at every point that is drawn.
+Texture coordinates are those of the live view (`geometry.js` and `materials.js` of the page), but
+computed at every point that is drawn.
 """
 
 from __future__ import annotations
@@ -19,33 +19,33 @@ from coursebuild.features.lab.picture.shapes import Array, Kind
 _CUBE, SKY = 1, 2
 """mjtTexture."""
 _SHARPER = 4.0
-"""How much longer than wide the place of a sample on a surface may be until it is blurred."""
+"""How much longer than wide a sample may be on a surface before the texture is blurred."""
 _LID = 0.9
 
 
 class Texture(Struct, frozen=True):
-    """A texture, flat or of a cube, and smaller ones made from it."""
+    """A flat texture or a cube texture, with smaller copies of it."""
 
     levels: tuple[Array, ...]
-    """(faces, height, width, 3) in [0, 1], from the finest on; each has half the size."""
+    """(faces, height, width, 3) in [0, 1], from the finest on; each is half as large."""
     role: int
     """mjtTexture."""
 
     @property
     def cube(self) -> bool:
-        """Whether it is looked up by a direction."""
+        """Whether a direction determines the texel."""
         return self.role in (_CUBE, SKY)
 
 
-def texture_of(given: dict[str, Any]) -> Texture | None:
-    """A texture as a trial recorded it; `None` where it has no data."""
-    if given["data"] is None:
+def texture_of(record: dict[str, Any]) -> Texture | None:
+    """Make a texture from the record of a trial; `None` if it has no data."""
+    if record["data"] is None:
         return None
-    width, height, channels = given["width"], given["height"], given["channels"]
-    pixels = np.asarray(given["data"], dtype=float).reshape(height, width, channels) / 255
+    width, height, channels = record["width"], record["height"], record["channels"]
+    pixels = np.asarray(record["data"], dtype=float).reshape(height, width, channels) / 255
     colour = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     faces = colour[None]
-    if given["type"] in (_CUBE, SKY):
+    if record["type"] in (_CUBE, SKY):
         six = height == 6 * width
         faces = colour.reshape(6, width, width, 3) if six else np.repeat(faces, 6, axis=0)
     levels = [faces]
@@ -53,7 +53,7 @@ def texture_of(given: dict[str, Any]) -> Texture | None:
         _, rows, columns, _ = levels[-1].shape
         even = levels[-1][:, : rows // 2 * 2, : columns // 2 * 2]
         levels.append(even.reshape(len(even), rows // 2, 2, columns // 2, 2, 3).mean(axis=(2, 4)))
-    return Texture(tuple(levels), given["type"])
+    return Texture(tuple(levels), record["type"])
 
 
 class TextureMapping(Struct, frozen=True):
@@ -66,14 +66,14 @@ class TextureMapping(Struct, frozen=True):
     repeat: tuple[float, float]
     uniform: bool
     endless: bool = False
-    given: bool = False
-    """Whether a file says where a mesh has what of the texture."""
+    has_uv: bool = False
+    """Whether a file gives the texture coordinates of a mesh."""
 
     def texels(self, places: Array, normals: Array, uv: Array, steps: Array) -> Array:
-        """Colours (n, 3) at places (n, 3) of the geom, m, in its own axes.
+        """Return the colours (n, 3) at places (n, 3) of the geom, m, in its own axes.
 
-        `normals` are of length 1 there, `uv` (n, 2) is what a file says, `steps` (n,) are the
-        lengths on the surface, m, that lie between samples, and where these look at it aslant.
+        `normals` have length 1; `uv` (n, 2) are texture coordinates from a file; `steps` (n,) are
+        the lengths on the surface, m, between samples, longer where it is seen at an angle.
         """
         levels = self.texture.levels
         half = np.where(np.array(self.size) > 0, self.size, 1.0)
@@ -81,47 +81,46 @@ class TextureMapping(Struct, frozen=True):
             face, s, t = _cube(self._direction(places, half))
             texels = steps * levels[0].shape[2] / (2 * half.min())
         else:
-            across = self._coordinates(places / half, places, normals, uv)
-            s, t = across.T
+            s, t = self._coordinates(places / half, places, normals, uv).T
             face = np.zeros(len(s), dtype=np.int64)
             period = np.array(self.repeat)
             scale = half[:2] if self.uniform or self.endless else np.ones(2)
-            wide = np.abs(period * scale) * (levels[0].shape[2], levels[0].shape[1])
-            texels = steps * float((wide / (2 * half[:2])).max())
+            widths = np.abs(period * scale) * (levels[0].shape[2], levels[0].shape[1])
+            texels = steps * float((widths / (2 * half[:2])).max())
         level = np.clip(np.rint(np.log2(np.maximum(texels, 1.0))), 0, len(levels) - 1)
         colours = np.empty((len(s), 3))
         for i in np.unique(level).astype(np.int64):
-            here = level == i
-            colours[here] = _looked_up(levels[i], face[here], s[here], t[here], self.texture.cube)
+            at = level == i
+            colours[at] = _interpolate(levels[i], face[at], s[at], t[at], self.texture.cube)
         return colours
 
     def _direction(self, places: Array, half: Array) -> Array:
-        """Where a cube's texture is looked up."""
+        """Return the directions in which a cube texture is looked up."""
         if self.uniform or self.kind in ("mesh", "sdf", "hfield"):
             return places
         unit = places / half
         if self.kind == "capsule":
-            beyond = np.abs(places[:, 2]) - half[2]
-            tip = np.sign(places[:, 2]) * (1 + beyond / half[0])
-            unit[:, 2] = np.where(beyond > 0, tip, unit[:, 2])
+            cap_height = np.abs(places[:, 2]) - half[2]
+            cap = np.sign(places[:, 2]) * (1 + cap_height / half[0])
+            unit[:, 2] = np.where(cap_height > 0, cap, unit[:, 2])
         return unit
 
     def _coordinates(self, unit: Array, places: Array, normals: Array, uv: Array) -> Array:
         repeat = np.array(self.repeat)
-        found: Array
-        if self.given:
-            found = uv * repeat
+        coordinates: Array
+        if self.has_uv:
+            coordinates = uv * repeat
         elif self.endless:
-            found = (1 + repeat * places[:, :2] * (1, -1)) / 2
+            coordinates = (1 + repeat * places[:, :2] * (1, -1)) / 2
         else:
-            once = self._once(unit, places, normals)
-            found = once * repeat * (self.size[:2] if self.uniform else 1.0)
-        return found
+            scale = self.size[:2] if self.uniform else 1.0
+            coordinates = self._unrepeated_coordinates(unit, places, normals) * repeat * scale
+        return coordinates
 
-    def _once(self, unit: Array, places: Array, normals: Array) -> Array:
-        """Coordinates of a texture that is spread over the geom once."""
+    def _unrepeated_coordinates(self, unit: Array, places: Array, normals: Array) -> Array:
+        """Return the coordinates of a texture that covers the geom once."""
         x, y, z = unit.T
-        around = np.mod(np.arctan2(y, x) / (2 * np.pi), 1.0)
+        angle = np.mod(np.arctan2(y, x) / (2 * np.pi), 1.0)
         match self.kind:
             case "plane" | "hfield":
                 u, v = (1 + x) / 2, (1 - y) / 2
@@ -132,44 +131,44 @@ class TextureMapping(Struct, frozen=True):
                 v = (1 - np.where(np.abs(normals[:, 2]) > 0.5, y, z)) / 2
             case "cylinder":
                 lid = np.abs(normals[:, 2]) > _LID
-                u, v = np.where(lid, (1 + x) / 2, around), np.where(lid, (1 + y) / 2, (1 - z) / 2)
+                u, v = np.where(lid, (1 + x) / 2, angle), np.where(lid, (1 + y) / 2, (1 - z) / 2)
             case "capsule":
-                beyond = (np.abs(places[:, 2]) - self.size[2]) / max(self.size[0], 1e-12)
-                rise = np.arcsin(np.clip(beyond, 0.0, 1.0)) / (np.pi / 2)
-                u, v = around, np.where(z > 1, 1 - rise, np.where(z < -1, rise, (1 - z) / 2))
+                cap_height = (np.abs(places[:, 2]) - self.size[2]) / max(self.size[0], 1e-12)
+                rise = np.arcsin(np.clip(cap_height, 0.0, 1.0)) / (np.pi / 2)
+                u, v = angle, np.where(z > 1, 1 - rise, np.where(z < -1, rise, (1 - z) / 2))
             case "sphere" | "ellipsoid":
-                u, v = around, np.arccos(np.clip(z, -1.0, 1.0)) / np.pi
+                u, v = angle, np.arccos(np.clip(z, -1.0, 1.0)) / np.pi
         return np.column_stack((u, v))
 
 
 def sharpness(cosines: Array) -> Array:
-    """How much longer a sample is on a surface seen at an angle, as far as it is blurred for it."""
+    """Return by how much to blur a surface that is seen at an angle, given the cosines."""
     longer = 1 / np.maximum(np.abs(cosines), 1e-3)
     return np.maximum(longer / _SHARPER, 1.0)
 
 
 def sky(texture: Texture, directions: Array) -> Array:
-    """Colours (n, 3) of a sky in directions of the world (n, 3)."""
+    """Return the colours (n, 3) of a sky in directions (n, 3) of the world."""
     x, y, z = directions.T
     face, s, t = _cube(np.column_stack((-x, z, -y)))
-    return _looked_up(texture.levels[0], face, s, t, True)
+    return _interpolate(texture.levels[0], face, s, t, True)
 
 
 def _cube(direction: Array) -> tuple[NDArray[np.int64], Array, Array]:
-    """Face and coordinates of a cube texture, as OpenGL has them."""
+    """Return the face and the coordinates of a cube texture, as OpenGL defines them."""
     x, y, z = direction.T
     axis = np.abs(direction).argmax(axis=1)
     major = np.take_along_axis(direction, axis[:, None], axis=1)[:, 0]
     positive = major >= 0
     sign = np.where(positive, 1.0, -1.0)
-    across = np.choose(axis, (-sign * z, x, sign * x))
-    down = np.choose(axis, (-y, sign * z, -y))
+    rightward = np.choose(axis, (-sign * z, x, sign * x))
+    downward = np.choose(axis, (-y, sign * z, -y))
     length = np.where(major == 0, 1.0, np.abs(major))
-    return 2 * axis + ~positive, (across / length + 1) / 2, (down / length + 1) / 2
+    return 2 * axis + ~positive, (rightward / length + 1) / 2, (downward / length + 1) / 2
 
 
-def _looked_up(level: Array, face: NDArray[np.int64], s: Array, t: Array, cube: bool) -> Array:
-    """Colours at coordinates, between the texels of a level."""
+def _interpolate(level: Array, face: NDArray[np.int64], s: Array, t: Array, cube: bool) -> Array:
+    """Interpolate the colours at coordinates between the texels of a level."""
     _, height, width, _ = level.shape
     x, y = s * width - 0.5, t * height - 0.5
     left, top = np.floor(x), np.floor(y)
@@ -177,12 +176,12 @@ def _looked_up(level: Array, face: NDArray[np.int64], s: Array, t: Array, cube: 
 
     def texel(dx: int, dy: int) -> Array:
         column, row = left.astype(np.int64) + dx, top.astype(np.int64) + dy
-        if cube:  # whose faces end
+        if cube:  # its faces do not repeat
             column, row = np.clip(column, 0, width - 1), np.clip(row, 0, height - 1)
-        found: Array = level[face, row % height, column % width]
-        return found
+        colours: Array = level[face, row % height, column % width]
+        return colours
 
     upper = texel(0, 0) * (1 - fx) + texel(1, 0) * fx
     lower = texel(0, 1) * (1 - fx) + texel(1, 1) * fx
-    found: Array = upper * (1 - fy) + lower * fy
-    return found
+    mixed: Array = upper * (1 - fy) + lower * fy
+    return mixed
