@@ -9,7 +9,7 @@ from typing import Any
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.bench.measuring import CompiledScene
-from coursebuild.features.bench.commands.runs import CannotError
+from coursebuild.features.bench.commands.runs import CannotMeasureError
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene
@@ -37,18 +37,18 @@ class Fake:
         self.found = list(found) or [swing()]
         self.asked: list[tuple[str, int, bool, bool]] = []
 
-    def scenarios_of(self, root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
+    def compile_scene(self, root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
         assert root.is_absolute()
         scenes: Any = tuple(self.found)
         return CompiledScene(scene, None, scenes)
 
-    def with_card(self, root: Path, scene: CourseScene, report: SceneReport) -> SceneReport:
+    def add_card(self, root: Path, scene: CourseScene, report: SceneReport) -> SceneReport:
         """What a model is made of is told elsewhere."""
         return report
 
-    def measured(
+    def run_scenario(
         self,
-        loaded: CompiledScene,
+        compiled: CompiledScene,
         number: int,
         *,
         quick: bool,
@@ -56,10 +56,10 @@ class Fake:
         tell: Callable[[str], None],
     ) -> ScenarioReport:
         tell("swing: Euler")
-        self.asked.append((loaded.scene.name, number, quick, timed))
+        self.asked.append((compiled.scene.name, number, quick, timed))
         found = self.found[number]
         if isinstance(found, Diagnostic):
-            raise CannotError(found)
+            raise CannotMeasureError(found)
         if isinstance(found, BaseException):
             raise found
         return found

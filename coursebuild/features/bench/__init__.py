@@ -1,24 +1,28 @@
-"""What is measured on models, and the recorded reports of it on their pages and in texts.
+"""Measurements of models, and their recorded reports on the pages of models and in texts.
 
-`measured` is the part of a model's page, of `scenarios` and of what the model can be without. A
-`bench` fence in a text names a model (`parse`): `checks` compares it with the course, `page` shows
-a scenario as the page of the model does. `commands` measures and records.
+`model_page` is the part of a model's page: its `scenarios`, and what the model could do without. A
+`bench` fence in a text names a model (`parse`): `checks` compares it with the course, and `page`
+shows a scenario as the page of the model does. `commands` measures and records.
 """
 
 from __future__ import annotations
 
 from coursebuild.core.features import Command, Feature, FenceKind, ModelPart
 from coursebuild.features.bench.checks import check_benches, check_keyframes
-from coursebuild.features.bench.measured import draw_measured, measured_facts, measured_view
 from coursebuild.features.bench.model import Bench
-from coursebuild.features.bench.page import bench_markdown, draw_bench, index_bench, shown_bench
+from coursebuild.features.bench.model_page import (
+    draw_measurements,
+    measurement_facts,
+    measurements_view,
+)
+from coursebuild.features.bench.page import bench_data, bench_markdown, draw_bench, index_bench
 from coursebuild.features.bench.parse import parse_bench
 
 KIND = FenceKind(
     name="bench",
     block=Bench,
     parse=parse_bench,
-    values=shown_bench,
+    values=bench_data,
     draw=draw_bench,
     markdown=bench_markdown,
     index=index_bench,
@@ -27,7 +31,7 @@ FEATURE = Feature(
     name="bench",
     needs=("lab",),
     fences=(KIND,),
-    model_part=ModelPart(facts=measured_facts, values=measured_view, draw=draw_measured),
+    model_part=ModelPart(facts=measurement_facts, values=measurements_view, draw=draw_measurements),
     check=check_benches,
     check_models=check_keyframes,
     commands=(

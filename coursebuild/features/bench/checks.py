@@ -1,7 +1,7 @@
-"""Shown reports against the course: the model exists, has the scenario, and was measured.
+"""Checks `bench` fences against the course: the model exists, has the scenario, and was measured.
 
-Entry points: `check_benches`; `check_keyframes`, for the scenarios of models that declare none,
-which are known where the compiled model is.
+Entry points: `check_benches`; `check_keyframes`, for models that declare no scenarios, whose
+keyframes are known only once the model is compiled.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from coursebuild.features.bench.model import Bench, declared_scenarios
 
 
 def check_benches(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
-    """What is wrong with the reports that documents show, as far as the course tells."""
+    """Report mistakes of `bench` fences that the course alone shows."""
     for document in documents:
         for block in document_blocks(document):
             if isinstance(block, Bench):
@@ -26,7 +26,7 @@ def check_benches(course: Course, documents: Iterable[Document]) -> Iterator[Dia
 def check_keyframes(
     course: Course, facts_of: Callable[[FeatureBlock], ModelFacts | None]
 ) -> Iterator[Diagnostic]:
-    """What is wrong with scenarios of models that declare none: their keyframes are scenarios."""
+    """Report unknown scenarios of models that declare none: there, keyframes are scenarios."""
     for document in course.documents:
         for block in document_blocks(document):
             if isinstance(block, Bench) and not declared_scenarios(course, block.model):
@@ -36,22 +36,22 @@ def check_keyframes(
 
 
 def _check(bench: Bench, course: Course) -> Iterator[Diagnostic]:
-    from coursebuild.numerics.reports.records import BENCH  # which most courses do not need
+    from coursebuild.numerics.reports.records import BENCH  # late: most courses do not need it
 
     models = [model.name for model in course.models]
     if bench.model not in models:
         message, help = f"no model `{bench.model}` in models/", did_you_mean(bench.model, models)
         yield diagnose("bench-model", bench.model_span, message, help=help)
         return
-    found = [one for one in course.declarations if one.model == bench.model]
-    sweeps = [sweep.name for one in found for sweep in one.sweeps]
+    declarations = [d for d in course.declarations if d.model == bench.model]
+    sweeps = [sweep.name for declaration in declarations for sweep in declaration.sweeps]
     if bench.sweep is not None and bench.sweep not in sweeps:
         message = f"the model `{bench.model}` has no sweep `{bench.sweep}`"
         help = did_you_mean(bench.sweep, sweeps)
         yield diagnose("bench-scenario", bench.sweep_span or bench.span, message, help=help)
-    declared = declared_scenarios(course, bench.model)
-    if declared:
-        yield from _check_scenario(bench, declared)
+    scenarios = declared_scenarios(course, bench.model)
+    if scenarios:
+        yield from _check_scenario(bench, scenarios)
     if BENCH.path(bench.model) not in course.files:
         message = f"nothing was recorded of the model `{bench.model}`, so the page says so"
         help = f"measure it with `{BENCH.command(bench.model)}`"

@@ -1,7 +1,7 @@
-"""Measured figures as a page sets them: numbers in words of a book, and tables.
+"""Measured figures as a page shows them: numbers in print style, and tables.
 
-Entry points: `Grid`, a table; `power`, `bounded`, `percent`, `factor`, `size`, numbers; `said`,
-`sentence`.
+Entry points: `Grid`, a table; `power`, `bounded`, `percent`, `factor`, `size`, for numbers;
+`phrase`, `sentence`, `machine_text`, for words.
 """
 
 from __future__ import annotations
@@ -16,48 +16,48 @@ from coursebuild.core.pages.strings import Strings
 
 _MINUS = "\u2212"
 _THIN = "\u2009"
-"""A thin space; tables and numbers are kept in one line by the style sheet."""
+"""A thin space; the style sheet keeps tables and numbers on one line."""
 
 
 class FigurePart(Struct, frozen=True):
-    """Rows of a table under a title of their own."""
+    """Successive rows of a table under a title of their own."""
 
     title: str
     remark: str
     count: int
-    """How many."""
+    """The number of rows."""
 
 
 class Grid(Struct, frozen=True):
     """A table."""
 
     label: str
-    """What it is, for who cannot see it."""
+    """What it shows, for screen readers."""
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    """The first cell of each is what the row is about."""
+    """The first cell names the row."""
     left: tuple[int, ...]
-    """Columns of words; numbers stand at the right."""
+    """Columns of words, set left; numbers are set right."""
     minor: tuple[int, ...] = ()
-    """Columns that go first where there is no room for all."""
-    marked: tuple[int, ...] = ()
+    """Columns that are left out first if there is no room for all."""
+    highlights: tuple[int, ...] = ()
     """Rows that stand out."""
     parts: tuple[FigurePart, ...] = ()
-    """All rows in order; empty where they are not parted."""
+    """The parts of the table, in order; empty if it has none."""
 
     @property
     def bodies(
         self,
     ) -> tuple[tuple[FigurePart | None, tuple[tuple[int, tuple[str, ...]], ...]], ...]:
         """The rows with their numbers, by part."""
-        numbered = tuple(enumerate(self.rows))
+        rows = tuple(enumerate(self.rows))
         if not self.parts:
-            return ((None, numbered),)
-        found, at = [], 0
+            return ((None, rows),)
+        bodies, start = [], 0
         for part in self.parts:
-            found.append((part, numbered[at : at + part.count]))
-            at += part.count
-        return tuple(found)
+            bodies.append((part, rows[start : start + part.count]))
+            start += part.count
+        return tuple(bodies)
 
 
 def grid(
@@ -66,25 +66,25 @@ def grid(
     *,
     words: tuple[str, ...] = (),
     minor: tuple[str, ...] = (),
-    marked: tuple[int, ...] = (),
+    highlights: tuple[int, ...] = (),
     parts: tuple[FigurePart, ...] = (),
 ) -> Grid:
-    """A table of columns without those that have no text; `words` and `minor` name some of them."""
-    shown = [(title, cells) for n, (title, cells) in enumerate(columns) if not n or any(cells)]
-    titles = tuple(title for title, _ in shown)
+    """Make a table of the columns that hold text; `words` and `minor` are titles of columns."""
+    filled_columns = [column for n, column in enumerate(columns) if not n or any(column[1])]
+    titles = tuple(title for title, _ in filled_columns)
     return Grid(
         label=label,
         head=titles,
-        rows=tuple(zip(*(cells for _, cells in shown), strict=True)),
+        rows=tuple(zip(*(cells for _, cells in filled_columns), strict=True)),
         left=tuple(n for n, title in enumerate(titles) if not n or title in words),
         minor=tuple(n for n, title in enumerate(titles) if title in minor),
-        marked=marked,
+        highlights=highlights,
         parts=parts,
     )
 
 
 def power(value: float | None, digits: int = 3) -> Markup:
-    """A number in so many digits, with a power of ten where it is very large or small."""
+    """Write a number in so many digits, with a power of ten if it is very large or small."""
     if value is None:
         return Markup()
     if not value or not math.isfinite(value):
@@ -93,25 +93,25 @@ def power(value: float | None, digits: int = 3) -> Markup:
     if -3 <= exponent < 5:
         places = max(0, digits - 1 - exponent)
         return Markup(f"{value:.{places}f}".replace("-", _MINUS))
-    return _raised(f"{value:.{digits - 1}e}")
+    return _scientific(f"{value:.{digits - 1}e}")
 
 
 def bounded(value: float | None, least: float) -> Markup:
-    """An error, of which no more is known than that it is smaller where it is `least`."""
+    """Write an error; one that is not above `least` is only known to be smaller than that."""
     if value is not None and least > 0.0 and value <= least * (1 + 1e-9):
         return Markup("&lt; ") + power(least, 2)
     return power(value)
 
 
-def _raised(text: str) -> Markup:
-    """A number as Python writes it, with a raised exponent."""
-    mantissa, found, exponent = text.partition("e")
-    tens = f"{_THIN}×{_THIN}10<sup>{int(exponent)}</sup>" if found else ""
+def _scientific(text: str) -> Markup:
+    """Write a number of Python's with a power of ten in place of its `e`."""
+    mantissa, mark, exponent = text.partition("e")
+    tens = f"{_THIN}×{_THIN}10<sup>{int(exponent)}</sup>" if mark else ""
     return Markup((mantissa + tens).replace("-", _MINUS))
 
 
 def percent(value: float | None) -> Markup:
-    """A relative change, with its sign."""
+    """Write a relative change, with its sign."""
     if value is None:
         return Markup()
     change = 100 * value
@@ -120,36 +120,36 @@ def percent(value: float | None) -> Markup:
     return Markup("" if change <= 0 else "+") + power(change, 2) + f"{_THIN}%"
 
 
-def said(words: Strings, key: str, **values: str) -> Markup:
-    """A text of the interface with values; numbers among them stay in one line."""
-    kept = {
-        name: whole(text) if isinstance(text, Markup) else text for name, text in values.items()
+def phrase(words: Strings, key: str, **values: str) -> Markup:
+    """Put values into a text of the interface; no line end breaks the numbers among them."""
+    unbroken_values = {
+        name: unbroken(text) if isinstance(text, Markup) else text for name, text in values.items()
     }
-    return Markup(escape(words(key)).format(**kept))
+    return Markup(escape(words(key)).format(**unbroken_values))
 
 
-def whole(number: Markup) -> Markup:
-    """A number that no line end breaks."""
+def unbroken(number: Markup) -> Markup:
+    """Mark a number so that no line end breaks it."""
     return Markup('<span class="whole">{}</span>').format(number)
 
 
 def factor(value: float | None) -> str:
-    """How many times as fast as real time."""
+    """Write how many times as fast as real time something runs."""
     if value is None:
         return ""
     return f"{value:,.0f}".replace(",", _THIN) if value >= 100 else f"{value:.3g}"
 
 
 def size(count: int) -> str:
-    """Bytes."""
-    share, unit = count / 1e6, "MB"
+    """Write a number of bytes."""
+    amount, unit = count / 1e6, "MB"
     if count < 1e7:
-        share, unit = (count, "B") if count < 1e4 else (count / 1e3, "kB")
-    return f"{share:,.0f} {unit}".replace(",", _THIN)
+        amount, unit = (count, "B") if count < 1e4 else (count / 1e3, "kB")
+    return f"{amount:,.0f} {unit}".replace(",", _THIN)
 
 
-def where(words: Strings, machine: Machine) -> str:
-    """On what machine, and with which versions."""
+def machine_text(words: Strings, machine: Machine) -> str:
+    """Name the machine and the versions."""
     return words(
         "measured.where",
         engine=machine.engine,
@@ -160,6 +160,6 @@ def where(words: Strings, machine: Machine) -> str:
 
 
 def sentence(text: str) -> str:
-    """A clause as a sentence of its own."""
+    """Make a sentence of a clause."""
     text = text[:1].upper() + text[1:]
     return text if not text or text.endswith((".", "?", "!")) else f"{text}."

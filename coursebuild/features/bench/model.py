@@ -8,35 +8,36 @@ from coursebuild.core.model import Course, FeatureBlock
 from coursebuild.core.text.source import Span
 
 BenchPart: TypeAlias = Literal["plot", "stable", "orders", "table"]
-"""What of a report is shown."""
+"""A part of a report that can be shown."""
 PARTS: tuple[BenchPart, ...] = ("plot", "stable", "orders", "table")
-"""In the order in which they are shown."""
+"""All parts, in the order in which they are shown."""
 
 
 class Bench(FeatureBlock, frozen=True):
-    """What was recorded of a model in one of its scenarios."""
+    """The recorded report on a model in one of its scenarios, or on a sweep."""
 
     model: str
     model_span: Span
     scenario: str | None
-    """`None`: the first."""
+    """`None` for the first."""
     scenario_span: Span | None
     sweep: str | None
-    """What is shown instead: parameters at other values."""
+    """Shown instead of a scenario: parameters at other values."""
     sweep_span: Span | None
     shows: tuple[BenchPart, ...]
-    """In the order in which it is shown."""
+    """The parts to show, in order."""
 
     def summary(self) -> Bench:
-        """All of it."""
+        """The block itself."""
         return self
 
     def mentioned_models(self) -> tuple[str, ...]:
-        """The one that was measured."""
+        """The model that was measured."""
         return (self.model,)
 
 
 def declared_scenarios(course: Course, model: str) -> dict[str, str]:
-    """The titles of the scenarios that stand beside a model, by name."""
-    found = (one for one in course.declarations if one.model == model)
-    return {one.name: one.title or one.name for each in found for one in each.scenarios}
+    """Map the scenarios that the course declares for a model to their titles."""
+    declarations = (d for d in course.declarations if d.model == model)
+    scenarios = (scenario for declaration in declarations for scenario in declaration.scenarios)
+    return {scenario.name: scenario.title or scenario.name for scenario in scenarios}

@@ -1,7 +1,7 @@
-"""From a `bench` fence to a `Bench`.
+"""Parses `bench` fences.
 
 Entry point: `parse_bench`. The first word is the name of the model, as in a link (`%20` is a
-space). Keys: `scenario=swing` (the first one without it), `show="plot,table"` (see `PARTS`), or
+space). Keys: `scenario=swing` (default: the first), `show="plot,table"` (see `PARTS`), or
 `sweep=softness`.
 """
 
@@ -20,36 +20,37 @@ _DEFAULT: tuple[BenchPart, ...] = ("plot", "table")
 
 
 def parse_bench(fence: Fence, _: TextParser) -> Parsed[Bench | None]:
-    """The block; none of a fence that says in a wrong way what to show."""
-    parsed = fence.keys(values=("scenario", "sweep", "show"), has_name=True)
-    keys, wrong = parsed.value, list(parsed.diagnostics)
+    """Parse a `bench` fence; `None` if it has mistakes."""
+    parsed_keys = fence.keys(values=("scenario", "sweep", "show"), has_name=True)
+    keys, diagnostics = parsed_keys.value, list(parsed_keys.diagnostics)
     if keys.name is None:
         message = "a bench needs the name of a model"
         help = "write `bench NAME`, with the name of a file in models/, without `.xml`"
-        wrong.append(diagnose("fence-info", kind_of(fence.info).span(), message, help=help))
+        diagnostics.append(diagnose("fence-info", kind_of(fence.info).span(), message, help=help))
     show = keys.get("show")
-    shows = _DEFAULT if show is None else _parts(show, wrong)
+    shows = _DEFAULT if show is None else _parse_parts(show, diagnostics)
     body = trim(fence.body, " \t\n")
     if body.text:
         message = "a bench shows what was recorded, and has no text of its own"
         help = "write the text before or after it"
-        wrong.append(diagnose("bench-text", body.span().first_line(), message, help=help))
-    if keys.name is None or wrong:
-        return Parsed(None, tuple(wrong))
+        diagnostics.append(diagnose("bench-text", body.span().first_line(), message, help=help))
+    if keys.name is None or diagnostics:
+        return Parsed(None, tuple(diagnostics))
     model, place = unquote(keys.name.key), keys.name.key_span
     scenario, scenario_place = keys.value("scenario"), keys.place("scenario")
-    swept = keys.value("sweep"), keys.place("sweep")
-    return Parsed(Bench(fence.span, model, place, scenario, scenario_place, *swept, shows))
+    sweep, sweep_place = keys.value("sweep"), keys.place("sweep")
+    bench = Bench(fence.span, model, place, scenario, scenario_place, sweep, sweep_place, shows)
+    return Parsed(bench)
 
 
-def _parts(show: Word, wrong: list[Diagnostic]) -> tuple[BenchPart, ...]:
-    """What to show, in the order of `PARTS`."""
-    wanted = {part.text: part for part in reversed(show.parts()) if part.text}
-    for name, part in wanted.items():
+def _parse_parts(show: Word, diagnostics: list[Diagnostic]) -> tuple[BenchPart, ...]:
+    """Read which parts to show, in the order of `PARTS`."""
+    parts = {part.text: part for part in reversed(show.parts()) if part.text}
+    for name, part in parts.items():
         if name not in PARTS:
             message, help = f"nothing of a report is called `{name}`", did_you_mean(name, PARTS)
-            wrong.append(diagnose("fence-key-value", part.span(), message, help=help))
-    if not wanted:
+            diagnostics.append(diagnose("fence-key-value", part.span(), message, help=help))
+    if not parts:
         message, help = "`show` names nothing", "for example `show=plot,table`"
-        wrong.append(diagnose("fence-key-value", show.value_span, message, help=help))
-    return tuple(name for name in PARTS if name in wanted)
+        diagnostics.append(diagnose("fence-key-value", show.value_span, message, help=help))
+    return tuple(name for name in PARTS if name in parts)

@@ -20,11 +20,11 @@ from coursebuild.features.bench.figures import (
     FigurePart,
     Grid,
     grid,
+    machine_text,
     percent,
+    phrase,
     power,
-    said,
     sentence,
-    where,
 )
 from coursebuild.features.bench.scenarios import (
     ORDERS,
@@ -101,7 +101,7 @@ def numerics_values(library: Library) -> dict[str, object]:
             for number, group in groupby(cases, key=attrgetter("case"))
         ),
         "integrators": INTEGRATORS,
-        "where": dict.fromkeys(where(words, report.machine) for report in cases),
+        "where": dict.fromkeys(machine_text(words, report.machine) for report in cases),
         "file": place.href(urls.file_path(STABILITY.path())),
         "command": STABILITY.command(),
     }
@@ -261,7 +261,7 @@ def _notes(words: Strings, report: CaseReport) -> list[str]:
     )
     notes: list[str] = [
         words("numerics.references", first=reference.source, second=reference.second),
-        said(words, "numerics.known", place=place, speed=speed),
+        phrase(words, "numerics.known", place=place, speed=speed),
     ]
     formulas = dict.fromkeys(line.formula for line in report.boundaries if line.formula)
     if formulas:

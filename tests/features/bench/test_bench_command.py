@@ -39,10 +39,10 @@ def test_bench_prints_a_table_and_json(course: Path, capsys: pytest.CaptureFixtu
     out, err = capsys.readouterr()
     assert err == ""
     rows = json.loads(out)["scenes"][0]["scenarios"][0]["rows"]
-    named = [(one["setting"]["integrator"], one) for one in rows]
-    assert {name for name, _ in named} >= {"Euler", "RK4", "implicit", "discrete"}
-    assert [one["setting"]["timestep"] for one in rows if one["own"]] == [0.002]
-    assert all(one["position"][0] < 1e-3 for name, one in named if name == "RK4")
+    by_integrator = [(row["setting"]["integrator"], row) for row in rows]
+    assert {name for name, _ in by_integrator} >= {"Euler", "RK4", "implicit", "discrete"}
+    assert [row["setting"]["timestep"] for row in rows if row["own"]] == [0.002]
+    assert all(row["position"][0] < 1e-3 for name, row in by_integrator if name == "RK4")
 
 
 def test_bench_with_wrong_arguments_gives_2(
@@ -72,13 +72,13 @@ def test_ctrl_c_ends_bench_and_leaves_no_litter(course: Path) -> None:
         text=True,
         env=environment,
         cwd=course,
-    ) as running:
-        assert running.stderr is not None
-        while running.stderr.readline() != "  box\n":
-            assert running.poll() is None
-        running.send_signal(signal.SIGINT)
-        out, err = running.communicate(timeout=300)
-    assert running.returncode == 130, err
+    ) as process:
+        assert process.stderr is not None
+        while process.stderr.readline() != "  box\n":
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=300)
+    assert process.returncode == 130, err
     assert err.endswith("interrupted\n")
     assert out == ""
     assert sorted(path.name for path in course.iterdir()) == [".coursebuild", "content", "models"]

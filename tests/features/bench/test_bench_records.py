@@ -1,4 +1,4 @@
-"""`coursebuild bench --record` and `--check`: what is recorded, and held against it."""
+"""`coursebuild bench --record` and `--check`: what is recorded, and how it is checked."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ def course(tmp_path: Path) -> Path:
     return bench_course(tmp_path)
 
 
-def recorded(course: Path, *found: ScenarioReport) -> Measurement[SceneReport]:
-    fake: Any = Fake(*found)
+def record(course: Path, *reports: ScenarioReport) -> Measurement[SceneReport]:
+    fake: Any = Fake(*reports)
     return bench(options(course), record=True, measuring=fake)
 
 
 def test_what_is_recorded_is_checked(course: Path) -> None:
     write(course / "models" / "arms" / "left arm.xml", BOX)
-    found = recorded(course)
-    assert found.ok
-    assert found.remarks == (
+    measurement = record(course)
+    assert measurement.ok
+    assert measurement.remarks == (
         "wrote content/reports/arms/left arm.bench.json",
         f"wrote {PATH}",
     )
@@ -41,30 +41,30 @@ def test_what_is_recorded_is_checked(course: Path) -> None:
     assert report.model == "box" and report.scenarios == (swing(),)
     assert report.digest == find_scenes(course, ("box",)).value[0].digest
     fake = Fake()
-    again = check(options(course), measuring=fake)
-    assert again.ok
-    assert [one.departures for one in again.checked] == [(), ()]
+    check_again = check(options(course), measuring=fake)
+    assert check_again.ok
+    assert [comparison.departures for comparison in check_again.checked] == [(), ()]
     assert fake.asked == [("arms/left arm", 0, False, False), ("box", 0, False, False)]
 
 
 def test_the_same_bytes_are_not_written_again(course: Path) -> None:
-    recorded(course)
+    record(course)
     before = (course / PATH).stat()
-    found = recorded(course)
-    assert found.remarks == (f"{PATH} is as it was",)
+    measurement = record(course)
+    assert measurement.remarks == (f"{PATH} is as it was",)
     assert (course / PATH).stat().st_mtime_ns == before.st_mtime_ns
 
 
 def test_a_figure_that_left_its_band_fails(course: Path) -> None:
-    recorded(course)
+    record(course)
     rows = list(swing().rows)
     rows[2] = replace(rows[2], velocity=(1.0, 1.0), cost=1000.0)
     fake = Fake(replace(swing(), rows=tuple(rows)))
-    found = check(options(course), measuring=fake)
-    assert not found.ok
-    (one,) = found.checked
-    assert (one.name, one.path) == ("box", PATH)
-    assert {d.figure for d in one.departures} == {
+    measurement = check(options(course), measuring=fake)
+    assert not measurement.ok
+    (comparison,) = measurement.checked
+    assert (comparison.name, comparison.path) == ("box", PATH)
+    assert {d.figure for d in comparison.departures} == {
         "error of velocity",
         "error of velocity at the end",
     }
@@ -80,9 +80,9 @@ def test_a_figure_that_left_its_band_fails(course: Path) -> None:
 def test_a_report_that_is_not_there_or_none_or_of_something_else(course: Path) -> None:
     write(course / "models" / "left arm.xml", BOX)
     fake = Fake()
-    found = check(options(course), measuring=fake)
-    assert not found.ok and fake.asked == []
-    assert [(one.message, one.help) for one in found.failures] == [
+    measurement = check(options(course), measuring=fake)
+    assert not measurement.ok and fake.asked == []
+    assert [(failure.message, failure.help) for failure in measurement.failures] == [
         (
             f"{PATH} is not there",
             "make it with `coursebuild bench box --record`, and commit it",
@@ -92,7 +92,7 @@ def test_a_report_that_is_not_there_or_none_or_of_something_else(course: Path) -
             "make it with `coursebuild bench 'left arm' --record`, and commit it",
         ),
     ]
-    recorded(course)
+    record(course)
     report = BENCH.decode((course / PATH).read_bytes())
     for data, message in (
         (b'{"holds": "coursebuild bench", "form": 1}', "was written by another version of this"),
@@ -109,30 +109,30 @@ def test_a_report_that_is_not_there_or_none_or_of_something_else(course: Path) -
 
 
 def test_a_part_is_not_recorded(course: Path) -> None:
-    why = " takes no --quick: what is recorded is measured in full"
-    with pytest.raises(UsageError, match=f"--record{why}"):
+    reason = " takes no --quick: what is recorded is measured in full"
+    with pytest.raises(UsageError, match=f"--record{reason}"):
         bench(options(course), quick=True, record=True, measuring=Fake())
-    with pytest.raises(UsageError, match=f"--check{why}"):
+    with pytest.raises(UsageError, match=f"--check{reason}"):
         check(options(course), quick=True, measuring=Fake())
 
 
 def test_where_nothing_can_be_written(course: Path, tmp_path: Path) -> None:
     (tmp_path / "away").mkdir()
     (course / "content" / "reports").symlink_to(tmp_path / "away")
-    (failure,) = recorded(course).failures
+    (failure,) = record(course).failures
     assert failure.message == f"{PATH} leads out of the project"
     (course / "content" / "reports").unlink()
     (course / "content" / "reports").write_text("a file")
-    (failure,) = recorded(course).failures
+    (failure,) = record(course).failures
     assert failure.message == f"{PATH} cannot be written: file exists"
     assert list((tmp_path / "away").iterdir()) == []
 
 
-def test_another_engine_is_told(course: Path) -> None:
-    recorded(course)
+def test_another_engine_is_reported(course: Path) -> None:
+    record(course)
     report = BENCH.decode((course / PATH).read_bytes())
     machine = replace(report.machine, engine="3.13.0", system="Plan 9 mips")
     (course / PATH).write_bytes(BENCH.encode(replace(report, machine=machine)))
-    (one,) = check(options(course), measuring=Fake()).checked
-    assert one.remarks[0].startswith("recorded with MuJoCo 3.13.0, measured with ")
-    assert one.remarks[1].startswith("recorded with Plan 9 mips, measured with ")
+    (comparison,) = check(options(course), measuring=Fake()).checked
+    assert comparison.remarks[0].startswith("recorded with MuJoCo 3.13.0, measured with ")
+    assert comparison.remarks[1].startswith("recorded with Plan 9 mips, measured with ")

@@ -15,8 +15,8 @@ from msgspec.structs import replace
 from coursebuild.features.bench.commands.bench.text import bench_text
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
-    checked_text,
-    measured_json,
+    format_checks,
+    measurement_json,
 )
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import RowVerdict
@@ -49,7 +49,7 @@ def test_text_is_as_wide_as_the_terminal(rewriting: bool) -> None:
 
 
 def test_departures_as_text(rewriting: bool) -> None:
-    text = checked_text([CHECKED, replace(CHECKED, name="leg", departures=())], Style())
+    text = format_checks([CHECKED, replace(CHECKED, name="leg", departures=())], Style())
     check_text(HERE / "departures.txt", text, rewriting=rewriting)
 
 
@@ -102,7 +102,7 @@ def test_a_table_keeps_what_has_room_where_wide_characters_take_two_cells() -> N
 @given(value=st.floats())
 def test_json_has_no_number_that_is_none(value: float) -> None:
     odd = replace(row(), position=(value, value), cost=Interval(value, value, value), growth=value)
-    found = scene(scenario([odd], horizon=value, floor=value))
-    text = measured_json({"scenes": [found]}, Measurement((found,)))
-    (told,) = json.loads(text)["scenes"][0]["scenarios"][0]["rows"]
-    assert told["growth"] == (value if math.isfinite(value) else None)
+    report = scene(scenario([odd], horizon=value, floor=value))
+    text = measurement_json({"scenes": [report]}, Measurement((report,)))
+    (row_value,) = json.loads(text)["scenes"][0]["scenarios"][0]["rows"]
+    assert row_value["growth"] == (value if math.isfinite(value) else None)

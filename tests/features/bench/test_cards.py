@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.run.machine import machine
-from coursebuild.features.bench.commands.bench.measuring import with_card
+from coursebuild.features.bench.commands.bench.measuring import add_card
 from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.pipeline.scenes import find_scenes
 
@@ -37,14 +37,14 @@ def root(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def carded(root: Path, seconds: float = 60.0) -> SceneReport:
+def report_with_card(root: Path, seconds: float = 60.0) -> SceneReport:
     (scene,) = find_scenes(root, ("ball",)).value
     report = SceneReport("ball", scene.digest, False, machine(), ())
-    return with_card(root, scene, report, seconds)
+    return add_card(root, scene, report, seconds)
 
 
 def test_a_card(root: Path) -> None:
-    card = carded(root).card
+    card = report_with_card(root).card
     assert card is not None
     assert (card.bodies, card.geoms, card.freedom) == (1, 2, 6)
     assert (card.possible, card.touched) == (1, 1)
@@ -55,5 +55,5 @@ def test_a_card(root: Path) -> None:
 
 def test_what_does_not_touch_in_the_scenarios_or_run_in_the_browser(root: Path) -> None:
     (root / "models/ball.toml").write_text('[[scenario]]\nname = "high"\nduration = 0.2\n')
-    card = carded(root, seconds=0.0).card
+    card = report_with_card(root, seconds=0.0).card
     assert card is not None and (card.possible, card.touched, card.browser) == (1, 0, None)

@@ -57,7 +57,7 @@ def values(course: Path, capsys: pytest.CaptureFixture[str], *arguments: str) ->
     return status, json.loads(out)
 
 
-def test_diet_tells_a_finding_as_text_and_as_json(
+def test_diet_shows_a_finding_as_text_and_as_json(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(course) == run(course) == 1
@@ -71,7 +71,7 @@ def test_diet_tells_a_finding_as_text_and_as_json(
     assert status == 1
     (model,) = value["models"]
     assert model["model"] == "swing" and model["quick"] and not model["ok"]
-    assert [one["status"] for one in model["scenarios"]] == ["ok"]
+    assert [scenario["status"] for scenario in model["scenarios"]] == ["ok"]
     (finding,) = model["findings"]
     assert finding["label"] == "proved" and finding["fixable"]
     assert finding["places"] == [
@@ -90,19 +90,19 @@ def test_diet_tells_a_finding_as_text_and_as_json(
 def test_fix_changes_only_what_is_in_vain_and_then_nothing(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Whatever the line ends are, with a mark at the beginning and letters beyond ASCII."""
+    """Line ends, a byte order mark and letters beyond ASCII stay."""
     file = course / "models" / "swing.xml"
     text = "\ufeff" + MODEL.replace("bob", "Kügelchen")
     file.write_bytes(text.replace("\n", "\r\n").encode())
     file.chmod(0o640)
     assert run(course, "--fix") == 0
     assert "changed models/swing.xml: sensor-unread" in capsys.readouterr().out
-    wanted = text.replace('<clock name="time"/> ', "").replace("\n", "\r\n").encode()
-    assert file.read_bytes() == wanted and file.stat().st_mode & 0o777 == 0o640
+    expected = text.replace('<clock name="time"/> ', "").replace("\n", "\r\n").encode()
+    assert file.read_bytes() == expected and file.stat().st_mode & 0o777 == 0o640
     status = file.stat()
     assert run(course, "--fix") == 0
     assert "changed" not in capsys.readouterr().out
-    assert file.stat().st_mtime_ns == status.st_mtime_ns and file.read_bytes() == wanted
+    assert file.stat().st_mtime_ns == status.st_mtime_ns and file.read_bytes() == expected
 
 
 def test_fix_takes_what_goes_together_and_leaves_what_only_runs_speak_for(
@@ -127,14 +127,14 @@ def test_fix_takes_what_goes_together_and_leaves_what_only_runs_speak_for(
 
 
 def test_a_finding_is_kept_with_a_reason(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    beside = course / "models" / "swing.toml"
-    beside.write_text('[[keep]]\nfinding = "sensor-unread time"\nreason = "shown in class"\n')
+    declarations = course / "models" / "swing.toml"
+    declarations.write_text('[[keep]]\nfinding = "sensor-unread time"\nreason = "shown in class"\n')
     assert run(course) == 0
     out = capsys.readouterr().out
     assert "    kept: shown in class\n" in out and "nothing in it is in vain" in out
     assert run(course, "--fix") == 0
     assert (course / "models" / "swing.xml").read_text() == MODEL
-    beside.write_text('[[keep]]\nfinding = "sensor-unread tim"\nreason = "shown in class"\n')
+    declarations.write_text('[[keep]]\nfinding = "sensor-unread tim"\nreason = "shown in class"\n')
     status, value = values(course, capsys)
     assert status == 1 and value["models"][0]["stale"] == [
         {"finding": "sensor-unread tim", "path": "models/swing.toml", "line": 2, "column": 11}
@@ -163,10 +163,10 @@ def test_sensor_that_a_lesson_reads_is_no_finding(
     assert run(course) == 0
 
 
-def test_what_a_script_says_otherwise_without_is_no_finding(
+def test_a_part_without_which_a_script_prints_something_else_is_no_finding(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """No scenario tells that the far body is gone, but the number of positions does."""
+    """No scenario shows that the far body is gone, but the number of positions does."""
     far = '<body pos="900 0 1"><freejoint/><geom size=".1"/></body>\n  </worldbody>'
     (course / "models" / "swing.xml").write_text(CLEAN.replace("  </worldbody>", far))
     lessons = course / "content" / "lessons"
@@ -174,9 +174,9 @@ def test_what_a_script_says_otherwise_without_is_no_finding(
     script = 'import mujoco\nm = mujoco.MjModel.from_xml_path(str(model_path("swing")))\nprint('
     (lessons / "1.1-one.md").write_text(LESSON.replace("SCRIPT", f"{script}m.nq)"))
     main(["-C", str(course), "diet"])
-    told = " ".join(capsys.readouterr().out.split())
-    assert "far-body: what the scene is about" not in told
-    assert "because examples/a.py says something else then: far-body" in told
+    output = " ".join(capsys.readouterr().out.split())
+    assert "far-body: what the scene is about" not in output
+    assert "because examples/a.py says something else then: far-body" in output
 
 
 def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
@@ -184,17 +184,17 @@ def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
 ) -> None:
     keys = '  <keyframe><key name="go" qpos="1"/><key name="rest"/></keyframe>\n</mujoco>'
     (course / "models" / "swing.xml").write_text(MODEL.replace("</mujoco>", keys))
-    beside = course / "models" / "swing.toml"
-    beside.write_text('[[scenario]]\nname = "a"\nkeyframe = "go"\nmeasure = "sensor:time"\n')
+    declarations = course / "models" / "swing.toml"
+    declarations.write_text('[[scenario]]\nname = "a"\nkeyframe = "go"\nmeasure = "sensor:time"\n')
     status, value = values(course, capsys)
     (finding,) = value["models"][0]["findings"]
     assert status == 1 and finding["kind"] == "unused-keyframe"
     assert [place["name"] for place in finding["places"]] == ["rest"]
-    beside.write_text('[[scenario]]\nname = "a"\nkeyframe = 1\nconserved = ["energy"]\n')
+    declarations.write_text('[[scenario]]\nname = "a"\nkeyframe = 1\nconserved = ["energy"]\n')
     status, value = values(course, capsys)
-    kinds = {one["kind"]: one for one in value["models"][0]["findings"]}
-    assert set(kinds) == {"unused-keyframe", "sensor-unread"}
-    assert [place["name"] for place in kinds["unused-keyframe"]["places"]] == ["go"]
+    findings = {finding["kind"]: finding for finding in value["models"][0]["findings"]}
+    assert set(findings) == {"unused-keyframe", "sensor-unread"}
+    assert [place["name"] for place in findings["unused-keyframe"]["places"]] == ["go"]
 
 
 SHARED = "<mujocoinclude>\n  <option/>\n  <sensor>\n    <clock/>\n  </sensor>\n</mujocoinclude>\n"
@@ -240,7 +240,9 @@ def test_a_report_is_recorded(course: Path, capsys: pytest.CaptureFixture[str]) 
     assert main(["-C", str(course), "diet", "--record"]) == 1
     assert "wrote content/reports/swing.diet.json" in capsys.readouterr().out
     report = DIET.decode(path.read_bytes())
-    assert report.model == "swing" and [one.kind for one in report.findings] == ["sensor-unread"]
+    assert report.model == "swing" and [finding.kind for finding in report.findings] == [
+        "sensor-unread"
+    ]
 
 
 def test_diet_with_wrong_arguments_gives_2(
@@ -270,16 +272,21 @@ def test_a_broken_model_keeps_no_other_from_being_looked_at(
     assert run(course, "-q", "good") == 0
     assert capsys.readouterr().out == "", "a quiet run tells only what is wrong"
     status, value = values(course, capsys)
-    assert status == 1 and [one["model"] for one in value["models"]] == ["good"]
-    said = {one["path"]: one["message"] for one in value["diagnostics"]}
-    assert set(said) == {"models/broken.xml", "models/loose.xml", "models/swing.toml"}
-    assert said["models/loose.xml"] == (
+    assert status == 1 and [model["model"] for model in value["models"]] == ["good"]
+    messages = {d["path"]: d["message"] for d in value["diagnostics"]}
+    assert set(messages) == {"models/broken.xml", "models/loose.xml", "models/swing.toml"}
+    assert messages["models/loose.xml"] == (
         "models/loose.xml:1:19 is no XML: not well-formed (invalid token)"
     )
-    assert said["models/swing.toml"] == "`qpos` has 2 numbers, and the model has 1 positions (`nq`)"
+    assert (
+        messages["models/swing.toml"]
+        == "`qpos` has 2 numbers, and the model has 1 positions (`nq`)"
+    )
 
 
-def test_a_scenario_that_diverges_is_told(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_scenario_that_diverges_is_reported(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     text = MODEL.replace("<mujoco>", '<mujoco>\n  <option timestep="0.1"/>')
     text = text.replace("<joint", '<joint stiffness="1e7"')
     key = '  <keyframe><key name="go" qpos="1"/></keyframe>\n</mujoco>'

@@ -57,7 +57,7 @@ REPORTS = [
 ]
 
 
-def test_findings_are_told_with_their_saving_reason_and_change(rewriting: bool) -> None:
+def test_findings_are_shown_with_their_saving_reason_and_change(rewriting: bool) -> None:
     text = diet_text(REPORTS, Style(width=90))
     check_text(Path(__file__).with_name("diet.txt"), text, rewriting=rewriting)
     assert [report.ok for report in REPORTS] == [False, False, True, False]
@@ -65,6 +65,6 @@ def test_findings_are_told_with_their_saving_reason_and_change(rewriting: bool) 
 
 def test_control_characters_are_shown_and_lines_are_not_too_long() -> None:
     odd = replace(FINDING, message="nobody reads \x1b[2J " + "word " * 40)
-    told = diet_text([replace(REPORT, findings=(odd,))], Style(width=60)).splitlines()
-    assert not any("\x1b" in line for line in told)
-    assert all(len(line) <= 60 for line in told if "models/" not in line)
+    lines = diet_text([replace(REPORT, findings=(odd,))], Style(width=60)).splitlines()
+    assert not any("\x1b" in line for line in lines)
+    assert all(len(line) <= 60 for line in lines if "models/" not in line)

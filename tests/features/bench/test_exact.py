@@ -1,4 +1,4 @@
-"""A course's own exact motion, `models/NAME.exact.py`: what errors are taken from, or a mistake."""
+"""A course's own exact motion, `models/NAME.exact.py`: errors refer to it, or it is a mistake."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.features.bench.commands.bench.measuring import measured, scenarios_of
-from coursebuild.features.bench.commands.runs import CannotError
+from coursebuild.features.bench.commands.bench.measuring import compile_scene, run_scenario
+from coursebuild.features.bench.commands.runs import CannotMeasureError
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.pipeline.scenes import find_scenes
 from support.measured_course import write
@@ -45,21 +45,21 @@ def report(course: Path, exact: str, toml: str = TOML) -> ScenarioReport:
     write(course / "models" / "ball.exact.py", exact)
     write(course / "models" / "ball.toml", toml)
     (scene,) = find_scenes(course, ("ball",)).value
-    loaded = scenarios_of(course, scene, quick=True)
-    return measured(loaded, 0, quick=True, timed=False, tell=lambda _: None)
+    compiled = compile_scene(course, scene, quick=True)
+    return run_scenario(compiled, 0, quick=True, timed=False, tell=lambda _: None)
 
 
-def test_errors_are_taken_from_what_the_course_knows(course: Path) -> None:
+def test_errors_are_taken_from_the_exact_motion(course: Path) -> None:
     for velocity in (", qvel - 9.81 * time", ""):
-        found = report(course, EXACT.format(velocity=velocity))
-        assert (found.reference, found.source) == ("closed", "models/ball.exact.py")
-        assert found.second == "Bulirsch–Stoer over mj_forward" and found.floor < 1e-13
-        (own,) = (row for row in found.rows if row.own)
-        assert own.position is not None
-        assert own.position[0] == pytest.approx(9.81 * 0.4 * 0.002 / 2)
-        assert own.figure == pytest.approx(own.position)
-    asked = TOML + 'reference = "ode"\n'
-    assert report(course, EXACT.format(velocity=""), asked).reference == "ode"
+        scenario = report(course, EXACT.format(velocity=velocity))
+        assert (scenario.reference, scenario.source) == ("closed", "models/ball.exact.py")
+        assert scenario.second == "Bulirsch–Stoer over mj_forward" and scenario.floor < 1e-13
+        (own_row,) = (row for row in scenario.rows if row.own)
+        assert own_row.position is not None
+        assert own_row.position[0] == pytest.approx(9.81 * 0.4 * 0.002 / 2)
+        assert own_row.figure == pytest.approx(own_row.position)
+    with_reference = TOML + 'reference = "ode"\n'
+    assert report(course, EXACT.format(velocity=""), with_reference).reference == "ode"
 
 
 def test_what_is_not_exact_or_no_motion_is_a_mistake(course: Path) -> None:
@@ -70,10 +70,11 @@ def test_what_is_not_exact_or_no_motion_is_a_mistake(course: Path) -> None:
         "import sys\n\nsys.exit()\n": "says no motion: ",
     }
     for text, message in cases.items():
-        with pytest.raises(CannotError) as caught:
+        with pytest.raises(CannotMeasureError) as caught:
             report(course, text)
-        wrong = caught.value.diagnostic
-        assert message in wrong.message and wrong.span.path == "models/ball.exact.py", text
+        diagnostic = caught.value.diagnostic
+        assert message in diagnostic.message, text
+        assert diagnostic.span.path == "models/ball.exact.py", text
 
 
 def test_what_was_measured_depends_on_it(course: Path) -> None:

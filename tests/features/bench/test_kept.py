@@ -1,4 +1,4 @@
-"""`coursebuild bench`: which models are measured, and what is kept."""
+"""`coursebuild bench`: which models are measured, and what is stored."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def test_bench_measures_every_model_that_is_no_part_of_another(course: Path) -> 
     write(course / "models" / "legs.xml", BOX)
     write(course / "models" / "walker.xml", '<mujoco><include file="legs.xml"/></mujoco>')
     fake = Fake()
-    found = bench(options(course), measuring=fake)
-    assert [scene.model for scene in found.reports] == ["arms/left arm", "box", "walker"]
-    assert found.ok
+    measurement = bench(options(course), measuring=fake)
+    assert [scene.model for scene in measurement.reports] == ["arms/left arm", "box", "walker"]
+    assert measurement.ok
     for name in ("arms/left arm", "models/arms/left arm.xml", "./models/arms/left arm.xml"):
         assert [s.model for s in bench(options(course), (name,), measuring=fake).reports] == [
             "arms/left arm"
@@ -46,10 +46,10 @@ def test_bench_measures_every_model_that_is_no_part_of_another(course: Path) -> 
 def test_model_that_does_not_compile_keeps_no_other_from_being_measured(course: Path) -> None:
     write(course / "models" / "bad.xml", BOX.replace('size="0.1"', 'size="-1"'))
     write(course / "models" / "worse.xml", "<mujoco>\n  <worldbody>\n")
-    found = bench(options(course), measuring=Fake())
-    assert [scene.model for scene in found.reports] == ["box"]
-    assert not found.ok
-    first, second = found.diagnostics
+    measurement = bench(options(course), measuring=Fake())
+    assert [scene.model for scene in measurement.reports] == ["box"]
+    assert not measurement.ok
+    first, second = measurement.diagnostics
     assert first.rule == second.rule == "model-error"
     assert first.message.startswith("the model `bad` does not compile: ")
     assert (first.span.path, first.span.text) == (
@@ -59,21 +59,21 @@ def test_model_that_does_not_compile_keeps_no_other_from_being_measured(course: 
     assert second.span.path == "models/worse.xml"
 
 
-def test_a_scenario_that_cannot_be_measured_is_told(course: Path) -> None:
+def test_a_scenario_that_cannot_be_measured_is_reported(course: Path) -> None:
     write(course / "models" / "arm.xml", BOX)
     scene = find_scenes(course, ("box",)).value[0]
-    wrong = diagnose("scenario-model", scene.model.source.span(0, 0), "no way")
-    found = bench(options(course), ("box",), measuring=Fake(swing(), wrong))
-    assert found.reports == () and [d.message for d in found.diagnostics] == ["no way"]
+    diagnostic = diagnose("scenario-model", scene.model.source.span(0, 0), "no way")
+    measurement = bench(options(course), ("box",), measuring=Fake(swing(), diagnostic))
+    assert measurement.reports == () and [d.message for d in measurement.diagnostics] == ["no way"]
 
 
 def test_model_is_measured_again_only_where_something_changed(course: Path) -> None:
     write(course / "models" / "box.toml", TOML)
     fake = Fake()
 
-    def run(**how: Any) -> list[str]:
-        found = bench(options(course, **how), measuring=fake)
-        assert found.reports[0].scenarios == (swing(),)
+    def run(**settings: Any) -> list[str]:
+        measurement = bench(options(course, **settings), measuring=fake)
+        assert measurement.reports[0].scenarios == (swing(),)
         return asked(fake)
 
     assert run() == ["box"]
@@ -97,9 +97,9 @@ def test_scenarios_measured_before_an_interruption_are_kept(course: Path) -> Non
         bench(options(course), measuring=fake)
     assert [number for _, number, *_ in fake.asked] == [0, 1]
     fake = Fake(swing(), replace(swing(), name="other"))
-    found = bench(options(course), measuring=fake)
+    measurement = bench(options(course), measuring=fake)
     assert [number for _, number, *_ in fake.asked] == [1]
-    assert [one.name for one in found.reports[0].scenarios] == ["swing", "other"]
+    assert [scenario.name for scenario in measurement.reports[0].scenarios] == ["swing", "other"]
 
 
 def test_two_runs_at_once_measure_one_after_the_other(course: Path) -> None:
@@ -107,15 +107,15 @@ def test_two_runs_at_once_measure_one_after_the_other(course: Path) -> None:
     most = 0
 
     class Slow(Fake):
-        def measured(self, *args: Any, **how: Any) -> ScenarioReport:
+        def run_scenario(self, *args: Any, **settings: Any) -> ScenarioReport:
             nonlocal most
             running.append(1)
             most = max(most, len(running))
-            gone.wait(0.2)
+            never.wait(0.2)
             running.pop()
-            return super().measured(*args, **how)
+            return super().run_scenario(*args, **settings)
 
-    gone = threading.Event()
+    never = threading.Event()
     fakes = [Slow(), Slow()]
     threads = [
         threading.Thread(target=lambda fake=fake: bench(options(course), measuring=fake))

@@ -55,18 +55,18 @@ TEXTS: dict[Callable[[Any], str], dict[Any, str]] = {
 
 def test_numbers_and_sentences_as_text() -> None:
     """Three digits, and a power of ten where a number needs one; a thin space before a unit."""
-    made = {
-        write: {value: write(value).replace("\u2009", " ") for value in texts}
-        for write, texts in TEXTS.items()
+    texts = {
+        write: {value: write(value).replace("\u2009", " ") for value in expected}
+        for write, expected in TEXTS.items()
     }
-    assert made == TEXTS
+    assert texts == TEXTS
     assert bounded(1e-11, 1e-11) == "&lt; 1.0\u2009×\u200910<sup>−11</sup>"
     assert [bounded(v, 0.0) for v in (None, 0.0, 0.5)] == ["", "0", "0.500"]
     assert bounded(0.002, 1e-3) == "0.00200"
 
 
-def pages(make: Make, found: Reports) -> dict[str, str]:
-    files = make("## A\n\nText.\n").site(reports=found)
+def pages(make: Make, reports: Reports) -> dict[str, str]:
+    files = make("## A\n\nText.\n").site(reports=reports)
     return {path: data.decode() for path, data in files.items() if path.endswith(".html")}
 
 
@@ -85,59 +85,63 @@ def text(html: str) -> str:
 
 
 def test_the_card_of_a_model(site: dict[str, str]) -> None:
-    told = text(site["models/box.html"])
-    assert "Pairs of geoms that may touch 7 Pairs that touch in the scenarios 2" in told
-    assert "MJCF, with its files 12 kB Compiled (MJB) 99 MB" in told
-    assert "Speed natively 100 × real time Speed in WebAssembly 151 × real time" in told
+    words = text(site["models/box.html"])
+    assert "Pairs of geoms that may touch 7 Pairs that touch in the scenarios 2" in words
+    assert "MJCF, with its files 12 kB Compiled (MJB) 99 MB" in words
+    assert "Speed natively 100 × real time Speed in WebAssembly 151 × real time" in words
 
 
 def test_a_scenario_has_its_plot_tables_and_command(site: dict[str, str]) -> None:
     page = site["models/box.html"]
-    told = text(page)
-    assert "A pendulum swings RK4 at 20 ms costs 0.39 times as much" in told
+    words = text(page)
+    assert "A pendulum swings RK4 at 20 ms costs 0.39 times as much" in words
     assert (
         "Largest stable timesteps over 10 s, with at most 2.5 J Integrator Largest stable timestep "
         "Steps Tried up to it Remark Euler 40 ms 250 60 from 1 ms implicit all up to 100 ms 100 49 "
         "from 1 ms RK4 90 ms 112 71 from 1 ms some are stable again, from 95 ms to 97 ms"
-    ) in told
-    assert "Reference by another integration (known to 1 × 10<sup>−12</sup>)" in told
+    ) in words
+    assert "Reference by another integration (known to 1 × 10<sup>−12</sup>)" in words
     assert page.count('class="work-precision"') == 4
     names = re.findall(r'aria-labelledby="(_plot[^"]*)"', page)
     ids = {name for pair in names for name in pair.split()}
     assert len(ids) == 8 and all(page.count(f'id="{name}"') == 1 for name in ids)
-    own = re.findall(r'<tr class="own"><th scope="row">(.*?)</th>', page)
-    assert own[0] == "Euler at 2 ms"
-    assert "Euler at 50 ms: diverged; the state is not finite." in told
-    assert "coursebuild bench box --record" in told
+    own_rows = re.findall(r'<tr class="own"><th scope="row">(.*?)</th>', page)
+    assert own_rows[0] == "Euler at 2 ms"
+    assert "Euler at 50 ms: diverged; the state is not finite." in words
+    assert "coursebuild bench box --record" in words
     assert 'href="../files/reports/box.bench.json"' in page
-    assert "MuJoCo 3.14.0, Python 3.11.7, NumPy 2.3.0; Linux x86_64, A Processor @ 2 GHz." in told
+    assert "MuJoCo 3.14.0, Python 3.11.7, NumPy 2.3.0; Linux x86_64, A Processor @ 2 GHz." in words
 
 
 def test_where_the_duration_ended_the_search_for_stable_timesteps(make: Make) -> None:
-    told = "49 from 1 ms longer ones were not tried: 20 of these are the whole scenario"
+    remark = "49 from 1 ms longer ones were not tried: 20 of these are the whole scenario"
     for duration, expected in ((2.0, True), (2.1, False)):
-        one = replace(box().scenarios[0], duration=duration)
-        found = pages(make, Reports({"box": scene(one, model="box")}))["models/box.html"]
-        assert (told in text(found)) is expected
+        long = replace(box().scenarios[0], duration=duration)
+        page = pages(make, Reports({"box": scene(long, model="box")}))["models/box.html"]
+        assert (remark in text(page)) is expected
 
 
 def test_an_error_that_the_reference_does_not_resolve_has_no_column(make: Make) -> None:
     flat = [row(velocity=(1e-11, 1e-11), position=(2e-3, 1e-3), own=True)]
-    found = Reports({"box": scene(scenario(flat, floor=1e-12, velocity_floor=1e-12), model="box")})
-    heads = re.findall(r"<th scope=\"col\"[^>]*>(.*?)</th>", pages(make, found)["models/box.html"])
+    site_reports = Reports(
+        {"box": scene(scenario(flat, floor=1e-12, velocity_floor=1e-12), model="box")}
+    )
+    heads = re.findall(
+        r"<th scope=\"col\"[^>]*>(.*?)</th>", pages(make, site_reports)["models/box.html"]
+    )
     assert "Position (m or rad)" in heads
     assert "Velocity (m/s or rad/s)" not in heads
 
 
 def test_the_diet_of_a_model(site: dict[str, str]) -> None:
-    told = text(site["models/box.html"])
-    assert "One thing in it is not needed by any scenario." in told
-    assert "sensor-unread Nobody reads &lt;this&gt; sensor." in told
-    assert "proved; ×1.07 as fast, 120 B of memory, 40 B of text (swing)." in told
-    assert "Because its value goes nowhere. models/box.xml:3" in told
-    assert "Kept: it is the horizon." in told
-    assert "It is no fault, as examples/a.py names &lt;it&gt;." in told
-    assert "coursebuild diet box --record" in told
+    words = text(site["models/box.html"])
+    assert "One thing in it is not needed by any scenario." in words
+    assert "sensor-unread Nobody reads &lt;this&gt; sensor." in words
+    assert "proved; ×1.07 as fast, 120 B of memory, 40 B of text (swing)." in words
+    assert "Because its value goes nowhere. models/box.xml:3" in words
+    assert "Kept: it is the horizon." in words
+    assert "It is no fault, as examples/a.py names &lt;it&gt;." in words
+    assert "coursebuild diet box --record" in words
 
 
 def test_what_was_measured_in_part(make: Make) -> None:
@@ -149,22 +153,22 @@ def test_what_was_measured_in_part(make: Make) -> None:
 
 def test_the_page_of_the_hard_cases(site: dict[str, str]) -> None:
     page = site["numerics/index.html"]
-    told = text(page)
-    assert "3 A &lt;top&gt;" in told and "5 Damped spring" in told
-    assert told.index("5 Damped spring") > told.index("3 A &lt;top&gt;")
+    words = text(page)
+    assert "3 A &lt;top&gt;" in words and "5 Damped spring" in words
+    assert words.index("5 Damped spring") > words.index("3 A &lt;top&gt;")
     assert (
         "References: the oscillator; Bulirsch–Stoer. They differ by "
         "1 × 10<sup>−13</sup> in position and 4 × 10<sup>−13</sup> in velocity."
-    ) in told
-    assert "Euler 200 ms 250 60 from 1 ms 200 ms −0.050 % diverged 1.50" in told
-    assert "RK4 280 ms 250 60 from 1 ms grew some are stable again, from 300 ms to 310 ms" in told
-    assert "implicit, discrete all up to 1 s" in told
-    assert "Theory: 2/ω." in told
-    assert "Period (s) 2π√(m/k) Euler, RK4 6.28 6.28 −1.9 × 10<sup>−4</sup>" in told
-    assert "Energy RK4 −4.10 × 10<sup>−10</sup> 0 −4.1 × 10<sup>−10</sup> Euler not finite" in told
-    assert "Euler 1.00 ± 0.01, bend 0.02" in told
-    assert "Euler at 500 ms: diverged; 1e9 rad/s." in told
-    assert "coursebuild stability spring" in told
+    ) in words
+    assert "Euler 200 ms 250 60 from 1 ms 200 ms −0.050 % diverged 1.50" in words
+    assert "RK4 280 ms 250 60 from 1 ms grew some are stable again, from 300 ms to 310 ms" in words
+    assert "implicit, discrete all up to 1 s" in words
+    assert "Theory: 2/ω." in words
+    assert "Period (s) 2π√(m/k) Euler, RK4 6.28 6.28 −1.9 × 10<sup>−4</sup>" in words
+    assert "Energy RK4 −4.10 × 10<sup>−10</sup> 0 −4.1 × 10<sup>−10</sup> Euler not finite" in words
+    assert "Euler 1.00 ± 0.01, bend 0.02" in words
+    assert "Euler at 500 ms: diverged; 1e9 rad/s." in words
+    assert "coursebuild stability spring" in words
     assert 'href="../files/reports/stability.json"' in page
     assert 'href="../numerics/index.html"' in site["models/box.html"]
     assert 'href="numerics/index.html"' in site["index.html"]
@@ -187,8 +191,8 @@ def test_errors_and_energy_are_drawn_against_processor_time(make: Make) -> None:
     ]
     lost = run(timestep=0.2, status="diverged")
     costs = tuple(StepCost(name, Interval(1e-6, 9e-7, 2e-6)) for name in ("Euler", "RK4"))
-    found = Reports(cases=(case("a", 4, errors=(lost, *runs), costs=costs),))
-    page = pages(make, found)["numerics/index.html"]
+    site_reports = Reports(cases=(case("a", 4, errors=(lost, *runs), costs=costs),))
+    page = pages(make, site_reports)["numerics/index.html"]
     assert page.count("<svg") == 2
     assert "Euler: 0.1 at 10 µs, 0.025 at 40 µs. RK4: 0.0001 at 10 µs" in page
     assert "error of position (m or rad) against processor time" in page
@@ -198,18 +202,20 @@ def test_errors_and_energy_are_drawn_against_processor_time(make: Make) -> None:
 
 
 def test_a_hard_case_of_an_unknown_number_goes_by_its_own_title(make: Make) -> None:
-    found = Reports(cases=(case("a", 4), case("b", 99), case("c", 99, boundaries=(), figures=())))
-    told = text(pages(make, found)["numerics/index.html"])
-    assert "4 A &lt;a&gt; No timestep" in told
-    assert "99 A &lt;b&gt; A &lt;b&gt; No timestep" in told
+    site_reports = Reports(
+        cases=(case("a", 4), case("b", 99), case("c", 99, boundaries=(), figures=()))
+    )
+    words = text(pages(make, site_reports)["numerics/index.html"])
+    assert "4 A &lt;a&gt; No timestep" in words
+    assert "99 A &lt;b&gt; A &lt;b&gt; No timestep" in words
 
 
 def test_a_scenario_whose_motion_the_course_knows_is_a_hard_case(make: Make) -> None:
-    known = replace(swing(), source="models/box.exact.py")
-    model = scene(known, replace(awkward(), name="awkward"), model="box")
+    exact = replace(swing(), source="models/box.exact.py")
+    model = scene(exact, replace(awkward(), name="awkward"), model="box")
     page = pages(make, Reports({"box": model}, cases=(case("a", 4),)))["numerics/index.html"]
-    told = text(page.replace("<details", "<div").replace("</details", "</div"))
-    assert "Cases of this course box: " in told and "coursebuild bench box" in told
+    words = text(page.replace("<details", "<div").replace("</details", "</div"))
+    assert "Cases of this course box: " in words and "coursebuild bench box" in words
     assert 'href="#box/swing"' in page and 'id="box/swing"' in page
     assert 'href="../models/box.html">box: ' in page and "box/awkward" not in page
-    assert "References: models/box.exact.py; " in told and "error of position" in page
+    assert "References: models/box.exact.py; " in words and "error of position" in page

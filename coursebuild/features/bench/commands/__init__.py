@@ -1,10 +1,8 @@
-"""The commands that measure: `bench`, `diet`, and what `stability` shares with them.
+"""The commands that measure, `bench` and `diet`, and what `stability` shares with them.
 
-`runs` measures one thing after the other and records what was found, a `Measurement`
-(`measurement`).
+`runs` measures one thing after the other into a `Measurement` (`measurement`), and records it.
 
-Entry points: `add_recorded`, what is done with reports in the course's folder; `measured`, which
-runs; `write_measured`, which prints what was found.
+Entry points: `add_report_options`; `run_measurement`; `write_measurement`.
 """
 
 from __future__ import annotations
@@ -18,15 +16,15 @@ from coursebuild.cli.arguments import options_of
 from coursebuild.cli.output import CLEAN, WRONG, style_of, write
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
-    measured_json,
-    measured_text,
+    measurement_json,
+    measurement_text,
 )
 from coursebuild.pipeline.options import Options
 from coursebuild.report.terminal import Style
 
 
-def add_recorded(parser: argparse.ArgumentParser) -> None:
-    """What is done with reports in the course's folder."""
+def add_report_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options for reports in the course's folder."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument(
         "--record", action="store_true", help="write what was measured to content/reports/"
@@ -38,10 +36,10 @@ def add_recorded(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def measured(
+def run_measurement(
     arguments: argparse.Namespace, measure: Callable[[Options], Measurement[Any]]
 ) -> Measurement[Any]:
-    """What a run with the options of the arguments finds."""
+    """Measure with the options that the arguments give."""
     options = options_of(arguments)
     try:
         return measure(options)
@@ -49,17 +47,17 @@ def measured(
         options.store.close()
 
 
-def write_measured(
+def write_measurement(
     arguments: argparse.Namespace,
-    found: Measurement[Any],
+    measurement: Measurement[Any],
     text: Callable[[Style], str],
     values: Mapping[str, object],
     *,
     empty: str = "",
 ) -> int:
-    """Print what was measured, as text or as JSON; the exit status."""
-    status = CLEAN if found.ok else WRONG
+    """Print a measurement as text or as JSON, and return the exit status."""
+    status = CLEAN if measurement.ok else WRONG
     if arguments.format == "json":
-        return write(measured_json(values, found), status)
+        return write(measurement_json(values, measurement), status)
     style = style_of(sys.stdout)
-    return write(measured_text(text(style), found, style) or empty, status)
+    return write(measurement_text(text(style), measurement, style) or empty, status)

@@ -1,4 +1,4 @@
-"""What pages show of reports, on a terminal: their words in English, sentences and tables.
+"""Shows on a terminal what pages show of reports: sentences in English, and tables.
 
 Entry points: `english`, `plain_text`, `grid_lines`.
 """
@@ -17,28 +17,28 @@ from coursebuild.core.pages.strings import Strings
 from coursebuild.features.bench.figures import Grid
 from coursebuild.report.terminal import FAINT, Column, Style, table, visible
 
-_RAISED = str.maketrans("-\u22120123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SUPERSCRIPTS = str.maketrans("-\u22120123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @functools.cache
 def english() -> Strings:
-    """The words of pages."""
+    """Return the words of English pages."""
     return strings_for(template_texts(), "en")
 
 
 def plain_text(text: str) -> str:
-    """A sentence or a cell without its markup."""
+    """Remove the markup of a sentence or a cell."""
     if not isinstance(text, Markup):
         return text
-    raised = re.sub("<sup>(.*?)</sup>", lambda found: found[1].translate(_RAISED), str(text))
-    return Markup(raised).striptags()
+    html = re.sub("<sup>(.*?)</sup>", lambda match: match[1].translate(_SUPERSCRIPTS), str(text))
+    return Markup(html).striptags()
 
 
 def grid_lines(grid: Grid, style: Style, marks: Sequence[tuple[str, str]] = ()) -> list[str]:
-    """A table of numbers under its label, as wide as the terminal at most.
+    """Write a table of numbers under its label, not wider than the terminal.
 
-    `marks`: what stands before each row, and its colour. Without them remarks stand below, each
-    with its row's name.
+    `marks` holds what stands before each row, and the row's colour. Without marks, remarks stand
+    below, each with its row's name.
     """
     columns = [Column("", tuple(mark for mark, _ in marks), left=True)] if marks else []
     for n, (title, *cells) in enumerate(zip(grid.head, *grid.rows, strict=True)):
@@ -49,10 +49,10 @@ def grid_lines(grid: Grid, style: Style, marks: Sequence[tuple[str, str]] = ()) 
     if marks:
         rows = [style.paint(row, code) for row, (_, code) in zip(rows, marks, strict=True)]
     lines = [style.paint(visible(grid.label), FAINT), style.paint(head, FAINT)]
-    for part, numbered in grid.bodies:
+    for part, numbered_rows in grid.bodies:
         lines += [] if part is None else [style.paint(visible(part.title), FAINT)]
-        lines += [rows[number] for number, _ in numbered]
+        lines += [rows[number] for number, _ in numbered_rows]
     if marks:
         return lines
     remarks = ((row[0], row[n]) for row in grid.rows for n in grid.left[1:])
-    return [*lines, *(f"{visible(name)}: {told}" for name, told in remarks if told)]
+    return [*lines, *(f"{visible(name)}: {text}" for name, text in remarks if text)]

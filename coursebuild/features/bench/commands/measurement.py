@@ -1,6 +1,7 @@
-"""What `bench`, `stability` and `diet` print around what they measured.
+"""The result of `bench`, `stability` and `diet`, and what they print besides their reports.
 
-Entry points: `Measurement`, `measured_text`, `measured_json`; `checked_text`, `failure_text`.
+Entry points: `Measurement`, `measurement_text`, `measurement_json`; `format_checks`,
+`failure_text`.
 """
 
 from __future__ import annotations
@@ -31,71 +32,75 @@ _T = TypeVar("_T")
 
 
 class Measurement(Struct, Generic[_T], frozen=True):
-    """What a run of a command that measures found."""
+    """The result of a command that measures."""
 
     reports: tuple[_T, ...]
-    """On models by name, on hard cases by number."""
+    """Reports on models, by name, or on hard cases, by number."""
     diagnostics: tuple[Diagnostic, ...] = ()
-    """Of models and what is declared for them."""
+    """Diagnostics of models and of what is declared for them."""
     failures: tuple[ReportFailure, ...] = ()
     checked: tuple[RecordCheck, ...] = ()
     remarks: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
-        """Whether everything was measured, is as it was recorded, and nothing is to be done."""
-        departed = any(one.departures for one in self.checked)
-        wrong = any(one.is_error for one in self.diagnostics)
-        open_ones = any(not getattr(one, "ok", True) for one in self.reports)
-        return not (wrong or self.failures or departed or open_ones)
+        """Whether everything was measured and agrees with the record, and nothing is to be done."""
+        has_departures = any(check.departures for check in self.checked)
+        has_errors = any(diagnostic.is_error for diagnostic in self.diagnostics)
+        has_tasks = any(not getattr(report, "ok", True) for report in self.reports)
+        return not (has_errors or self.failures or has_departures or has_tasks)
 
 
-def measured_text(measured: str, found: Measurement[_T], style: Style) -> str:
-    """What is wrong, what was measured, how it differs from what was recorded, what was done."""
-    parts = [diagnostic_text(one, style) + "\n" for one in found.diagnostics]
-    parts += ["".join(failure_text(one, style) for one in found.failures), measured]
-    parts += [checked_text(found.checked, style)]
-    parts += ["".join(f"{visible(one)}\n" for one in found.remarks)]
+def measurement_text(reports: str, measurement: Measurement[_T], style: Style) -> str:
+    """Write diagnostics, failures, the text of the reports, checks and remarks."""
+    parts = [diagnostic_text(diagnostic, style) + "\n" for diagnostic in measurement.diagnostics]
+    parts += ["".join(failure_text(failure, style) for failure in measurement.failures), reports]
+    parts += [format_checks(measurement.checked, style)]
+    parts += ["".join(f"{visible(remark)}\n" for remark in measurement.remarks)]
     return "\n".join(part for part in parts if part)
 
 
-def measured_json(measured: Mapping[str, object], found: Measurement[_T]) -> str:
-    """The same as one JSON object."""
-    around = {name: getattr(found, name) for name in Measurement.__struct_fields__[1:]}
-    return json_text({**measured, **around})
+def measurement_json(reports: Mapping[str, object], measurement: Measurement[_T]) -> str:
+    """Write the same as one JSON object."""
+    rest = {name: getattr(measurement, name) for name in Measurement.__struct_fields__[1:]}
+    return json_text({**reports, **rest})
 
 
 def failure_text(failure: ReportFailure, style: Style) -> str:
-    """What is wrong with a recorded report, and how to mend it."""
+    """Say what is wrong with a recorded report, and how to mend it."""
     text = f"{style.paint('error', RED)}{style.paint(f': {visible(failure.message)}', BOLD)}\n"
     return text + (f"  help: {visible(failure.help)}\n" if failure.help else "")
 
 
-def checked_text(checked: Sequence[RecordCheck], style: Style) -> str:
-    """Each recorded report: as it was recorded, or all that left its band."""
-    return "\n".join(_checked(one, style) for one in checked)
+def format_checks(checks: Sequence[RecordCheck], style: Style) -> str:
+    """Say of each recorded report that it holds, or which figures left their bands."""
+    return "\n".join(_format_check(check, style) for check in checks)
 
 
-def _checked(one: RecordCheck, style: Style) -> str:
-    if one.departures:
-        many = plural(len(one.departures), "figure")
-        said = style.paint(f"{many} not as recorded in {visible(one.path)}", RED)
+def _format_check(check: RecordCheck, style: Style) -> str:
+    if check.departures:
+        figures = plural(len(check.departures), "figure")
+        verdict = style.paint(f"{figures} not as recorded in {visible(check.path)}", RED)
     else:
-        said = style.paint(f"as recorded in {visible(one.path)}", GREEN)
-    lines = [f"{style.paint(visible(one.name), BOLD)}  {said}"]
-    lines += ["  " + style.paint(visible(remark), YELLOW) for remark in one.remarks]
-    for where in dict.fromkeys(departure.where for departure in one.departures):
-        head, *rows = _rows([each for each in one.departures if each.where == where])
-        lines += ["", "  " + style.paint(visible(where), BOLD), "    " + style.paint(head, FAINT)]
+        verdict = style.paint(f"as recorded in {visible(check.path)}", GREEN)
+    lines = [f"{style.paint(visible(check.name), BOLD)}  {verdict}"]
+    lines += ["  " + style.paint(visible(remark), YELLOW) for remark in check.remarks]
+    for place in dict.fromkeys(departure.where for departure in check.departures):
+        head, *rows = _departure_table([d for d in check.departures if d.where == place])
+        lines += ["", "  " + style.paint(visible(place), BOLD), "    " + style.paint(head, FAINT)]
         lines += [f"    {row}" for row in rows]
     return "\n".join(lines) + "\n"
 
 
-def _rows(found: Sequence[Departure]) -> list[str]:
+def _departure_table(departures: Sequence[Departure]) -> list[str]:
     names = ("setting", "figure", "recorded", "measured", "band")
     return table(
         [
-            Column(n, tuple(getattr(o, n) for o in found), left=n not in ("recorded", "measured"))
-            for n in names
+            Column(
+                name,
+                tuple(getattr(departure, name) for departure in departures),
+                left=name not in ("recorded", "measured"),
+            )
+            for name in names
         ]
     )

@@ -1,6 +1,6 @@
-"""What `bench`, `stability` and `diet` find, and reports of it in the course's folder.
+"""How `bench`, `stability` and `diet` measure, and write reports into the course's folder.
 
-Entry points: `MeasuringRun`, which gives a `Measurement`; `CannotError`; `with_records`.
+Entry points: `MeasuringRun`, which makes a `Measurement`; `CannotMeasureError`; `write_records`.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ _T = TypeVar("_T")
 _A = TypeVar("_A")
 
 
-class CannotError(Exception):
-    """Why a model cannot be measured, or looked at."""
+class CannotMeasureError(Exception):
+    """A model cannot be measured, or looked at; the diagnostic says why."""
 
     def __init__(self, diagnostic: Diagnostic) -> None:
         super().__init__(diagnostic.message)
@@ -35,102 +35,107 @@ class CannotError(Exception):
 
 
 class MeasuringRun:
-    """Measures one thing after the other, from what is kept where that is there.
+    """Measures one thing after the other, or takes the result from the store.
 
-    One run of a course measures at a time, since two would disturb each other's times; the second
-    finds what the first has measured.
+    Only one run of a course measures at a time, since two would disturb each other's times; the
+    second finds what the first has measured.
     """
 
-    stage, done = "measuring", "measured"
-    """What is said while things are measured, and of a thing that was."""
+    stage, success = "measuring", "measured"
+    """Words of the progress display: for the stage, and for a thing that was measured."""
 
     def __init__(
-        self, options: Options, diagnostics: Iterable[Diagnostic] = (), *, again: bool = False
+        self, options: Options, diagnostics: Iterable[Diagnostic] = (), *, use_store: bool = True
     ) -> None:
         self.options = options
-        self.again = again
-        """Whether nothing is taken from what is kept, nor kept."""
+        self.use_store = use_store
+        """Whether results are taken from the store, and put into it."""
         self.diagnostics = list(diagnostics)
         self.failures: list[ReportFailure] = []
         self.remarks: list[str] = []
         self.progress = Progress(quiet=options.quiet)
         options.store.listen(self.progress.say)
 
-    def each(self, things: Sequence[_A], one: Callable[[_A], _T | None]) -> Measurement[_T]:
-        """What there is on each thing."""
-        found: list[_T | None] = []
+    def measure_each(
+        self, things: Sequence[_A], measure: Callable[[_A], _T | None]
+    ) -> Measurement[_T]:
+        """Measure each thing, and collect the reports."""
+        reports: list[_T | None] = []
         if things:
             with self.progress.stage(self.stage, len(things)):
-                found = [one(thing) for thing in things]
+                reports = [measure(thing) for thing in things]
         return Measurement(
-            tuple(report for report in found if report is not None),
+            tuple(report for report in reports if report is not None),
             sort_diagnostics(self.diagnostics),
             failures=tuple(self.failures),
             remarks=tuple(self.remarks),
         )
 
-    def once(
+    def load_or_measure(
         self,
         name: str,
         kind: str,
         parts: tuple[object, ...],
-        what: type[_T],
+        report_type: type[_T],
         measure: Callable[[], _T | None],
     ) -> _T | None:
-        """What is kept of a thing under all that it depends on, or is measured now."""
-        found = self.kept(kind, parts, what)
-        if found is None:
+        """Load the report on a thing by all that it depends on, or measure the thing now."""
+        report = self.load(kind, parts, report_type)
+        if report is None:
             with project_lock(self.options.root, self.progress.say, name="bench-lock"):
-                found = self.kept(kind, parts, what)  # by whom we waited for, perhaps
-                if found is None:
+                # The run that held the lock may have measured it.
+                report = self.load(kind, parts, report_type)
+                if report is None:
                     self.progress.started(name)
-                    began = time.monotonic()
+                    start = time.monotonic()
                     try:
-                        found = measure()
-                    except CannotError as error:
+                        report = measure()
+                    except CannotMeasureError as error:
                         self.diagnostics.append(error.diagnostic)
-                    verdict = f"not {self.done}" if found is None else self.done
-                    self.progress.finished(name, verdict, time.monotonic() - began)
-                    if found is not None:
-                        self.keep(kind, parts, found)
-                    return found
+                    verdict = f"not {self.success}" if report is None else self.success
+                    self.progress.finished(name, verdict, time.monotonic() - start)
+                    if report is not None:
+                        self.save(kind, parts, report)
+                    return report
         self.progress.known()
-        return found
+        return report
 
-    def kept(self, kind: str, parts: tuple[object, ...], what: type[_T]) -> _T | None:
-        """What was made of these before."""
-        return None if self.again else self.options.store.get_value(kind, fingerprint(parts), what)
+    def load(self, kind: str, parts: tuple[object, ...], report_type: type[_T]) -> _T | None:
+        """Load the stored report that depends on these parts, if there is one."""
+        if not self.use_store:
+            return None
+        return self.options.store.get_value(kind, fingerprint(parts), report_type)
 
-    def keep(self, kind: str, parts: tuple[object, ...], value: object) -> None:
-        """Keep what was made of these."""
-        if not self.again:
+    def save(self, kind: str, parts: tuple[object, ...], value: object) -> None:
+        """Store a report under the parts on which it depends."""
+        if self.use_store:
             self.options.store.put_value(kind, fingerprint(parts), value)
 
 
 def forbid_quick(option: str, *, quick: bool) -> None:
-    """Say that an option is for what was measured in full.
+    """Forbid `--quick` with an option for full measurements.
 
     Raises:
-        UsageError: it was not.
+        UsageError: `quick` is set.
     """
     if quick:
         raise UsageError(f"{option} takes no --quick: what is recorded is measured in full")
 
 
-def with_records(
-    root: Path, found: Measurement[_T], records: Iterable[tuple[str, bytes]]
+def write_records(
+    root: Path, measurement: Measurement[_T], records: Iterable[tuple[str, bytes]]
 ) -> Measurement[_T]:
-    """Write reports, by their paths, and say so."""
-    said = [_write_record(root, path, data) for path, data in records]
+    """Write reports, given as (path, bytes), and add what was done to the measurement."""
+    outcomes = [_write_record(root, path, data) for path, data in records]
     return replace(
-        found,
-        failures=tuple(one for one in said if isinstance(one, ReportFailure)),
-        remarks=tuple(one for one in said if isinstance(one, str)),
+        measurement,
+        failures=tuple(outcome for outcome in outcomes if isinstance(outcome, ReportFailure)),
+        remarks=tuple(outcome for outcome in outcomes if isinstance(outcome, str)),
     )
 
 
 def _write_record(root: Path, path: str, data: bytes) -> str | ReportFailure:
-    """Write a report; what was done in words, or why it cannot be done."""
+    """Write a report, and say what was done, or why it cannot be done."""
     try:
         target = resolve_inside(root, path)
         before = target.read_bytes() if target.exists() else None

@@ -7,7 +7,11 @@ from typing import Any
 
 from coursebuild.cli.arguments import add_cache, add_format, add_quiet
 from coursebuild.cli.output import CLEAN, write
-from coursebuild.features.bench.commands import add_recorded, measured, write_measured
+from coursebuild.features.bench.commands import (
+    add_report_options,
+    run_measurement,
+    write_measurement,
+)
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.features.numerics.commands.stability import check_stability, stability
 from coursebuild.features.numerics.commands.text import stability_text
@@ -30,7 +34,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         help="a hard case, or a family of them (default: all)",
     )
     add_format(parser, "text", "json")
-    add_recorded(parser)
+    add_report_options(parser)
     add_cache(parser)
 
 
@@ -43,11 +47,11 @@ def run(arguments: argparse.Namespace) -> int:
             return check_stability(options, names)
         return stability(options, names, record=arguments.record)
 
-    measurement = measured(arguments, measure)
+    measurement = run_measurement(arguments, measure)
     if arguments.format == "json" and measurement.ok and not (arguments.record or arguments.check):
         return write(json_text(measurement.reports), CLEAN)
     printed_reports = () if arguments.check else measurement.reports
     values = {"cases": measurement.reports}
-    return write_measured(
+    return write_measurement(
         arguments, measurement, lambda style: stability_text(printed_reports, style), values
     )

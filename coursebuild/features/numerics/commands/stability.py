@@ -22,7 +22,7 @@ from coursebuild.core.run.machine import machine, one_processor
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import nearest
 from coursebuild.features.bench.commands.measurement import Measurement
-from coursebuild.features.bench.commands.runs import MeasuringRun, with_records
+from coursebuild.features.bench.commands.runs import MeasuringRun, write_records
 from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.departures import RecordCheck, case_departures
 from coursebuild.numerics.reports.records import STABILITY, ReportFailure
@@ -61,7 +61,7 @@ def _record(
         unchanged = [case for case in old if case.name in _problem_names() and case.name not in new]
     cases = sorted([*unchanged, *measurement.reports], key=lambda case: (case.case, case.name))
     records = [(STABILITY.path(), STABILITY.encode(tuple(cases)))]
-    return with_records(options.root, measurement, records)
+    return write_records(options.root, measurement, records)
 
 
 def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
@@ -74,7 +74,7 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
     recorded = read_record(options.root, STABILITY)
     if isinstance(recorded, ReportFailure):
         return Measurement((), failures=(recorded,))
-    measurement = _CaseRun(options, again=True).all(problems)
+    measurement = _CaseRun(options, use_store=False).all(problems)
     new = {case.name for case in measurement.reports}
     old = [case for case in recorded if not names or case.name in new]
     engine = engine_version()
@@ -96,11 +96,13 @@ class _CaseRun(MeasuringRun):
         """Measure the problems of these names."""
         self.here, self.code = machine(pinned=True), code_digest(*_CODE)
         with one_processor():
-            return self.each(problems, self._measure_once)
+            return self.measure_each(problems, self._measure_once)
 
     def _measure_once(self, name: str) -> CaseReport | None:
         parts = (name, self.code, self.here)
-        return self.once(name, "stability", parts, CaseReport, lambda: self._measure(name))
+        return self.load_or_measure(
+            name, "stability", parts, CaseReport, lambda: self._measure(name)
+        )
 
     def _measure(self, name: str) -> CaseReport | None:
         from coursebuild.numerics.cases import DisagreementError, measure_case

@@ -6,7 +6,11 @@ import argparse
 from typing import Any
 
 from coursebuild.cli.arguments import add_cache, add_format, add_quiet
-from coursebuild.features.bench.commands import add_recorded, measured, write_measured
+from coursebuild.features.bench.commands import (
+    add_report_options,
+    run_measurement,
+    write_measurement,
+)
 from coursebuild.features.bench.commands.bench.run import bench, check
 from coursebuild.features.bench.commands.bench.text import bench_text
 from coursebuild.features.bench.commands.measurement import Measurement
@@ -20,7 +24,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments."""
     add_quiet(parser)
     parser.add_argument(
         "scenes", nargs="*", metavar="SCENE", help="a model, as in models/SCENE.xml (default: all)"
@@ -29,12 +33,12 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quick", action="store_true", help="fewer settings and rough times, for a first look"
     )
-    add_recorded(parser)
+    add_report_options(parser)
     add_cache(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure, or measure again."""
+    """Measure models, or check their recorded reports."""
     names, quick = tuple(arguments.scenes), arguments.quick
 
     def measure(options: Options) -> Measurement[Any]:
@@ -42,12 +46,12 @@ def run(arguments: argparse.Namespace) -> int:
             return check(options, names, quick=quick)
         return bench(options, names, quick=quick, record=arguments.record)
 
-    found = measured(arguments, measure)
-    shown = () if arguments.check else found.reports
-    return write_measured(
+    measurement = run_measurement(arguments, measure)
+    reports = () if arguments.check else measurement.reports
+    return write_measurement(
         arguments,
-        found,
-        lambda style: bench_text(shown, style),
-        {"scenes": found.reports},
+        measurement,
+        lambda style: bench_text(reports, style),
+        {"scenes": measurement.reports},
         empty="there is no model to measure\n",
     )

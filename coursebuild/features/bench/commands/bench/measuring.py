@@ -1,7 +1,7 @@
-"""Measuring one scenario of a scene: the compiled model, the clock, and what goes wrong.
+"""Measures the scenarios of a scene, with its compiled model and a clock.
 
-Entry points: `scenarios_of(root, scene)`, `measured(loaded, …)`; `with_card(root, scene, report)`,
-what a model is made of and how fast the browser's engine runs it.
+Entry points: `compile_scene(root, scene)`, `run_scenario(compiled, …)`, `run_sweep`;
+`add_card(root, scene, report)`, what a model is made of and how fast the browser's engine runs it.
 
 1. The clock is the processor time of this thread: it stands still while others run.
 2. MuJoCo's warnings are not printed: it would also write them into the working directory, which is
@@ -30,7 +30,7 @@ from coursebuild.core.run.machine import one_processor
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.features.bench.commands.runs import CannotError
+from coursebuild.features.bench.commands.runs import CannotMeasureError
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.engine import silent
 from coursebuild.numerics.problem import Array, Scenario
@@ -45,7 +45,7 @@ from coursebuild.numerics.sweep import measure_sweep
 from coursebuild.pipeline.scenes import CourseScene
 
 _SECONDS = 20.0
-"""Processor time that a run may take."""
+"""Limit of a run, in seconds of processor time."""
 
 
 class CompiledScene(Struct, frozen=True):
@@ -56,40 +56,40 @@ class CompiledScene(Struct, frozen=True):
     """An `mjModel`."""
     scenarios: tuple[PhysicsScene, ...]
     spec: Any = None
-    """An `mjSpec` of it, from which it can be compiled otherwise."""
+    """Its `mjSpec`, from which it can be compiled with other parameters."""
 
 
-def scenarios_of(root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
+def compile_scene(root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
     """Compile a scene, and work out its scenarios.
 
     Raises:
-        CannotError: they cannot be.
+        CannotMeasureError: this is not possible.
     """
-    with _told(scene):
-        model = _compiled(root, scene)
-        known = _exact(root, scene)
-        found = scenes(model, scene.declared, quick=quick)
-        named = tuple(replace(one, exact=known) for one in found)
+    with _report_errors(scene):
+        model = _compile_model(root, scene)
+        exact = _exact_motion(root, scene)
+        scenarios = scenes(model, scene.declared, quick=quick)
+        scenarios = tuple(replace(scenario, exact=exact) for scenario in scenarios)
         spec = mujoco.MjSpec.from_file(str(root / scene.model.source.path))
-        return CompiledScene(scene, model, named, spec)
+        return CompiledScene(scene, model, scenarios, spec)
 
 
-def measured(
-    loaded: CompiledScene, number: int, *, quick: bool, timed: bool, tell: Callable[[str], None]
+def run_scenario(
+    compiled: CompiledScene, number: int, *, quick: bool, timed: bool, tell: Callable[[str], None]
 ) -> ScenarioReport:
-    """Measure a scenario, by its number.
+    """Measure a scenario, given by its number.
 
     Raises:
-        CannotError: it cannot be.
+        CannotMeasureError: this is not possible.
     """
     clock = time.thread_time_ns if timed else None
-    with _told(loaded.scene), one_processor():
-        chosen = loaded.scenarios[number]
-        return measure_scenario(loaded.model, chosen, quick=quick, clock=clock, tell=tell)
+    with _report_errors(compiled.scene), one_processor():
+        scenario = compiled.scenarios[number]
+        return measure_scenario(compiled.model, scenario, quick=quick, clock=clock, tell=tell)
 
 
-def swept(
-    loaded: CompiledScene,
+def run_sweep(
+    compiled: CompiledScene,
     sweep: DeclaredSweep,
     *,
     quick: bool,
@@ -99,52 +99,52 @@ def swept(
     """Measure a sweep that the course declares.
 
     Raises:
-        CannotError: it cannot be.
+        CannotMeasureError: this is not possible.
     """
     tell(sweep.name)
     clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
-    found = (one for one in loaded.scenarios if sweep.scenario in (None, one.name))
-    with _told(loaded.scene):
-        return measure_sweep(loaded.spec, next(found), sweep, clocks, quick=quick)
+    scenarios = (s for s in compiled.scenarios if sweep.scenario in (None, s.name))
+    with _report_errors(compiled.scene):
+        return measure_sweep(compiled.spec, next(scenarios), sweep, clocks, quick=quick)
 
 
 @contextmanager
-def _told(scene: CourseScene) -> Iterator[None]:
-    """What goes wrong meanwhile is told at its place, and what MuJoCo warns of not at all."""
+def _report_errors(scene: CourseScene) -> Iterator[None]:
+    """Turn errors into diagnostics at their places, and silence MuJoCo's warnings."""
     source = scene.model.source
     try:
         with silent():
             yield
     except SceneError as error:
         place = error.span or scene.declared.source.span(0, 0)
-        wrong = diagnose("scenario-model", place, error.message, help=error.help)
-        raise CannotError(wrong) from None
+        diagnostic = diagnose("scenario-model", place, error.message, help=error.help)
+        raise CannotMeasureError(diagnostic) from None
     except mujoco.FatalError as error:  # such as a model that asks for less memory than it needs
-        said = f"the model `{scene.name}` cannot be measured: {' '.join(str(error).split())}"
-        raise CannotError(diagnose("model-error", source.span(0, 0), said)) from None
+        message = f"the model `{scene.name}` cannot be measured: {' '.join(str(error).split())}"
+        raise CannotMeasureError(diagnose("model-error", source.span(0, 0), message)) from None
 
 
-def _compiled(root: Path, scene: CourseScene) -> Any:
+def _compile_model(root: Path, scene: CourseScene) -> Any:
     path = str(root / scene.model.source.path)
     return mujoco.MjModel.from_xml_path(path, assets={path: scene.model.source.text.encode()})
 
 
-def _exact(root: Path, scene: CourseScene) -> ExactMotion | None:
-    """What the course knows of the motion: its code runs as a script does, in a child."""
+def _exact_motion(root: Path, scene: CourseScene) -> ExactMotion | None:
+    """Return the exact motion, if the course has code for it, which runs in a child."""
     path = exact_file(scene.name)
     if not (root / path).is_file():
         return None
     span = Source(path, "").span(0, 0)
 
     def states(times: Array, qpos: Array, qvel: Array) -> tuple[Array, Array | None]:
-        asked = {"times": times.tolist(), "qpos": qpos.tolist(), "qvel": qvel.tolist()}
+        request = {"times": times.tolist(), "qpos": qpos.tolist(), "qvel": qvel.tolist()}
         script = os.path.relpath(EXACT_SCRIPT, root)
-        job = ScriptJob(script, (path, json.dumps(asked)), _SECONDS, ())
+        job = ScriptJob(script, (path, json.dumps(request)), _SECONDS, ())
         with ScriptServer() as server:
             (run,) = server.run(root, (job,), parallel=1)
         try:
-            found = msgspec.json.decode(run.stdout, type=list[list[list[float]]])
-            parts = [np.array(part) for part in zip(*found, strict=True)]
+            rows = msgspec.json.decode(run.stdout, type=list[list[list[float]]])
+            parts = [np.array(part) for part in zip(*rows, strict=True)]
         except (msgspec.DecodeError, ValueError):
             last = run.stderr.strip().splitlines()[-1:] or [run.outcome.value]
             message = f"`{path}` says no motion: {last[0]}"
@@ -155,10 +155,10 @@ def _exact(root: Path, scene: CourseScene) -> ExactMotion | None:
     return ExactMotion(span, states)
 
 
-def with_card(
+def add_card(
     root: Path, scene: CourseScene, report: SceneReport, seconds: float = _SECONDS
 ) -> SceneReport:
-    """The report with the model's card; a run in the browser's engine may take so many `seconds`.
+    """Add the model's card to its report; a run in the browser's engine may take `seconds`.
 
     Raises:
         EffectError: an engine cannot be loaded.
@@ -166,10 +166,10 @@ def with_card(
     from coursebuild.core.run.mjcf import existing_files
 
     source = scene.model.source
-    with silent():  # what it warns of, it would write into the working directory
-        model = _compiled(root, scene)
-        found = scenes(model, scene.declared)
-        touched = {pair for one in found for pair in watch(model, one).touching_pairs}
+    with silent():  # MuJoCo would write its warnings into the working directory
+        model = _compile_model(root, scene)
+        scenarios = scenes(model, scene.declared)
+        touched = {pair for scenario in scenarios for pair in watch(model, scenario).touching_pairs}
     files = (root / path for path in existing_files(root, source.path, source.text))
     card = SceneCard(
         bodies=int(model.nbody) - 1,
@@ -179,13 +179,15 @@ def with_card(
         touched=len(touched),
         mjcf=len(source.text.encode()) + sum(path.stat().st_size for path in files),
         mjb=int(mujoco.mj_sizeModel(model)),
-        browser=_in_browser(root, scene, found[0].scenario, seconds),
+        browser=_browser_speed(root, scene, scenarios[0].scenario, seconds),
     )
     return replace(report, card=card)
 
 
-def _in_browser(root: Path, scene: CourseScene, scenario: Scenario, seconds: float) -> float | None:
-    """Simulated time over the time that it takes in a browser; `None` where that is not known."""
+def _browser_speed(
+    root: Path, scene: CourseScene, scenario: Scenario, seconds: float
+) -> float | None:
+    """Measure simulated time over the time that it takes in a browser; `None` if it fails."""
     from coursebuild.features.lab.engines.speed import real_time_factor
 
     key = None if scenario.keyframe < 0 else scenario.keyframe

@@ -2,11 +2,11 @@
 
 Entry points: `bench(options, names, …)`, `check(…)`.
 
-1. Names mean models. One that does not compile is told, and the others are measured.
-2. What was measured is kept under all that it depends on, a scenario at a time: a run that was
-   stopped goes on where it was. Times say something of this machine only, so they are not shared.
-3. Recording writes what was measured into `content/reports/`; checking measures again, whatever is
-   kept, and holds figures of accuracy against what is recorded there.
+1. Names mean models. One that does not compile is reported, and the others are measured.
+2. Each scenario's report is stored by all that it depends on, so that a run that was stopped goes
+   on where it was. Times are true of this machine only, so reports are not shared.
+3. Recording writes the reports into `content/reports/`; checking measures again, whatever is
+   stored, and compares figures of accuracy with what is recorded there.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.bench import measuring
 from coursebuild.features.bench.commands.measurement import Measurement
-from coursebuild.features.bench.commands.runs import MeasuringRun, forbid_quick, with_records
+from coursebuild.features.bench.commands.runs import MeasuringRun, forbid_quick, write_records
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.departures import RecordCheck, scene_departures
 from coursebuild.numerics.reports.records import BENCH, ReportFailure
@@ -37,7 +37,7 @@ _CODE = (
     "coursebuild/features/bench/commands/bench/measuring.py",
     "mjcourse/spatial",
 )
-"""What measures and says what was measured."""
+"""The code on which reports depend."""
 
 
 def bench(
@@ -48,9 +48,10 @@ def bench(
     record: bool = False,
     measuring: Any = measuring,
 ) -> Measurement[SceneReport]:
-    """Measure the models that the names mean; all where there are none.
+    """Measure the models that the names mean; without names, all.
 
-    `record`: each model's report is also written into the course. `measuring`: what measures.
+    `record`: each model's report is also written into the course. `measuring`: the module that
+    measures.
 
     Raises:
         UsageError: no model is called so, or only a part is to be recorded.
@@ -59,11 +60,11 @@ def bench(
         forbid_quick("--record", quick=quick)
     scenes = find_scenes(options.root, names)
     run = SceneRun(options, scenes.diagnostics, measuring, quick=quick, cards=record)
-    found = run.each(scenes.value, run.measure)
+    measurement = run.measure_each(scenes.value, run.measure)
     if not record:
-        return found
-    records = ((BENCH.path(one.model), BENCH.encode(one)) for one in found.reports)
-    return with_records(options.root, found, records)
+        return measurement
+    records = ((BENCH.path(report.model), BENCH.encode(report)) for report in measurement.reports)
+    return write_records(options.root, measurement, records)
 
 
 def check(
@@ -73,7 +74,7 @@ def check(
     quick: bool = False,
     measuring: Any = measuring,
 ) -> Measurement[SceneReport]:
-    """Measure again, and hold it against what is recorded.
+    """Measure again, and compare with the recorded reports.
 
     A model without a recorded report, or with one that cannot be read, is not measured.
 
@@ -82,7 +83,7 @@ def check(
     """
     forbid_quick("--check", quick=quick)
     scenes = find_scenes(options.root, names)
-    run = SceneRun(options, scenes.diagnostics, measuring, again=True)
+    run = SceneRun(options, scenes.diagnostics, measuring, use_store=False)
     recorded: dict[str, SceneReport] = {}
     for scene in scenes.value:
         report = read_record(options.root, BENCH, scene.name)
@@ -90,27 +91,30 @@ def check(
             run.failures.append(report)
         else:
             recorded[scene.name] = report
-    known = {scene.name: scene for scene in scenes.value if scene.name in recorded}
-    found = run.each(tuple(known.values()), run.measure)
-    checked = [_checked(recorded[one.model], one, known[one.model]) for one in found.reports]
-    return replace(found, checked=tuple(checked))
+    by_name = {scene.name: scene for scene in scenes.value if scene.name in recorded}
+    measurement = run.measure_each(tuple(by_name.values()), run.measure)
+    checks = [
+        _compare(recorded[report.model], report, by_name[report.model])
+        for report in measurement.reports
+    ]
+    return replace(measurement, checked=tuple(checks))
 
 
-def _checked(recorded: SceneReport, measured: SceneReport, scene: CourseScene) -> RecordCheck:
+def _compare(recorded: SceneReport, report: SceneReport, scene: CourseScene) -> RecordCheck:
     remarks = []
-    if recorded.digest != measured.digest:
+    if recorded.digest != report.digest:
         remarks.append("the model or its scenarios have changed since it was recorded")
-    old, new = recorded.machine, measured.machine
-    for what, before, now in (
+    old, new = recorded.machine, report.machine
+    for program, before, now in (
         ("MuJoCo ", old.engine, new.engine),
         ("NumPy ", old.numpy, new.numpy),
         ("Python ", old.python, new.python),
         ("", old.system, new.system),
     ):
         if before != now:
-            remarks.append(f"recorded with {what}{before}, measured with {now}")
-    departures = scene_departures(recorded, measured, scene.declared.bench)
-    return RecordCheck(measured.model, BENCH.path(measured.model), departures, tuple(remarks))
+            remarks.append(f"recorded with {program}{before}, measured with {now}")
+    departures = scene_departures(recorded, report, scene.declared.bench)
+    return RecordCheck(report.model, BENCH.path(report.model), departures, tuple(remarks))
 
 
 class SceneRun(MeasuringRun):
@@ -123,68 +127,69 @@ class SceneRun(MeasuringRun):
         measuring: Any,
         *,
         quick: bool = False,
-        again: bool = False,
+        use_store: bool = True,
         cards: bool = False,
     ) -> None:
-        super().__init__(options, diagnostics, again=again)  # again, times do not matter
+        super().__init__(options, diagnostics, use_store=use_store)
         self.quick = quick
         self.cards = cards
-        """Whether it is also told what the models are made of."""
+        """Whether reports also say what the models are made of."""
         self.measuring = measuring
-        self.here = machine(pinned=True)
+        self.machine = machine(pinned=True)
         self.code = code_digest(*_CODE)
 
     def measure(self, scene: CourseScene) -> SceneReport | None:
-        """What was measured on a scene; `None` where it cannot be."""
-        parts = (scene.name, scene.digest, self.quick, self.code, self.here)
-        whole = (*parts, self.cards)
-        return self.once(
-            scene.name, "bench", whole, SceneReport, lambda: self._report(scene, parts)
+        """Report on a scene; `None` if it cannot be measured."""
+        parts = (scene.name, scene.digest, self.quick, self.code, self.machine)
+        all_parts = (*parts, self.cards)
+        return self.load_or_measure(
+            scene.name, "bench", all_parts, SceneReport, lambda: self._report(scene, parts)
         )
 
     def _report(self, scene: CourseScene, parts: tuple[object, ...]) -> SceneReport:
-        root, timed, name = self.options.root, not self.again, scene.name
-        loaded = self.measuring.scenarios_of(root, scene, quick=self.quick)
+        # A check compares no times, so it measures none.
+        root, timed, name = self.options.root, self.use_store, scene.name
+        compiled = self.measuring.compile_scene(root, scene, quick=self.quick)
 
         def tell(text: str) -> None:
             self.progress.doing(name, text)
 
-        how = {"quick": self.quick, "timed": timed, "tell": tell}
+        settings = {"quick": self.quick, "timed": timed, "tell": tell}
         report = SceneReport(
             model=name,
             digest=scene.digest,
             quick=self.quick,
-            machine=self.here,
+            machine=self.machine,
             scenarios=tuple(
-                self._part(
+                self._load_or_measure_part(
                     "bench-scenarios",
                     (*parts, n),
                     ScenarioReport,
-                    partial(self.measuring.measured, loaded, n, **how),
+                    partial(self.measuring.run_scenario, compiled, n, **settings),
                 )
-                for n in range(len(loaded.scenarios))
+                for n in range(len(compiled.scenarios))
             ),
             sweeps=tuple(
-                self._part(
+                self._load_or_measure_part(
                     "bench-sweeps",
-                    (*parts, one.name),
+                    (*parts, sweep.name),
                     SweepReport,
-                    partial(self.measuring.swept, loaded, one, **how),
+                    partial(self.measuring.run_sweep, compiled, sweep, **settings),
                 )
-                for one in scene.declared.sweeps
+                for sweep in scene.declared.sweeps
             ),
         )
         if self.cards and report.scenarios:
             tell("what it is made of")
-            report = self.measuring.with_card(root, scene, report)
+            report = self.measuring.add_card(root, scene, report)
         return report
 
-    def _part(
-        self, kind: str, parts: tuple[object, ...], what: type[_T], measure: Callable[[], _T]
+    def _load_or_measure_part(
+        self, kind: str, parts: tuple[object, ...], report_type: type[_T], measure: Callable[[], _T]
     ) -> _T:
-        """A scenario or a sweep, from what is kept or measured now."""
-        found = self.kept(kind, parts, what)
-        if found is None:
-            found = measure()
-            self.keep(kind, parts, found)
-        return found
+        """Load the report on a scenario or a sweep, or measure it now."""
+        report = self.load(kind, parts, report_type)
+        if report is None:
+            report = measure()
+            self.save(kind, parts, report)
+        return report

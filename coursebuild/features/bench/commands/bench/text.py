@@ -1,4 +1,4 @@
-"""Speed against error of models, as tables for people: what the model's page says of them.
+"""Speed against error of models as text: the tables of the models' pages, on a terminal.
 
 Entry point: `bench_text(scenes, style)`.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from coursebuild.features.bench.commands.grids import english, grid_lines, plain_text
-from coursebuild.features.bench.figures import Grid, power, where
+from coursebuild.features.bench.figures import Grid, machine_text, power
 from coursebuild.features.bench.scenarios import scenario_view
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport, WorkPrecisionRow
 from coursebuild.numerics.reports.sweep import SweepReport
@@ -19,7 +19,7 @@ _INDENT = "  "
 
 
 def bench_text(scenes: Sequence[SceneReport], style: Style) -> str:
-    """Every model with its scenarios, a blank line between."""
+    """Write every model with its scenarios, and a blank line between models."""
     return "\n".join(_scene(scene, style) for scene in scenes)
 
 
@@ -27,7 +27,7 @@ def _scene(scene: SceneReport, style: Style) -> str:
     head = style.paint(visible(scene.model), BOLD)
     if scene.quick:
         head += "  " + style.paint("quick: fewer settings, rough times", YELLOW)
-    lines = [head, *style.wrap(where(english(), scene.machine), _INDENT)]
+    lines = [head, *style.wrap(machine_text(english(), scene.machine), _INDENT)]
     if not scene.scenarios:
         lines.append(f"{_INDENT}nothing can move in it, so that nothing was measured")
     for scenario in scene.scenarios:
@@ -40,7 +40,7 @@ def _scene(scene: SceneReport, style: Style) -> str:
 def _scenario(report: ScenarioReport, style: Style) -> list[str]:
     view = scenario_view(english(), report)
     lines = [_title(report.name, report.title, style)]
-    for text in (*map(plain_text, view.about), *_also(report), *report.notes):
+    for text in (*map(plain_text, view.description), *_plot_remarks(report), *report.notes):
         lines += style.wrap(text, 2 * _INDENT)
     legend = f"{_OWN} the scene's own   {_FRONT} on the Pareto front"
     lines += _table(view.settings, map(_mark, report.rows), legend, style)
@@ -68,8 +68,8 @@ def _title(name: str, title: str, style: Style) -> str:
     return _INDENT + style.paint(visible(name), BOLD) + (f"  {visible(title)}" if title else "")
 
 
-def _also(report: ScenarioReport) -> Iterator[str]:
-    """What a page says with its plot."""
+def _plot_remarks(report: ScenarioReport) -> Iterator[str]:
+    """Say what a page says in its plot."""
     if report.figure:
         yield f"It measures {report.figure}."
     if report.velocity_floor > report.floor:
@@ -79,7 +79,7 @@ def _also(report: ScenarioReport) -> Iterator[str]:
 def _table(
     grid: Grid, marks: Iterable[tuple[str, str]], legend: str, style: Style
 ) -> Iterator[str]:
-    """All settings, or values."""
+    """Write the table of settings, or of values."""
     yield ""
     if not grid.rows:
         yield f"{2 * _INDENT}no setting was measured"
@@ -96,7 +96,7 @@ def _mark(row: WorkPrecisionRow) -> tuple[str, str]:
 
 
 def _notes(notes: Sequence[str], style: Style) -> list[str]:
-    """Why runs were lost."""
+    """Write why runs were lost."""
     return ["" for _ in notes[:1]] + [
         line for note in notes for line in style.wrap(note, 2 * _INDENT, YELLOW)
     ]

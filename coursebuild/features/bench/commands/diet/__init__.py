@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_cache, add_format, add_quiet
 from coursebuild.cli.output import CLEAN
-from coursebuild.features.bench.commands import measured, write_measured
+from coursebuild.features.bench.commands import run_measurement, write_measurement
 from coursebuild.features.bench.commands.diet.run import diet
 from coursebuild.features.bench.commands.diet.text import diet_text, diet_values
 
@@ -20,7 +20,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments."""
     add_quiet(parser)
     parser.add_argument(
         "models", nargs="*", metavar="MODEL", help="a file of models/ (default: all)"
@@ -39,16 +39,18 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Look at models, and mend them or record what was found."""
-    how = {name: getattr(arguments, name) for name in ("quick", "fix", "record")}
-    found = measured(arguments, lambda options: diet(options, tuple(arguments.models), **how))
+    settings = {name: getattr(arguments, name) for name in ("quick", "fix", "record")}
+    names = tuple(arguments.models)
+    measurement = run_measurement(arguments, lambda options: diet(options, names, **settings))
     if arguments.quiet and arguments.format == "text":
-        if found.ok:
+        if measurement.ok:
             return CLEAN
-        found = replace(found, reports=tuple(one for one in found.reports if not one.ok))
-    return write_measured(
+        reports = tuple(report for report in measurement.reports if not report.ok)
+        measurement = replace(measurement, reports=reports)
+    return write_measurement(
         arguments,
-        found,
-        lambda style: diet_text(found.reports, style),
-        diet_values(found.reports),
+        measurement,
+        lambda style: diet_text(measurement.reports, style),
+        diet_values(measurement.reports),
         empty="there is no model to look at\n",
     )

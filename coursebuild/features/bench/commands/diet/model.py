@@ -1,11 +1,11 @@
-"""A model of the course as the scene diet sees it: its files, who reads it, what is to be kept.
+"""A model of the course as the diet sees it: its files, its readers, and what is to be kept.
 
 Entry point: `DietModel`.
 
-1. Who reads a model is told by `readers`, and by what is declared to be measured on it.
+1. `readers` and the observables that are declared for a model say who reads it.
 2. A file that another model uses too, or that is not in `models/`, is not changed.
-3. Changed files are read again as such, compiled and compared with what was run; only then are they
-   written, all of them or none.
+3. Changed files are read again, compiled and compared with the model that was run; only then are
+   they written, all of them or none.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.diet.readers import readers_of
-from coursebuild.features.bench.commands.runs import CannotError
+from coursebuild.features.bench.commands.runs import CannotMeasureError
 from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.markup import MarkupError
 from coursebuild.numerics.pruning.model_text import ModelTextError, model_bytes, open_model
@@ -36,11 +36,11 @@ from coursebuild.numerics.scene import SceneError
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
 
 _TEXT = ".coursebuild-text.xml"
-"""No file has this name: MuJoCo takes the text in its place."""
+"""No file has this name: MuJoCo reads the text in its place."""
 
 
 class DietModel:
-    """A model of the course, its files, and who reads it."""
+    """A model of the course, its files and its readers."""
 
     def __init__(
         self, root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
@@ -48,37 +48,37 @@ class DietModel:
         self.root = root
         self.scene = scene
         self.path = scene.model.source.path
-        self.keeps = {" ".join(one.finding.split()): one for one in scene.declared.keep}
+        self.keeps = {" ".join(keep.finding.split()): keep for keep in scene.declared.keep}
         self.locked = _locked(root, files, self.path, scene.model.source.text)
         self.readers = _readers(root, files, course, scene)
         self._files: dict[str, bytes | None] = {}
 
     def read(self, path: str) -> bytes | None:
-        """The bytes of a file, as they were when it was first looked at."""
+        """Return the bytes of a file as first read; `None` if it cannot be read."""
         if path not in self._files:
             try:
-                there = (self.root / path).is_file()
-                self._files[path] = read_bytes(self.root, path) if there else None
+                is_file = (self.root / path).is_file()
+                self._files[path] = read_bytes(self.root, path) if is_file else None
             except EffectError:
                 self._files[path] = None
         return self._files[path]
 
     def compile(self, text: bytes) -> Any:
-        """A text as if it stood in the model's place."""
+        """Compile a text as if it stood in the model's place."""
         place = str((self.root / self.path).parent / _TEXT)
         try:
             return mujoco.MjModel.from_xml_path(place, assets={place: text})
         except (ValueError, mujoco.FatalError) as error:
-            shown = str(error).replace(f"{self.root}/", "").replace(_TEXT, Path(self.path).name)
-            raise ValueError(shown) from None
+            message = str(error).replace(f"{self.root}/", "").replace(_TEXT, Path(self.path).name)
+            raise ValueError(message) from None
 
     def survey(
-        self, here: Machine, *, quick: bool, tell: Callable[[str], None], rerun: Rerun | None
+        self, machine: Machine, *, quick: bool, tell: Callable[[str], None], rerun: Rerun | None
     ) -> Survey:
-        """Try everything; `rerun` says who of the course's scripts and labs differs then.
+        """Try every change; `rerun` says which of the course's scripts and labs then differ.
 
         Raises:
-            CannotError: it cannot be looked at.
+            CannotMeasureError: the model cannot be looked at.
         """
         source = self.scene.model.source
         try:
@@ -87,13 +87,13 @@ class DietModel:
             order = Order(
                 self.scene.name,
                 self.scene.digest,
-                here,
+                machine,
                 text,
                 pruning_scenes(text.model, declared, quick=quick),
                 self.readers,
                 self.keeps,
                 self.locked,
-                any(one.controls for one in declared.scenarios),
+                any(scenario.controls for scenario in declared.scenarios),
                 time.thread_time_ns,
                 quick,
                 tell,
@@ -101,73 +101,73 @@ class DietModel:
             )
             return survey(order)
         except MarkupError as error:
-            said = f"{error.path}:{error.line}:{error.column} is no XML: {error.message}"
+            message = f"{error.path}:{error.line}:{error.column} is no XML: {error.message}"
             help = "MuJoCo reads it all the same; other tools do not"
-            raise CannotError(diagnose("model-error", source.span(0, 0), said, help=help)) from None
+            diagnostic = diagnose("model-error", source.span(0, 0), message, help=help)
+            raise CannotMeasureError(diagnostic) from None
         except SceneError as error:
             span = error.span or source.span(0, 0)
-            message = error.message
-            raise CannotError(diagnose("scenario-model", span, message, help=error.help)) from None
+            diagnostic = diagnose("scenario-model", span, error.message, help=error.help)
+            raise CannotMeasureError(diagnostic) from None
         except (ModelTextError, ValueError, mujoco.FatalError) as error:
             words = " ".join(str(error).split())
-            said = f"the diet cannot look at the model `{self.scene.name}`: {words}"
-            raise CannotError(diagnose("model-error", source.span(0, 0), said)) from None
+            message = f"the diet cannot look at the model `{self.scene.name}`: {words}"
+            diagnostic = diagnose("model-error", source.span(0, 0), message)
+            raise CannotMeasureError(diagnostic) from None
 
     def write(self, survey: Survey) -> None:
-        """Make the changes that were found; all of them, or none.
+        """Write the changes that were found; all of them, or none.
 
         Raises:
             EffectError: a file cannot be written, or somebody changed it.
-            CannotError: the files would make another model than the one that was run.
+            CannotMeasureError: the files would make another model than the one that was run.
         """
-        changed = survey.text.files(survey.edits)
+        new_files = survey.text.files(survey.edits)
 
         def read(path: str) -> bytes | None:
-            return changed.get(path) or self.read(path)
+            return new_files.get(path) or self.read(path)
 
-        new = open_model(self.path, read, self.compile, check=False).model
-        if model_bytes(new) != model_bytes(survey.text.compile(survey.edits)):
+        new_model = open_model(self.path, read, self.compile, check=False).model
+        if model_bytes(new_model) != model_bytes(survey.text.compile(survey.edits)):
             message = f"the changed model `{self.scene.name}` is not the one that was run"
             place = self.scene.model.source.span(0, 0)
-            raise CannotError(diagnose("model-error", place, message))
-        changes = [FileChange(path, self.read(path), data) for path, data in changed.items()]
-        change_files(self.root, sorted(changes, key=lambda one: one.path))
+            raise CannotMeasureError(diagnose("model-error", place, message))
+        changes = [FileChange(path, self.read(path), data) for path, data in new_files.items()]
+        change_files(self.root, sorted(changes, key=lambda change: change.path))
         self._files.clear()
 
     def digest(self) -> str:
-        """Of the model as it lies on the disk now."""
+        """Return the digest of the model as it is on the disk now."""
         text = (self.read(self.path) or b"").decode("utf-8")
         model = MjcfModel(self.scene.name, Source(self.path, text))
         return scene_digest(self.root, model, self.scene.declared)
 
 
 def _locked(root: Path, files: CourseFiles, path: str, text: str) -> Mapping[str, str]:
-    """Files of the model that are not to be changed, and why."""
+    """Map the files of the model that must not be changed to the reason."""
     parts = model_files(root, path, text)
     locked = {
         part: f"{part} is not in models/"
         for part in parts
         if not (part.startswith("models/") and part.endswith(".xml"))
     }
-    mine = {path, *parts}
-    for other in files.models:
-        if other.source.path == path:
-            continue
-        shared = set(model_files(root, other.source.path, other.source.text)) & mine
-        if other.source.path not in mine:
-            for part in sorted(shared):
-                locked.setdefault(part, f"{other.source.path} uses {part} too")
+    own_files = {path, *parts}
+    for model in files.models:
+        user = model.source.path
+        if user not in own_files:
+            for part in sorted(own_files.intersection(model_files(root, user, model.source.text))):
+                locked.setdefault(part, f"{user} uses {part} too")
     return locked
 
 
 def _readers(
     root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
 ) -> tuple[Reader, ...]:
-    """Everything in the course that may use a model, and what is to be measured on it."""
-    found = list(readers_of(course, root, files, scene))
-    declared = scene.declared.scenarios
-    names = frozenset(one.observable.name for one in declared if one.observable is not None)
-    fields = {"energy"} if any("energy" in (one.conserved or ()) for one in declared) else set()
+    """List everything in the course that may read a model, its observables included."""
+    readers = list(readers_of(course, root, files, scene))
+    scenarios = scene.declared.scenarios
+    names = frozenset(s.observable.name for s in scenarios if s.observable is not None)
+    fields = {"energy"} if any("energy" in (s.conserved or ()) for s in scenarios) else set()
     if names or fields:
-        found.append(Reader(scene.declared.source.path, names=names, words=frozenset(fields)))
-    return tuple(found)
+        readers.append(Reader(scene.declared.source.path, names=names, words=frozenset(fields)))
+    return tuple(readers)

@@ -1,12 +1,12 @@
-"""Who reads a model of the course, and whether they say the same with another one.
+"""Who reads a model of the course, and whether their output changes with the model.
 
 Entry points: `readers_of(course, root, files, scene)`; `Reruns`, which runs scripts and labs.
 
-1. Every script of the course that may use the model is a reader, wherever it stands; so is every
-   file of code, as scripts and labs may use it. A lab draws its model: it may use all of it, but
-   for what is asked for by name or number.
+1. Every script of the course that may use the model is a reader; so is every file of code, as
+   scripts and labs may use it. A lab draws its model, so it may use all of it, except what code
+   asks for by name or number.
 2. Scripts and labs run in a copy of the course with the changed files, and their output is compared
-   with that in the course itself. Which of them use the model is told by the files that they read.
+   with that in the course itself. The files that they read show which of them use the model.
 """
 
 from __future__ import annotations
@@ -36,57 +36,57 @@ from coursebuild.pipeline.verify import verify
 
 _CODE = (".py", ".js", ".mjs", ".ts")
 _NOT_DRAWN = frozenset(("Sensor", "Actuator", "Keyframe", "Numeric", "Tuple"))
-"""Kinds that a lab's picture does not show."""
+"""Kinds that the picture of a lab does not show."""
 _COPIED = ("content", "models")
 
 
 def readers_of(
     course: Course | None, root: Path, files: CourseFiles, scene: CourseScene
 ) -> tuple[Reader, ...]:
-    """Everything in the course that may use a model."""
+    """List everything in the course that may use a model."""
     if course is None:
         return (Reader("content/course.toml", opaque="the course cannot be read"),)
-    own = {Path(path).stem for path in files.files if path.endswith(".py")}
+    modules = {Path(path).stem for path in files.files if path.endswith(".py")}
     scripts = [
-        read_code(one.path, one.text, own)
-        for one in extract(course).value
-        if _may_use(one.text, scene.name)
+        read_code(script.path, script.text, modules)
+        for script in extract(course).value
+        if _may_use(script.text, scene.name)
     ]
-    labs = list(_blocks(course, scene.name))
-    if not scripts and not labs:
+    blocks = list(_block_readers(course, scene.name))
+    if not scripts and not blocks:
         return ()
-    return (*scripts, *labs, *_code(root, files, own))
+    return (*scripts, *blocks, *_code_readers(root, files, modules))
 
 
 def _may_use(text: str, model: str) -> bool:
-    """Whether a script names a model, or makes the names or texts of models while it runs."""
-    last = model.rpartition("/")[2]
-    literal = re.findall(r"\bmodel_path\(\s*(?:\"[^\"]*\"|'[^']*')\s*\)", text)
-    made = len(re.findall(r"\bmodel_path\b", re.sub(r"(?m)^.*\bimport\b.*$", "", text)))
-    opened = re.search(r"from_(xml|binary)_path|from_file|from_string|\.xml\b", text)
-    return last in text or made != len(literal) or (not literal and opened is not None)
+    """Whether a script names a model, or may compute the name or text of one."""
+    name = model.rpartition("/")[2]
+    literals = re.findall(r"\bmodel_path\(\s*(?:\"[^\"]*\"|'[^']*')\s*\)", text)
+    uses = len(re.findall(r"\bmodel_path\b", re.sub(r"(?m)^.*\bimport\b.*$", "", text)))
+    loader = re.search(r"from_(xml|binary)_path|from_file|from_string|\.xml\b", text)
+    return name in text or uses != len(literals) or (not literals and loader is not None)
 
 
-def _blocks(course: Course, model: str) -> Iterator[Reader]:
-    """Labs and other blocks that show a model."""
+def _block_readers(course: Course, model: str) -> Iterator[Reader]:
+    """Yield the labs and other blocks that show a model."""
     for document in course.documents:
         for block in document_blocks(document):
             if not isinstance(block, FeatureBlock) or model not in block.models():
                 continue
             place = f"{block.span.path}:{block.span.line}"
-            drawn = frozenset(VIEWS.values()) - _NOT_DRAWN
+            kinds = frozenset(VIEWS.values()) - _NOT_DRAWN
             if not isinstance(block, Lab):
-                yield Reader(place, kinds=drawn)
+                yield Reader(place, kinds=kinds)
                 continue
             code = read_code(place, "\n".join(piece.text for _, piece in block.code))
             names = frozenset(re.findall(r"\"((?:[^\"\\]|\\.)*)\"", block.config))
             if re.search(r"\"key(frame)?\"\s*:\s*\d", block.config):
-                drawn |= {"Keyframe"}
-            yield replace(code, names=code.names | names, kinds=code.kinds | drawn)
+                kinds |= {"Keyframe"}
+            yield replace(code, names=code.names | names, kinds=code.kinds | kinds)
 
 
-def _code(root: Path, files: CourseFiles, own: set[str]) -> Iterator[Reader]:
-    """The course's files of code."""
+def _code_readers(root: Path, files: CourseFiles, modules: set[str]) -> Iterator[Reader]:
+    """Yield the course's files of code."""
     for path in files.files:
         if path.endswith(_CODE):
             try:
@@ -94,79 +94,81 @@ def _code(root: Path, files: CourseFiles, own: set[str]) -> Iterator[Reader]:
             except EffectError:
                 yield Reader(path, opaque="it cannot be read")
             else:
-                yield read_code(path, text, own)
+                yield read_code(path, text, modules)
 
 
 class Reruns:
-    """Runs what uses a model, in the course and in copies of it."""
+    """Runs the users of a model, in the course and in copies of it."""
 
     def __init__(self, options: Options, course: Course, scene: CourseScene) -> None:
         self.options = replace(options, quiet=True)
         self.course = course
         self.scene = scene
-        self._before: dict[str, object] | None = None
+        self._original_outputs: dict[str, object] | None = None
         self._documents: frozenset[str] = frozenset()
 
-    def differing(self, files: Mapping[str, bytes]) -> str:
-        """Who says something else with these files changed; empty where nobody does."""
-        if self._before is None:
-            self._before = self._users()
-        if not self._before:
+    def first_difference(self, files: Mapping[str, bytes]) -> str:
+        """Name a user whose output changes with these files; empty if none does."""
+        if self._original_outputs is None:
+            self._original_outputs = self._run_users()
+        original_outputs = self._original_outputs
+        if not original_outputs:
             return ""
         with temporary_folder() as folder:
             root = Path(folder).resolve()
-            self._copy(root)
+            self._copy_course(root)
             for path, data in files.items():
                 (root / path).write_bytes(data)
             course = load(root).value
             if course is None:
                 return "the course"
             options = replace(self.options, root=root, cache=Memo(root))
-            after = self._outputs(course, options, self._documents)
-        return next((name for name, said in self._before.items() if after.get(name) != said), "")
+            outputs = self._run(course, options, self._documents)
+        changes = (name for name in original_outputs if outputs.get(name) != original_outputs[name])
+        return next(changes, "")
 
-    def _users(self) -> dict[str, object]:
-        """What those say in the course that use the model."""
+    def _run_users(self) -> dict[str, object]:
+        """Run the users of the model in the course, and return their outputs by name."""
         source = self.scene.model.source
-        mine = {source.path, *model_files(self.options.root, source.path, source.text)}
+        model_paths = {source.path, *model_files(self.options.root, source.path, source.text)}
         results = verify(self.course, self.options, Progress(quiet=True)).results
         paths = {
             run.path
             for run in results.runs
-            if run.trace is not None and not mine.isdisjoint(run.trace.files)
+            if run.trace is not None and not model_paths.isdisjoint(run.trace.files)
         }
-        shown = {
+        showing_documents = {
             document.source.path
             for document in self.course.documents
             for block in document_blocks(document)
             if isinstance(block, FeatureBlock) and self.scene.name in block.models()
         }
-        labs = [trial for trial in results.trials if trial.span.path in shown]
+        labs = [trial for trial in results.trials if trial.span.path in showing_documents]
         self._documents = frozenset(
-            one.document for one in extract(self.course).value if one.path in paths
+            script.document for script in extract(self.course).value if script.path in paths
         ) | {trial.span.path for trial in labs}
         if not self._documents:
             return {}
-        whole = self._outputs(self.course, self.options, self._documents)
+        outputs = self._run(self.course, self.options, self._documents)
         names = paths | {trial.line.name for trial in labs}
-        return {name: said for name, said in whole.items() if name in names}
+        return {name: output for name, output in outputs.items() if name in names}
 
-    def _outputs(
+    def _run(
         self, course: Course, options: Options, documents: frozenset[str]
     ) -> dict[str, object]:
-        """What scripts print, and what labs record."""
+        """Run documents, and return what scripts print and labs record."""
         results = verify(course, options, Progress(quiet=True), documents, static=True).results
-        said: dict[str, object] = {
+        outputs: dict[str, object] = {
             run.path: (run.outcome, run.status, run.stdout, run.figures) for run in results.runs
         }
         for trial in results.trials:
             output = trial.output
             record = getattr(output, "record", None), getattr(output, "picture", None)
-            said[trial.line.name] = (trial.line.status, trial.line.tried, record)
-        return said
+            outputs[trial.line.name] = (trial.line.status, trial.line.tried, record)
+        return outputs
 
-    def _copy(self, root: Path) -> None:
-        """The course in another place; what cannot be changed is linked."""
+    def _copy_course(self, root: Path) -> None:
+        """Copy the course to another folder, and link what no change concerns."""
         for entry in sorted(self.options.root.iterdir()):
             if entry.name in _COPIED and entry.is_dir():
                 shutil.copytree(entry, root / entry.name)

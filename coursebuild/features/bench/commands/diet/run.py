@@ -2,12 +2,13 @@
 
 Entry point: `diet(options, names, …)`.
 
-1. Names mean models. One that does not compile is told, and the others are looked at.
-2. What code of the course may notice is not proved, and what scripts and labs say otherwise without
-   is no finding. A finding that is wanted stands in `models/NAME.toml` with its reason.
-3. What was found is kept under all that it depends on, as of `bench`.
-4. `fix` takes out what is proved, until nothing is left: what something needed that is gone may go
-   as well. A file that changed meanwhile is left as it is.
+1. Names mean models. One that does not compile is reported, and the others are looked at.
+2. A part that code of the course may notice is not proved superfluous, and a part without which
+   scripts or labs have another output is no finding. A part that is to stay stands in
+   `models/NAME.toml` with its reason.
+3. Reports are stored by all that they depend on, as those of `bench`.
+4. `fix` takes out what is proved, again and again, as what only a removed part needed may go as
+   well. A file that was edited meanwhile is left as it is.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.diet.model import DietModel
 from coursebuild.features.bench.commands.diet.readers import Reruns
 from coursebuild.features.bench.commands.measurement import Measurement
-from coursebuild.features.bench.commands.runs import MeasuringRun, forbid_quick, with_records
+from coursebuild.features.bench.commands.runs import MeasuringRun, forbid_quick, write_records
 from coursebuild.numerics.engine import silent
 from coursebuild.numerics.pruning.survey import Survey
 from coursebuild.numerics.reports.diet import DietReport
@@ -53,10 +54,10 @@ def diet(
     fix: bool = False,
     record: bool = False,
 ) -> Measurement[DietReport]:
-    """Look at the models that the names mean; at all where there are none.
+    """Look at the models that the names mean; without names, at all.
 
-    `fix`: what is proved is taken out, and the reports are of what is left. `record`:
-    each report is also written into the course.
+    `fix`: what is proved is taken out, and the reports are about the rest. `record`: each report
+    is also written into the course.
 
     Raises:
         UsageError: no model is called so, or only a part is to be recorded.
@@ -65,15 +66,15 @@ def diet(
         forbid_quick("--record", quick=quick)
     scenes = find_scenes(options.root, names)
     run = _DietRun(options, scenes.diagnostics, quick=quick, fix=fix)
-    found = run.each(scenes.value, run.look_at)
+    measurement = run.measure_each(scenes.value, run.look_at)
     if not record:
-        return found
-    records = ((DIET.path(one.model), DIET.encode(one)) for one in found.reports)
-    return with_records(options.root, found, records)
+        return measurement
+    records = ((DIET.path(report.model), DIET.encode(report)) for report in measurement.reports)
+    return write_records(options.root, measurement, records)
 
 
-def _state(file: Path) -> tuple[int, int]:
-    """What tells whether a file is another one."""
+def _file_state(file: Path) -> tuple[int, int]:
+    """Return what changes when a file is edited."""
     status = file.stat()
     return status.st_size, status.st_mtime_ns
 
@@ -81,7 +82,7 @@ def _state(file: Path) -> tuple[int, int]:
 class _DietRun(MeasuringRun):
     """Looks at models one after the other."""
 
-    stage, done = "looking at models", "looked at"
+    stage, success = "looking at models", "looked at"
 
     def __init__(
         self, options: Options, diagnostics: Sequence[Diagnostic], *, quick: bool, fix: bool
@@ -91,67 +92,68 @@ class _DietRun(MeasuringRun):
         self.fix = fix
         self.files = read_course(options.root).value
         self.course = load(options.root).value
-        self.here = machine()
+        self.machine = machine()
         self.code = code_digest(*_CODE)
 
     def look_at(self, scene: CourseScene) -> DietReport | None:
-        """What is found in a model; `None` where it cannot be looked at, or not be changed."""
-        look = DietModel(self.options.root, self.files, self.course, scene)
-        return self.once(
-            scene.name, "diet", self._parts(look), DietReport, lambda: self._looked(look)
+        """Report on a model; `None` if it cannot be looked at, or cannot be changed."""
+        model = DietModel(self.options.root, self.files, self.course, scene)
+        return self.load_or_measure(
+            scene.name, "diet", self._parts(model), DietReport, lambda: self._report(model)
         )
 
-    def _looked(self, look: DietModel) -> DietReport | None:
-        with silent():  # what MuJoCo warns of, it would write into the working directory
-            report = self._fixed(look) if self.fix else self._surveyed(look).report
-        return None if report is None else replace(report, digest=look.digest())
+    def _report(self, model: DietModel) -> DietReport | None:
+        with silent():  # MuJoCo would write its warnings into the working directory
+            report = self._fix(model) if self.fix else self._survey(model).report
+        return None if report is None else replace(report, digest=model.digest())
 
-    def _surveyed(self, look: DietModel) -> Survey:
-        tell, rerun = partial(self.progress.doing, look.scene.name), None
+    def _survey(self, model: DietModel) -> Survey:
+        tell, rerun = partial(self.progress.doing, model.scene.name), None
         if not self.quick and self.course is not None:
-            rerun = Reruns(self.options, self.course, look.scene).differing
-        return look.survey(self.here, quick=self.quick, tell=tell, rerun=rerun)
+            rerun = Reruns(self.options, self.course, model.scene).first_difference
+        return model.survey(self.machine, quick=self.quick, tell=tell, rerun=rerun)
 
-    def _fixed(self, look: DietModel) -> DietReport | None:
-        """Change and look again until nothing is left to change.
+    def _fix(self, model: DietModel) -> DietReport | None:
+        """Change the model and look again until nothing is left to change.
 
-        `None` where it could not be written; why is told.
+        `None` if a change could not be written, which is reported as a failure.
         """
         kinds: dict[str, dict[str, None]] = {}
-        survey = self._surveyed(look)
+        survey = self._survey(model)
         while survey.edits:
             try:
-                look.write(survey)
+                model.write(survey)
             except EffectError as error:
                 self.failures.append(ReportFailure(error.message, error.help))
                 return None
             for finding in survey.report.findings:
                 for edit in finding.edits if finding.fixable else ():
                     kinds.setdefault(edit.path, {})[finding.kind] = None
-            survey = self._surveyed(look)
+            survey = self._survey(model)
         self.remarks += [f"changed {path}: {', '.join(kinds[path])}" for path in sorted(kinds)]
         return survey.report
 
-    def _parts(self, look: DietModel) -> tuple[object, ...]:
-        """All that what is found depends on; first the digest of the model."""
-        parts: list[object] = [look.scene.digest, look.scene.name, self.quick, self.code, self.here]
-        for one in look.scene.declared.keep:
-            place = one.finding_span
-            parts.append((one.finding, one.reason, place.line, place.column))
-        parts += look.locked.items()
-        if look.readers and self.course is not None:
-            parts += [(one.source.path, one.source.text) for one in self.course.documents]
-            parts += [(path, _state(self.options.root / path)) for path in self.files.files]
+    def _parts(self, model: DietModel) -> tuple[object, ...]:
+        """Return all that a report depends on; first the digest of the model."""
+        scene = model.scene
+        parts: list[object] = [scene.digest, scene.name, self.quick, self.code, self.machine]
+        for keep in scene.declared.keep:
+            place = keep.finding_span
+            parts.append((keep.finding, keep.reason, place.line, place.column))
+        parts += model.locked.items()
+        if model.readers and self.course is not None:
+            parts += [(d.source.path, d.source.text) for d in self.course.documents]
+            parts += [(path, _file_state(self.options.root / path)) for path in self.files.files]
         return tuple(parts)
 
-    def kept(self, kind: str, parts: tuple[object, ...], what: type[_T]) -> _T | None:
-        """What was found before, if there is nothing in it to fix where that is wanted."""
-        found = super().kept(kind, parts, what)
-        if self.fix and isinstance(found, DietReport) and any(o.fixable for o in found.findings):
+    def load(self, kind: str, parts: tuple[object, ...], report_type: type[_T]) -> _T | None:
+        """Load the stored report, unless this run is to fix something in it."""
+        report = super().load(kind, parts, report_type)
+        if self.fix and isinstance(report, DietReport) and any(f.fixable for f in report.findings):
             return None
-        return found
+        return report
 
-    def keep(self, kind: str, parts: tuple[object, ...], value: object) -> None:
-        """Keep what was found, unless the files changed meanwhile, by us or somebody else."""
+    def save(self, kind: str, parts: tuple[object, ...], value: object) -> None:
+        """Store a report, unless this run or somebody else has changed the files meanwhile."""
         if isinstance(value, DietReport) and value.digest == parts[0]:
-            super().keep(kind, parts, value)
+            super().save(kind, parts, value)
