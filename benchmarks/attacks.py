@@ -32,7 +32,7 @@ import msgspec  # noqa: E402
 
 from coursebuild.core.engine.memo import HASH, sealed, unsealed  # noqa: E402
 from support.mortal_commands import DIED, Mortals, mortal_commands  # noqa: E402
-from support.poisoned_values import changed  # noqa: E402
+from support.poisoned_values import mutate  # noqa: E402
 from support.scratch_course import Folder, block, command, wait_until_alone  # noqa: E402
 
 LESSON = "## One\n\n$a_{1}$\n\n" + block("a.py", "print(1)", "1") + block("b.py", "print(2)", "2")
@@ -173,7 +173,7 @@ class Attack:
         status, _ = mortals.run(self.folder, "build", "-q", fatal=fatal)
         wait_until_alone(self.folder)
         self.deaths += status == DIED
-        return 0 if status == DIED else status, mortals.said
+        return 0 if status == DIED else status, mortals.output
 
     def entries(self, count: int, seed: int) -> Iterator[tuple[str, bytes, bool]]:
         """Entries of each kind in turn: with a bit wrong, cut, or with a seal and wrong data.
@@ -212,7 +212,7 @@ def poison(data: bytes, chance: random.Random) -> bytes:
             value = decode(data)
             while True:
                 with contextlib.suppress(OverflowError, UnicodeEncodeError):
-                    return encode(changed(value, chance))
+                    return encode(mutate(value, chance))
     return data[: len(data) // 2]
 
 

@@ -27,7 +27,8 @@ READINGS = frozenset(
     "text_content".split()
 )
 WAITS = frozenset(
-    "becomes comes expect until wait_for wait_for_event wait_for_load_state wait_for_url".split()
+    "becomes expect until wait_for wait_for_condition wait_for_event wait_for_load_state "
+    "wait_for_url".split()
 )
 Rule = Callable[[], Iterator[tuple[str, int]]]
 

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from support.built_sites import BuiltCourses, Site, Sites, course_copy
-from support.lab_page import watched
+from support.lab_page import watch_page
 
 
 @pytest.fixture(scope="session")
@@ -83,7 +83,7 @@ def opened(calm: BrowserContext) -> Iterator[Callable[[str], Page]]:
     said: list[list[str]] = []
 
     def opened(address: str) -> Page:
-        page, lines = watched(calm)
+        page, lines = watch_page(calm)
         said.append(lines)
         page.goto(address)
         return page

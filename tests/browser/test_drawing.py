@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page
 
 from support.built_sites import Site
 from support.lab_course import PAGE
-from support.lab_page import lab, until, watched
+from support.lab_page import lab, until, watch_page
 
 pytestmark = pytest.mark.browser
 
@@ -80,7 +80,7 @@ def shown(
 ) -> Iterator[tuple[Page, list[str]]]:
     """The page, and what it says to the console."""
     with browsers["webgl"].new_context(viewport=WINDOW) as context:
-        page, said = watched(context)
+        page, said = watch_page(context)
         page.goto(sites["drawing"].url(LESSON))
         yield page, said
 
@@ -119,7 +119,7 @@ def test_with_a_graphics_processor_there_are_shadows_too(
             "  return name === 0x9246 ? 'A graphics processor' : getParameter.call(this, name)\n"
             "}"
         )
-        page, said = watched(context)
+        page, said = watch_page(context)
         page.goto(sites["drawing"].url(LESSON))
         ready(page, ENDLESS)
         assert page.evaluate(COMPARE, ENDLESS)["middle"] <= 2, "the rest is as without"
@@ -141,7 +141,7 @@ def test_text_of_plots_has_its_size_on_dense_screens(
                 "  return fillText.apply(this, all)\n"
                 "}"
             )
-            page, _ = watched(context)
+            page, _ = watch_page(context)
             page.goto(base + PAGE)
             lab(page, state=None)
             until(page, "() => sizes.size > 0")

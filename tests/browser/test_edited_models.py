@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.axe import violations
 from support.lab_course import PAGE
-from support.lab_page import EDITED, lab, press, until, watched
+from support.lab_page import EDITED, lab, press, until, watch_page
 
 pytestmark = pytest.mark.browser
 
@@ -22,7 +22,7 @@ ENDLESS = '<option iterations="2000000000" tolerance="0" ls_iterations="9" solve
 def page(browsers: Mapping[str, Browser], base: str) -> Iterator[Page]:
     """A phone's window, in which the lab is near."""
     with browsers["webgl"].new_context(viewport={"width": 390, "height": 800}) as context:
-        page, said = watched(context)
+        page, said = watch_page(context)
         page.goto(base + PAGE)
         lab(page, EDITED)
         yield page

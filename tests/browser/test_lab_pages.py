@@ -15,16 +15,16 @@ from support.lab_page import (
     AUTO,
     MOUNT,
     SWING,
-    comes,
+    fetch_text,
     floats,
     lab,
-    parsed,
+    parse_link,
     press,
     reach,
-    served,
     state_of,
     time_of,
-    watched,
+    wait_for_condition,
+    watch_page,
 )
 
 pytestmark = pytest.mark.browser
@@ -34,7 +34,7 @@ def test_motion_that_is_not_welcome_begins_with_a_press_or_a_move(
     browsers: Mapping[str, Browser], base: str
 ) -> None:
     with browsers["webgl"].new_context(reduced_motion="reduce") as context:
-        page, _ = watched(context)
+        page, _ = watch_page(context)
         page.goto(base + PAGE)
         found = lab(page, AUTO)
         press(found, "One step")
@@ -55,7 +55,7 @@ def test_goal_is_reached_kept_and_its_motion_shown_to_others(
     browsers: Mapping[str, Browser], base: str
 ) -> None:
     with browsers["webgl"].new_context(has_touch=True) as context:
-        page, said = watched(context)
+        page, said = watch_page(context)
         page.goto(base + PAGE)
         swing = lab(page)
         goal = swing.locator(".lab-live .lab-goal")
@@ -72,7 +72,7 @@ def test_goal_is_reached_kept_and_its_motion_shown_to_others(
         assert state["l"] == [[9.8, 2.5, None], [[0, 2], [0, 2]]]
         link = page.evaluate("() => location.href")
 
-        other, also_said = watched(context)
+        other, also_said = watch_page(context)
         other.goto(link)
         again = lab(other)
         expect(again.locator(".lab-live .lab-goal")).to_contain_text("Reached before.")
@@ -91,7 +91,7 @@ def test_goal_is_reached_kept_and_its_motion_shown_to_others(
 
 
 def test_state_too_large_for_a_link_is_told(context: BrowserContext, base: str) -> None:
-    page, said = watched(context)
+    page, said = watch_page(context)
     page.goto(base + PAGE)
     page.evaluate(MOUNT, SWING)
     page.evaluate(
@@ -103,7 +103,7 @@ def test_state_too_large_for_a_link_is_told(context: BrowserContext, base: str) 
     message = page.locator("#tried .lab-message")
     expect(message).to_contain_text("lab.live.link_controls")
     expect(message).to_have_class(re.compile(r"\blab-is-warning\b"))
-    state = parsed(page.evaluate("() => location.href"))
+    state = parse_link(page.evaluate("() => location.href"))
     assert (state["v"], state["physics"]) == ([3, 0.5, None], b"")
     assert said == []
 
@@ -121,14 +121,16 @@ def test_divergence_and_errors_of_lab_code_are_told_and_it_goes_on(
     context: BrowserContext, base: str
 ) -> None:
     def answer(route: Route) -> None:
-        route.fulfill(body=served(route) + BAD_PUSH, headers={"content-type": "text/javascript"})
+        route.fulfill(
+            body=fetch_text(route) + BAD_PUSH, headers={"content-type": "text/javascript"}
+        )
 
     context.route(re.compile(r"/labs/[^/]*lab-1\.[0-9a-f]+\.js$"), answer)
-    page, _ = watched(context)
+    page, _ = watch_page(context)
     page.goto(base + PAGE)
     swing = lab(page)
     press(swing, "Play")
-    comes(page, lambda: time_of(swing) > 0)
+    wait_for_condition(page, lambda: time_of(swing) > 0)
     press(swing, "Push")
     message = swing.locator(".lab-message:visible")
     expect(message).to_have_text(re.compile(r"^Diverged at t = \d+\.\d\d s: "))
@@ -149,11 +151,11 @@ def test_without_webgl_everything_else_works(browsers: Mapping[str, Browser], ba
         expect(swing.locator(".lab-view")).to_contain_text("no WebGL")
         press(swing, "Play")
         expect(swing.locator(".lab-live dd").first).not_to_contain_text("2.500")
-        comes(page, lambda: time_of(swing) > 0)
+        wait_for_condition(page, lambda: time_of(swing) > 0)
 
 
 def test_from_disk_the_recorded_form_stays(context: BrowserContext, course: Site) -> None:
-    page, said = watched(context)
+    page, said = watch_page(context)
     page.goto((course.public / PAGE).as_uri())
     swing = page.locator(".lab").first
     expect(swing.locator(".lab-message")).to_contain_text("http.server")
@@ -162,7 +164,7 @@ def test_from_disk_the_recorded_form_stays(context: BrowserContext, course: Site
 
 
 def test_missing_file_is_told(context: BrowserContext, base: str) -> None:
-    page, _ = watched(context)
+    page, _ = watch_page(context)
     context.route("**/*.mjb", lambda route: route.fulfill(status=404, body=""))
     page.goto(base + PAGE)
     swing = lab(page, SWING, "ended")

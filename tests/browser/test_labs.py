@@ -22,8 +22,6 @@ from support.lab_page import (
     AUTO,
     SWING,
     TWINS,
-    changed,
-    comes,
     floats,
     lab,
     press,
@@ -31,9 +29,11 @@ from support.lab_page import (
     readout,
     shows,
     state_of,
-    still,
     time_of,
-    watched,
+    wait_for_change,
+    wait_for_condition,
+    wait_until_still,
+    watch_page,
 )
 
 pytestmark = pytest.mark.browser
@@ -58,7 +58,7 @@ class Lesson:
 def lesson(browsers: Mapping[str, Browser], base: str) -> Iterator[Lesson]:
     size = {"width": 1000, "height": 800}
     with browsers["webgl"].new_context(viewport=size) as context:  # type: ignore[arg-type]
-        page, said = watched(context)
+        page, said = watch_page(context)
         asked: list[str] = []
         page.on("request", lambda request: asked.append(request.url))
         page.goto(base + PAGE, wait_until="networkidle")
@@ -125,7 +125,7 @@ def test_engine_is_fetched_once_and_only_when_a_lab_is_near(lesson: Lesson, swin
 def test_state_is_that_of_native_mujoco(lesson: Lesson, swing: Locator, course: Site) -> None:
     page = lesson.page
     press(swing, "Play")
-    comes(page, lambda: time_of(swing) > 0.4)
+    wait_for_condition(page, lambda: time_of(swing) > 0.4)
     press(swing, "Pause")
     reach(page, SWING, "paused")
     state = state_of(page, swing)
@@ -134,7 +134,7 @@ def test_state_is_that_of_native_mujoco(lesson: Lesson, swing: Locator, course: 
     expected = native(course, steps, 2.5)
     np.testing.assert_allclose(floats(state)[:3], expected, rtol=1e-9)
     shows(swing, "angle", f"{expected[1]:.3f}")
-    comes(page, lambda: time_of(swing) == pytest.approx(expected[0], abs=0.006))
+    wait_for_condition(page, lambda: time_of(swing) == pytest.approx(expected[0], abs=0.006))
 
 
 def test_controls_do_what_they_say(lesson: Lesson, swing: Locator, course: Site) -> None:
@@ -170,7 +170,7 @@ def test_link_leads_back_to_the_state(lesson: Lesson, swing: Locator) -> None:
     for _ in range(7):
         press(swing, "One step")
     state = state_of(page, swing)
-    other, said = watched(page.context)
+    other, said = watch_page(page.context)
     other.goto(page.evaluate("() => location.href"))
     again = other.locator(".lab").nth(SWING)
     expect(again).to_have_attribute("data-state", "paused")
@@ -193,13 +193,13 @@ def test_keys_on_the_picture(lesson: Lesson, swing: Locator) -> None:
     page.keyboard.press(".")
     expect(swing.locator(".lab-time")).to_have_text(re.compile(r"^0\.00"))
     expect(view.locator(".lab-scale")).to_have_accessible_name("Scale: the bar is 0.5 m long")
-    first = still(page, view)
+    first = wait_until_still(page, view)
     page.keyboard.press("ArrowLeft")
-    turned = changed(page, view, first)
+    turned = wait_for_change(page, view, first)
     page.keyboard.press("+")
-    changed(page, view, turned)
+    wait_for_change(page, view, turned)
     page.keyboard.press("0")
-    comes(page, lambda: view.screenshot() == first)
+    wait_for_condition(page, lambda: view.screenshot() == first)
     page.keyboard.press(" ")
     reach(page, SWING, "playing")
     page.keyboard.press(" ")
@@ -238,14 +238,14 @@ def test_body_is_pulled_by_a_spring(lesson: Lesson, swing: Locator) -> None:
             pictures(page, 5)
         return True
 
-    comes(page, stays)
+    wait_for_condition(page, stays)
     page.mouse.up()
 
 
 def test_lab_out_of_sight_waits_and_goes_on_when_it_is_back(lesson: Lesson, swing: Locator) -> None:
     page = lesson.page
     press(swing, "Play")
-    comes(page, lambda: time_of(swing) > 0.1)
+    wait_for_condition(page, lambda: time_of(swing) > 0.1)
     page.evaluate("() => window.scrollTo(0, 0)")
 
     def waits() -> bool:
@@ -253,17 +253,17 @@ def test_lab_out_of_sight_waits_and_goes_on_when_it_is_back(lesson: Lesson, swin
         pictures(page, 60)
         return time_of(swing) == before
 
-    comes(page, waits)
+    wait_for_condition(page, waits)
     expect(swing).to_have_attribute("data-state", "playing")
     away = time_of(swing)
     swing.scroll_into_view_if_needed()
-    comes(page, lambda: time_of(swing) > away)
+    wait_for_condition(page, lambda: time_of(swing) > away)
 
 
 def test_goal_that_was_shown_does_not_count(lesson: Lesson, swing: Locator) -> None:
     goal = swing.locator(".lab-live .lab-goal")
     press(swing, "Show me")
-    comes(lesson.page, lambda: float(readout(swing, "angle")) > 4)
+    wait_for_condition(lesson.page, lambda: float(readout(swing, "angle")) > 4)
     expect(goal).to_contain_text("Not counted: this run")
     press(swing, "Reset")
     expect(goal).to_contain_text("0.00 s of 0.2 s")
@@ -278,24 +278,24 @@ def test_every_kind_of_geom_and_overlay_is_drawn_and_a_large_state_fits_into_a_l
 ) -> None:
     page = lesson.page
     found = lab(page, ALL)
-    before = still(page, found.locator(".lab-view"))
+    before = wait_until_still(page, found.locator(".lab-view"))
     for box in found.locator(".lab-check input").all():
         box.check()
     for arrow in found.locator(".lab-arrow").all():
         arrow.click()
         expect(arrow).to_have_attribute("aria-pressed", "true")
     press(found, "Play")
-    comes(page, lambda: time_of(found) > 0.6)  # by then bodies touch the ground
-    changed(page, found.locator(".lab-view"), before)
+    wait_for_condition(page, lambda: time_of(found) > 0.6)  # by then bodies touch the ground
+    wait_for_change(page, found.locator(".lab-view"), before)
     press(found, "Pause")
     reach(page, ALL, "paused")
     state = state_of(page, found)
     assert floats(state).size > 500
     expect(found.locator(".lab-message")).not_to_contain_text("controls only")
-    other, said = watched(page.context)
+    other, said = watch_page(page.context)
     other.goto(page.evaluate("() => location.href"))
     again = lab(other, ALL)
-    comes(other, lambda: time_of(again) > 0)
+    wait_for_condition(other, lambda: time_of(again) > 0)
     back = state_of(other, again)
     assert (back["n"], back["t"]) == (state["n"], state["t"])
     assert floats(back).tobytes() == floats(state).tobytes()
@@ -308,12 +308,12 @@ def test_lab_of_a_kind_of_the_course_runs_two_simulations(lesson: Lesson) -> Non
     twins = lab(page, TWINS, None)
     twins.locator(".lab-play").wait_for()
     views = twins.locator(".lab-view").all()
-    first = [still(page, view) for view in views]
+    first = [wait_until_still(page, view) for view in views]
     press(twins, "Play")
-    comes(page, lambda: time_of(twins) > 0.3)
+    wait_for_condition(page, lambda: time_of(twins) > 0.3)
     press(twins, "Pause")
     for view, before in zip(views, first, strict=True):
-        changed(page, view, before)
+        wait_for_change(page, view, before)
     expect(twins.locator(".lab-plot canvas")).to_be_visible()
     expect(twins.locator(".lab-message:visible")).to_have_count(0)
     assert lesson.said == []
@@ -321,6 +321,6 @@ def test_lab_of_a_kind_of_the_course_runs_two_simulations(lesson: Lesson) -> Non
 
 def test_lab_starts_by_itself_where_motion_is_welcome(lesson: Lesson) -> None:
     found = lab(lesson.page, AUTO, "playing")
-    comes(lesson.page, lambda: time_of(found) > 0)
+    wait_for_condition(lesson.page, lambda: time_of(found) > 0)
     press(found, "Pause")
     reach(lesson.page, AUTO, "paused")

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import BrowserContext, CDPSession, Page, Route
 
 from support.lab_course import PAGE
-from support.lab_page import SWING, served, watched
+from support.lab_page import SWING, fetch_text, watch_page
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -90,14 +90,14 @@ def kept(page: Page, session: CDPSession) -> Kept:
 
 
 def reveal(route: Route) -> None:
-    route.fulfill(body=REVEAL + served(route), headers={"content-type": "text/javascript"})
+    route.fulfill(body=REVEAL + fetch_text(route), headers={"content-type": "text/javascript"})
 
 
 def test_two_hundred_labs_that_come_and_go_leave_nothing(
     context: BrowserContext, base: str
 ) -> None:
     context.route(re.compile(r"/worker\.[0-9a-f]+\.js$"), reveal)
-    page, said = watched(context)
+    page, said = watch_page(context)
     page.set_viewport_size({"width": 400, "height": 500})
     page.goto(base + PAGE)
     session = context.new_cdp_session(page)

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.built_sites import Site
-from support.lab_page import becomes, comes, until
+from support.lab_page import becomes, until, wait_for_condition
 
 pytestmark = pytest.mark.browser
 
@@ -42,7 +42,7 @@ def test_the_anchor_of_a_formula_is_seen_when_it_is_pointed_at_or_focused(
     expect(anchor).to_have_css("opacity", "0")
     page.hover(NEWTON)
     expect(anchor).to_have_css("opacity", "1")
-    comes(page, lambda: large_enough(anchor))
+    wait_for_condition(page, lambda: large_enough(anchor))
     page.mouse.move(0, 0)
     anchor.evaluate("node => node.focus({focusVisible: true})")
     expect(anchor).to_have_css("opacity", "1")
@@ -107,7 +107,7 @@ def test_a_long_contents_list_follows_the_reader(page: Page, base: str) -> None:
     for part in ("Part 20", "Part 26.1", "Part 2"):
         page.get_by_role("heading", name=part).first.evaluate("node => node.scrollIntoView()")
         expect(current(page)).to_have_text(re.compile(f"^{re.escape(part)}"))
-        comes(page, lambda: in_sight(page))
+        wait_for_condition(page, lambda: in_sight(page))
     page.evaluate("scrollTo(0, 0)")
     becomes(page, lambda: toc.evaluate("node => node.scrollTop"), 0)
 
@@ -148,7 +148,7 @@ def test_the_nodes_of_a_drawing_are_links(page: Page, base: str) -> None:
     expect(wide).to_be_hidden()
     expect(narrow).to_be_visible()
     until(page, "() => document.documentElement.scrollWidth === 320")
-    comes(page, lambda: large_enough(narrow.get_by_role("link").first))
+    wait_for_condition(page, lambda: large_enough(narrow.get_by_role("link").first))
     narrow.get_by_role("link", name="1.1 Lesson one (Published)").click()
     page.wait_for_url("**/1.1-one.html")
 

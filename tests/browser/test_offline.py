@@ -18,7 +18,7 @@ from coursebuild.preview.server import PreviewServer
 from coursebuild.preview.session import Session
 from support.built_sites import Site
 from support.lab_course import PAGE
-from support.lab_page import becomes, comes, lab, until, watched
+from support.lab_page import becomes, lab, until, wait_for_condition, watch_page
 from support.scratch_course import Folder
 from support.static_host import Host
 
@@ -91,7 +91,7 @@ def settle(page: Page) -> None:
 
 def settled_page(context: BrowserContext, host: Host, path: str = "") -> tuple[Page, list[str]]:
     """A page whose worker has kept what it keeps."""
-    page, said = watched(context)
+    page, said = watch_page(context)
     page.goto(host.url + path)
     page.evaluate("navigator.serviceWorker.ready.then(() => 0)")
     own = "new URL(document.documentElement.dataset.root + 'service-worker.js', document.baseURI)"
@@ -181,17 +181,17 @@ def test_no_way_back_leads_elsewhere(kept: tuple[Page, Host]) -> None:
 def test_nothing_is_asked_for_before_the_page_has_loaded_and_only_once(
     context: BrowserContext, host: Host
 ) -> None:
-    page, _ = watched(context)
+    page, _ = watch_page(context)
     page.goto(host.url + FIRST)
     loaded = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd")
     until(page, "navigator.serviceWorker.controller !== null")
     list_ = "performance.getEntriesByType('resource').filter(({ name }) => /files.json/.test(name))"
     assert page.evaluate(f"{list_}.every(({{ startTime }}) => startTime > {loaded})")
     settle(page)
-    host.since()
+    host.take_requests()
     page.goto(host.url + SECOND)
     settle(page)
-    assert host.since() == [SECOND]
+    assert host.take_requests() == [SECOND]
 
 
 def test_page_that_was_kept_says_when_there_is_a_newer_one(
@@ -228,7 +228,7 @@ def test_several_courses_on_one_origin(
 
 
 def test_reader_chooses_what_is_kept(context: BrowserContext, host: Host) -> None:
-    page, said = watched(context)
+    page, said = watch_page(context)
     page.goto(f"{host.url}offline/")
     see(page, "files of the course are here.")
     expect(page.get_by_label("all text and pictures")).to_be_checked()
@@ -254,7 +254,7 @@ def test_reader_chooses_what_is_kept(context: BrowserContext, host: Host) -> Non
 def test_last_report_stands_where_the_store_opens_after_it(
     context: BrowserContext, host: Host
 ) -> None:
-    page, said = watched(context)
+    page, said = watch_page(context)
     page.add_init_script(SLOW_STORE)
     page.goto(f"{host.url}offline/")
     see(page, "files of the course are here.")
@@ -308,12 +308,12 @@ def test_lab_that_was_used_runs_without_a_network(
     """Also where it ran before there was a worker."""
     shutil.copytree(course.public, tmp_path / "site")
     with Host(tmp_path / "site") as host:
-        page, _ = watched(context)
+        page, _ = watch_page(context)
         # The host has none yet: a request that is caught in the browser can hold back the next one.
         worker = (tmp_path / "site/service-worker.js").rename(tmp_path / "worker.js")
         page.goto(host.url + PAGE)
         lab(page)
-        comes(page, lambda: "service-worker.js" in host.asked)
+        wait_for_condition(page, lambda: "service-worker.js" in host.requests)
         worker.rename(tmp_path / "site/service-worker.js")
         page.reload()
         lab(page)

@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import BrowserContext, Page, expect
 
 from support.axe import violations
-from support.lab_page import becomes, watched
+from support.lab_page import becomes, watch_page
 from support.quiz_page import press, question
 
 pytestmark = pytest.mark.browser
@@ -23,7 +23,7 @@ def lesson(quizzes: str) -> str:
 
 @pytest.fixture
 def page(context: BrowserContext) -> Iterator[Page]:
-    page, said = watched(context)
+    page, said = watch_page(context)
     yield page
     assert [text for text in said if "/assets/labs/" not in text] == []
 

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page, expect
 from pypdf import PdfReader
 
 from support.built_sites import Site
-from support.lab_page import becomes, settled
+from support.lab_page import becomes, wait_until_settled
 
 pytestmark = pytest.mark.browser
 
@@ -50,7 +50,7 @@ HEADINGS = ".prose :is(h2, h3), .callout-head, .lab-title"
 
 def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
     page.goto(sites["real"].url(REAL))
-    settled(page)
+    wait_until_settled(page)
     headings = page.locator(HEADINGS).evaluate_all(
         "all => all.map(h => h.innerText.replace('#', '').trim())"
     )
@@ -77,7 +77,7 @@ def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
 def test_what_is_folded_is_open_and_links_say_where_they_lead(nasty: str, page: Page) -> None:
     page.set_viewport_size({"width": 1440, "height": 900})
     page.goto(nasty)
-    settled(page)
+    wait_until_settled(page)
     text = words(" ".join(printed(page)))
     for there in ("Hidden at first.", "return one(x) + 13", "So.", "A note whose mark is folded"):
         assert there in text, there

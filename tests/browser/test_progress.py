@@ -9,8 +9,17 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import BrowserContext, Locator, Page, Route, expect
 
-from support.lab_page import becomes, comes, until
-from support.reader_page import FALL_PAGE, KEY, OVERALL, PUSH_PAGE, WAY, choose, put, question
+from support.lab_page import becomes, until, wait_for_condition
+from support.reader_page import (
+    FALL_PAGE,
+    KEY,
+    OVERALL,
+    PUSH_PAGE,
+    WAY,
+    choose,
+    question,
+    store_answers,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -20,7 +29,9 @@ Opened = Callable[[str], Page]
 def marked(page: Page, id: str, text: str) -> None:
     """The mark of a lesson, as it is read out, comes to begin with a text."""
     place = page.locator(f'[data-lesson="{id}"] [data-mark]')
-    comes(page, lambda: " ".join((place.text_content() or "").split()).startswith(text))
+    wait_for_condition(
+        page, lambda: " ".join((place.text_content() or "").split()).startswith(text)
+    )
 
 
 def lesson_end(page: Page) -> Locator:
@@ -61,7 +72,7 @@ def test_home_page_leads_back_to_the_section(calm: BrowserContext, site: str) ->
     page.goto(site + PUSH_PAGE)
     page.evaluate("() => document.getElementById('law').scrollIntoView()")
     written = f"() => localStorage.getItem('{KEY}') !== null"
-    comes(page, lambda: page.clock.run_for(1000) or page.evaluate(written))
+    wait_for_condition(page, lambda: page.clock.run_for(1000) or page.evaluate(written))
     page.goto(site)
     start = page.locator('[data-progress="start"]')
     expect(start.locator("a")).to_have_text("Continue with 1.1 Push & <em>pull</em>")
@@ -112,7 +123,7 @@ def test_marks_move_nothing(opened: Opened, site: str) -> None:
     The fonts are left out: what they move is another matter, measured in `test_lighthouse.py`.
     """
     page = opened(site + FALL_PAGE)
-    put(page, WAY, {"quiz": "push.check_1", "key": "smoke", "right": True, "number": 3})
+    store_answers(page, WAY, {"quiz": "push.check_1", "key": "smoke", "right": True, "number": 3})
     quiet = page.context.new_page()
     quiet.route("**/*.woff2", lambda route: route.abort())
     quiet.add_init_script(DRAWN_FIRST)
@@ -122,7 +133,7 @@ def test_marks_move_nothing(opened: Opened, site: str) -> None:
         quiet.set_viewport_size({"width": width, "height": 900})
         for path in ("", "levels/1.html", "progress/", "review/"):
             quiet.goto(site + path, wait_until="commit")
-            comes(quiet, lambda: len(held) > 0)
+            wait_for_condition(quiet, lambda: len(held) > 0)
             quiet.evaluate(MARKED)  # the page is drawn before its script comes
             held.pop().continue_()
             quiet.wait_for_load_state()

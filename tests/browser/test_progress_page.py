@@ -10,7 +10,16 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from support.lab_page import becomes, until
-from support.reader_page import FALL_PAGE, OVERALL, PUSH_PAGE, WAY, choose, kept, put, question
+from support.reader_page import (
+    FALL_PAGE,
+    OVERALL,
+    PUSH_PAGE,
+    WAY,
+    choose,
+    question,
+    store_answers,
+    stored_progress,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -41,7 +50,7 @@ def test_saving_forgetting_and_bringing_in(
     assert saving.value.suggested_filename in named
     file = tmp_path / "saved.json"
     saving.value.save_as(file)
-    assert json.loads(file.read_text("utf-8")) == kept(page)
+    assert json.loads(file.read_text("utf-8")) == stored_progress(page)
 
     page.get_by_role("button", name="Forget everything").click()
     ask = page.get_by_role("dialog", name="Forget everything?")
@@ -90,21 +99,21 @@ WRONG_FILES = (
 
 def test_wrong_files_change_nothing(opened: Opened, site: str, tmp_path: Path) -> None:
     page = opened(site)
-    put(page, WAY)
+    store_answers(page, WAY)
     page.goto(site + "progress/")
-    before = kept(page)
+    before = stored_progress(page)
     for data, message in WRONG_FILES:
         (tmp_path / "wrong.json").write_bytes(data)
         page.locator("input[type=file]").set_input_files(tmp_path / "wrong.json")
         expect(page.locator(TOLD)).to_contain_text(message)
-        becomes(page, lambda: kept(page), before)
+        becomes(page, lambda: stored_progress(page), before)
 
 
 def test_what_is_no_longer_in_the_course_is_shown_and_can_be_forgotten(
     opened: Opened, site: str
 ) -> None:
     page = opened(site)
-    put(
+    store_answers(
         page,
         {"quiz": "<i>gone", "key": "x", "lesson": "7.7", "number": 3},
         {**WAY, "key": "was", "number": 9},
@@ -127,7 +136,7 @@ def test_what_is_no_longer_in_the_course_is_shown_and_can_be_forgotten(
 
 def test_everything_works_from_the_keyboard(opened: Opened, site: str) -> None:
     page = opened(site)
-    put(page, WAY)
+    store_answers(page, WAY)
     page.goto(site + "review/")
     press(page, "Begin")
     expect(question(page, "way").locator(".quiz-check")).to_be_visible()
@@ -172,7 +181,7 @@ SMALLEST = """(part) => Math.min(...[...part.querySelectorAll('button, input[typ
 
 def test_what_can_be_pressed_is_large_enough(opened: Opened, site: str) -> None:
     page = opened(site)
-    put(page, {**WAY, "quiz": "gone"})
+    store_answers(page, {**WAY, "quiz": "gone"})
     page.set_viewport_size({"width": 320, "height": 640})
     for path, part, button in (
         ("progress/", "main", "Forget all of these"),

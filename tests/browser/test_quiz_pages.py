@@ -12,7 +12,7 @@ from playwright.sync_api import BrowserContext, Page, expect
 from support.axe import violations
 from support.built_sites import Site, course_copy
 from support.lab_page import becomes, until
-from support.preview_process import serving
+from support.preview_process import serve_preview
 from support.quiz_page import (
     ANGLE,
     KEY,
@@ -29,9 +29,9 @@ from support.quiz_page import (
     answer_field,
     clean_page,
     items,
-    kept,
     press,
     question,
+    stored_answer,
     verdict,
     visit,
 )
@@ -109,7 +109,9 @@ def test_answers_are_there_again_and_those_that_do_not_fit_are_left_out(page: Pa
     expect(question(page, PREDICT).locator(".lab")).to_be_visible()
     expect(question(page, OPEN).get_by_role("radio", name="In part")).to_be_checked()
     becomes(page, lambda: items(page), order)
-    becomes(page, lambda: (kept(page, MCQ) or {})["tries"], 1)  # loading answers nothing again
+    becomes(
+        page, lambda: (stored_answer(page, MCQ) or {})["tries"], 1
+    )  # loading answers nothing again
     for given in MISFITS:
         page.evaluate(MISFIT, given)
         visit(page, page.url)
@@ -196,8 +198,8 @@ def test_half_typed_answer_survives_the_author(
     tmp_path: Path, stores: Path, calm: BrowserContext
 ) -> None:
     folder = course_copy("quizzes", tmp_path / "course", stores)
-    with serving(folder) as preview:
-        preview.heard("checked: ")
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("checked: ")
         page = calm.new_page()
         visit(page, f"http://127.0.0.1:{preview.port}/{PATH}")
         page.evaluate("window.same = true")

@@ -24,9 +24,9 @@ from support.quiz_page import (
     answer_field,
     clean_page,
     items,
-    kept,
     press,
     question,
+    stored_answer,
     texts,
     verdict,
 )
@@ -56,7 +56,7 @@ def test_one_right_option_of_several(lesson: Page) -> None:
     said = verdict(lesson, MCQ)
     press(lesson, MCQ)
     expect(said).to_have_text("Choose one first.")
-    assert kept(lesson, MCQ) is None
+    assert stored_answer(lesson, MCQ) is None
     radios.nth(0).check()
     expect(said).to_be_empty()
     press(lesson, MCQ)
@@ -73,7 +73,7 @@ def test_one_right_option_of_several(lesson: Page) -> None:
     expect(said).to_have_attribute("role", "status")
     expect(one.get_by_role("button", name="Check")).to_be_focused()
     expect(one.get_by_role("button", name="Check")).to_have_attribute("aria-disabled", "true")
-    answer = kept(lesson, MCQ) or {}
+    answer = stored_answer(lesson, MCQ) or {}
     assert (answer["right"], answer["tries"], answer["number"]) == (True, 2, 1)
     assert (answer["kind"], answer["lesson"], len(answer["given"])) == ("mcq", "1.1", 1)
 
@@ -102,7 +102,7 @@ def test_number_is_judged_and_told_what_is_wrong_with_it(lesson: Page) -> None:
     press(lesson, NUMBER)
     expect(said).to_contain_text("This cannot be read.")
     expect(said).to_contain_text("something unexpected at “<img src=x onerror=alert(1)>”")
-    assert kept(lesson, NUMBER) is None  # it is no try
+    assert stored_answer(lesson, NUMBER) is None  # it is no try
     for tries, (entered, text, wrong) in enumerate(
         (
             ("80", "the power of ten is not", "true"),
@@ -115,7 +115,7 @@ def test_number_is_judged_and_told_what_is_wrong_with_it(lesson: Page) -> None:
         expect(said).to_contain_text(text)
         expect(field).to_be_focused()
         becomes(lesson, lambda: field.get_attribute("aria-invalid") or "false", wrong)
-        answer = kept(lesson, NUMBER) or {}
+        answer = stored_answer(lesson, NUMBER) or {}
         found = (answer["given"], answer["right"], answer["tries"])
         assert found == (entered, wrong == "false", tries)
     # It is mended beside what is wrong with it.
@@ -159,7 +159,7 @@ def test_open_question_is_compared_and_marked_by_the_learner(lesson: Page) -> No
     answer_field(lesson, OPEN).fill("It <b>is</b>\nso.")
     press(lesson, OPEN, "Compare")
     expect(verdict(lesson, OPEN)).to_contain_text("Since so.")
-    assert (kept(lesson, OPEN) or {})["right"] is None
+    assert (stored_answer(lesson, OPEN) or {})["right"] is None
     for name, said, right in (
         ("In part", "Marked as right in part.", False),
         ("It says the same", "Marked as right.", True),
@@ -167,7 +167,7 @@ def test_open_question_is_compared_and_marked_by_the_learner(lesson: Page) -> No
     ):
         one.get_by_role("radio", name=name).check()
         expect(verdict(lesson, OPEN)).to_contain_text(said)
-        answer = kept(lesson, OPEN) or {}
+        answer = stored_answer(lesson, OPEN) or {}
         assert (answer["right"], answer["tries"]) == (right, 1)
 
 
@@ -266,7 +266,7 @@ def test_hints_come_one_by_one_and_the_answer_after_a_try(page: Page) -> None:
     question(page, MCQ).get_by_role("radio").nth(2).check()
     press(page, MCQ)
     expect(verdict(page, MCQ)).to_contain_text("Not right.")
-    assert (kept(page, MCQ) or {})["hints"] == 1
+    assert (stored_answer(page, MCQ) or {})["hints"] == 1
     one, field = question(page, NUMBER), answer_field(page, NUMBER)
     reveal = one.get_by_role("button", name="Show the answer")
     again = one.get_by_role("button", name="Try again")
@@ -278,7 +278,7 @@ def test_hints_come_one_by_one_and_the_answer_after_a_try(page: Page) -> None:
     expect(verdict(page, NUMBER)).to_contain_text("0.08 kg m2 within 0.0001 kg m2")
     expect(verdict(page, NUMBER)).to_contain_text("So much.")
     expect(again).to_be_focused()
-    assert (kept(page, NUMBER) or {})["right"] is False
+    assert (stored_answer(page, NUMBER) or {})["right"] is False
     again.click()
     expect(verdict(page, NUMBER)).to_be_empty()
     expect(field).to_have_value("")

@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from support.axe import violations
 from support.built_sites import Site
-from support.lab_page import becomes, comes, settled, until
+from support.lab_page import becomes, until, wait_for_condition, wait_until_settled
 
 pytestmark = pytest.mark.browser
 
@@ -31,7 +31,7 @@ def open_page(browsers: Mapping[str, Browser], sites: Mapping[str, Site]) -> Ite
             made = browsers["plain"].new_context(viewport=viewport, **options)
             page = stack.enter_context(made).new_page()
             page.goto(sites[name].url(LESSON) + at)
-            settled(page)
+            wait_until_settled(page)
             return page
 
         yield open_page
@@ -65,7 +65,7 @@ def test_wide_things_scroll_in_themselves(open_page: OpenPage) -> None:
     output.focus()
     page.keyboard.press("End")
     page.keyboard.press("ArrowRight")
-    comes(page, lambda: output.evaluate("b => b.scrollLeft") > 0)
+    wait_for_condition(page, lambda: output.evaluate("b => b.scrollLeft") > 0)
 
 
 def test_code_in_a_callout_is_as_wide_as_elsewhere(open_page: OpenPage) -> None:
@@ -78,8 +78,8 @@ def test_code_in_a_callout_is_as_wide_as_elsewhere(open_page: OpenPage) -> None:
 
     for width in (800, 1200, 1440):
         page.set_viewport_size({"width": width, "height": 900})
-        comes(page, lambda: ends(".callout-solution > .code", ".prose > .script"))
-        comes(page, lambda: ends(".callout-solution > p >> nth=1", ".prose > p"))
+        wait_for_condition(page, lambda: ends(".callout-solution > .code", ".prose > .script"))
+        wait_for_condition(page, lambda: ends(".callout-solution > p >> nth=1", ".prose > p"))
 
 
 def test_formulas_of_usual_height_leave_lines_where_they_are(open_page: OpenPage) -> None:
@@ -164,7 +164,7 @@ def test_an_address_of_no_line_does_no_harm(open_page: OpenPage) -> None:
         page.evaluate("to => { location.hash = to }", address)
         becomes(page, lambda: marked(page), [])
         page.reload()
-        settled(page)
+        wait_until_settled(page)
         assert marked(page) == [], address
     expect(page.locator(".lines").first).to_be_visible()
 
@@ -177,11 +177,11 @@ def test_lines_are_marked_by_pointer_and_by_keys(open_page: OpenPage) -> None:
     box = column.bounding_box()
     height = box["height"] / column.inner_text().count("\n", 0) if box else 0
     column.click(position={"x": 20, "y": height * 2.2})
-    comes(page, lambda: len(marked(page)) == 1)
+    wait_for_condition(page, lambda: len(marked(page)) == 1)
     expect(page).to_have_url(re.compile(r"#sub/wide\.L\d+$"))
     becomes(page, lambda: marked(page), [page.url.partition("#")[2]])
     column.press("Shift+ArrowDown")
-    comes(page, lambda: len(marked(page)) == 2)
+    wait_for_condition(page, lambda: len(marked(page)) == 2)
     expect(page).to_have_url(re.compile(r"#sub/wide\.L\d+-L\d+$"))
     column.press("Home")
     becomes(page, lambda: marked(page), [f"sub/wide.L{first}"])
@@ -263,7 +263,7 @@ def test_each_note_is_there_once_and_folded_ones_wait(open_page: OpenPage) -> No
         below = all(a["bottom"] <= b["top"] for a, b in itertools.pairwise(order))
         return below and ids == sorted(ids)
 
-    comes(page, listed)  # at the end
+    wait_for_condition(page, listed)  # at the end
 
 
 # ------------------------------------------------------------------------- from the right

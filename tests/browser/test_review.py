@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from support.built_sites import Site
-from support.reader_page import FALL_PAGE, OVERALL, PUSH_PAGE, WAY, choose, put, question
+from support.reader_page import FALL_PAGE, OVERALL, PUSH_PAGE, WAY, choose, question, store_answers
 from support.scratch_course import Folder
 from support.static_host import Host
 
@@ -30,7 +30,7 @@ def is_chosen(found: Locator, option: str) -> None:
 
 def test_missed_questions_come_back(opened: Opened, site: str) -> None:
     page = opened(site)
-    put(
+    store_answers(
         page,
         {"quiz": "push.check_1", "key": "smoke", "number": 3},
         WAY,
@@ -73,7 +73,7 @@ def test_missed_questions_come_back(opened: Opened, site: str) -> None:
 
 def test_question_that_cannot_be_fetched_is_linked(opened: Opened, site: str) -> None:
     page = opened(site + "about.html")
-    put(page, WAY)
+    store_answers(page, WAY)
     page = page.context.new_page()
     page.route("**/lessons/*", lambda route: route.fulfill(status=500, body="no"))
     page.goto(site + "review/")
@@ -88,7 +88,7 @@ def test_review_opened_from_disk_links_to_questions(
     opened: Opened, sites: Mapping[str, Site]
 ) -> None:
     page = opened((sites["reader"].public / "review/index.html").as_uri())
-    put(page, WAY)
+    store_answers(page, WAY)
     page.reload()
     expect(review_of(page)).to_contain_text("Pages opened from disk")
     page.get_by_role("link", name="question 1 in its lesson").click()

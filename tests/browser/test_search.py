@@ -11,7 +11,7 @@ from playwright.sync_api import BrowserContext, Locator, Page, expect
 
 from support.axe import violations
 from support.built_sites import Site
-from support.lab_page import becomes, settled, until
+from support.lab_page import becomes, until, wait_until_settled
 
 pytestmark = pytest.mark.browser
 
@@ -55,7 +55,7 @@ LOADED = """() => performance.getEntriesByType('resource').map((entry) => entry.
 
 def test_nothing_is_loaded_before_it_is_asked_for(opened: Opened, site: str) -> None:
     page = opened(site + ONE)
-    settled(page)
+    wait_until_settled(page)
     assert page.evaluate(LOADED) == []
     open_by_key(page)
     becomes(page, lambda: len(page.evaluate(LOADED)), 2)

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import BrowserContext, Page
 
 from support.lab_course import PAGE
-from support.lab_page import SWING, comes, lab, reach, time_of, watched
+from support.lab_page import SWING, lab, reach, time_of, wait_for_condition, watch_page
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -40,12 +40,12 @@ DRAW = """(n) => new Promise((done) => {
 
 def run(context: BrowserContext, base: str) -> tuple[Page, list[str]]:
     """The swing with its plot, running for a while."""
-    page, said = watched(context)
+    page, said = watch_page(context)
     page.goto(base + PAGE)
     swing = lab(page)
     swing.get_by_role("button", name="Play").click()
     reach(page, SWING, "playing")
-    comes(page, lambda: time_of(swing) > 1)
+    wait_for_condition(page, lambda: time_of(swing) > 1)
     return page, said
 
 

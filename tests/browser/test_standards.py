@@ -17,7 +17,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 from support import quiz_page
 from support.axe import violations
 from support.built_sites import Site
-from support.lab_page import settled, until, watched
+from support.lab_page import until, wait_until_settled, watch_page
 from support.scratch_course import ROOT
 from support.static_host import Host
 
@@ -164,10 +164,10 @@ def keeps_the_standards(browser: Browser, site: Site, paths: list[str], closely:
     with browser.new_context(viewport=WINDOW) as context:
         asked: list[str] = []
         context.on("request", lambda request: asked.append(request.url))
-        page, said = watched(context)
+        page, said = watch_page(context)
         for path in paths:
             page.goto(site.url(path))
-            settled(page)
+            wait_until_settled(page)
             if closely:
                 run_labs(page)
             page.evaluate(WHOLE)
@@ -190,14 +190,14 @@ def test_every_kind_of_page_opens_from_disk(
     """Without a word to the console; what cannot work from there says so."""
     site = sites["full"]
     with browsers["webgl"].new_context(viewport=WINDOW) as context:
-        page, said = watched(context)
+        page, said = watch_page(context)
         asked: list[str] = []
         page.on("request", lambda request: asked.append(request.url))
         for kind, path in site.kinds().items():
             if kind == "notfound":  # it is served at any address, and names its files for that
                 continue
             page.goto((site.public / path).as_uri())
-            settled(page)
+            wait_until_settled(page)
             for lab in page.locator("main [data-lab][data-config]").all():
                 expect(lab).to_contain_text("when the page comes from a web server")
         assert said == []

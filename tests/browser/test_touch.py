@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, CDPSession, Page
 
 from support.lab_course import PAGE
-from support.lab_page import MOUNT, SWING, comes, until, watched
+from support.lab_page import MOUNT, SWING, until, wait_for_condition, watch_page
 
 pytestmark = pytest.mark.browser
 
@@ -75,7 +75,7 @@ def screen(browsers: Mapping[str, Browser], base: str) -> Iterator[Phone]:
     with browsers["webgl"].new_context(
         viewport={"width": 390, "height": 700}, has_touch=True, is_mobile=True
     ) as context:
-        page, said = watched(context)
+        page, said = watch_page(context)
         page.goto(base + PAGE)
         # Fonts that come later move the text, and the page with it.
         page.evaluate("() => document.fonts.ready.then(() => 0)")
@@ -125,7 +125,7 @@ def turned(page: Page, before: dict[str, Any], **pixels: float) -> None:
         now = camera(page)
         return all(abs(now[name] - angle) <= 1 for name, angle in wanted.items())
 
-    comes(page, there)
+    wait_for_condition(page, there)
 
 
 def test_one_finger_turns(phone: Phone) -> None:
@@ -151,7 +151,7 @@ def test_finger_that_goes_up_or_down_scrolls_the_page_each_time(phone: Phone) ->
         fingers.down((beside, y))
         fingers.move((beside, y + way * 120), steps=12)
         fingers.up()
-        comes(page, lambda: (scroll - scrolled(page)) * way > 60)  # noqa: B023
+        wait_for_condition(page, lambda: (scroll - scrolled(page)) * way > 60)  # noqa: B023
         page.evaluate(RESTS, 20)
         assert camera(page) == before
         assert not focused(page)
@@ -161,7 +161,7 @@ def test_tap_gives_the_picture_every_gesture(phone: Phone) -> None:
     page, fingers, _ = phone
     x, y = middle(page)
     fingers.tap(x, y)
-    comes(page, lambda: focused(page))
+    wait_for_condition(page, lambda: focused(page))
     before, scroll = camera(page), scrolled(page)
     fingers.down((x, y - 40))
     fingers.move((x, y + 40), steps=12)
@@ -174,7 +174,7 @@ def test_tap_gives_the_picture_every_gesture(phone: Phone) -> None:
         return not focused(page)
 
     # Beside it, another tap gives the page its own back.
-    comes(page, left)
+    wait_for_condition(page, left)
 
 
 @pytest.mark.parametrize("sideways", [True, False])
@@ -190,14 +190,14 @@ def test_two_fingers_zoom_and_move(phone: Phone, sideways: bool) -> None:
     fingers.down(at(-30), at(30))
     fingers.move(at(-90), at(90))
     third = pytest.approx(before["distance"] / 3, rel=0.05)
-    comes(page, lambda: camera(page)["distance"] == third)
+    wait_for_condition(page, lambda: camera(page)["distance"] == third)
     wide = camera(page)
     assert wide["target"] == pytest.approx(before["target"], abs=0.02)
     fingers.move(at(-90, 0, 45), at(90, 0, 45))
     height = 2 * wide["distance"] * math.tan(math.pi / 8)
     up = height * math.cos(math.radians(wide["elevation"])) * 45 / HEIGHT
     raised = pytest.approx(wide["target"][2] + up, abs=0.1 * abs(up))
-    comes(page, lambda: camera(page)["target"][2] == raised)
+    wait_for_condition(page, lambda: camera(page)["target"][2] == raised)
     moved = camera(page)
     fingers.up()
     assert moved["distance"] == pytest.approx(wide["distance"], rel=0.02)
@@ -253,7 +253,7 @@ def test_buttons_sliders_and_lists_by_touch(phone: Phone) -> None:
     fingers.down((box["x"] + box["width"] / 2, y))
     fingers.move((box["x"] + box["width"] * 0.9, y))
     fingers.up()
-    comes(page, lambda: abs(float(slider.input_value()) - 18) <= 1.2)
+    wait_for_condition(page, lambda: abs(float(slider.input_value()) - 18) <= 1.2)
     page.locator("#tried .lab-buttons button").tap()
     until(page, "() => window.made.values[0] > 16")
     until(page, "() => window.made.state === 'playing'")

@@ -12,7 +12,7 @@ import pytest
 
 from coursebuild.cli.commands import known_commands
 from coursebuild.core.syntax.schemas import json_schema
-from support.generated_parts import headings, renewed
+from support.generated_parts import headings, regenerate
 from support.markdown_files import PAGES
 
 LONG = 6
@@ -29,7 +29,7 @@ def generated(kind: str) -> set[str]:
 
 
 def test_generated_parts_are_in_step(request: pytest.FixtureRequest) -> None:
-    stale = {path: now for path, text in TEXTS.items() if (now := renewed(text)) != text}
+    stale = {path: now for path, text in TEXTS.items() if (now := regenerate(text)) != text}
     if request.config.getoption("--rewrite-fixtures"):
         for path, now in stale.items():
             path.write_text(now, encoding="utf-8")

@@ -19,13 +19,13 @@ from urllib.request import urlopen
 import pytest
 
 from support.markdown_files import DOCS, Fence, fences
-from support.scratch_course import Done, Folder
+from support.scratch_course import CommandResult, Folder
 
 pytestmark = pytest.mark.site
 
 
 def test_the_tutorial_leads_to_a_published_course(tmp_path: Path) -> None:
-    folder, done = Folder(tmp_path), Done(0, "", "")
+    folder, done = Folder(tmp_path), CommandResult(0, "", "")
     for fence in fences(DOCS / "tutorial.md"):
         if fence.is_("prints"):
             assert fence.text in done.out
@@ -43,7 +43,7 @@ def test_the_tutorial_leads_to_a_published_course(tmp_path: Path) -> None:
     assert "1.3-check" in page
 
 
-def walked(folder: Folder, fence: Fence) -> tuple[Folder, Done]:
+def walked(folder: Folder, fence: Fence) -> tuple[Folder, CommandResult]:
     """The folder in which the commands end, and what the last of them did."""
     path, mistake, edit = fence.value("in"), fence.value("mistake"), fence.value("replace")
     before = folder.text(path) if path else ""
@@ -52,7 +52,7 @@ def walked(folder: Folder, fence: Fence) -> tuple[Folder, Done]:
         head, found, tail = before.rpartition(old)
         assert found
         folder.write(path, head + new + tail)
-    done = Done(0, "", "")
+    done = CommandResult(0, "", "")
     for line in fence.text.splitlines():
         program, *words = shlex.split(line)
         if program == "cd":

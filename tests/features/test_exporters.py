@@ -149,7 +149,7 @@ def test_full_disk_leaves_what_was_there(course: Folder, monkeypatch: pytest.Mon
     done = course.main("export", "scorm")
     assert done.status == 1 and "cannot be written: no space left on device" in done.err
     assert course.read("course-scorm.zip") == once
-    assert not [name for name in course.beside() if name.startswith(".course-scorm.zip")]
+    assert not [name for name in course.entries() if name.startswith(".course-scorm.zip")]
 
 
 @pytest.mark.engine

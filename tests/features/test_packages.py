@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from support.axe import violations
-from support.scratch_course import GOOD, ROOT, Done, Folder
+from support.scratch_course import GOOD, ROOT, CommandResult, Folder
 from support.static_host import Host
 
 pytestmark = pytest.mark.site
@@ -69,7 +69,7 @@ def course(tmp_path_factory: pytest.TempPathFactory, stores: Path, packages: Pat
     return folder
 
 
-def run(folder: Folder, packages: Path, *arguments: str) -> Done:
+def run(folder: Folder, packages: Path, *arguments: str) -> CommandResult:
     return folder.run(*arguments, env={"PYTHONPATH": f"{packages}:{ROOT}"})
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from support.scratch_course import GOOD, ROOT, Done, Folder
+from support.scratch_course import GOOD, ROOT, CommandResult, Folder
 
 pytestmark = pytest.mark.site
 
@@ -33,7 +33,7 @@ def test_a_course_is_built_without_a_feature(feature: str, tmp_path: Path, store
     for name in (feature, *TAKEN[feature]):
         shutil.rmtree(installed / "coursebuild" / "features" / name)
 
-    def run(*arguments: str) -> Done:
+    def run(*arguments: str) -> CommandResult:
         return course.run(*arguments, env={"PYTHONPATH": str(installed)})
 
     done = run("build")
@@ -58,7 +58,7 @@ def test_a_course_is_built_without_a_feature(feature: str, tmp_path: Path, store
                 ("schema", "quiz"): "there is no schema 'quiz': choose from course, lab, model",
             }
             for arguments, reason in said.items():
-                assert run(*arguments) == Done(2, "", f"coursebuild: {reason}\n")
+                assert run(*arguments) == CommandResult(2, "", f"coursebuild: {reason}\n")
             course.write(course.lesson(1), GOOD + QUIZ)
             done = run("check")
             assert done.status == 1

@@ -43,7 +43,7 @@ def test_quaternion_to_four_ulp() -> None:
     for seq, angles in itertools.product(SEQUENCES, TURNS):
         actual = spatial.euler_to_quat(angles, seq)
         errors[seq, angles] = hp.ulps_of(mpmath.mpf(1), actual, exact_quat(np.array(angles), seq))
-    assert hp.beyond(4, errors) == []
+    assert hp.errors_over(4, errors) == []
 
 
 @pytest.mark.site
@@ -58,7 +58,7 @@ def test_angles_give_the_rotation_back_to_six_ulp() -> None:
         assert abs(actual[[0, 2]]).max() <= np.pi, (seq, angles)
         low, high = (0, np.pi) if seq[0] == seq[2] else (-np.pi / 2, np.pi / 2)
         assert low <= actual[1] <= high, (seq, angles)
-    assert hp.beyond(6, errors) == []
+    assert hp.errors_over(6, errors) == []
 
 
 def test_gimbal_lock_has_one_answer() -> None:

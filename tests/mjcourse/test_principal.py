@@ -69,9 +69,9 @@ def test_moments_and_axes() -> None:
         again = hp.matmul(spread, hp.transpose(columns))
         entry = max(max(map(abs, entries)), hp.DENORMAL / hp.ULP)
         differences[case] = hp.ulps_of(entry, tensor, again)
-    assert hp.beyond(4, moment_errors) == []
-    assert hp.beyond(5, bends) == []
-    assert hp.beyond(8, differences) == []
+    assert hp.errors_over(4, moment_errors) == []
+    assert hp.errors_over(5, bends) == []
+    assert hp.errors_over(8, differences) == []
 
 
 def test_graded_tensors_keep_their_small_moments() -> None:
@@ -80,8 +80,8 @@ def test_graded_tensors_keep_their_small_moments() -> None:
         with mpmath.workdps(700):
             expected = sorted(mpmath.eigsy(table_of(tensor), eigvals_only=True))
         moments, _ = spatial.principal_axes(tensor)
-        errors[repr(tensor.tolist())] = hp.own_ulps(moments, expected)
-    assert hp.beyond(8, errors) == []
+        errors[repr(tensor.tolist())] = hp.entry_ulps(moments, expected)
+    assert hp.errors_over(8, errors) == []
 
 
 def test_axes_of_a_diagonal_tensor_are_the_frame_s_own() -> None:

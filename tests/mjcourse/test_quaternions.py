@@ -34,8 +34,8 @@ def test_normalize_to_two_ulp_at_any_length() -> None:
     for quat, size in (*itertools.product(QUATS, hp.SIZES), *((end, 1.0) for end in ends)):
         scaled = np.array(quat) * size
         expected = hp.unit(hp.exact(scaled))
-        errors[quat, size] = hp.own_ulps(spatial.quat_normalize(scaled), expected)
-    assert hp.beyond(2, errors) == []
+        errors[quat, size] = hp.entry_ulps(spatial.quat_normalize(scaled), expected)
+    assert hp.errors_over(2, errors) == []
 
 
 def test_mul_to_two_ulp_of_the_lengths() -> None:
@@ -44,7 +44,7 @@ def test_mul_to_two_ulp_of_the_lengths() -> None:
         p, q = hp.exact(a), hp.exact(b)
         size = hp.length(p) * hp.length(q)
         errors[a, b] = hp.ulps_of(size, spatial.quat_mul(a, b), hp.mul(p, q))
-    assert hp.beyond(2, errors) == []
+    assert hp.errors_over(2, errors) == []
 
 
 def test_mul_is_the_plain_product() -> None:
@@ -63,10 +63,10 @@ def test_rotate_to_six_ulp_at_any_length() -> None:
     errors = {}
     for quat, size, vector in itertools.product(QUATS, hp.SIZES, vectors):
         scaled = np.array(quat) * size
-        expected = hp.turned(hp.exact(scaled), hp.exact(vector))
+        expected = hp.rotate(hp.exact(scaled), hp.exact(vector))
         actual = spatial.quat_rotate(scaled, vector)
         errors[quat, size, vector] = hp.ulps_of(hp.length(hp.exact(vector)), actual, expected)
-    assert hp.beyond(6, errors) == []
+    assert hp.errors_over(6, errors) == []
 
 
 def test_axis_angle_to_four_ulp() -> None:
@@ -82,10 +82,10 @@ def test_axis_angle_to_four_ulp() -> None:
         direction, turn = hp.unit(hp.exact(axis)), mpmath.mpf(angle)
         expected = hp.exp([turn * entry for entry in direction])
         actual = spatial.axis_angle_to_quat(axis, angle)
-        sines[axis, angle] = hp.own_ulps(actual[1:], expected[1:])
+        sines[axis, angle] = hp.entry_ulps(actual[1:], expected[1:])
         cosines[axis, angle] = hp.ulps_of(mpmath.mpf(1), actual[:1], expected[:1])
-    assert hp.beyond(4, sines) == []
-    assert hp.beyond(1, cosines) == []
+    assert hp.errors_over(4, sines) == []
+    assert hp.errors_over(1, cosines) == []
 
 
 def test_a_bad_quaternion_is_nan_and_the_others_are_not() -> None:

@@ -31,8 +31,8 @@ def test_matrix_of_a_quaternion() -> None:
         actual, case = spatial.quat_to_mat(quat), tuple(quat.tolist())
         errors[case] = hp.ulps_of(ONE, actual, hp.matrix(hp.exact(quat)))
         bends[case] = orthonormality(actual)
-    assert hp.beyond(4, errors) == []
-    assert hp.beyond(5, bends) == []
+    assert hp.errors_over(4, errors) == []
+    assert hp.errors_over(5, bends) == []
 
 
 @pytest.mark.site
@@ -45,7 +45,7 @@ def test_quaternion_of_a_matrix_at_any_angle() -> None:
         expected = hp.same_up_to_sign(actual, exact_quat(mat))
         errors[axis, angle] = hp.ulps_of(ONE, actual, expected)
         assert actual[0] >= 0, (axis, angle)
-    assert hp.beyond(3, errors) == []
+    assert hp.errors_over(3, errors) == []
 
 
 def exact_quat(mat: np.ndarray) -> hp.Vector:

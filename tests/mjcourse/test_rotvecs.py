@@ -22,8 +22,8 @@ def test_exp_to_four_ulp_of_each_component() -> None:
         if hp.length(hp.exact(rotvec)) > mpmath.pi:
             rotvec = rotvec / 2
         expected = hp.exp(hp.exact(rotvec))
-        errors[axis, angle] = hp.own_ulps(spatial.rotvec_to_quat(rotvec)[1:], expected[1:])
-    assert hp.beyond(4, errors) == []
+        errors[axis, angle] = hp.entry_ulps(spatial.rotvec_to_quat(rotvec)[1:], expected[1:])
+    assert hp.errors_over(4, errors) == []
 
 
 @pytest.mark.site
@@ -33,8 +33,8 @@ def test_log_to_four_ulp_of_each_component() -> None:
     for axis, angle, size in itertools.product(hp.AXES, angles, hp.SIZES):
         quat = spatial.axis_angle_to_quat(axis, angle) * size
         expected = hp.log(hp.exact(quat))
-        errors[axis, angle, size] = hp.own_ulps(spatial.quat_to_rotvec(quat), expected)
-    assert hp.beyond(4, errors) == []
+        errors[axis, angle, size] = hp.entry_ulps(spatial.quat_to_rotvec(quat), expected)
+    assert hp.errors_over(4, errors) == []
 
 
 def test_log_keeps_the_digits_of_the_smallest_angles() -> None:
@@ -43,10 +43,10 @@ def test_log_keeps_the_digits_of_the_smallest_angles() -> None:
         rotvec = rotvec_of(axis, angle)
         quat = spatial.rotvec_to_quat(rotvec)
         actual = spatial.quat_to_rotvec(quat)
-        errors[axis, angle, "of the quaternion"] = hp.own_ulps(actual, hp.log(hp.exact(quat)))
+        errors[axis, angle, "of the quaternion"] = hp.entry_ulps(actual, hp.log(hp.exact(quat)))
         if angle > 1e-300:
-            errors[axis, angle, "there and back"] = hp.own_ulps(actual, hp.exact(rotvec))
-    assert hp.beyond(4, errors) == []
+            errors[axis, angle, "there and back"] = hp.entry_ulps(actual, hp.exact(rotvec))
+    assert hp.errors_over(4, errors) == []
 
 
 def test_log_at_exactly_half_a_turn() -> None:
@@ -85,7 +85,7 @@ def test_difference_of_rotations_keeps_its_digits() -> None:
             errors["difference", *case] = hp.ulps_of(size, spatial.quat_sub(b, a), expected)
             distance = spatial.angular_distance(a, b)
             errors["distance", *case] = hp.ulps_of(size, [distance], [size])
-    assert hp.beyond(4, errors) == []
+    assert hp.errors_over(4, errors) == []
 
 
 def test_distance_of_equal_and_opposite_rotations() -> None:
@@ -113,7 +113,7 @@ def test_slerp_to_four_ulp() -> None:
             for t in parts:
                 expected = hp.mul(begin, hp.exp([mpmath.mpf(t) * entry for entry in rotvec]))
                 errors[apart, k, t] = hp.ulps_of(ONE, spatial.quat_slerp(a, b, t), expected)
-    assert hp.beyond(4, errors) == []
+    assert hp.errors_over(4, errors) == []
 
 
 def test_slerp_at_its_ends_and_beyond() -> None:
@@ -134,4 +134,4 @@ def test_integrate_to_four_ulp() -> None:
             expected = hp.mul(hp.unit(hp.exact(quat)), hp.exp(turn))
             actual = spatial.quat_integrate(quat, angvel, dt)
             errors[angle, dt, k] = hp.ulps_of(ONE, actual, expected)
-    assert hp.beyond(4, errors) == []
+    assert hp.errors_over(4, errors) == []

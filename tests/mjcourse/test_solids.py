@@ -26,8 +26,8 @@ def test_box_and_ellipsoid_to_four_ulp() -> None:
         for call, share in ((spatial.box_inertia, 3), (spatial.ellipsoid_inertia, 5)):
             expected = diagonal(*(m / share * moment for moment in moments))
             case = (call.__name__, mass, *half_sizes)
-            errors[case] = hp.own_ulps(call(mass, half_sizes), expected)
-    assert hp.beyond(4, errors) == []
+            errors[case] = hp.entry_ulps(call(mass, half_sizes), expected)
+    assert hp.errors_over(4, errors) == []
 
 
 def test_sphere_to_three_ulp_cylinder_to_five_and_capsule_to_eight() -> None:
@@ -36,15 +36,17 @@ def test_sphere_to_three_ulp_cylinder_to_five_and_capsule_to_eight() -> None:
         m, r, h = hp.exact([mass, radius, half])
         ball = m * r * r * 2 / 5
         actual = spatial.sphere_inertia(mass, radius)
-        spheres[mass, radius] = hp.own_ulps(actual, diagonal(ball, ball, ball))
+        spheres[mass, radius] = hp.entry_ulps(actual, diagonal(ball, ball, ball))
         transverse, axial = m * (r * r / 4 + h * h / 3), m * r * r / 2
         actual = spatial.cylinder_inertia(mass, radius, half)
-        cylinders[mass, radius, half] = hp.own_ulps(actual, diagonal(transverse, transverse, axial))
+        cylinders[mass, radius, half] = hp.entry_ulps(
+            actual, diagonal(transverse, transverse, axial)
+        )
         actual = spatial.capsule_inertia(mass, radius, half)
-        capsules[mass, radius, half] = hp.own_ulps(actual, exact_capsule(m, r, h))
-    assert hp.beyond(3, spheres) == []
-    assert hp.beyond(5, cylinders) == []
-    assert hp.beyond(8, capsules) == []
+        capsules[mass, radius, half] = hp.entry_ulps(actual, exact_capsule(m, r, h))
+    assert hp.errors_over(3, spheres) == []
+    assert hp.errors_over(5, cylinders) == []
+    assert hp.errors_over(8, capsules) == []
 
 
 def exact_capsule(m: mpmath.mpf, r: mpmath.mpf, h: mpmath.mpf) -> hp.Vector:

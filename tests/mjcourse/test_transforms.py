@@ -32,7 +32,7 @@ def test_blocks_of_the_transforms() -> None:
             assert (actual[3:, 3:] == rot).all()
             assert (zero == 0).all()
             errors[kind, tuple(pos)] = hp.ulps_of(size, full, coupling)
-    assert hp.beyond(2, errors) == []
+    assert hp.errors_over(2, errors) == []
 
 
 def test_a_force_off_the_origin_has_a_torque() -> None:

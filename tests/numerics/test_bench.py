@@ -11,7 +11,7 @@ from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.scene import scenes
 from support.bench_runs import FAMILY, MODELS, orders, row
-from support.surveys import declared
+from support.surveys import parse_declared
 
 pytestmark = pytest.mark.site
 
@@ -21,7 +21,7 @@ def of_box() -> ScenarioReport:
     """The first flip of the tumbling box."""
     text = (MODELS / "tumbling_box.toml").read_text(encoding="utf-8")
     model = mujoco.MjModel.from_xml_path(str(MODELS / "tumbling_box.xml"))
-    scene = next(s for s in scenes(model, declared(text)) if s.name == "first-flip")
+    scene = next(s for s in scenes(model, parse_declared(text)) if s.name == "first-flip")
     return measure_scenario(model, scene, clock=None)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.scene import SceneError, scenes
-from support.bench_runs import measured
+from support.bench_runs import measure
 from support.surveys import NOTHING
 
 pytestmark = pytest.mark.site
@@ -38,7 +38,7 @@ def stiff(step: float, start: float, stiffness: float = 1e5) -> Any:
 
 def test_a_scene_that_blows_up_under_its_own_setting() -> None:
     """Without `autoreset="disable"` such a run ends where it began, with error 0."""
-    (report,) = measured(stiff(0.008, 0.01), FROM_KEYFRAME, quick=True)
+    (report,) = measure(stiff(0.008, 0.01), FROM_KEYFRAME, quick=True)
     (own_row,) = (line for line in report.rows if line.own)
     assert own_row.status == "diverged"
     assert "MuJoCo warned of bad accelerations" in own_row.reasons
@@ -57,7 +57,7 @@ def test_a_scene_that_blows_up_under_its_own_setting() -> None:
 
 def test_a_scene_that_diverges_at_every_timestep_is_refused() -> None:
     with pytest.raises(SceneError, match=r"it diverges within .* s even at 0\.25 s a step"):
-        measured(stiff(1.0, 0.01), quick=True)
+        measure(stiff(1.0, 0.01), quick=True)
 
 
 def test_times_are_of_the_clock() -> None:

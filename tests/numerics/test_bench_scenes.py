@@ -7,7 +7,7 @@ import math
 import mujoco
 import pytest
 
-from support.bench_runs import measured, orders, row
+from support.bench_runs import measure, orders, row
 
 pytestmark = pytest.mark.site
 
@@ -35,7 +35,7 @@ measure = "site:tip"
 
 
 def test_commands_are_held_so_that_runge_kutta_keeps_its_order() -> None:
-    (report,) = measured(mujoco.MjModel.from_xml_string(SERVO), SERVO_TOML)
+    (report,) = measure(mujoco.MjModel.from_xml_string(SERVO), SERVO_TOML)
     assert (report.reference, report.hold) == ("ode", 0.3)
     assert orders(report, "position")["RK4"] == pytest.approx(4.0, abs=0.15)
     assert report.figure == "place of the site tip [m]"
@@ -63,7 +63,7 @@ DOUBLE = """\
 
 
 def test_chaos_has_a_horizon_and_then_statistics() -> None:
-    (report,) = measured(
+    (report,) = measure(
         mujoco.MjModel.from_xml_string(DOUBLE),
         '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 9\nsample = 0.04\n',
         quick=True,
@@ -95,7 +95,7 @@ def test_a_block_that_sticks_creeps_alike_in_each_measurement() -> None:
     model = mujoco.MjModel.from_xml_string(BLOCK)
     before = (model.opt.timestep, model.opt.integrator, model.opt.cone, model.opt.disableflags)
     short = '[[scenario]]\nname = "a"\nduration = 0.48\nsample = 0.016\n'
-    (report,), repeated = (measured(model, short, quick=True) for _ in range(2))
+    (report,), repeated = (measure(model, short, quick=True) for _ in range(2))
     opt = model.opt
     assert (opt.timestep, opt.integrator, opt.cone, opt.disableflags) == before
     assert repeated == (report,)
@@ -130,7 +130,7 @@ def test_the_error_of_a_pyramid_is_among_what_is_seen() -> None:
       </worldbody>
     </mujoco>
     """
-    (report,) = measured(mujoco.MjModel.from_xml_string(mjcf), quick=True)
+    (report,) = measure(mujoco.MjModel.from_xml_string(mjcf), quick=True)
     own_row = next(line for line in report.rows if line.own)
     slope, time = 3 * 2**0.5, 2.0
     exact = (slope - 0.3 * 9 / 2**0.5 - (slope - 0.3 * 9)) * time**2 / 2  # half is enough

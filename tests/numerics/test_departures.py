@@ -17,7 +17,16 @@ from coursebuild.numerics.reports.bench import (
 )
 from coursebuild.numerics.reports.cases import BoundaryLine, FigureLine
 from coursebuild.numerics.reports.departures import Departure, case_departures, scene_departures
-from support.bench_reports import FIRST, MACHINE, interval, lost, row, scenario, scene, swing
+from support.bench_reports import (
+    FIRST,
+    MACHINE,
+    diverged_row,
+    interval,
+    row,
+    scenario,
+    scene,
+    swing,
+)
 from support.model_reports import case
 
 
@@ -64,7 +73,9 @@ def test_the_band_of_an_error(was: float, now: float, departs: bool) -> None:
 
 
 def test_a_status_says_all_of_its_row() -> None:
-    assert of_rows(row(), lost("Euler", 0.002)) == [("status", "ok", "diverged", "the same")]
+    assert of_rows(row(), diverged_row("Euler", 0.002)) == [
+        ("status", "ok", "diverged", "the same")
+    ]
 
 
 @pytest.mark.parametrize(

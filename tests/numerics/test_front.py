@@ -6,7 +6,7 @@ import pytest
 
 from coursebuild.numerics.front import front, verdict
 from coursebuild.numerics.reports.bench import WorkPrecisionRow
-from support.bench_reports import lost, row
+from support.bench_reports import diverged_row, row
 
 Point = tuple[float, float] | None
 """Cost and error; `None`: a run that was lost."""
@@ -19,7 +19,7 @@ def rows_with_front(*points: Point) -> tuple[WorkPrecisionRow, ...]:
         is_own = {"own": True} if n == 0 else {}
         name, timestep = ("Euler", 0.002) if n == 0 else ("RK4", 0.01)
         if point is None:
-            rows.append(lost(name, timestep, **is_own))
+            rows.append(diverged_row(name, timestep, **is_own))
         else:
             rows.append(row(name, timestep, cost=point[0], seen=point[1], **is_own))
     return front(rows)

@@ -16,7 +16,7 @@ from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.numerics.reports.plot import plot_svg, work_precision
 from coursebuild.numerics.reports.text import main_quantity, quantities
-from support.bench_reports import lost, row, scenario, swing
+from support.bench_reports import diverged_row, row, scenario, swing
 
 PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")
 
@@ -107,7 +107,7 @@ def test_the_key_says_what_there_is_and_nothing_else() -> None:
 
 
 def test_the_own_setting_is_ringed_also_where_it_was_lost() -> None:
-    for report in (swing(), scenario([lost(own=True), row("RK4", 0.01)])):
+    for report in (swing(), scenario([diverged_row(own=True), row("RK4", 0.01)])):
         root = parse_plot(report)
         first, *_ = root.iter("circle")
         assert first.attrib["r"] == "8.5"

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from coursebuild.numerics.reports.records import BENCH, STABILITY, RecordError
-from support.bench_reports import lost, row, scenario, scene, swing
+from support.bench_reports import diverged_row, row, scenario, scene, swing
 from support.model_reports import case
 
 GOOD = BENCH.encode(scene())
@@ -15,7 +15,11 @@ HEAD = b'{"holds": "coursebuild bench"'
 
 
 def test_what_is_written_is_read() -> None:
-    for report in (scene(), scene(scenario([])), scene(scenario([lost(), row("Ω\n", 1e-300)]))):
+    for report in (
+        scene(),
+        scene(scenario([])),
+        scene(scenario([diverged_row(), row("Ω\n", 1e-300)])),
+    ):
         data = BENCH.encode(report)
         assert BENCH.decode(data) == report
         assert BENCH.encode(BENCH.decode(data)) == data

@@ -14,7 +14,7 @@ from coursebuild.numerics.pilot import run_pilot
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.references import KnownMotion, find_reference
 from coursebuild.numerics.scene import SceneError, scenes
-from support.surveys import NOTHING, declared
+from support.surveys import NOTHING, parse_declared
 
 pytestmark = pytest.mark.site
 
@@ -44,7 +44,7 @@ def pendulum(joint: str = "", floor: float = -9, actuator: str = "", option: str
 def reference_of(
     model: Any, text: str = 'name = "a"\nkeyframe = 0\nduration = 0.5\n'
 ) -> KnownMotion:
-    (scene,) = scenes(model, declared("[[scenario]]\n" + text), quick=True)
+    (scene,) = scenes(model, parse_declared("[[scenario]]\n" + text), quick=True)
     return find_reference(model, run_pilot(model, scene), quick=True)
 
 

@@ -13,7 +13,7 @@ from coursebuild.core.model.scenarios import is_multiple
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.scene import Scene, SceneError, scenes
-from support.surveys import NOTHING, declared
+from support.surveys import NOTHING, parse_declared
 
 ARM = """\
 <mujoco>
@@ -39,7 +39,7 @@ def arm(step: float = 0.002) -> Any:
 
 
 def only(text: str, model: Any = None) -> Scene:
-    (scene,) = scenes(arm() if model is None else model, declared("[[scenario]]\n" + text))
+    (scene,) = scenes(arm() if model is None else model, parse_declared("[[scenario]]\n" + text))
     return scene
 
 
@@ -48,14 +48,14 @@ def test_keyframes_are_scenarios_by_themselves() -> None:
     assert (first.name, first.scenario.keyframe) == ("home", 0)
     assert (second.name, second.scenario.keyframe) == ("keyframe-1", 1)
     assert first.scenario.duration == 2.0
-    assert scenes(arm(), declared("[[keep]]\nfinding='x'\nreason='y'\n"))[0].name == "home"
+    assert scenes(arm(), parse_declared("[[keep]]\nfinding='x'\nreason='y'\n"))[0].name == "home"
 
 
 def test_where_nothing_moves_there_is_nothing_to_measure() -> None:
     still = mujoco.MjModel.from_xml_string("<mujoco/>")
     assert scenes(still, NOTHING) == ()
     with pytest.raises(SceneError, match="nothing can move"):
-        scenes(still, declared('[[scenario]]\nname = "a"\n'))
+        scenes(still, parse_declared('[[scenario]]\nname = "a"\n'))
 
 
 def test_what_is_declared_is_taken() -> None:
@@ -141,6 +141,6 @@ def test_what_does_not_fit_or_would_take_hours_is_refused(
     text: str, message: str, line: int
 ) -> None:
     with pytest.raises(SceneError) as caught:
-        scenes(arm(), declared(f'[[scenario]]\nname = "a"\n{text}\n'), quick=True)
+        scenes(arm(), parse_declared(f'[[scenario]]\nname = "a"\n{text}\n'), quick=True)
     assert caught.value.message.startswith(message)
     assert (caught.value.span.line if caught.value.span else 0) == line

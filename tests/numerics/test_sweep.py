@@ -17,7 +17,7 @@ from coursebuild.numerics.reports.sweep_plot import sweep_svg
 from coursebuild.numerics.scene import SceneError, scenes
 from coursebuild.numerics.sweep import measure_sweep
 from support.bench_reports import scene
-from support.surveys import declared
+from support.surveys import parse_declared
 
 BALL = """\
 <mujoco>
@@ -46,7 +46,7 @@ def run_sweep(
     lines: str, mjcf: str = BALL, *, toml: str = TOML, timed: bool = False
 ) -> SweepReport:
     text = f'{toml}\n[[sweep]]\nname = "s"\n{lines}\n'
-    declarations = declared(text)
+    declarations = parse_declared(text)
     (scene,) = scenes(mujoco.MjModel.from_xml_string(mjcf), declarations)
     ticks = iter(range(0, 10**12, 2_000_000))
     clocks = (lambda: next(ticks), lambda: next(ticks)) if timed else None

@@ -7,7 +7,7 @@ import signal
 
 import pytest
 
-from support.preview_process import Events, serving
+from support.preview_process import Events, serve_preview
 from support.scratch_course import GOOD, Make, block
 
 pytestmark = pytest.mark.site
@@ -18,7 +18,7 @@ def test_output_is_accepted(make: Make) -> None:
         "3.14159\r\n```\r\n\r\n", "3\r\n```\r\n"
     )
     folder = make(lesson)
-    with serving(folder) as preview, preview.events() as events:
+    with serve_preview(folder) as preview, preview.events() as events:
 
         def offered(told: Events) -> bool:
             return any(output.get("offer") for output in told.news["outputs"])
@@ -60,13 +60,13 @@ def test_output_is_accepted(make: Make) -> None:
         assert folder.read(folder.lesson()) == before
         assert preview.accept(body, **right) == (200, {"message": ""})
         assert folder.read(folder.lesson()) == before.replace(b"hello 3\r", b"hello 3.14159\r")
-        events.settled()
+        events.wait_until_settled()
         assert events.news["outputs"][0]["state"] == "verified"
 
 
 def test_what_changed_since_is_not_written(make: Make) -> None:
     folder = make(GOOD.replace("hello 3.14159", "hello 3"))
-    with serving(folder) as preview, preview.events() as events:
+    with serve_preview(folder) as preview, preview.events() as events:
         events.until(lambda told: any(o.get("offer") for o in told.news["outputs"]))
         id = events.news["outputs"][0]["offer"]
         # Somebody saves, and the server has not heard of it: another process holds its attention.
@@ -93,7 +93,7 @@ def test_what_cannot_be_recorded_is_not_offered(make: Make) -> None:
         + block("x.py", code, "period 2.95 s\nhalf 1.975 s")
         + "`2.006`{out}\n"
     )
-    with serving(folder) as preview, preview.events() as events:
+    with serve_preview(folder) as preview, preview.events() as events:
         events.until(lambda told: any(o.get("refused") for o in told.news["outputs"]))
         (output, _) = events.news["outputs"]
         assert output["offer"] is None
@@ -112,7 +112,7 @@ def test_output_is_accepted_and_then_the_number_in_its_place(make: Make) -> None
         "## Swing\n\n" + block("x.py", code, "period 2.006 s\nhalf 1.003 s") + prose,
         "## Again\n\n`2.01 s`{out=examples/x.py} and `1.003`{out=examples/x.py}\n",
     )
-    with serving(folder) as preview, preview.events() as events:
+    with serve_preview(folder) as preview, preview.events() as events:
         events.until(lambda told: any(o.get("offer") for o in told.news["outputs"]))
         assert events.news["numbers"] == []  # what is recorded bears them out
         assert preview.accept_offer(events.news["outputs"][0]["offer"]) == (200, {"message": ""})
@@ -121,7 +121,7 @@ def test_output_is_accepted_and_then_the_number_in_its_place(make: Make) -> None
         assert (number["text"], number["better"]) == ("2.006", "2.950")
         assert number["label"] == "2.95 is printed where 2.006 was"
         assert preview.accept_offer(number["offer"]) == (200, {"message": ""})
-        events.settled("binding-mismatch", "binding-mismatch")
+        events.wait_until_settled("binding-mismatch", "binding-mismatch")
         assert prose.replace("2.006", "2.950") in folder.text(folder.lesson())
         assert [problem["label"] for problem in events.news["problems"]] == [
             "2.95 is printed where 2.006 was",

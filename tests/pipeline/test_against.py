@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.run.versions import engine_version
-from support.scratch_course import Done, Folder, Make, block, ended, wait_until_alone
+from support.scratch_course import CommandResult, Folder, Make, block, kill_at_end, wait_until_alone
 from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.site
@@ -95,7 +95,7 @@ def environments(course: Folder) -> list[str]:
     return sorted(name.removeprefix("mujoco-").rpartition("-")[0] for name in names)
 
 
-def against(course: Folder, *more: str, version: str = OTHER) -> Done:
+def against(course: Folder, *more: str, version: str = OTHER) -> CommandResult:
     return course.main("check", "--against", version, *more)
 
 
@@ -271,7 +271,7 @@ def test_interrupted_installations_leave_nothing_and_two_commands_at_once_instal
     for number, left in ((signal.SIGINT, []), (signal.SIGKILL, [".new"])):
         mark.unlink(missing_ok=True)
         slow = course.start("check", "--against", "9.4.0", stdout=subprocess.DEVNULL)
-        with ended(slow) as process:
+        with kill_at_end(slow) as process:
             wait_for_file(mark)
             process.send_signal(number)
             process.wait(120)
@@ -280,8 +280,8 @@ def test_interrupted_installations_leave_nothing_and_two_commands_at_once_instal
             wait_until_alone(course)
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with (
-        ended(course.start("check", "--against", OTHER, **pipes)) as one,
-        ended(course.start("check", "--against", OTHER, **pipes)) as two,
+        kill_at_end(course.start("check", "--against", OTHER, **pipes)) as one,
+        kill_at_end(course.start("check", "--against", OTHER, **pipes)) as two,
     ):
         said = [process.communicate(timeout=900) for process in (one, two)]
     assert said[0][0] == said[1][0] != b""

@@ -16,7 +16,7 @@ from support.scratch_course import (
     FIRST,
     GOOD,
     SECOND,
-    Done,
+    CommandResult,
     Folder,
     Make,
     block,
@@ -40,7 +40,7 @@ def test_status_and_report_tell_whether_the_course_is_right(make: Make) -> None:
             0,
             "everything holds",
         )
-        assert folder.main(command, "--quiet") == Done(0, "", ""), command
+        assert folder.main(command, "--quiet") == CommandResult(0, "", ""), command
     folder.write(folder.lesson(), GOOD + "> [!nosuch]\n> Text.\n")
     for command in COMMANDS:
         done = folder.main(command)

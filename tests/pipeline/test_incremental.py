@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.engine.memo import sealed, unsealed
-from support.edited_course import EDITS, LESSON, NORUN, QUIZ, WORDS, Course, Edit, drawn
+from support.edited_course import EDITS, LESSON, NORUN, QUIZ, WORDS, Course, Edit, drawn_pages
 from support.live_course import differences
 from support.scratch_course import Folder
 
@@ -59,11 +59,11 @@ def build(course: Course) -> dict[str, bytes]:
 
 
 def test_an_edit_draws_the_pages_that_show_it(course: Course) -> None:
-    assert drawn(course.folder) == set()
+    assert drawn_pages(course.folder) == set()
     for path in (course.folder.root / "content").rglob("*"):
         if path.is_file():
             path.write_bytes(path.read_bytes())
-    assert drawn(course.folder) == set(), "they were touched, and no more"
+    assert drawn_pages(course.folder) == set(), "they were touched, and no more"
     one, two, three = (lesson(f"1.{n}") for n in (1, 2, 3))
     lists = {"index.html", "levels/1.html", "progress/index.html", "review/index.html"}
     term = "A [thing]{term} is one.\n\nProse"
@@ -93,12 +93,12 @@ def test_an_edit_draws_the_pages_that_show_it(course: Course) -> None:
         ("1.2", '"why"', '"why-not"', {two, *lists}),
     ):
         course.edit(id, old, new)
-        assert drawn(course.folder) == pages, new
+        assert drawn_pages(course.folder) == pages, new
     page = course.folder.text("content/pages/about.md")
     course.folder.write("content/pages/about.md", page.replace("*it*", "that"))
-    assert drawn(course.folder) == {"about.html"}
+    assert drawn_pages(course.folder) == {"about.html"}
     course.folder.write("models/box.xml", '<mujoco model="b"/>\n')
-    assert drawn(course.folder) == {"models/box.html"}
+    assert drawn_pages(course.folder) == {"models/box.html"}
 
 
 def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
@@ -107,16 +107,16 @@ def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
     around = {"index.html", "levels/1.html", lesson("1.1"), lesson("1.3"), SYMBOLS}
     around.add("progress/index.html")
     # Lesson 2.1 needs it, which the level of that one says too.
-    assert drawn(course.folder) == around | {lesson("1.2"), lesson("2.1"), "levels/2.html"}
+    assert drawn_pages(course.folder) == around | {lesson("1.2"), lesson("2.1"), "levels/2.html"}
     course.levels["2"] = "Second"
     course.save()
     levels = {"levels/1.html", "levels/2.html", "progress/index.html"}
-    assert drawn(course.folder) == {"index.html", *levels, lesson("2.1"), lesson("2.2")}
+    assert drawn_pages(course.folder) == {"index.html", *levels, lesson("2.1"), lesson("2.2")}
     course.edit("1.3", "[!note]", "[!warning]")
-    drawn(course.folder)
+    drawn_pages(course.folder)
     course.extra = '[callouts.warning]\nlabel = "Careful"\npromise = "It bites."\n'
     course.save()
-    assert drawn(course.folder) == {lesson("1.3")}
+    assert drawn_pages(course.folder) == {lesson("1.3")}
     text = course.folder.text("content/course.toml")
     course.folder.write("content/course.toml", text.replace('"Tested"', '"Renamed"'))
     assert course.folder.main("build", "--quiet").status == 0  # over the site of before

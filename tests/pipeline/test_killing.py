@@ -161,10 +161,12 @@ def test_build_without_files_or_memory_says_so_and_leaves_old_or_new_site(
         trials.begin()
         status, _ = mortals.run(folder, "build", "-q", fault=fault, fatal=fatal)
         assert status in (0, 1), where
-        assert status == 0 or any(words in mortals.said.lower() for words in told), where
-        assert "Traceback" not in mortals.said or where.startswith("socket.__new__@core/run/v8"), (
+        assert status == 0 or any(words in mortals.output.lower() for words in told), where
+        assert "Traceback" not in mortals.output or where.startswith(
+            "socket.__new__@core/run/v8"
+        ), (
             where,
-            mortals.said,
+            mortals.output,
         )
         left = folder.tree()
         assert part(left, "content/") == part(new, "content/"), where

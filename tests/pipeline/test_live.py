@@ -80,7 +80,7 @@ def test_the_last_good_page_stays_and_the_others_go_on(
         before = running.find(one)
         folder.write(folder.lesson(), good.replace("## Hello", "## Never seen") + mistake)
         assert running.save(folder.lesson())
-        assert rule in running.wrong()
+        assert rule in running.error_rules()
         assert running.session.files.is_kept(one)
         assert running.find(one) == before
         folder.write(folder.lesson(2), f"## Two after {rule}\n")
@@ -90,7 +90,7 @@ def test_the_last_good_page_stays_and_the_others_go_on(
         assert running.find(one) == before
         folder.write(folder.lesson(), good.replace("## Hello", f"## Hello {rule}"))
         assert running.save(folder.lesson())
-        assert running.wrong() == []
+        assert running.error_rules() == []
         assert f"Hello {rule}".encode() in (running.find(one) or b"")
         folder.write(folder.lesson(), good)
         running.save(folder.lesson())
@@ -114,7 +114,7 @@ def test_a_term_that_goes_makes_a_mistake_elsewhere_until_it_comes_back(
         folder.replace(path, old, new)
         running.save(path)
         running.session.read()
-        assert running.wrong() == wrong
+        assert running.error_rules() == wrong
 
 
 # --- what a save comes to in its own time
@@ -129,11 +129,11 @@ def test_script_that_imports_another_runs_again_when_that_is_edited(
     )
     one = live(folder)
     one.rebuild.once()
-    assert one.wrong() == []
+    assert one.error_rules() == []
     folder.replace(folder.lesson(), "VALUE = 1", "VALUE = 2")
     assert one.save(folder.lesson())
     one.rebuild.once()
-    assert one.wrong() == ["output-drift"]
+    assert one.error_rules() == ["output-drift"]
 
 
 def test_what_fails_is_said_once_and_tried_again(
@@ -184,6 +184,6 @@ def test_page_with_a_mistake_is_not_taken_from_a_build_before_it(
     folder.write(folder.lesson(), GOOD + "\n[Nowhere](#nowhere)\n")
     running = live(folder)
     running.rebuild.once()
-    assert running.wrong() == ["link-anchor"]
+    assert running.error_rules() == ["link-anchor"]
     assert running.find("lessons/1.1-one.html") is None
     assert running.session.files.has_page("lessons/1.1-one.html")

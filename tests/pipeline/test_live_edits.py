@@ -36,7 +36,7 @@ class Preview:
     def is_right(self) -> bool:
         """Whether there is a site; it is that of a clean build."""
         built, site = self.builds(self.course.folder), self.live.site()
-        assert (self.live.wrong() == []) is (built is not None)
+        assert (self.live.error_rules() == []) is (built is not None)
         assert built is None or differences(site, built) == []
         return built is not None
 

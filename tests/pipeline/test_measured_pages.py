@@ -17,9 +17,9 @@ from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.numerics.reports.records import BENCH, DIET, STABILITY
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.scenes import scene_digest
-from support.edited_course import drawn
+from support.edited_course import drawn_pages
 from support.model_reports import box, case, diet, finding
-from support.preview_process import serving
+from support.preview_process import serve_preview
 from support.scratch_course import GOOD, Folder
 from support.waiting import wait_until
 
@@ -156,19 +156,24 @@ def test_report_is_in_markdown_notebook_ebook_and_search(course: Course) -> None
 
 
 def test_another_report_draws_the_pages_that_show_it_and_no_others(course: Course) -> None:
-    assert drawn(course.folder) == set()
+    assert drawn_pages(course.folder) == set()
     course.write_diet("it is far away")
-    assert drawn(course.folder) == {PAGE}
+    assert drawn_pages(course.folder) == {PAGE}
     course.write_cases("it hangs")
-    assert drawn(course.folder) == {NUMERICS}
+    assert drawn_pages(course.folder) == {NUMERICS}
     report = course.bench(card=None)
     course.write_bench(report)
-    assert drawn(course.folder) == {PAGE}
+    assert drawn_pages(course.folder) == {PAGE}
     swing, awkward = report.scenarios
     course.write_bench(replace(report, scenarios=(swing, replace(awkward, title="Other"))))
-    assert drawn(course.folder) == {PAGE, SHOWING}
+    assert drawn_pages(course.folder) == {PAGE, SHOWING}
     (course.folder.root / STABILITY.path()).unlink()
-    assert drawn(course.folder) == {"index.html", PAGE, "models/cup.html", "models/arm/part.html"}
+    assert drawn_pages(course.folder) == {
+        "index.html",
+        PAGE,
+        "models/cup.html",
+        "models/arm/part.html",
+    }
 
 
 def test_a_report_that_does_not_fit_is_told_and_not_shown(course: Course) -> None:
@@ -213,7 +218,7 @@ def test_a_report_that_does_not_fit_is_told_and_not_shown(course: Course) -> Non
 
 
 def test_the_preview_follows_reports(course: Course) -> None:
-    with serving(course.folder) as preview:
+    with serve_preview(course.folder) as preview:
 
         def shows(path: str, text: str) -> None:
             wait_until(lambda: text in preview.get(path)[2].decode(), f"{text!r} on {path}")

@@ -20,7 +20,7 @@ from coursebuild.core.scripts.sensitivity import amplification
 from coursebuild.report.explained import Explained, Explanation, explained_text
 from coursebuild.report.terminal import Style
 from support.fake_runs import JOB, LOOKED, NOTHING, PATH, SCRIPT, Desk
-from support.poisoned_values import poisoned
+from support.poisoned_values import mutations
 
 Act = Callable[[Desk], object]
 SOUGHT = Trace((), (), (), (), "", sought=("examples/{json}",))
@@ -83,7 +83,7 @@ def test_runs_that_another_may_not_repeat_are_not_remembered(desk: Desk) -> None
     for outcome, fields, why in FORGOTTEN:
         shutil.rmtree(desk.root / ".coursebuild", ignore_errors=True)
         desk.run(outcome=outcome, **fields)
-        assert (desk.recall(), desk.why()) == (None, why)
+        assert (desk.recall(), desk.rerun_reason()) == (None, why)
         last = desk.memory().last_record(PATH)
         assert last is not None and last.stored_run.outcome is outcome
 
@@ -131,10 +131,10 @@ def test_poisoned_results_of_a_shared_cache_are_one_or_told(tmp_path: Path) -> N
     assert whole is not None
     victim = Desk(tmp_path / "victim", shared=str(place))
     believed = 0
-    for data in poisoned(whole, 200):
+    for data in mutations(whole, 200):
         shutil.rmtree(victim.root / ".coursebuild/scripts", ignore_errors=True)
         entry.write_bytes(sealed(name, data))
-        victim.told.clear()
+        victim.messages.clear()
         run = victim.recall()
         memory = victim.memory()
         reasons = memory.reasons(memory.inputs(JOB, SCRIPT))
@@ -147,7 +147,7 @@ def test_poisoned_results_of_a_shared_cache_are_one_or_told(tmp_path: Path) -> N
         text = explained_text(Explanation(PATH, "script", (shown,)), Style(colour=False))
         assert "\x1b" not in text
         if run is None:
-            assert victim.told in ([], [DAMAGED.format(name[:20])]), data
+            assert victim.messages in ([], [DAMAGED.format(name[:20])]), data
         else:
             believed += 1
             assert run.path == PATH
@@ -315,7 +315,7 @@ def test_result_is_not_kept_where_something_was_saved_while_the_script_ran(tmp_p
     for number, (trace, act, why) in enumerate(WHILE_IT_RAN):
         desk = Desk(tmp_path / str(number))
         desk.run(trace, during=lambda act=act, desk=desk: act(desk))
-        assert desk.why() == why
+        assert desk.rerun_reason() == why
         assert (desk.recall() is not None) is (why == ""), number
 
 

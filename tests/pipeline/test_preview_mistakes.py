@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, expect
 
-from support.preview_page import LESSON, Open, lesson_page, see
-from support.preview_process import serving
+from support.preview_page import LESSON, PreviewPage, lesson_page, see
+from support.preview_process import serve_preview
 from support.scratch_course import GOOD, HELD, Make, block
 from support.waiting import wait_for_file
 
@@ -29,10 +29,10 @@ def test_mistakes_are_shown_and_clear_by_themselves(
     editor, told = tmp_path / "code", tmp_path / "told"
     editor.write_text(f'#!/bin/sh\necho "$@" > "{told}"\n')
     editor.chmod(0o755)
-    with serving(folder, env={"VISUAL": str(editor)}) as preview:
-        preview.heard("checked: ")
-        other = Open(browser, preview, "lessons/1.2-two.html")
-        with other, Open(browser, preview, LESSON) as opened:
+    with serve_preview(folder, env={"VISUAL": str(editor)}) as preview:
+        preview.wait_for_line("checked: ")
+        other = PreviewPage(browser, preview, "lessons/1.2-two.html")
+        with other, PreviewPage(browser, preview, LESSON) as opened:
             page = opened.page
             panel = page.get_by_role("region", name="Problems")
             expect(panel).to_have_count(0)
@@ -76,7 +76,7 @@ def test_mistakes_are_shown_and_clear_by_themselves(
             expect(panel).to_have_count(0)
             expect(page.locator(".prose h2").first).to_contain_text("Mended")
             expect(other.page.get_by_role("region", name="Problems")).to_have_count(0)
-            opened.unbroken()
+            opened.check_unbroken()
 
 
 def test_drift_is_shown_in_its_place_and_accepted(make: Make, browser: Browser) -> None:

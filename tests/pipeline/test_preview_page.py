@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, expect
 
-from support.lab_page import comes
-from support.preview_page import LESSON, Open, lesson_page, see, texts
-from support.preview_process import serving
+from support.lab_page import wait_for_condition
+from support.preview_page import LESSON, PreviewPage, lesson_page, see, texts
+from support.preview_process import serve_preview
 from support.scratch_course import GOOD, ROOT, Make
 from support.static_host import Host
 
@@ -55,7 +55,7 @@ def test_what_was_not_touched_stays_as_and_where_it_is(make: Make, browser: Brow
         texts(page, "Paragraph three")
         expect(hint).to_have_attribute("open", "")
         expect(page.get_by_role("button", name="Copy")).to_be_focused()
-        comes(page, lambda: page.evaluate("String(getSelection())") == "mpha")
+        wait_for_condition(page, lambda: page.evaluate("String(getSelection())") == "mpha")
         kept = page.locator("h2, .script, .hint, math").evaluate_all(
             "elements => elements.filter((element) => element.mine).length"
         )
@@ -67,14 +67,14 @@ def test_what_was_not_touched_stays_as_and_where_it_is(make: Make, browser: Brow
         folder.replace(folder.lesson(), "## Quiz\n", f"{'Much more. ' * 400}\n\n## Quiz\n")
         texts(page, "Much more.")
         expect(page.locator("html")).to_have_css("overflow-anchor", "auto")
-        comes(page, lambda: abs(place.evaluate(top) - before) < 1)
+        wait_for_condition(page, lambda: abs(place.evaluate(top) - before) < 1)
 
 
 def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
     folder = make(RICH)
-    with serving(folder) as preview:
-        preview.heard("checked: ")
-        with Open(browser, preview, LESSON) as opened:
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("checked: ")
+        with PreviewPage(browser, preview, LESSON) as opened:
             page = opened.page
             text = folder.text(folder.lesson())
             for old, new, shown in (
@@ -109,10 +109,10 @@ def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
             }"""
             see(page.locator(".question.is-live"))  # its script comes when it is needed
             living = page.evaluate(structure)
-            opened.unbroken()
+            opened.check_unbroken()
             page.reload()
             see(page.locator(".question.is-live"))
-            comes(page, lambda: page.evaluate(structure) == living)
+            wait_for_condition(page, lambda: page.evaluate(structure) == living)
 
 
 def test_lab_that_was_not_touched_goes_on(make: Make, browser: Browser) -> None:
@@ -139,15 +139,15 @@ def test_lab_that_was_not_touched_goes_on(make: Make, browser: Browser) -> None:
 def test_page_that_goes_and_one_that_comes(make: Make, browser: Browser) -> None:
     folder = make(GOOD, "## Two\n")
     map_ = folder.text("content/course.toml")
-    with serving(folder) as preview:
-        preview.heard("checked: ")
-        with Open(browser, preview, "lessons/1.2-two.html") as opened:
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("checked: ")
+        with PreviewPage(browser, preview, "lessons/1.2-two.html") as opened:
             page = opened.page
             folder.write("content/course.toml", map_.replace('"two"', '"zwei"'))
             (folder.root / folder.lesson(2)).rename(folder.root / "content/lessons/1.2-zwei.md")
             see(page.locator(".preview-button", has_text="this page is gone"))
-            opened.unbroken()
-            with Open(browser, preview, "lessons/1.2-two.html") as missing:
+            opened.check_unbroken()
+            with PreviewPage(browser, preview, "lessons/1.2-two.html") as missing:
                 expect(missing.page.locator("main")).to_contain_text("There is no page")
                 family = re.compile("Source Serif")
                 expect(missing.page.locator("h1")).to_have_css("font-family", family)
@@ -159,14 +159,14 @@ def test_page_that_goes_and_one_that_comes(make: Make, browser: Browser) -> None
 
 def test_preview_that_stops_and_starts_again(make: Make, browser: Browser) -> None:
     folder = make(GOOD)
-    with serving(folder) as preview:
-        preview.heard("checked: ")
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("checked: ")
         port = preview.port
-        opened = Open(browser, preview, LESSON)
+        opened = PreviewPage(browser, preview, LESSON)
     with opened:
         see(opened.page.locator(".preview-button", has_text="the preview has stopped"))
         folder.replace(folder.lesson(), "## Hello", "## Back")
-        with serving(folder, "--port", str(port)):
+        with serve_preview(folder, "--port", str(port)):
             expect(opened.page.locator(".prose h2")).to_contain_text("Back")
             expect(opened.page.locator(".preview-button")).to_be_hidden()
             assert opened.page.evaluate("window.same")
@@ -211,8 +211,8 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
     """From another site, and from another port of this one."""
     folder = make(GOOD + "![A](../pic.svg)\n")
     folder.write("content/pic.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>')
-    with Host(tmp_path) as host, serving(folder) as preview:
-        preview.heard("checked: ")
+    with Host(tmp_path) as host, serve_preview(folder) as preview:
+        preview.wait_for_line("checked: ")
         address = f"http://127.0.0.1:{preview.port}/"
         (tmp_path / "index.html").write_text(ATTACK.replace("ADDRESS", address))
         for url in (host.url, host.url.replace("localhost", "127.0.0.1")):
@@ -220,7 +220,7 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
                 page = context.new_page()
                 page.goto(url)
                 (frame,) = page.main_frame.child_frames
-                comes(page, lambda frame=frame: frame.url.startswith("chrome-error:"))
+                wait_for_condition(page, lambda frame=frame: frame.url.startswith("chrome-error:"))
                 said = page.evaluate(STEAL, address)
                 assert set(said.values()) == {"refused"}, said
                 assert page.evaluate("window.draft") == "nothing"
@@ -236,9 +236,9 @@ def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> Non
     axe = (ROOT / "site/node_modules/axe-core/axe.min.js").read_text("utf-8")
     rules = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "best-practice"]
     folder = make(GOOD.replace("3.14159\n```", "3\n```") + "`7`{out}\n", "[x](lesson:9.9)\n")
-    with serving(folder) as preview:
-        preview.heard("link-lesson")
-        with Open(browser, preview, LESSON) as opened:
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("link-lesson")
+        with PreviewPage(browser, preview, LESSON) as opened:
             page = opened.page
             see(page.get_by_role("button", name="Accept this output"))
             see(page.get_by_role("region", name="Problems"))

@@ -57,7 +57,7 @@ def test_nothing_is_published_before_there_is_a_site(make: Make) -> None:
     done = folder.main("build")
     assert done.status == 1
     assert "\nnothing was published\n" in done.out
-    assert folder.beside() == [
+    assert folder.entries() == [
         ".coursebuild",
         "content",
         "content/course.toml",

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from support.preview_process import Preview, serving
+from support.preview_process import Preview, serve_preview
 from support.scratch_course import GOOD, Folder, Make
 from support.waiting import wait_for_file
 
@@ -35,8 +35,8 @@ def preview(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[
     )
     browser.chmod(0o755)
     env = {"BROWSER": f"'{browser}' %s"}
-    with serving(folder, "--open", env=env) as running:
-        running.heard("checked: ")
+    with serve_preview(folder, "--open", env=env) as running:
+        running.wait_for_line("checked: ")
         yield running
 
 
@@ -189,7 +189,7 @@ def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> No
     origins = ("vscode-webview:", "https://*.example.org:8080")
     folder = make(GOOD)
     folder.replace("content/course.toml", "[course]", '[course]\nbase_url = "https://x.org/a/b"')
-    with serving(folder, *(f"--embed={origin}" for origin in origins)) as preview:
+    with serve_preview(folder, *(f"--embed={origin}" for origin in origins)) as preview:
         status, headers, _ = preview.get("/", **{**LINK, DEST: "iframe"})
         policy = "frame-ancestors vscode-webview: https://*.example.org:8080"
         assert (status, headers["Content-Security-Policy"]) == (200, policy)
@@ -205,8 +205,8 @@ def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> No
 
 
 def test_other_machines_need_the_token_of_the_link(make: Make) -> None:
-    with serving(make(GOOD), "--host", "0.0.0.0") as preview:
-        (token,) = re.findall(r"/\?token=([\w-]{16,})", preview.heard("serving http://"))
+    with serve_preview(make(GOOD), "--host", "0.0.0.0") as preview:
+        (token,) = re.findall(r"/\?token=([\w-]{16,})", preview.wait_for_line("serving http://"))
         status, headers, body = preview.get("/")
         assert (status, headers | PRIVATE == headers) == (403, True)
         assert body == b"open the address that the terminal shows, which lets this browser in\n"

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from support.preview_process import PATIENT, serving
-from support.scratch_course import GOOD, HELD, SILENT, Make, block, ended, wait_until_alone
+from support.preview_process import PATIENT, serve_preview
+from support.scratch_course import GOOD, HELD, SILENT, Make, block, kill_at_end, wait_until_alone
 from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.site
@@ -18,18 +18,18 @@ pytestmark = pytest.mark.site
 def test_page_is_told_of_every_save(make: Make) -> None:
     folder = make(GOOD)
     page = "/lessons/1.1-one.html"
-    with serving(folder) as preview, preview.events() as events:
-        events.settled()
+    with serve_preview(folder) as preview, preview.events() as events:
+        events.wait_until_settled()
         assert events.news["scripts"] == [{"path": "examples/hello.py", "state": "ok"}]
 
         def shows(text: bytes) -> bool:
             return text in preview.get(page)[2]
 
         folder.replace(folder.lesson(), "## Hello\n", "## Hello again\n")
-        events.changed()
+        events.wait_for_change()
         assert shows(b"Hello again")
         folder.replace(folder.lesson(), "3.14159\n```", "3.14158\n```")
-        events.settled("output-drift")
+        events.wait_until_settled("output-drift")
         assert shows(b"3.14158")  # the page is new, and says what is wrong with it
         folder.replace(folder.lesson(), "## Hello again\n", "## Never [x](lesson:9.9)\n")
         events.until(lambda told: "link-lesson" in told.rules())
@@ -38,7 +38,7 @@ def test_page_is_told_of_every_save(make: Make) -> None:
         with preview.events("index.html") as late:  # a page that is opened now is told as well
             late.until(lambda told: "link-lesson" in told.rules())
         folder.write(folder.lesson(), GOOD)
-        events.settled()
+        events.wait_until_settled()
         assert shows(b"Hello") and not shows(b"Hello again")
         # The map is gone, and back.
         map_ = folder.read("content/course.toml")
@@ -46,14 +46,14 @@ def test_page_is_told_of_every_save(make: Make) -> None:
         events.until(lambda told: "map-missing" in told.rules())
         assert shows(b"Hello")
         folder.write("content/course.toml", map_)
-        events.settled()
+        events.wait_until_settled()
 
 
 def test_terminal_tells_what_is_new_and_what_is_gone(make: Make) -> None:
     """Wherever lines have moved to."""
     folder = make(GOOD)
-    with serving(folder) as preview:
-        preview.heard("checked: everything holds")
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("checked: everything holds")
         for text, mistakes, said in (
             ("[a](lesson:8.1)\n\n[b](lesson:8.2)\n", ["8.1", "8.2"], "2 errors (2 new)"),
             ("Text.\n\n[b](lesson:8.2)\n\n[c](#c)\n", ["link-anchor"], "2 errors (1 new, 1 gone)"),
@@ -61,10 +61,10 @@ def test_terminal_tells_what_is_new_and_what_is_gone(make: Make) -> None:
             ("", [], "everything holds"),
             ("Text.\n", [], "everything holds"),
         ):
-            before = len(preview.said)
+            before = len(preview.lines)
             folder.write(folder.lesson(), GOOD + text)
-            preview.heard(f"checked: {said}", before)
-            lines = preview.said[before:]
+            preview.wait_for_line(f"checked: {said}", before)
+            lines = preview.lines[before:]
             new = [line for line in lines if line.startswith("error[")]
             assert len(new) == len(mistakes)
             assert all(mistake in line for mistake, line in zip(mistakes, new, strict=True))
@@ -112,27 +112,27 @@ def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make)
     pictures = [f"content/pics/{number}.svg" for number in range(300)]
     for path in pictures:
         folder.write(path, '<svg xmlns="http://www.w3.org/2000/svg"/>')
-    with serving(folder, code=PATIENT) as preview, preview.events() as events:
-        events.settled()
+    with serve_preview(folder, code=PATIENT) as preview, preview.events() as events:
+        events.wait_until_settled()
         for save in SAVES:
             name = save.__name__
-            before = len(preview.said)
+            before = len(preview.lines)
             save(folder.root / folder.lesson(), GOOD.replace("## Hello", f"## {name}"))
-            events.changed()
+            events.wait_for_change()
             assert name.encode() in preview.get("/lessons/1.1-one.html")[2], name
-            events.settled()
-            told = [line for line in preview.said[before:] if not line.startswith("checked")]
+            events.wait_until_settled()
+            told = [line for line in preview.lines[before:] if not line.startswith("checked")]
             assert len(told) == 1 and told[0].startswith("changed: content/lessons/1.1-one.md (")
-        before = len(preview.said)
+        before = len(preview.lines)
         for path in pictures:
             (folder.root / path).unlink()
         for number in range(1, 7):
             folder.write(folder.lesson(number), "## Two\n")
-        events.changed()
+        events.wait_for_change()
         for page in ("1.1-one", "1.6-six"):
             assert b"Two" in preview.get(f"/lessons/{page}.html")[2]
-        events.settled()
-        changed = [line for line in preview.said[before:] if line.startswith("changed: ")]
+        events.wait_until_settled()
+        changed = [line for line in preview.lines[before:] if line.startswith("changed: ")]
         assert len(changed) == 1, changed
 
 
@@ -141,25 +141,25 @@ def test_pages_elsewhere_are_followed_and_two_browsers_told_alike(make: Make) ->
     entry = '[[page]]\nid = "readme"\ntitle = "Page"\nfile = "README.md"\n'
     folder.write("content/course.toml", folder.text("content/course.toml") + entry)
     folder.write("README.md", "One.\n")
-    with serving(folder) as preview:
+    with serve_preview(folder) as preview:
         with preview.events("readme.html") as events:  # a file outside of `content/`
-            events.settled()
+            events.wait_until_settled()
             folder.write("README.md", "Two.\n")
-            events.changed()
+            events.wait_for_change()
             assert b"Two." in preview.get("/readme.html")[2]
         with preview.events() as one, preview.events() as two:
-            one.settled()
-            two.settled()
+            one.wait_until_settled()
+            two.wait_until_settled()
             assert (old := one.state) == two.state
             folder.replace(folder.lesson(), "## Hello", "## Both")
-            assert one.changed().state == two.changed().state
+            assert one.wait_for_change().state == two.wait_for_change().state
         folder.replace(folder.lesson(), "## Both", "## Later")
         with preview.events("lessons/1.2-two.html") as other:
-            other.settled()
+            other.wait_until_settled()
             assert other.pages == 1  # nothing of its own changed
         with preview.events() as back:
             assert back.until(lambda told: bool(told.state)).state not in (old, one.state)
-            back.settled()
+            back.wait_until_settled()
 
 
 def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_for(
@@ -167,7 +167,7 @@ def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_fo
 ) -> None:
     code = f"open('begun', 'a').write('x')\n{HELD}print(1)"
     folder = make("## First\n\n" + block("x.py", code, "1", info="timeout=3000"))
-    with serving(folder) as preview, preview.events() as events:
+    with serve_preview(folder) as preview, preview.events() as events:
         wait_for_file(folder.root / "begun")
         assert events.until(lambda told: bool(told.news["scripts"])).news["scripts"] == [
             {"path": "examples/x.py", "state": "running"}
@@ -176,7 +176,7 @@ def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_fo
         folder.replace(folder.lesson(), "## First", "## Second")
         events.until(lambda told: b"Second" in preview.get("/lessons/1.1-one.html")[2])
         folder.write("go", "")
-        events.settled("script-writes")
+        events.wait_until_settled("script-writes")
         assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
         assert folder.read("begun") == b"x"
         (folder.root / "go").unlink()
@@ -184,7 +184,7 @@ def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_fo
         wait_for_file(folder.root / "begun", 2)
         events.until(lambda told: told.news["scripts"][0]["state"] == "running")
         folder.replace(folder.lesson(), HELD, "")
-        events.settled("script-writes")
+        events.wait_until_settled("script-writes")
         assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
         assert folder.read("begun") == b"xxx"
 
@@ -194,14 +194,14 @@ def test_what_a_script_prints_is_shown_while_others_run(make: Make) -> None:
     folder = make("## A\n\n" + block("a.py", reads, "1") + block("b.py", HELD + reads, "1"))
     folder.write("models/data.txt", "1")
     folder.write("go", "")
-    with serving(folder, "--jobs", "2") as preview, preview.events() as events:
-        events.settled()
+    with serve_preview(folder, "--jobs", "2") as preview, preview.events() as events:
+        events.wait_until_settled()
         (folder.root / "go").unlink()
         folder.write("models/data.txt", "2")
         events.until(lambda told: told.news["outputs"][0]["state"] == "drift")
         assert events.news["outputs"][1]["state"] == "verified"  # as far as is known
         folder.write("go", "")
-        events.settled("output-drift", "output-drift")
+        events.wait_until_settled("output-drift", "output-drift")
         assert all(output["offer"] for output in events.news["outputs"])
 
 
@@ -210,13 +210,13 @@ def test_course_that_is_wrong_from_the_beginning(make: Make) -> None:
     good = folder.read("content/course.toml")
     folder.write("content/course.toml", "[course\n")
     page = "/lessons/1.1-one.html"
-    with serving(folder) as preview, preview.events() as events:
+    with serve_preview(folder) as preview, preview.events() as events:
         events.until(lambda told: "map-syntax" in told.rules())
         status, _, body = preview.get("/")
         assert status == 404
         assert b"Nothing is built yet." in body and b"/.coursebuild/preview.js" in body
         folder.write("content/course.toml", good)
-        events.settled("link-lesson")
+        events.wait_until_settled("link-lesson")
         assert events.state == ""
         status, _, body = preview.get(page)
         assert status == 200
@@ -236,13 +236,13 @@ def test_preview_that_is_interrupted_ends_cleanly(make: Make) -> None:
     folder = make(GOOD)
     pruned = folder.root / ".coursebuild" / "pruned"
     with (
-        serving(folder, "--cache-size", "1K", env=SILENT) as preview,
+        serve_preview(folder, "--cache-size", "1K", env=SILENT) as preview,
         preview.events() as events,
     ):
-        preview.heard("checked: ")
+        preview.wait_for_line("checked: ")
         assert not pruned.exists()
         preview.process.send_signal(signal.SIGINT)
-        preview.interrupted()
+        preview.check_interrupted()
         for _ in events.stream:  # it ends
             pass
         assert preview.process.stdout is not None and preview.process.stdout.read() == b""
@@ -251,7 +251,7 @@ def test_preview_that_is_interrupted_ends_cleanly(make: Make) -> None:
     assert pruned.exists(), "what is kept stays within its bound for who only previews as well"
     # The port is free again.
     process = folder.start("serve", "--port", str(port), stderr=subprocess.PIPE)
-    with ended(process):
+    with kill_at_end(process):
         assert process.stderr is not None
         serving_ = b"serving http://127.0.0.1:%d/" % port
         assert any(line.startswith(serving_) for line in process.stderr)
@@ -260,7 +260,7 @@ def test_preview_that_is_interrupted_ends_cleanly(make: Make) -> None:
 def test_scripts_end_with_a_preview_that_is_killed(make: Make) -> None:
     slow = "import time, pathlib\npathlib.Path('begun').touch()\nwhile True: time.sleep(60)"
     folder = make("## One\n\n" + block("x.py", slow))
-    with serving(folder) as preview:
+    with serve_preview(folder) as preview:
         wait_for_file(folder.root / "begun")
         preview.process.kill()
         assert preview.process.wait(600) == -signal.SIGKILL
@@ -269,7 +269,7 @@ def test_scripts_end_with_a_preview_that_is_killed(make: Make) -> None:
 def test_preview_that_is_ended_while_the_course_is_read_ends_cleanly(make: Make) -> None:
     folder = make(*(GOOD.replace("hello.py", f"hello{n}.py") + "$x$\n" * 500 for n in range(6)))
     process = folder.start("serve", "--port", "0", env=SILENT, stderr=subprocess.PIPE)
-    with ended(process):
+    with kill_at_end(process):
         assert process.stderr is not None
         assert process.stderr.readline() == b"reading lessons and pages\n"
         process.terminate()

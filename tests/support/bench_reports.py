@@ -65,7 +65,9 @@ def interval(value: float) -> Interval:
     return Interval(value, 0.99 * value, 1.01 * value)
 
 
-def lost(integrator: str = "Euler", timestep: float = 0.1, **other: Any) -> WorkPrecisionRow:
+def diverged_row(
+    integrator: str = "Euler", timestep: float = 0.1, **other: Any
+) -> WorkPrecisionRow:
     """A row that diverged, and so was not timed."""
     nothing = dict.fromkeys(("position", "velocity", "cost", "seconds"))
     fields = {"status": "diverged", "reasons": ("the state is not finite",), **nothing, **other}
@@ -100,7 +102,7 @@ def swing() -> ScenarioReport:
     for integrator, order, work in _KNOWN:
         for timestep in (0.05, 0.02, 0.01, 0.005, 0.002, 0.001):
             if integrator == "Euler" and timestep == 0.05:
-                rows.append(lost(integrator, timestep))
+                rows.append(diverged_row(integrator, timestep))
                 continue
             error = max(0.4 * (20 * timestep) ** order * 0.3, 1e-11)
             rows.append(
@@ -168,7 +170,7 @@ def awkward() -> ScenarioReport:
             seen=0.00123,
             **{**newton, "solver": "CG", "iterations": 7, "cone": "elliptic"},
         ),
-        lost(
+        diverged_row(
             "RK4", 0.1, status="reset", reasons=("the clock was reset",), **{**newton, "cone": ""}
         ),
     ]

@@ -10,16 +10,16 @@ from msgspec.structs import replace
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.reports.bench import ScenarioReport, WorkPrecisionRow
 from coursebuild.numerics.scene import scenes
-from support.surveys import declared
+from support.surveys import parse_declared
 
 MODELS = Path(__file__).parents[2] / "models"
 FAMILY = ("Euler", "implicit", "implicitfast", "discrete")
 
 
-def measured(model: Any, text: str = "", *, quick: bool = False) -> tuple[ScenarioReport, ...]:
+def measure(model: Any, text: str = "", *, quick: bool = False) -> tuple[ScenarioReport, ...]:
     return tuple(
         measure_scenario(model, one, quick=quick, clock=None)
-        for one in scenes(model, declared(text), quick=quick)
+        for one in scenes(model, parse_declared(text), quick=quick)
     )
 
 

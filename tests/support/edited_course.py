@@ -89,7 +89,7 @@ class Course:
         self.folder.write("content/course.toml", "\n".join(parts))
 
 
-def drawn(folder: Folder) -> set[str]:
+def drawn_pages(folder: Folder) -> set[str]:
     """The pages that a build draws anew."""
     with prepare(folder.options(), Progress(quiet=True)) as (report, site):
         assert site is not None, report.diagnostics

@@ -27,7 +27,7 @@ class Editor:
         self.places = Places(folder.root)
         self.texts: dict[str, str] = {}
         """Of the files that are open, by path."""
-        self.told: dict[str, list[types.Diagnostic]] = {}
+        self.diagnostics: dict[str, list[types.Diagnostic]] = {}
         self._news = threading.Condition()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever)
@@ -74,7 +74,7 @@ class Editor:
 
     def leave(self, path: str) -> None:
         """Close a file, without saving it."""
-        params = types.DidCloseTextDocumentParams(self.named(path))
+        params = types.DidCloseTextDocumentParams(self.identifier(path))
         self._do(self.client.text_document_did_close, params)
         del self.texts[path]
 
@@ -86,7 +86,7 @@ class Editor:
 
     # --- what is asked
 
-    def named(self, path: str) -> types.TextDocumentIdentifier:
+    def identifier(self, path: str) -> types.TextDocumentIdentifier:
         return types.TextDocumentIdentifier(self.places.uri(path))
 
     def place(self, path: str, needle: str) -> types.Position:
@@ -99,29 +99,29 @@ class Editor:
         return self.ask(getattr(self.client, f"text_document_{method}_async")(params))
 
     def hover_text(self, path: str, needle: str) -> str:
-        where = types.HoverParams(self.named(path), self.place(path, needle))
+        where = types.HoverParams(self.identifier(path), self.place(path, needle))
         found = self.request("hover", where)
         return "" if found is None else found.contents.value
 
-    def defined_at(self, path: str, needle: str) -> str:
+    def definition(self, path: str, needle: str) -> str:
         """Path and line of a definition."""
-        where = types.DefinitionParams(self.named(path), self.place(path, needle))
+        where = types.DefinitionParams(self.identifier(path), self.place(path, needle))
         found = self.request("definition", where)
         if found is None:
             return ""
         return f"{self.places.path(found.uri)}:{found.range.start.line + 1}"
 
     def proposals(self, path: str, needle: str) -> dict[str, types.CompletionItem]:
-        where = types.CompletionParams(self.named(path), self.place(path, needle))
+        where = types.CompletionParams(self.identifier(path), self.place(path, needle))
         return {i.label: i for i in self.request("completion", where)}
 
     def actions(self, path: str, needle: str) -> dict[str, types.CodeAction]:
         place = self.place(path, needle)
         context = types.CodeActionContext([])
-        where = types.CodeActionParams(self.named(path), types.Range(place, place), context)
+        where = types.CodeActionParams(self.identifier(path), types.Range(place, place), context)
         return {a.title: a for a in self.request("code_action", where)}
 
-    def edited(self, edits: dict[str, list[types.TextEdit]]) -> dict[str, str]:
+    def apply_edits(self, edits: dict[str, list[types.TextEdit]]) -> dict[str, str]:
         """The texts of files after edits, by path."""
         done = {}
         for uri, its in edits.items():
@@ -139,25 +139,25 @@ class Editor:
 
     def _hear(self, told: types.PublishDiagnosticsParams) -> None:
         with self._news:
-            self.told[self.places.path(told.uri)] = list(told.diagnostics)
+            self.diagnostics[self.places.path(told.uri)] = list(told.diagnostics)
             self._news.notify_all()
 
     def until(self, path: str, *rules: str, line: int | None = None) -> list[types.Diagnostic]:
         """The diagnostics of a file, once they are of these rules, the first at this line."""
 
         def good() -> bool:
-            told = self.told.get(path, [])
+            told = self.diagnostics.get(path, [])
             return [one.code for one in told] == [*rules] and (
                 line is None or told[0].range.start.line == line
             )
 
         with self._news:
-            assert self._news.wait_for(good, 120), self.told
-            return self.told.get(path, [])
+            assert self._news.wait_for(good, 120), self.diagnostics
+            return self.diagnostics.get(path, [])
 
-    def eventually(self, answer: Callable[[], T]) -> T:
+    def wait_for(self, answer: Callable[[], T]) -> T:
         """An answer, asked for until it is something."""
         until = time.monotonic() + 120
         while not (found := answer()):
-            assert time.monotonic() < until, self.told
+            assert time.monotonic() < until, self.diagnostics
         return found

@@ -27,7 +27,7 @@ class Desk:
     root: Path
     fresh: bool = False
     shared: str | None = None
-    told: list[str] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.write(PATH, SCRIPT)
@@ -52,7 +52,7 @@ class Desk:
         """That of a new command."""
         shared = None if self.shared is None else shared_cache(self.shared)
         store = Memo(self.root, fresh=self.fresh, shared=shared)
-        store.listen(self.told.append)
+        store.listen(self.messages.append)
         return Memory(self.root, store)
 
     def recall(self, job: ScriptJob = JOB, text: bytes = SCRIPT) -> ScriptRun | None:
@@ -79,7 +79,7 @@ class Desk:
         memory.store.close()
         return memory
 
-    def why(self) -> str:
+    def rerun_reason(self) -> str:
         last = self.memory().last_record(PATH)
         assert last is not None
         return last.reason_forgotten

@@ -15,22 +15,22 @@ from support.plain_html import plain_html
 from support.random_lessons import KINDS
 
 
-def formatted(text: str, width: int, lesson: bool = True) -> Parsed[str]:
+def format_text(text: str, width: int, lesson: bool = True) -> Parsed[str]:
     source = Source("content/lessons/1.1-a.md", text)
     return format_document(source, KINDS, lesson=lesson, width=width)
 
 
 def check_formatting(text: str, width: int, lesson: bool) -> None:
     """What a reader sees stays, and formatting once more changes nothing."""
-    done = formatted(text, width, lesson)
+    done = format_text(text, width, lesson)
     if done.diagnostics:
         assert done.value == text
     else:
-        assert shown(done.value, lesson) == shown(text, lesson)
-        assert formatted(done.value, width, lesson) == Parsed(done.value)
+        assert reader_view(done.value, lesson) == reader_view(text, lesson)
+        assert format_text(done.value, width, lesson) == Parsed(done.value)
 
 
-def shown(text: str, lesson: bool) -> list[object]:
+def reader_view(text: str, lesson: bool) -> list[object]:
     """The page as HTML, in which white space counts in code only, and the JSON in fences."""
     document = parse_document(Source("content/lessons/1.1-a.md", text), KINDS, lesson=lesson).value
     parts = re.split(r"(<pre.*?</pre>)", str(plain_html(document)), flags=re.DOTALL)

@@ -26,7 +26,7 @@ _PART = re.compile(r"(<!-- generated: ([^>\n]+) -->\n).*?(<!-- end -->)", re.DOT
 _FENCE = re.compile(r"^(`{3,})[^`\n]*\n.*?^\1`*$", re.MULTILINE | re.DOTALL)
 
 
-def renewed(text: str) -> str:
+def regenerate(text: str) -> str:
     """A page with its generated parts as they should be."""
 
     def part(found: re.Match[str]) -> str:

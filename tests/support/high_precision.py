@@ -92,7 +92,7 @@ def transpose(a: Sequence[mpmath.mpf], n: int = 3) -> Vector:
     return [a[n * j + i] for i in range(n) for j in range(n)]
 
 
-def turned(q: Sequence[mpmath.mpf], vector: Sequence[mpmath.mpf]) -> Vector:
+def rotate(q: Sequence[mpmath.mpf], vector: Sequence[mpmath.mpf]) -> Vector:
     rows = matrix(q)
     return [sum(rows[3 * i + j] * vector[j] for j in range(3)) for i in range(3)]
 
@@ -103,7 +103,7 @@ def ulps_of(size: mpmath.mpf, got: ArrayLike, want: Iterable[mpmath.mpf]) -> flo
     return _largest(abs(g - w) / (ULP * size) for g, w in pairs)
 
 
-def own_ulps(got: ArrayLike, want: Iterable[mpmath.mpf]) -> float:
+def entry_ulps(got: ArrayLike, want: Iterable[mpmath.mpf]) -> float:
     """The largest error, each in ulp of its entry, or in denormal steps if those are larger."""
     pairs = zip(exact(got), want, strict=True)
     return _largest(abs(g - w) / max(ULP * abs(w), DENORMAL) for g, w in pairs)
@@ -114,7 +114,7 @@ def _largest(errors: Iterable[mpmath.mpf]) -> float:
     return float(max(errors, key=lambda error: (mpmath.isnan(error), error)))
 
 
-def beyond(bound: float, errors: Mapping[object, float]) -> list[str]:
+def errors_over(bound: float, errors: Mapping[object, float]) -> list[str]:
     """What to say of each case whose error, in ulp, is over the bound or is no number."""
     assert errors, "no case was looked at"
     return [

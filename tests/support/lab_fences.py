@@ -7,7 +7,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.model import Lab
-from support.positioned_nodes import shown
+from support.positioned_nodes import format_diagnostics
 
 
 def parse(body: str, kind: str = "simlab") -> Parsed[Lab | None]:
@@ -18,5 +18,5 @@ def parse(body: str, kind: str = "simlab") -> Parsed[Lab | None]:
     return Parsed(next(labs, None), parsed.diagnostics)
 
 
-def told(body: str, kind: str = "simlab") -> list[str]:
-    return shown(parse(body, kind).diagnostics)
+def messages(body: str, kind: str = "simlab") -> list[str]:
+    return format_diagnostics(parse(body, kind).diagnostics)

@@ -26,7 +26,7 @@ def course(root: Path, stores: Path, *lessons: str) -> Folder:
     return folder
 
 
-def checked(folder: Folder, *names: str, status: int | None = None) -> dict[str, Any]:
+def run_check(folder: Folder, *names: str, status: int | None = None) -> dict[str, Any]:
     """A check's report, as JSON."""
     done = folder.main("check", *names, "--format", "json")
     assert status is None or done.status == status, done.out + done.err

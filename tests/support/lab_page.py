@@ -31,7 +31,7 @@ MOUNT = """async (number) => {
 test sees more of it, as `made`, than its picture."""
 
 
-def watched(context: BrowserContext) -> tuple[Page, list[str]]:
+def watch_page(context: BrowserContext) -> tuple[Page, list[str]]:
     """A page, and what it says to the console.
 
     What was still on its way when the next page was opened is no failure.
@@ -48,7 +48,7 @@ def watched(context: BrowserContext) -> tuple[Page, list[str]]:
     return page, said
 
 
-def served(route: Route) -> str:
+def fetch_text(route: Route) -> str:
     """What the server has where a request goes to; also when its page is closed meanwhile."""
     with urllib.request.urlopen(route.request.url, timeout=SLOW / 1000) as answer:
         return bytes(answer.read()).decode()
@@ -73,7 +73,7 @@ def becomes(page: Page, value: Callable[[], object], wanted: object) -> None:
     assert found == wanted
 
 
-def settled(page: Page) -> None:
+def wait_until_settled(page: Page) -> None:
     """Wait until the page's script has run, its fonts are there, and it has nothing left to do."""
     expect(page.locator("[data-tools] select").first).to_be_attached()
     until(page, "document.fonts.status === 'loaded'")
@@ -108,10 +108,10 @@ def readout(found: Locator, label: str) -> str:
 
 def shows(found: Locator, label: str, text: str) -> None:
     """A readout comes to show a text; a page draws when it gets to it."""
-    comes(found.page, lambda: readout(found, label) == text)
+    wait_for_condition(found.page, lambda: readout(found, label) == text)
 
 
-def comes(page: Page, true: Callable[[], bool]) -> None:
+def wait_for_condition(page: Page, true: Callable[[], bool]) -> None:
     """Wait for something; how long it takes on a machine is no matter."""
     for _ in range(SLOW // 50):
         if true():
@@ -120,7 +120,7 @@ def comes(page: Page, true: Callable[[], bool]) -> None:
     raise AssertionError("it never comes")
 
 
-def changed(page: Page, view: Locator, before: bytes) -> bytes:
+def wait_for_change(page: Page, view: Locator, before: bytes) -> bytes:
     """The picture once it is another one."""
     for _ in range(SLOW // 100):
         now = view.screenshot()
@@ -130,7 +130,7 @@ def changed(page: Page, view: Locator, before: bytes) -> bytes:
     raise AssertionError("the picture stays as it is")
 
 
-def still(page: Page, view: Locator) -> bytes:
+def wait_until_still(page: Page, view: Locator) -> bytes:
     """The picture once it changes no more."""
     before = view.screenshot()
     for _ in range(SLOW // 300):
@@ -152,10 +152,10 @@ def state_of(page: Page, found: Locator) -> dict[str, object]:
     before = page.evaluate("() => location.href")
     found.get_by_role("button", name="Copy link").click()
     until(page, "before => location.href !== before", before)
-    return parsed(page.evaluate("() => location.href"))
+    return parse_link(page.evaluate("() => location.href"))
 
 
-def parsed(address: str) -> dict[str, object]:
+def parse_link(address: str) -> dict[str, object]:
     """The content of a link: its JSON, and the physics as `physics`."""
     packed = parse_qs(urlsplit(address).fragment)["z"][0]
     content = zlib.decompress(base64.urlsafe_b64decode(packed + "==="), wbits=-15)

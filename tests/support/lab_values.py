@@ -69,17 +69,17 @@ class Bench(Engines):
     """Both engines, and what they are asked for a lab."""
 
     def trial(self, lab: Lab, seconds: float = 30.0) -> dict[str, Any]:
-        return self.browser.trial(request(lab), self.saved(lab), seconds)
+        return self.browser.trial(request(lab), self.save_model(lab), seconds)
 
     def parity(self, lab: Lab) -> dict[str, Any]:
         """The comparison of the main run."""
-        reply, mjb = self.trial(lab), self.saved(lab)
+        reply, mjb = self.trial(lab), self.save_model(lab)
         assert not reply["failures"], reply["failures"]
         run = reply["main"]["parity"]
         horizon = max(1, round(1.0 / reply["main"]["timestep"]))
         return {**self.native.parity(mjb, run, horizon), "run": run, "mjb": mjb}
 
-    def saved(self, lab: Lab) -> bytes:
+    def save_model(self, lab: Lab) -> bytes:
         """The lab's own model."""
         assert lab.xml is not None
         return self.native.save("models/x.xml", lab.xml.text)

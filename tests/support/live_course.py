@@ -52,7 +52,7 @@ class Live:
         self.rebuild.close()
         self.session.close()
 
-    def wrong(self) -> list[str]:
+    def error_rules(self) -> list[str]:
         return sorted(d.rule for d in self.session.diagnostics() if d.severity == "error")
 
 

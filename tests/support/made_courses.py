@@ -84,12 +84,12 @@ def document(path: str, text: str) -> Document:
     return parsed.value
 
 
-def told(diagnostics: Iterable[Diagnostic]) -> list[str]:
+def rules_and_texts(diagnostics: Iterable[Diagnostic]) -> list[str]:
     """The rule of each, and the text that it points at."""
     return [f"{d.rule}: {d.span.text}" for d in diagnostics]
 
 
-def said(diagnostics: Iterable[Diagnostic]) -> list[str]:
+def messages(diagnostics: Iterable[Diagnostic]) -> list[str]:
     """The message of each, with its help."""
     return [d.message + (f" [{d.help}]" if d.help else "") for d in diagnostics]
 

@@ -35,7 +35,7 @@ class Fake:
 
     def __init__(self, *found: ScenarioReport | Diagnostic | BaseException) -> None:
         self.found = list(found) or [swing()]
-        self.asked: list[tuple[str, int, bool, bool]] = []
+        self.calls: list[tuple[str, int, bool, bool]] = []
 
     def compile_scene(self, root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
         assert root.is_absolute()
@@ -56,7 +56,7 @@ class Fake:
         tell: Callable[[str], None],
     ) -> ScenarioReport:
         tell("swing: Euler")
-        self.asked.append((compiled.scene.name, number, quick, timed))
+        self.calls.append((compiled.scene.name, number, quick, timed))
         found = self.found[number]
         if isinstance(found, Diagnostic):
             raise CannotMeasureError(found)
@@ -82,7 +82,7 @@ def options(root: Path, **other: Any) -> Options:
     return Options(root, 1, True, Memo(root, **other))
 
 
-def asked(fake: Fake) -> list[str]:
-    names = [name for name, *_ in fake.asked]
-    fake.asked.clear()
+def take_calls(fake: Fake) -> list[str]:
+    names = [name for name, *_ in fake.calls]
+    fake.calls.clear()
     return names

@@ -21,7 +21,7 @@ class Mortals:
         self.process = process
         self.exchanges = True
         """Whether two folders can be swapped in one step."""
-        self.said = ""
+        self.output = ""
         """What the last one wrote for its user."""
 
     def run(
@@ -33,7 +33,7 @@ class Mortals:
         request |= {"exchanges": self.exchanges, "fault": fault}
         print(json.dumps(request), file=self.process.stdin, flush=True)
         reply = json.loads(self.process.stdout.readline())
-        self.said = reply["said"]
+        self.output = reply["said"]
         return reply["status"], reply["calls"]
 
     def die(self, folder: Folder, *arguments: str, fatal: int) -> None:

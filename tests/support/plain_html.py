@@ -49,7 +49,7 @@ def plain_blocks(blocks: Iterable[model.Block]) -> str:
     return text
 
 
-def escaped(text: str) -> str:
+def escape(text: str) -> str:
     return html.escape(text, quote=False).replace('"', "&quot;")
 
 
@@ -72,11 +72,11 @@ class PlainContext(Context):
         return Markup(f"<p>{render_inlines((image,), self)}\n{caption}</p>\n")
 
     def code(self, language: str, text: str) -> Markup:
-        name = f' class="language-{escaped(language)}"' if language else ""
-        return Markup(f"<pre><code{name}>{escaped(text)}</code></pre>\n")
+        name = f' class="language-{escape(language)}"' if language else ""
+        return Markup(f"<pre><code{name}>{escape(text)}</code></pre>\n")
 
     def binding(self, binding: model.NumberBinding) -> Markup:
-        return Markup(f"<code>{escaped(binding.text)}</code>")
+        return Markup(f"<code>{escape(binding.text)}</code>")
 
     def block(self, block: OwnBlock) -> Markup:
         match block:

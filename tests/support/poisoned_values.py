@@ -24,7 +24,7 @@ def _places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]
         yield from _places(child, (*path, index))
 
 
-def changed(value: Any, chance: random.Random) -> Any:
+def mutate(value: Any, chance: random.Random) -> Any:
     """A copy of a value of JSON in which something is put in one place, or taken away."""
     path = (0, *chance.choice(list(_places(value))))
     whole = [copy.deepcopy(value)]
@@ -38,8 +38,8 @@ def changed(value: Any, chance: random.Random) -> Any:
     return whole[0]
 
 
-def poisoned(text: bytes, count: int) -> Iterator[bytes]:
+def mutations(text: bytes, count: int) -> Iterator[bytes]:
     """As many changes of a JSON text."""
     value, chance = json.loads(text), random.Random(21)
     for _ in range(count):
-        yield json.dumps(changed(value, chance)).encode()
+        yield json.dumps(mutate(value, chance)).encode()

@@ -15,7 +15,7 @@ from coursebuild.core.syntax.nodes import (
 from coursebuild.core.text.diagnostics import Diagnostic
 
 
-def shown(diagnostics: tuple[Diagnostic, ...]) -> list[str]:
+def format_diagnostics(diagnostics: tuple[Diagnostic, ...]) -> list[str]:
     """Each mistake in a line: its place, rule, message and help."""
     return [
         f"{d.span.line}:{d.span.column}-{d.span.end_column} {d.rule}: {d.message}"

@@ -7,33 +7,33 @@ from collections.abc import Iterator
 
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from support.preview_process import Preview, serving
+from support.preview_process import Preview, serve_preview
 from support.scratch_course import Folder
 
 
-class Open:
+class PreviewPage:
     """A page of a preview, and what its console said."""
 
     def __init__(self, browser: Browser, preview: Preview, path: str, **options: object) -> None:
         self.context = browser.new_context(**options)
         self.page = self.context.new_page()
-        self.said: list[str] = []
-        self.page.on("console", lambda message: self.said.append(message.text))
-        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.console: list[str] = []
+        self.page.on("console", lambda message: self.console.append(message.text))
+        self.page.on("pageerror", lambda error: self.console.append(str(error)))
         self.page.goto(f"http://127.0.0.1:{preview.port}/{path}")
         # A page that is loaded again loses this.
         self.page.evaluate("window.same = true")
 
-    def __enter__(self) -> Open:
+    def __enter__(self) -> PreviewPage:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.context.close()
 
-    def unbroken(self) -> None:
+    def check_unbroken(self) -> None:
         """It is still the same document, and nothing went wrong in it."""
         assert self.page.evaluate("window.same")
-        assert self.said == []
+        assert self.console == []
 
 
 def see(locator: Locator) -> None:
@@ -50,8 +50,8 @@ LESSON = "lessons/1.1-one.html"
 @contextlib.contextmanager
 def lesson_page(folder: Folder, browser: Browser) -> Iterator[Page]:
     """The page of a lesson, which stays the same document, with nothing that goes wrong in it."""
-    with serving(folder) as preview:
-        preview.heard("checked: ")
-        with Open(browser, preview, LESSON) as opened:
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("checked: ")
+        with PreviewPage(browser, preview, LESSON) as opened:
             yield opened.page
-            opened.unbroken()
+            opened.check_unbroken()

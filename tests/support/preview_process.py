@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from coursebuild.preview.server import PREFIX
-from support.scratch_course import Folder, ended, wait_until_alone
+from support.scratch_course import Folder, kill_at_end, wait_until_alone
 
 PATIENT = """
 import sys
@@ -35,35 +35,35 @@ class Preview:
     def __init__(self, folder: Folder, process: subprocess.Popen[bytes]) -> None:
         self.folder = folder
         self.process = process
-        self.said: list[str] = []
+        self.lines: list[str] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-        first = self.heard("serving http://127.0.0.1:")
+        first = self.wait_for_line("serving http://127.0.0.1:")
         self.port = int(first.partition("127.0.0.1:")[2].partition("/")[0])
 
     def _read(self) -> None:
         assert self.process.stderr is not None
         with contextlib.suppress(ValueError):  # closed at the end of the test
             for line in self.process.stderr:
-                self.said.append(line.decode().rstrip("\n"))
+                self.lines.append(line.decode().rstrip("\n"))
 
-    def heard(self, text: str, after: int = 0, seconds: float = 300.0) -> str:
+    def wait_for_line(self, text: str, after: int = 0, seconds: float = 300.0) -> str:
         """The first line said that holds a text."""
         until = time.monotonic() + seconds
         while True:
-            for line in self.said[after:]:
+            for line in self.lines[after:]:
                 if text in line:
                     return line
-            assert time.monotonic() < until, f"{text!r} is not in {self.said}"
-            assert self.process.poll() is None, self.said
+            assert time.monotonic() < until, f"{text!r} is not in {self.lines}"
+            assert self.process.poll() is None, self.lines
             time.sleep(0.02)
 
-    def interrupted(self) -> None:
+    def check_interrupted(self) -> None:
         """It comes to its end, in good order."""
         assert self.process.wait(600) == 130
         self._reader.join(600)
-        assert self.said[-1] == "interrupted"
-        assert "Traceback" not in "\n".join(self.said)
+        assert self.lines[-1] == "interrupted"
+        assert "Traceback" not in "\n".join(self.lines)
 
     def get(
         self, path: str, method: str = "GET", body: bytes = b"", **headers: str
@@ -132,7 +132,7 @@ class Events:
                     raise AssertionError(name)
         return self
 
-    def changed(self) -> Events:
+    def wait_for_change(self) -> Events:
         """The page is another than it was."""
         before = self.state
         return self.until(lambda told: told.state != before)
@@ -140,7 +140,7 @@ class Events:
     def rules(self) -> list[str]:
         return [problem["rule"] for problem in self.news["problems"]]
 
-    def settled(self, *rules: str) -> Events:
+    def wait_until_settled(self, *rules: str) -> Events:
         """All is known, and this is what is wrong."""
         return self.until(lambda told: told.news["busy"] == "" and told.rules() == [*rules])
 
@@ -160,11 +160,11 @@ def _events(stream: Iterable[bytes]) -> Iterator[tuple[str, str]]:
 
 
 @contextlib.contextmanager
-def serving(
+def serve_preview(
     folder: Folder, *arguments: str, env: Mapping[str, str] | None = None, code: str = ""
 ) -> Iterator[Preview]:
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     process = folder.start("serve", "--port", "0", *arguments, env=env, code=code, **pipes)
-    with ended(process):
+    with kill_at_end(process):
         yield Preview(folder, process)
     wait_until_alone(folder)

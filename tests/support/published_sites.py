@@ -17,15 +17,15 @@ class Pages:
     """Pages whose text is their key, and which were made."""
 
     def __init__(self) -> None:
-        self.made: list[str] = []
+        self.made_paths: list[str] = []
 
     def __call__(self, **keys: str) -> list[SiteFile]:
         """Files `a/b/c.html` are called `a__b__c`."""
-        return [self.one(name.replace("__", "/") + ".html", key) for name, key in keys.items()]
+        return [self.page(name.replace("__", "/") + ".html", key) for name, key in keys.items()]
 
-    def one(self, path: str, key: str) -> CachedFile:
+    def page(self, path: str, key: str) -> CachedFile:
         def make() -> bytes:
-            self.made.append(path)
+            self.made_paths.append(path)
             return f"{path} {key}".encode()
 
         return CachedFile(path, key, make)
@@ -43,7 +43,7 @@ MANY = {"a": "1", "b__c": "1", "b__d": "1", "e__f__g": "1"}
 TEXTS = {path: f"{path} 1" for path in ("a.html", "b/c.html", "b/d.html", "e/f/g.html")}
 
 
-def beside(root: Path) -> list[str]:
+def entries(root: Path) -> list[str]:
     return sorted(p.name for p in root.iterdir() if p.name != ".coursebuild")
 
 
@@ -64,5 +64,5 @@ def spared(root: Path, pages: Pages) -> Path:
     publish(root, root / "public", pages(**MANY | {"a": "0"}))
     publish(root, root / "public", pages(**MANY))
     assert texts(root / SPARE) == TEXTS | {"a.html": "a.html 0"}
-    pages.made.clear()
+    pages.made_paths.clear()
     return root

@@ -9,7 +9,7 @@ from typing import Any
 
 from playwright.sync_api import BrowserContext, Locator, Page, expect
 
-from support.lab_page import watched
+from support.lab_page import watch_page
 
 PATH = "lessons/1.1-one.html"
 MCQ, SEVERAL, NUMBER, ANGLE, PREDICT, OPEN, OUTPUT, ORDER, BARE = range(9)
@@ -22,7 +22,7 @@ KEY = "() => Object.keys(localStorage).find((key) => key.startsWith('coursebuild
 
 def clean_page(context: BrowserContext, site: str) -> Iterator[Page]:
     """The lesson, with its quiz alive; nothing may go wrong in it."""
-    page, said = watched(context)
+    page, said = watch_page(context)
     visit(page, site + PATH)
     yield page
     # A page that is left while a lab loads loads no further; there may be no service worker.
@@ -55,7 +55,7 @@ def press(page: Page, number: int, name: str = "Check") -> None:
     question(page, number).get_by_role("button", name=name, exact=True).click()
 
 
-def kept(page: Page, number: int) -> dict[str, Any] | None:
+def stored_answer(page: Page, number: int) -> dict[str, Any] | None:
     """What is kept of a question."""
     key = question(page, number).get_attribute("data-question")
     text = page.evaluate(f"localStorage[({KEY})()] ?? null")

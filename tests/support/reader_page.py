@@ -23,7 +23,7 @@ def choose(found: Locator, option: str) -> None:
     found.locator(".quiz-check").click()
 
 
-def kept(page: Page) -> dict[str, object]:
+def stored_progress(page: Page) -> dict[str, object]:
     found: dict[str, object] = json.loads(page.evaluate("key => localStorage.getItem(key)", KEY))
     return found
 
@@ -32,7 +32,7 @@ WAY = {"quiz": "fall", "key": "way", "lesson": "1.2"}
 """A wrong answer in lesson 1.2."""
 
 
-def put(page: Page, *answers: dict[str, object]) -> None:
+def store_answers(page: Page, *answers: dict[str, object]) -> None:
     """Write answers into the storage as a visit two days ago would have."""
     when = datetime.datetime.now(datetime.UTC) - datetime.timedelta(days=2)
     tick = int(when.timestamp() * 1000)

@@ -130,7 +130,7 @@ class Layout:
         for folder in self.folders:
             (root / folder).mkdir(parents=True)
         for path, data in self.files.items():
-            put(root / path, data)
+            write_file(root / path, data)
         for path, target in self.links.items():
             (root / path).parent.mkdir(parents=True, exist_ok=True)
             (root / path).symlink_to(target)
@@ -138,10 +138,10 @@ class Layout:
     def write_later(self, root: Path) -> None:
         """Put the later files there."""
         for path, data in self.later.items():
-            put(root / path, data)
+            write_file(root / path, data)
 
 
-def put(path: Path, data: bytes) -> None:
+def write_file(path: Path, data: bytes) -> None:
     """Write a file, its folder as well."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(data)

@@ -35,7 +35,7 @@ class Example(Struct, frozen=True):
     command: str
     """`check`, or the command that finds it."""
     files: tuple[ExampleFile, ...]
-    told: str
+    output: str
 
 
 def catalogue_page(examples: Mapping[str, Example]) -> str:
@@ -77,7 +77,7 @@ def _entry(rule: Rule, example: Example | None) -> str:
         parts.append(f"\n`{file.path}`{file.remark}\n")
         if file.text:
             parts.append(f"\n{_fence(_LANGUAGES.get(file.path.rpartition('.')[2], ''), file.text)}")
-    parts.append(f"\n`coursebuild {example.command}` says:\n\n{_fence('', example.told)}")
+    parts.append(f"\n`coursebuild {example.command}` says:\n\n{_fence('', example.output)}")
     return "".join(parts)
 
 

@@ -42,7 +42,7 @@ GOOD = "## Hello\n\n" + block("hello.py", HELLO, "hello 3.14159")
 
 
 @dataclass(frozen=True, slots=True)
-class Done:
+class CommandResult:
     """What a command did."""
 
     status: int
@@ -118,7 +118,7 @@ class Folder:
             if path.is_file() and ".coursebuild" not in path.relative_to(self.root).parts
         }
 
-    def beside(self) -> list[str]:
+    def entries(self) -> list[str]:
         """The names in the course's folder and in `content/lessons` and `examples`."""
         return sorted(
             path.relative_to(self.root).as_posix()
@@ -144,7 +144,7 @@ class Folder:
         """To call a command as a function."""
         return Options(self.root.resolve(), jobs, quiet=True)
 
-    def main(self, *arguments: str, cwd: Path | None = None) -> Done:
+    def main(self, *arguments: str, cwd: Path | None = None) -> CommandResult:
         """Run a command in this process."""
         out, err = io.StringIO(), io.StringIO()
         with (
@@ -157,7 +157,7 @@ class Folder:
             except SystemExit as stop:  # argparse's way to say that it is over
                 assert isinstance(stop.code, int)
                 status = stop.code
-        return Done(status, out.getvalue(), err.getvalue())
+        return CommandResult(status, out.getvalue(), err.getvalue())
 
     def run(
         self,
@@ -165,7 +165,7 @@ class Folder:
         cwd: Path | None = None,
         env: Mapping[str, str] | None = None,
         seconds: float = 600.0,
-    ) -> Done:
+    ) -> CommandResult:
         """Run a command in a process of its own."""
         done = subprocess.run(
             command(*arguments),
@@ -175,7 +175,7 @@ class Folder:
             capture_output=True,
             timeout=seconds,
         )
-        return Done(done.returncode, done.stdout.decode(), done.stderr.decode())
+        return CommandResult(done.returncode, done.stdout.decode(), done.stderr.decode())
 
     def start(
         self, *arguments: str, env: Mapping[str, str] | None = None, code: str = "", **pipes: int
@@ -250,7 +250,7 @@ def wait_until_alone(folder: Folder) -> None:
 
 
 @contextlib.contextmanager
-def ended(process: subprocess.Popen[bytes]) -> Iterator[subprocess.Popen[bytes]]:
+def kill_at_end(process: subprocess.Popen[bytes]) -> Iterator[subprocess.Popen[bytes]]:
     """A process that is gone afterwards, however the test ends."""
     try:
         yield process

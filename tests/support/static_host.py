@@ -25,7 +25,7 @@ class Host(contextlib.AbstractContextManager["Host"]):
     def __init__(self, folder: Path, base: str = "/") -> None:
         self.folder = folder
         self.base = base
-        self.asked: list[str] = []
+        self.requests: list[str] = []
         """Paths that were asked for, with their queries."""
         self.fonts_delay = 0.0
         """Seconds before a font, which on this machine alone comes before anything is drawn."""
@@ -68,9 +68,9 @@ class Host(contextlib.AbstractContextManager["Host"]):
             finally:
                 self.start()
 
-    def since(self) -> list[str]:
+    def take_requests(self) -> list[str]:
         """What was asked for since this was asked the last time."""
-        found, self.asked = self.asked, []
+        found, self.requests = self.requests, []
         return sorted(found)
 
     def file(self, address: str) -> tuple[int, Path]:
@@ -120,7 +120,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         host = self.host
-        host.asked.append(self.path.removeprefix(host.base))
+        host.requests.append(self.path.removeprefix(host.base))
         status, path = host.file(self.path)
         time.sleep(host.fonts_delay if path.suffix == ".woff2" else 0.0)
         data = path.read_bytes() if path.is_file() else b""

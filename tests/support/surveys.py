@@ -50,7 +50,7 @@ def field(links: int, pieces: int) -> str:
     return scene(floor + inner + boxes, rest=f"<sensor>{sensors}</sensor>")
 
 
-def opened(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:
+def open_files(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:
     """A model whose files are given; assets are found by their names."""
     data = {name: one.encode() if isinstance(one, str) else one for name, one in files.items()}
     assets = {name.rpartition("/")[2]: one for name, one in data.items() if name != path}
@@ -61,17 +61,17 @@ def opened(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:
     return open_model(path, data.get, compiled)
 
 
-def declared(text: str) -> Declarations:
+def parse_declared(text: str) -> Declarations:
     """What a file beside a model declares."""
     parsed = parse_declarations(Source("models/a.toml", text))
     assert parsed.value is not None, parsed.diagnostics
     return parsed.value
 
 
-NOTHING = declared("")
+NOTHING = parse_declared("")
 
 
-def tried(
+def run_survey(
     text: str | bytes | Mapping[str, str | bytes],
     *,
     lesson: str = "",
@@ -82,7 +82,7 @@ def tried(
     clock: Clock | None = None,
 ) -> Survey:
     """What was found in a model; `lesson` is a script that uses it."""
-    model = opened(text if isinstance(text, Mapping) else {PATH: text})
+    model = open_files(text if isinstance(text, Mapping) else {PATH: text})
     place = Source("models/a.toml", "").span(0, 0)
     order = Order(
         "a",
@@ -101,7 +101,7 @@ def tried(
     return survey(order)
 
 
-def found(survey: Survey) -> dict[str, Finding]:
+def findings_by_kind(survey: Survey) -> dict[str, Finding]:
     """Findings that are no settings, by kind; where nothing is timed, all that there is."""
     things = [one for one in survey.report.findings if one.kind not in SETTINGS]
     kinds = [one.kind for one in things]
@@ -114,7 +114,7 @@ def names(finding: Finding) -> list[str]:
     return [place.name for place in finding.places]
 
 
-def fixed(survey: Survey, path: str = PATH) -> str:
+def fixed_text(survey: Survey, path: str = PATH) -> str:
     """The file after all that is proved was changed."""
     files = {one.path: one.data for one in survey.text.documents}
     return (files | survey.text.files(survey.edits))[path].decode()

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from coursebuild.core.text.diagnostics import Diagnostic
 from support.fixture_cases import check_cases
-from support.positioned_nodes import shown
+from support.positioned_nodes import format_diagnostics
 
 FOLDER = Path(__file__).parents[1] / "fixtures" / "texts"
 
@@ -27,7 +27,7 @@ def _told(texts: str, read: Reader) -> str:
     lines = []
     for line in texts.splitlines():
         value, diagnostics = read(ast.literal_eval(line))
-        lines += [line, *(f"  {one}" for one in shown(diagnostics))]
+        lines += [line, *(f"  {one}" for one in format_diagnostics(diagnostics))]
         if value is not None:
             lines.append("  and it is read")
     return "".join(f"{line}\n" for line in lines)

@@ -25,25 +25,25 @@ from coursebuild.core.text.source import Excerpt, Span
 HIDDEN = {"span", "children", "blocks", "items", "header", "rows"}
 
 
-def where(span: Span) -> str:
+def format_span(span: Span) -> str:
     return f"{span.line}:{span.column}-{span.end_line}:{span.end_column}"
 
 
 def dump(parsed: Parsed[Document]) -> str:
     lines = list(_nodes(parsed.value.blocks, 0))
     for note in parsed.value.footnotes:
-        head = f"Footnote {where(note.span)} {note.number} {note.label!r}"
+        head = f"Footnote {format_span(note.span)} {note.number} {note.label!r}"
         lines += [f"{head} references={note.references}", *_nodes(note.blocks, 1)]
-    return "".join(f"{line}\n" for line in lines) + told(parsed.diagnostics)
+    return "".join(f"{line}\n" for line in lines) + format_diagnostics(parsed.diagnostics)
 
 
-def told(diagnostics: tuple[Diagnostic, ...]) -> str:
+def format_diagnostics(diagnostics: tuple[Diagnostic, ...]) -> str:
     lines = []
     for d in diagnostics:
-        lines.append(f"! {where(d.span)} {d.severity}[{d.rule}]: {d.message}")
+        lines.append(f"! {format_span(d.span)} {d.severity}[{d.rule}]: {d.message}")
         lines += [f"!   = help: {d.help}"] if d.help else []
         for note in d.notes:
-            place = f" at {where(note.span)}" if note.span else ""
+            place = f" at {format_span(note.span)}" if note.span else ""
             lines.append(f"!   = note: {note.message}{place}")
     return "".join(f"{line}\n" for line in lines)
 
@@ -56,12 +56,12 @@ def _nodes(nodes: tuple[Block | Inline, ...], depth: int) -> Iterator[str]:
 def _node(node: Block | Inline | ListItem, depth: int) -> Iterator[str]:
     indent = "  " * depth
     values = [_value(f.name, getattr(node, f.name)) for f in fields(node) if f.name not in HIDDEN]
-    words = [type(node).__name__, where(node.span), *filter(None, values)]
+    words = [type(node).__name__, format_span(node.span), *filter(None, values)]
     yield indent + " ".join(words)
     if isinstance(node, Table):
         for cells in (node.header, *node.rows):
             for cell in cells:
-                yield f"{indent}  Cell {where(cell.span)} {cell.text.text!r}"
+                yield f"{indent}  Cell {format_span(cell.span)} {cell.text.text!r}"
                 yield from _nodes(cell.children, depth + 2)
         return
     for name in ("title", "caption", "input", "process", "output"):
@@ -80,13 +80,13 @@ def _node(node: Block | Inline | ListItem, depth: int) -> Iterator[str]:
 def _value(name: str, value: object) -> str:
     """What a field adds to its node's line."""
     if isinstance(value, Span):
-        return f"{name}={where(value)}"
+        return f"{name}={format_span(value)}"
     if isinstance(value, Excerpt):
-        return f"{name}={where(value.span())} {value.text!r}"
+        return f"{name}={format_span(value.span())} {value.text!r}"
     if isinstance(value, Label):
-        return f"label={where(value.span)} {value.id!r}"
+        return f"label={format_span(value.span)} {value.id!r}"
     if isinstance(value, Meaning):
-        return f"meaning={where(value.span)} {value.text!r} {value.unit!r}"
+        return f"meaning={format_span(value.span)} {value.text!r} {value.unit!r}"
     if isinstance(value, Comparison):
         tolerances = f" rtol={value.rtol} atol={value.atol}" if value.mode.value == "rtol" else ""
         return f"[{value.mode.value}{tolerances}{' ellipsis' if value.ellipsis else ''}]"

@@ -8,7 +8,7 @@ from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import CompileResult
 from coursebuild.core.text.diagnostics import Diagnostic
-from support.made_courses import BOX, facts, make_course, told
+from support.made_courses import BOX, facts, make_course, rules_and_texts
 
 GOOD = CompileResult("", None, facts())
 
@@ -70,7 +70,7 @@ def test_texts_of_blocks_and_labs_are_compiled_in_their_order() -> None:
 def test_an_error_is_reported_at_its_line_without_indent(
     keys: str, line: int | None, expected: str
 ) -> None:
-    assert told(check(block(keys), failure(line))) == [f"mjcf-error: {expected}"]
+    assert rules_and_texts(check(block(keys), failure(line))) == [f"mjcf-error: {expected}"]
 
 
 PART = "<!-- a part -->\n<mujocoinclude/>\n"
@@ -90,7 +90,7 @@ def test_a_file_that_others_include_need_not_compile(
     part: str, whole: CompileResult, expected: list[str]
 ) -> None:
     course = make_course(models={"part": part, "whole": BOX})
-    assert told(check(course, part=failure(), whole=whole)) == expected
+    assert rules_and_texts(check(course, part=failure(), whole=whole)) == expected
 
 
 def test_names_that_a_lab_uses_are_in_its_own_model() -> None:
@@ -103,24 +103,24 @@ def test_names_that_a_lab_uses_are_in_its_own_model() -> None:
             ('"trail": "top", "key": 3', ["lab-name: 3", 'lab-name: "top"']),
         ):
             course = make_course(f"```lab\n{{{source}, {fields}}}\n```\n", models={"box": BOX})
-            assert told(check(course, of_text, box=box)) == expected
+            assert rules_and_texts(check(course, of_text, box=box)) == expected
     course = make_course('```lab\n{"model": "box", "key": 9}\n```\n', models={"box": BOX})
-    assert told(check(course, box=failure())) == ["model-error: "]
+    assert rules_and_texts(check(course, box=failure())) == ["model-error: "]
 
 
 def test_a_part_that_a_lab_uses_as_its_model_must_compile() -> None:
     course = make_course('```lab\n{"model": "part"}\n```\n', models={"part": PART})
-    assert told(check(course, part=failure())) == ["model-error: "]
+    assert rules_and_texts(check(course, part=failure())) == ["model-error: "]
 
 
 def test_scenarios_are_compared_with_the_compiled_model() -> None:
     report = "```bench box scenario=fall\n```\n"
     home = CompileResult("", None, facts(keyframes=("home",)))
     undeclared = make_course(report, models={"box": BOX})
-    assert told(check(undeclared, box=home)) == ["bench-scenario: fall"]
-    assert told(check(undeclared, box=failure())) == ["model-error: "]
+    assert rules_and_texts(check(undeclared, box=home)) == ["bench-scenario: fall"]
+    assert rules_and_texts(check(undeclared, box=failure())) == ["model-error: "]
     scenarios = '[[scenario]]\nname = "swing"\nkeyframe = 1\n'
     course = make_course(report, models={"box": BOX}, declared={"box": scenarios})
     # That the scenario is none of those declared is known before anything is compiled.
-    assert told(check(course, box=home)) == ["scenario-model: 1"]
-    assert told(check(course, box=failure())) == ["model-error: "]
+    assert rules_and_texts(check(course, box=home)) == ["scenario-model: 1"]
+    assert rules_and_texts(check(course, box=failure())) == ["model-error: "]

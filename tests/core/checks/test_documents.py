@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from coursebuild.core.checks.course import check_course, check_document
 from coursebuild.core.checks.links import link_targets
-from support.made_courses import make_course, told
+from support.made_courses import make_course, rules_and_texts
 
 
 def test_one_document_is_checked_as_in_the_whole_course() -> None:
@@ -19,7 +19,7 @@ def test_one_document_is_checked_as_in_the_whole_course() -> None:
     one_by_one = [
         line
         for document in course.documents
-        for line in told(check_document(course, document, link_targets(course)))
+        for line in rules_and_texts(check_document(course, document, link_targets(course)))
     ]
-    assert sorted(one_by_one) == sorted(told(check_course(course)))
+    assert sorted(one_by_one) == sorted(rules_and_texts(check_course(course)))
     assert len(one_by_one) == 8

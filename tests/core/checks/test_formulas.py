@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from coursebuild.core.checks.formulas import check_formulas, course_formulas
 from coursebuild.core.model.results import Formula, MathError
-from support.made_courses import make_course, said, told
+from support.made_courses import make_course, messages, rules_and_texts
 
 
 def test_each_formula_is_listed_once_in_order_of_first_use() -> None:
@@ -24,6 +24,6 @@ def test_a_wrong_formula_is_reported_at_each_place() -> None:
     for position, expected in ((None, "x + y"), (0, "x"), (4, "y"), (5, "y"), (99, "y")):
         typeset = {**good, Formula("x + y", False): MathError("no good", position)}
         diagnostics = check_formulas(document, typeset)
-        assert told(diagnostics) == [f"math-syntax: {expected}"] * 2
-        assert said(diagnostics) == ["the formula does not parse: no good"] * 2
+        assert rules_and_texts(diagnostics) == [f"math-syntax: {expected}"] * 2
+        assert messages(diagnostics) == ["the formula does not parse: no good"] * 2
         assert [d.span.line for d in diagnostics] == [1, 3]

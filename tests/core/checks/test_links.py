@@ -6,7 +6,7 @@ import pytest
 
 from coursebuild.core.checks.course import check_course
 from coursebuild.core.checks.links import anchors
-from support.made_courses import BOX, document, make_course, said, told
+from support.made_courses import BOX, document, make_course, messages, rules_and_texts
 
 SCRIPT = "```python file=examples/a_b.py\nx = 1\nprint(x)\n```\n\nOutput:\n\n```text\n1\n```\n"
 QUESTION = '{"id": "one", "kind": "open", "q": "Q", "reference": "R"}'
@@ -15,7 +15,9 @@ QUIZ = f'```quiz\n{{"id": "q1", "questions": [{QUESTION}]}}\n```\n'
 
 def messages_of(first: str, second: str = f"## There {{#there}}\n\n{SCRIPT}") -> list[str]:
     files = ["content/lessons/plot.svg", "content/data/a b.csv"]
-    return told(check_course(make_course(first, second, models={"box": BOX}, files=files)))
+    return rules_and_texts(
+        check_course(make_course(first, second, models={"box": BOX}, files=files))
+    )
 
 
 GOOD = (
@@ -93,4 +95,4 @@ def test_anchors_of_a_document() -> None:
     ],
 )  # fmt: skip
 def test_the_message_says_why_a_link_leads_nowhere(text: str, message: str) -> None:
-    assert said(check_course(make_course(text, models={"box": BOX}))) == [message]
+    assert messages(check_course(make_course(text, models={"box": BOX}))) == [message]

@@ -9,7 +9,7 @@ import pytest
 from coursebuild.core.checks.course import check_course
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.features.quiz.checks import check_output_lines
-from support.made_courses import make_course, said, told
+from support.made_courses import make_course, messages, rules_and_texts
 
 
 def question(line: int = 1) -> str:
@@ -26,8 +26,8 @@ def test_an_output_question_needs_a_script_that_runs() -> None:
     script = "```python file=examples/x.py\nprint(1)\n```\n"
     assert check_course(make_course(question(), script)) == ()
     diagnostics = check_course(make_course(question(), script.replace(".py", ".py norun")))
-    assert told(diagnostics) == ['quiz-output: "examples/x.py"']
-    assert said(diagnostics) == ["`examples/x.py` is marked `norun`, so it has no output"]
+    assert rules_and_texts(diagnostics) == ['quiz-output: "examples/x.py"']
+    assert messages(diagnostics) == ["`examples/x.py` is marked `norun`, so it has no output"]
 
 
 @pytest.mark.parametrize(
@@ -45,6 +45,8 @@ def test_an_output_question_is_about_a_line_that_is_printed(
 ) -> None:
     course = make_course(question(line))
     message = f"`examples/x.py` has no line {line}: it prints {lines}"
-    assert said(check_output_lines(course, [script_run(stdout)])) == ([message] if lines else [])
+    assert messages(check_output_lines(course, [script_run(stdout)])) == (
+        [message] if lines else []
+    )
     for runs in ([], [script_run(stdout, Outcome.FAILED)]):
         assert not list(check_output_lines(course, runs)), "it did not run to its end"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.core.checks.compiled import check_scenarios
-from support.made_courses import facts, make_course, said, told
+from support.made_courses import facts, make_course, messages, rules_and_texts
 
 MODEL = facts(
     nq=3,
@@ -29,7 +29,10 @@ def messages_of(*scenarios: str) -> list[str]:
     texts = (f'[[scenario]]\nname = "s{n}"\n{text}\n' for n, text in enumerate(scenarios))
     (declarations,) = make_course(models={}, declared={"box": "".join(texts)}).declarations
     diagnostics = tuple(check_scenarios(declarations, MODEL))
-    return [f"{a}; {b}" for a, b in zip(told(diagnostics), said(diagnostics), strict=True)]
+    return [
+        f"{a}; {b}"
+        for a, b in zip(rules_and_texts(diagnostics), messages(diagnostics), strict=True)
+    ]
 
 
 def test_scenarios_that_fit_their_model_are_good() -> None:

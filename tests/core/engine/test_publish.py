@@ -18,7 +18,7 @@ from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import exchange, publish
 from coursebuild.core.files.errors import EffectError, PublishRefusedError
 from coursebuild.core.model.results import OutputFile
-from support.published_sites import beside, texts
+from support.published_sites import entries, texts
 from support.published_sites import root as root
 
 PATHS = ("index.html", "404.html", "lessons/4.2/index.html", "assets/fonts/a b é.woff2")
@@ -70,7 +70,7 @@ def test_folder_keeps_its_permissions_and_a_link_its_place(root: Path, tmp_path:
         assert (root / "public").is_symlink()
         assert stat.S_IMODE((tmp_path / "www").stat().st_mode) == 0o2775
         assert texts(tmp_path / "www") == site_texts(text)
-    assert beside(tmp_path) == ["course", "www"]
+    assert entries(tmp_path) == ["course", "www"]
 
 
 def test_file_managers_may_look(root: Path) -> None:
@@ -99,7 +99,7 @@ def test_full_disk(root: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> No
         with pytest.raises(EffectError, match="no space left on device"):
             publish(root, root / "public", site("two"))
     assert texts(root / "public") == site_texts("one")
-    assert beside(root) == ["content", "public"]
+    assert entries(root) == ["content", "public"]
 
 
 def test_paths_that_no_site_has_or_that_are_in_each_others_way(root: Path) -> None:
@@ -112,7 +112,7 @@ def test_paths_that_no_site_has_or_that_are_in_each_others_way(root: Path) -> No
         with pytest.raises((ValueError, EffectError)):
             publish(root, root / "public", [OutputFile(path, b"") for path in paths])
     assert texts(root / "public") == site_texts("one")
-    assert beside(root) == ["content", "public"]
+    assert entries(root) == ["content", "public"]
 
 
 @pytest.mark.site
@@ -228,4 +228,4 @@ def test_two_builds_at_once(root: Path, exchanges: bool) -> None:
     assert len(set(texts(root / "public").values())) == 1
     assert len(texts(root / "public")) == 20
     publish(root, root / "public", site("one"))
-    assert beside(root) == ["content", "public"]
+    assert entries(root) == ["content", "public"]

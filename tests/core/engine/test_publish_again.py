@@ -25,7 +25,7 @@ def test_where_nothing_differs_the_site_stays(root: Path, pages: Pages) -> None:
     assert out.stat().st_ino == before
     assert publish(root, out, [*pages(a="1"), OutputFile("x.css", b"y")]) == ("x.css",)
     assert out.stat().st_ino != before
-    assert pages.made == ["a.html"]
+    assert pages.made_paths == ["a.html"]
 
 
 def test_a_file_somebody_put_there_by_our_marker_goes(root: Path, pages: Pages) -> None:
@@ -59,7 +59,7 @@ def test_a_project_that_moves_keeps_its_site_and_a_copy_makes_it_again(
     publish(root, root / "public", pages(a="1"))
     new_root, copy = root.rename(tmp_path / "moved"), tmp_path / "copy"
     assert publish(new_root, new_root / "public", pages(a="1")) == ()
-    assert pages.made == ["a.html"]
+    assert pages.made_paths == ["a.html"]
     shutil.copytree(new_root, copy)
     assert publish(copy, copy / "public", pages(a="1")) == ("a.html",)
 

@@ -11,7 +11,7 @@ import pytest
 
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
-from support.published_sites import MANY, SPARE, TEXTS, Pages, beside, texts
+from support.published_sites import MANY, SPARE, TEXTS, Pages, entries, texts
 from support.published_sites import pages as pages
 from support.published_sites import root as root
 from support.published_sites import spared as spared
@@ -109,7 +109,7 @@ def test_changes_by_hand(
     assert (out / "b/c.html").read_text() == "b/c.html 1"
     publish(spared, out, pages(**MANY | {"a": "3"}))
     assert texts(out) == TEXTS | {"a.html": "a.html 3"}
-    assert beside(spared) == ["content", "public"]
+    assert entries(spared) == ["content", "public"]
 
 
 def test_what_is_unlinked_in_the_spare_stays_in_the_site(spared: Path, pages: Pages) -> None:
@@ -154,4 +154,4 @@ def test_something_else_for_a_spare(spared: Path, tmp_path: Path, pages: Pages, 
         assert publish(spared, spared / "public", pages(**MANY | {"a": key})) == ("a.html",)
         assert texts(spared / "public") == TEXTS | {"a.html": f"a.html {key}"}
     assert texts(elsewhere) == before
-    assert beside(spared) == ["content", "public"]
+    assert entries(spared) == ["content", "public"]

@@ -15,7 +15,7 @@ from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
-from support.published_sites import MANY, SPARE, TEXTS, Pages, beside, texts
+from support.published_sites import MANY, SPARE, TEXTS, Pages, entries, texts
 from support.published_sites import pages as pages
 from support.published_sites import root as root
 from support.published_sites import spared as spared
@@ -38,8 +38,8 @@ def test_what_did_not_change_is_neither_made_nor_linked(
     assert texts(spared / SPARE) == TEXTS
     assert publish(spared, spared / "public", pages(**MANY | {"b__d": "3"})) == ("b/d.html",)
     assert links == ["a.html"]
-    assert pages.made == ["b/d.html", "b/d.html"]
-    assert beside(spared) == ["content", "public"]
+    assert pages.made_paths == ["b/d.html", "b/d.html"]
+    assert entries(spared) == ["content", "public"]
 
 
 @pytest.mark.site
@@ -53,8 +53,8 @@ def test_a_long_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: st
     before: dict[str, str] = {}
     for _ in range(60):
         pages = Pages()
-        paths = publish(tmp_path, tmp_path / "public", [pages.one(*item) for item in site.items()])
-        assert sorted(paths) == sorted(pages.made)
+        paths = publish(tmp_path, tmp_path / "public", [pages.page(*item) for item in site.items()])
+        assert sorted(paths) == sorted(pages.made_paths)
         assert set(paths) == {path for path, key in site.items() if before.get(path) != key}
         assert texts(tmp_path / "public") == {path: f"{path} {key}" for path, key in site.items()}
         assert (tmp_path / "public" / MARKER).read_text().split("\n")[1:-1] == sorted(site)
@@ -76,7 +76,7 @@ def test_two_places_have_one_spare(spared: Path, pages: Pages) -> None:
         for out in ("public", "other"):
             publish(spared, spared / out, pages(**MANY | {"a": key}))
             assert texts(spared / out) == TEXTS | {"a.html": f"a.html {key}"}
-    assert beside(spared) == ["content", "other", "public"]
+    assert entries(spared) == ["content", "other", "public"]
 
 
 def test_a_place_on_another_file_system_than_the_course(
@@ -93,7 +93,7 @@ def test_a_place_on_another_file_system_than_the_course(
     for key in "23":
         assert publish(spared, spared / "public", pages(**MANY | {"a": key})) == ("a.html",)
         assert texts(spared / "public") == TEXTS | {"a.html": f"a.html {key}"}
-        assert beside(spared) == ["content", "public"]
+        assert entries(spared) == ["content", "public"]
 
 
 def test_a_failure_while_a_page_is_made_leaves_the_old_site(spared: Path, pages: Pages) -> None:
@@ -103,7 +103,7 @@ def test_a_failure_while_a_page_is_made_leaves_the_old_site(spared: Path, pages:
     with pytest.raises(KeyboardInterrupt):
         publish(spared, spared / "public", [*pages(**MANY), CachedFile("x.html", "2", broken)])
     assert texts(spared / "public") == TEXTS
-    assert beside(spared) == ["content", "public"]
+    assert entries(spared) == ["content", "public"]
     assert publish(spared, spared / "public", pages(**MANY | {"a": "2"})) == ("a.html",)
 
 
@@ -121,7 +121,7 @@ def test_somebody_changes_the_folder_that_is_written(spared: Path, removes: bool
     with pytest.raises(EffectError, match="somebody else changes what is being written"):
         publish(spared, spared / "public", [*pages(**MANY), CachedFile("x.html", "1", make)])
     assert texts(spared / "public") == TEXTS
-    assert beside(spared) == ["content", "public"]
+    assert entries(spared) == ["content", "public"]
     publish(spared, spared / "public", [*pages(**MANY), CachedFile("x.html", "2", lambda: b"new")])
     assert texts(spared / "public") == TEXTS | {"x.html": "new"}
 
@@ -132,11 +132,11 @@ def test_a_site_that_may_only_be_read_leaves_nothing_beside_it(held_back: Path) 
     out.chmod(0o555)
     for number in range(2, 5):
         publish(held_back, out, pages(**MANY | {"a": str(number)}))
-        assert beside(held_back) == ["public"]
+        assert entries(held_back) == ["public"]
         assert texts(out) == TEXTS | {"a.html": f"a.html {number}"}
         assert (held_back / SPARE).is_dir()
         assert out.stat().st_mode & 0o777 == 0o555
-    assert pages.made[len(MANY) :] == ["a.html"] * 3
+    assert pages.made_paths[len(MANY) :] == ["a.html"] * 3
     out.chmod(0o755)
 
 

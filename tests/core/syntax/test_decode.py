@@ -21,7 +21,7 @@ from coursebuild.core.syntax.wording import JSON, TOML
 from coursebuild.core.text.source import Excerpt, Source
 from coursebuild.features.lab.schema import SimLab
 from coursebuild.features.quiz.schema import QuizFile
-from support.positioned_nodes import shown
+from support.positioned_nodes import format_diagnostics
 from support.text_cases import check_texts
 
 
@@ -116,7 +116,7 @@ def test_toml_has_other_nouns() -> None:
     )
     assert parsed_toml.value is not None
     decoding = decode(parsed_toml.value, Body, "the body", TOML)
-    assert shown(decoding.diagnostics) == [
+    assert format_diagnostics(decoding.diagnostics) == [
         "1:8-18 field-type: `name` must be a string, not a date or time"
         ' [put it between quotes: `"2024-01-01"`]',
         "2:9-10 field-type: `shape` must be a table, not the number 3",

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from support.formatting import check_formatting, formatted
+from support.formatting import check_formatting, format_text
 from support.random_lessons import markdown
-from support.scratch_course import Done, Make
+from support.scratch_course import CommandResult, Make
 
 ROOT = Path(__file__).parents[3]
 MAP = "content/course.toml"
@@ -93,7 +93,7 @@ def test_paragraphs_are_wrapped_at_a_width(text: str, wanted: str) -> None:
 
 
 def tidied(text: str, width: int = 0) -> str:
-    done = formatted(text, width)
+    done = format_text(text, width)
     assert not done.diagnostics
     return done.value
 
@@ -115,7 +115,7 @@ def test_lines_of_the_course_stay() -> None:
     """Where the map names no width, only tables and white space change."""
     for path in DOCUMENTS:
         text, lesson = path.read_text(), path.parent.name == "lessons"
-        lines = formatted(text, 0, lesson).value.splitlines()
+        lines = format_text(text, 0, lesson).value.splitlines()
         changed = {*lines} - {*text.splitlines()}
         assert all(line.lstrip("> ").startswith("|") for line in changed), path
 
@@ -126,13 +126,13 @@ def test_command_formats_the_course_by_the_width_of_its_map(
     course = make("## A\none two three four\n", "## B\n\ntext\n")
     course.write(MAP, course.text(MAP) + "\n[format]\nwidth = 10\n")
     path, before = course.lesson(1), course.tree()
-    assert course.main("fmt", "--check") == Done(1, f"would format {path}\n", "")
+    assert course.main("fmt", "--check") == CommandResult(1, f"would format {path}\n", "")
     shown = course.main("fmt", "1.1", "--diff")
     assert (shown.status, "\n+one two\n+three four" in shown.out) == (1, True)
     assert course.tree() == before
-    assert course.main("fmt") == Done(0, f"changed {path}\n", "")
+    assert course.main("fmt") == CommandResult(0, f"changed {path}\n", "")
     assert course.text(path) == "## A\n\none two\nthree four\n"
-    assert course.main("fmt", "--check") == Done(0, "", "")
+    assert course.main("fmt", "--check") == CommandResult(0, "", "")
 
 
 def test_command_leaves_what_it_cannot_read(make: Make) -> None:

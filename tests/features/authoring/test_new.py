@@ -12,7 +12,7 @@ import pytest
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.course_map import with_lesson
-from support.scratch_course import FIRST, ROOT, SECOND, Done, Make
+from support.scratch_course import FIRST, ROOT, SECOND, CommandResult, Make
 
 pytestmark = pytest.mark.site
 
@@ -69,7 +69,7 @@ def test_new_lesson_is_checked_and_built_as_it_is(make: Make) -> None:
         (("1.2.1", "A\tB\x7f"), "content/lessons/1.2.1-a-b.md"),
     ):
         done = folder.main("new", "lesson", *arguments)
-        assert done == Done(0, f"changed {MAP}\nwrote {path}\n", "")
+        assert done == CommandResult(0, f"changed {MAP}\nwrote {path}\n", "")
         assert (folder.root / path).is_file()
     done = folder.main("check")
     assert (done.status, done.out.count("warning")) == (0, 0), done.out
@@ -125,14 +125,14 @@ def test_what_cannot_be_added_changes_nothing(make: Make) -> None:
 def test_new_model_compiles(make: Make) -> None:
     folder = make(FIRST + "\nThe [model](model:parts/falling-ball).\n")
     done = folder.main("new", "model", "parts/falling-ball")
-    assert done == Done(0, "wrote models/parts/falling-ball.xml\n", "")
+    assert done == CommandResult(0, "wrote models/parts/falling-ball.xml\n", "")
     assert folder.main("check").status == 0
 
 
 def test_new_template_is_the_one_of_the_tool_and_known_for_it(make: Make) -> None:
     folder = make(FIRST)
     done = folder.main("new", "template", "blocks/code.html")
-    assert done == Done(0, "wrote theme/templates/blocks/code.html\n", "")
+    assert done == CommandResult(0, "wrote theme/templates/blocks/code.html\n", "")
     first, _, rest = folder.text("theme/templates/blocks/code.html").partition("\n")
     assert rest == (ROOT / "templates/blocks/code.html").read_text(encoding="utf-8")
     assert folder.main("new", "template", "blocks/code.html").status == 2

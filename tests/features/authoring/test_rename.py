@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from support.scratch_course import FIRST, SECOND, Done, Folder, Make, block
+from support.scratch_course import FIRST, SECOND, CommandResult, Folder, Make, block
 
 pytestmark = pytest.mark.site
 
@@ -48,7 +48,7 @@ def test_every_link_mention_and_prerequisite_follows(course: Folder) -> None:
     assert before.status == 0, before.out
     toml, lesson = course.text(MAP), course.text(course.lesson(3))
     done = course.main("rename", "1.2", "1.7")
-    assert done == Done(
+    assert done == CommandResult(
         0,
         f"changed {MAP}\nchanged {course.lesson(3)}\n"
         "wrote content/lessons/1.7-two.md\nremoved content/lessons/1.2-two.md\n",
@@ -181,7 +181,7 @@ def test_bytes_that_are_no_text_are_moved_as_they_are(make: Make) -> None:
 
 
 def test_of_two_at_once_one_is_done(course: Folder) -> None:
-    def rename(new: str) -> Done:
+    def rename(new: str) -> CommandResult:
         return course.run("rename", "1.2", new)
 
     with ThreadPoolExecutor(2) as pool:

@@ -44,7 +44,7 @@ def test_what_is_recorded_is_checked(course: Path) -> None:
     check_again = check(options(course), measuring=fake)
     assert check_again.ok
     assert [comparison.departures for comparison in check_again.checked] == [(), ()]
-    assert fake.asked == [("arms/left arm", 0, False, False), ("box", 0, False, False)]
+    assert fake.calls == [("arms/left arm", 0, False, False), ("box", 0, False, False)]
 
 
 def test_the_same_bytes_are_not_written_again(course: Path) -> None:
@@ -81,7 +81,7 @@ def test_a_report_that_is_not_there_or_none_or_of_something_else(course: Path) -
     write(course / "models" / "left arm.xml", BOX)
     fake = Fake()
     measurement = check(options(course), measuring=fake)
-    assert not measurement.ok and fake.asked == []
+    assert not measurement.ok and fake.calls == []
     assert [(failure.message, failure.help) for failure in measurement.failures] == [
         (
             f"{PATH} is not there",

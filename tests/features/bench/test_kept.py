@@ -17,7 +17,7 @@ from coursebuild.features.bench.commands.bench.run import bench
 from coursebuild.numerics.reports.bench import ScenarioReport
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scenes import find_scenes
-from support.measured_course import BOX, TOML, Fake, asked, bench_course, options, swing, write
+from support.measured_course import BOX, TOML, Fake, bench_course, options, swing, take_calls, write
 
 pytestmark = pytest.mark.site
 
@@ -74,7 +74,7 @@ def test_model_is_measured_again_only_where_something_changed(course: Path) -> N
     def run(**settings: Any) -> list[str]:
         measurement = bench(options(course, **settings), measuring=fake)
         assert measurement.reports[0].scenarios == (swing(),)
-        return asked(fake)
+        return take_calls(fake)
 
     assert run() == ["box"]
     assert run() == []
@@ -88,17 +88,17 @@ def test_model_is_measured_again_only_where_something_changed(course: Path) -> N
     write(course / "models" / "box.xml", BOX + "<!-- -->")
     assert run() == ["box"]
     bench(options(course), quick=True, measuring=fake)
-    assert fake.asked == [("box", 0, True, True)]
+    assert fake.calls == [("box", 0, True, True)]
 
 
 def test_scenarios_measured_before_an_interruption_are_kept(course: Path) -> None:
     fake = Fake(swing(), KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
         bench(options(course), measuring=fake)
-    assert [number for _, number, *_ in fake.asked] == [0, 1]
+    assert [number for _, number, *_ in fake.calls] == [0, 1]
     fake = Fake(swing(), replace(swing(), name="other"))
     measurement = bench(options(course), measuring=fake)
-    assert [number for _, number, *_ in fake.asked] == [1]
+    assert [number for _, number, *_ in fake.calls] == [1]
     assert [scenario.name for scenario in measurement.reports[0].scenarios] == ["swing", "other"]
 
 
@@ -126,7 +126,7 @@ def test_two_runs_at_once_measure_one_after_the_other(course: Path) -> None:
     for thread in threads:
         thread.join()
     assert most == 1
-    assert sum(len(fake.asked) for fake in fakes) == 1
+    assert sum(len(fake.calls) for fake in fakes) == 1
 
 
 class Terminal(io.StringIO):

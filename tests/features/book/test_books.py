@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from support.archives import told
+from support.archives import epub_messages
 from support.built_sites import BuiltCourses
 from support.scratch_course import Folder, Make
 
@@ -80,7 +80,7 @@ def full_course(tmp_path_factory: pytest.TempPathFactory, built_courses: BuiltCo
 def test_ebook_of_every_construct_and_of_wild_html_is_valid(full_course: Folder) -> None:
     book = export(full_course, "epub")
     assert book.read_bytes()[30:58] == b"mimetypeapplication/epub+zip"
-    assert told(book) == []
+    assert epub_messages(book) == []
     with zipfile.ZipFile(book) as archive:
         assert {info.date_time for info in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
         assert 'page-progression-direction="rtl"' in archive.read("EPUB/package.opf").decode()
@@ -112,7 +112,7 @@ def test_ebook_of_course_is_valid(built_courses: BuiltCourses, name: str, tmp_pa
     book = tmp_path / "course.epub"
     process = built_courses[name].main("export", "epub", "--quiet", "--out", str(book))
     assert process.status == 0, process.out
-    assert told(book) == []
+    assert epub_messages(book) == []
 
 
 def test_export_follows_edits_and_can_be_offered_by_a_link(make_course: Make) -> None:

@@ -18,7 +18,7 @@ from coursebuild.features.lab.schema import (
     Slider,
     Verify,
 )
-from support.lab_fences import parse, told
+from support.lab_fences import messages, parse
 from support.lab_values import lab_of
 
 COMPLETE = r"""{
@@ -104,14 +104,14 @@ def test_of_another_kind_only_what_all_have_is_checked() -> None:
     assert lab is not None
     assert (lab.kind, lab.config, lab.fields) == ("graph", body, SimLab(title="T", height=100))
     assert len(lab.note) == 1
-    assert told('{"title": 4, "points": [1,], "height": 5, "a": 1, "a": 2}', "graph") == [
+    assert messages('{"title": 4, "points": [1,], "height": 5, "a": 1, "a": 2}', "graph") == [
         "2:11-12 field-type: `title` must be a string, not the number 4"
         ' [put it between quotes: `"4"`]',
         "2:26-27 json-syntax: a comma before `]` [remove the comma]",
         "2:40-41 field-value: `height` must be at least 80, not 5",
         "2:51-54 field-repeated: `a` is given twice",
     ]
-    assert told("[]", "graph") == ["2:1-2 field-type: the lab must be an object, not an array"]
+    assert messages("[]", "graph") == ["2:1-2 field-type: the lab must be an object, not an array"]
 
 
 def test_a_model_that_readers_edit() -> None:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from support.lab_lessons import RIGHT, checked, course, fence
+from support.lab_lessons import RIGHT, course, fence, run_check
 from support.scratch_course import Folder
 
 pytestmark = pytest.mark.engine
@@ -45,7 +45,7 @@ def site(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> BuiltSite:
     folder = course(root, stores, "## A lab\n\n" + fence(RIGHT), "## A\n\n" + fence(RESETS))
     folder.write("models/a/still.xml", STILL)
     folder.write("models/lost.xml", LOST)
-    report = checked(folder, status=0)
+    report = run_check(folder, status=0)
     build = folder.main("build")
     assert build.status == 0, build.out + build.err
     return BuiltSite(folder, report)
@@ -71,14 +71,14 @@ def test_a_lab_in_which_everything_holds(site: BuiltSite) -> None:
 
 
 def test_a_lab_whose_reset_leads_elsewhere_is_warned_of_and_published(site: BuiltSite) -> None:
-    second_report = checked(site.folder, status=0)
+    second_report = run_check(site.folder, status=0)
     for report, is_cached in ((site.report, False), (second_report, True)):
         (diagnostic,) = report["diagnostics"]
         fields = [diagnostic[name] for name in ("rule", "severity", "line")]
         assert fields == ["lab-reset", "warning", 5]
         assert [(lab["status"], lab["cached"]) for lab in report["labs"]] == [("ok", is_cached)] * 2
     assert '<div class="lab-static">' in site.page("1.3")
-    only = checked(site.folder, "1.3")
+    only = run_check(site.folder, "1.3")
     assert [lab["name"] for lab in only["labs"]] == ["1.3-lab-1"]
 
 

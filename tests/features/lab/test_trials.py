@@ -30,11 +30,11 @@ from coursebuild.features.lab.inputs import lab_trials
 from coursebuild.features.lab.trial import Engines, LabTrials
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import Options
-from support.lab_lessons import BALL, checked, course, fence
+from support.lab_lessons import BALL, course, fence, run_check
 from support.lab_values import OpenEngines, try_labs
 from support.made_courses import make_course
-from support.poisoned_values import poisoned
-from support.scratch_course import Folder, block, ended, wait_until_alone
+from support.poisoned_values import mutations
+from support.scratch_course import Folder, block, kill_at_end, wait_until_alone
 from support.waiting import wait_until
 
 pytestmark = pytest.mark.engine
@@ -46,7 +46,7 @@ LAB = """{"title": "T", "model": "ball", "height": 80, "setup": "ctx.a = 1",
 
 def are_cached(folder: Folder) -> list[bool]:
     """Whether each lab was taken from the store; `--shard` makes the command look at the labs."""
-    return [lab["cached"] for lab in checked(folder, "--shard", "1/1", status=0)["labs"]]
+    return [lab["cached"] for lab in run_check(folder, "--shard", "1/1", status=0)["labs"]]
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +118,7 @@ def test_poisoned_trials_are_one_that_can_be_shown_or_told(
     bombs = (zlib.compress(data, 1) for data in (b" " * (1 + (1 << 28)), b"[" * 100_000))
     text = zlib.decompress(reply)
     without_main = json.dumps({**json.loads(text), "main": None}).encode()
-    texts = map(zlib.compress, (text[:-1], without_main, *poisoned(text, count)))
+    texts = map(zlib.compress, (text[:-1], without_main, *mutations(text, count)))
     for data in (reply, *bombs, *texts):
         entry.write_bytes(sealed(name, data))
         shutil.rmtree(tried_course.root / ".coursebuild/pictures", ignore_errors=True)
@@ -206,7 +206,7 @@ def test_native_mujoco_that_dies_is_told_at_the_lab(
 
     monkeypatch.setattr(NativeEngine, "parity", kill_and_compare)
     folder = course(tmp_path / "course", stores, "## A\n\n" + fence(LAB))
-    (diagnostic,) = checked(folder, status=1)["diagnostics"]
+    (diagnostic,) = run_check(folder, status=1)["diagnostics"]
     assert (diagnostic["rule"], diagnostic["line"]) == ("lab-engine", 3)
     assert diagnostic["message"] == "native MuJoCo crashed (SIGKILL)"
     monkeypatch.undo()
@@ -228,7 +228,7 @@ def test_signal_ends_labs_and_scripts_at_once_and_leaves_nothing(
     folder = course(tmp_path / "course", stores, lesson)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    with ended(folder.start("check", "1.2", **pipes)) as process:
+    with kill_at_end(folder.start("check", "1.2", **pipes)) as process:
         wait_until(lambda: (folder.root / "running").exists() and kept_trials(folder), "the loop")
         os.kill(process.pid, number)
         assert process.wait(600) == status

@@ -67,7 +67,7 @@ BALL = """<!-- A ball in the air. -->
 
 def wait_for_results(editor: Editor) -> None:
     """Until everything has run."""
-    editor.eventually(lambda: "nq = 7" in editor.hover_text(TWO, "model:ba|ll"))
+    editor.wait_for(lambda: "nq = 7" in editor.hover_text(TWO, "model:ba|ll"))
 
 
 @pytest.fixture(scope="module")
@@ -144,9 +144,9 @@ def test_scripts_run_when_they_are_saved(editor: Editor) -> None:
     assert diagnostic.range.start.line == 20
     accept = "Accept what `examples/fall.py` prints"
     # offered once the script has run a second time
-    action = editor.eventually(lambda: editor.actions(ONE, "at 1.|000 m").get(accept))
+    action = editor.wait_for(lambda: editor.actions(ONE, "at 1.|000 m").get(accept))
     assert action.kind == types.CodeActionKind.QuickFix and action.diagnostics
-    (new,) = editor.edited(action.edit.changes).values()
+    (new,) = editor.apply_edits(action.edit.changes).values()
     assert new == ("A line more.\n\n" + typed).replace("\nafter", "\na ball after")
     editor.write(ONE, new)
     editor.until(ONE)
@@ -187,7 +187,7 @@ def test_a_text_that_is_too_long_is_not_read(editor: Editor) -> None:
     text = "$x$ *a* {out} " * 20_000
     editor.write(ONE, text)
     editor.until(ONE, "text-long")
-    params = editor.named(ONE), types.FormattingOptions(4, True)
+    params = editor.identifier(ONE), types.FormattingOptions(4, True)
     assert not editor.request("formatting", types.DocumentFormattingParams(*params))
     assert not editor.request("folding_range", types.FoldingRangeParams(params[0]))
     assert not editor.actions(ONE, text[:3] + "|" + text[3:])
@@ -256,7 +256,7 @@ DEFINITIONS = [
 
 
 def test_where_something_is_said(editor: Editor) -> None:
-    places = [(path, needle, editor.defined_at(path, needle)) for path, needle, _ in DEFINITIONS]
+    places = [(path, needle, editor.definition(path, needle)) for path, needle, _ in DEFINITIONS]
     assert places == DEFINITIONS
 
 
@@ -288,7 +288,7 @@ def test_what_may_be_written(editor: Editor, path: str, typed: str, label: str, 
     editor.write(path, editor.texts[path] + "\n" + typed.replace("|", "", 1))
     item = editor.proposals(path, typed)[label]
     assert isinstance(item.text_edit, types.TextEdit)
-    (text,) = editor.edited({editor.places.uri(path): [item.text_edit]}).values()
+    (text,) = editor.apply_edits({editor.places.uri(path): [item.text_edit]}).values()
     before, after = typed.split("|", 1)
     stem = re.split(r'[\s:#=.!`("\[{]', before)[-1]
     start = before.removesuffix('"' + stem) if new.startswith('"') else before.removesuffix(stem)
@@ -309,11 +309,13 @@ def test_a_number_that_was_printed_can_be_bound(editor: Editor) -> None:
     editor.write(ONE, text)
     (bind,) = editor.actions(ONE, "for 0.0|02 s, not").values()
     assert bind.title == "Bind `0.002` to what `examples/fall.py` prints"
-    assert editor.edited(bind.edit.changes)[ONE] == text.replace(
+    assert editor.apply_edits(bind.edit.changes)[ONE] == text.replace(
         "r 0.002 s, not", "r `0.002`{out} s, not"
     )
     (bind,) = editor.actions(ONE, "to `1.0|00` m.").values()
-    assert editor.edited(bind.edit.changes)[ONE] == text.replace("`1.000` m.", "`1.000`{out} m.")
+    assert editor.apply_edits(bind.edit.changes)[ONE] == text.replace(
+        "`1.000` m.", "`1.000`{out} m."
+    )
     assert not editor.actions(ONE, "not |5 s")
     assert not editor.actions(ONE, "at 1.|000 m\n```")
 
@@ -324,31 +326,31 @@ def test_a_proposal_of_a_diagnostic_is_a_quick_fix(editor: Editor) -> None:
     editor.until(ONE, "binding-mismatch")
     (fix,) = editor.actions(ONE, "`1.2|00 m`").values()
     assert (fix.title, fix.kind) == ("Write `1.000 m`", types.CodeActionKind.QuickFix)
-    assert editor.edited(fix.edit.changes)[ONE] == text.replace("1.200", "1.000")
+    assert editor.apply_edits(fix.edit.changes)[ONE] == text.replace("1.200", "1.000")
 
 
 def test_a_lesson_gets_another_id_everywhere(editor: Editor) -> None:
-    place = editor.named(TWO), editor.place(TWO, "lesson:1.|1#fall")
+    place = editor.identifier(TWO), editor.place(TWO, "lesson:1.|1#fall")
     name = editor.request("prepare_rename", types.PrepareRenameParams(*place))
     assert name.range.end.character - name.range.start.character == len("1.1")
     assert name.placeholder == "1.1"
     rename_edit = editor.request("rename", types.RenameParams(*place, new_name="1.5"))
     *edits, file_rename = rename_edit.document_changes
     assert editor.places.path(file_rename.new_uri) == "content/lessons/1.5-one.md"
-    new = editor.edited({edit.text_document.uri: edit.edits for edit in edits})
+    new = editor.apply_edits({edit.text_document.uri: edit.edits for edit in edits})
     assert new[TWO] == LINKS.replace("1.1", "1.5")
     assert 'id = "1.5"' in new[MAP]
     assert 'id = "1.1"' not in new[MAP]
     with pytest.raises(JsonRpcException, match=r"there is a lesson 1\.2 already"):
         editor.request("rename", types.RenameParams(*place, new_name="1.2"))
-    heading = editor.named(TWO), editor.place(TWO, "## L|inks")
+    heading = editor.identifier(TWO), editor.place(TWO, "## L|inks")
     assert editor.request("prepare_rename", types.PrepareRenameParams(*heading)) is None
 
 
 def rename(editor: Editor, path: str, needle: str, name: str) -> dict[str, str]:
-    place = editor.named(path), editor.place(path, needle)
+    place = editor.identifier(path), editor.place(path, needle)
     edit = editor.request("rename", types.RenameParams(*place, new_name=name))
-    return {} if edit is None else editor.edited(edit.changes)
+    return {} if edit is None else editor.apply_edits(edit.changes)
 
 
 def test_a_term_and_a_label_get_another_name_everywhere(editor: Editor) -> None:
@@ -381,7 +383,7 @@ def test_a_term_and_a_label_get_another_name_everywhere(editor: Editor) -> None:
 
 def test_headings_and_what_can_be_folded(editor: Editor) -> None:
     editor.write(TWO, "## A\n\n### B `c`\n\n> [!tip]\n> Fold\n\n## D\n\n```text\nx\n```\n")
-    document = editor.named(TWO)
+    document = editor.identifier(TWO)
     symbols = editor.request("document_symbol", types.DocumentSymbolParams(document))
     assert [(s.name, [i.name for i in s.children]) for s in symbols] == [("A", ["B c"]), ("D", [])]
     folds = editor.request("folding_range", types.FoldingRangeParams(document))
@@ -390,11 +392,11 @@ def test_headings_and_what_can_be_folded(editor: Editor) -> None:
 
 
 def test_a_text_is_formatted(editor: Editor) -> None:
-    params = editor.named(TWO), types.FormattingOptions(4, True)
+    params = editor.identifier(TWO), types.FormattingOptions(4, True)
     editor.write(TWO, "## A\n\n| a | b |\n|-|-|\n| 100 | 2 |\n")
     (edit,) = editor.request("formatting", types.DocumentFormattingParams(*params))
     new = "## A\n\n| a   | b   |\n| --- | --- |\n| 100 | 2   |\n"
-    assert editor.edited({editor.places.uri(TWO): [edit]}) == {TWO: new}
+    assert editor.apply_edits({editor.places.uri(TWO): [edit]}) == {TWO: new}
     editor.write(TWO, new)
     assert not editor.request("formatting", types.DocumentFormattingParams(*params))
 

@@ -14,13 +14,13 @@ from support.archives import (
     formula_mistakes,
     mistakes,
     packaging_schema,
-    referred,
+    referenced_files,
 )
 from support.hostile_html import HOSTILE, REFUSED
 from support.qti_rules import MATHML, QTI
 from support.qti_rules import mistakes as item_mistakes
 from support.question_zoo import ANY, SCRIPT, SVG, quiz
-from support.scratch_course import GOOD, Done, Folder, Make
+from support.scratch_course import GOOD, CommandResult, Folder, Make
 
 pytestmark = pytest.mark.site
 
@@ -28,7 +28,7 @@ ZIP = "quizzes-qti.zip"
 SPACES = {"q": QTI, "m": MATHML}
 
 
-def export(folder: Folder, *arguments: str) -> Done:
+def export(folder: Folder, *arguments: str) -> CommandResult:
     command = folder.main("export", "qti", *arguments)
     assert command.status == 0, command.out + command.err
     return command
@@ -46,7 +46,7 @@ def check(files: dict[str, bytes]) -> None:
     """A package is whole: valid, every file listed, every address a file of it."""
     manifest = files["imsmanifest.xml"]
     assert mistakes(packaging_schema(), manifest) == []
-    assert set(referred(manifest)) == set(files) - {"imsmanifest.xml"}
+    assert set(referenced_files(manifest)) == set(files) - {"imsmanifest.xml"}
     for path, data in files.items():
         if path.startswith(("items/", "tests/")):
             assert item_mistakes(data) == [], path

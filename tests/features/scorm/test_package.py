@@ -12,7 +12,7 @@ from lxml import etree
 
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.links import check_links
-from support.archives import Package, entries, mistakes, referred, scorm_schema
+from support.archives import Package, entries, mistakes, referenced_files, scorm_schema
 from support.question_zoo import ANY, quiz
 from support.scratch_course import Folder, Make
 
@@ -35,7 +35,7 @@ def package(folder: Folder) -> dict[str, bytes]:
 def check(files: dict[str, bytes]) -> None:
     manifest = files["imsmanifest.xml"]
     assert mistakes(scorm_schema(), manifest) == []
-    paths = set(referred(manifest))
+    paths = set(referenced_files(manifest))
     assert paths == set(files) - {"imsmanifest.xml"}
     root = etree.fromstring(manifest)
     resources = {node.get("identifier"): node for node in root.iter(f"{CP}resource")}

@@ -14,7 +14,7 @@ from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.compare import compare, pruning_scenes
 from coursebuild.numerics.pruning.index_map import IndexMap, Removal, fits, index_map, transfer
 from coursebuild.numerics.scene import Scene
-from support.surveys import NOTHING, declared
+from support.surveys import NOTHING, parse_declared
 
 DOUBLE = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/>
   <body pos="1 0 0"><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0" mass="{mass!r}"/></body>
@@ -104,9 +104,9 @@ controls = [[1], [2]]\nqvel = [0, 5]\n"""
     mjcf = DOUBLE.format(mass=1.0).replace('<joint axis="0 1 0"/>', '<joint name="j"/>', 1)
     motor = "<actuator><motor joint='j'/></actuator></mujoco>"
     model = mujoco.MjModel.from_xml_string(mjcf.replace("</mujoco>", motor))
-    (scene,) = pruning_scenes(model, declared(text))
+    (scene,) = pruning_scenes(model, parse_declared(text))
     assert (scene.name, scene.scenario.qvel[-1]) == ("push", 5)
     commands = [(step, command[0]) for step, command in enumerate(scene.scenario.commands(0.002))]
     assert commands == [(step, 1 if step < 100 else 2) for step in range(500)]
-    (short,) = pruning_scenes(model, declared(text), quick=True)
+    (short,) = pruning_scenes(model, parse_declared(text), quick=True)
     assert short.scenario.duration == 0.5

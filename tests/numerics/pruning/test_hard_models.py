@@ -12,7 +12,7 @@ import pytest
 from coursebuild.numerics.pruning.model_text import ModelTextError
 from coursebuild.numerics.pruning.survey import Survey
 from coursebuild.numerics.reports.diet import PROVED
-from support.surveys import PATH, fixed, found, names, opened, tried
+from support.surveys import PATH, findings_by_kind, fixed_text, names, open_files, run_survey
 
 pytestmark = pytest.mark.site
 
@@ -41,14 +41,14 @@ def whole(files: str | Mapping[str, str | bytes], *, lesson: str = "") -> tuple[
     first: Survey | None = None
     now = dict(before)
     for _ in range(6):
-        survey = tried(now, lesson=lesson, quick=False)
+        survey = run_survey(now, lesson=lesson, quick=False)
         first = first or survey
         if not survey.edits:
             break
         now |= survey.text.files(survey.edits)
     else:
         raise AssertionError("there is always something left")
-    old, new = opened(before).model, opened(now).model
+    old, new = open_files(before).model, open_files(now).model
     joints = joints_of(new)
     assert motion(old, joints) == motion(new, joints)
     text = now[PATH]
@@ -75,14 +75,14 @@ def test_includes_are_changed_where_they_stand() -> None:
 </mujocoinclude>""",
         "models/parts/sensors.xml": "<x>\n<sensor>\n  <clock/>\n</sensor>\n</x>\n",
     }
-    survey = tried(files)
-    assert set(found(survey)) >= {"sensor-unread", "unused-site", "unused-default"}
-    assert [place.path for place in found(survey)["sensor-unread"].places] == [
+    survey = run_survey(files)
+    assert set(findings_by_kind(survey)) >= {"sensor-unread", "unused-site", "unused-default"}
+    assert [place.path for place in findings_by_kind(survey)["sensor-unread"].places] == [
         "models/parts/sensors.xml"
     ]
-    assert fixed(survey, "models/parts/sensors.xml") == files["models/parts/sensors.xml"]
-    assert '<include file="parts/sensors.xml"/>' not in fixed(survey, "models/parts/arm.xml")
-    main = fixed(survey)
+    assert fixed_text(survey, "models/parts/sensors.xml") == files["models/parts/sensors.xml"]
+    assert '<include file="parts/sensors.xml"/>' not in fixed_text(survey, "models/parts/arm.xml")
+    main = fixed_text(survey)
     assert main.count("\r\n") == main.count("\n") == 5 and "idle" not in main
     whole(files)
 
@@ -101,7 +101,7 @@ def test_includes_are_changed_where_they_stand() -> None:
 )
 def test_what_is_no_model_of_its_own(files: Mapping[str, str], words: str) -> None:
     with pytest.raises(ModelTextError, match=words.replace(".", r"\.")):
-        opened(files)
+        open_files(files)
 
 
 REPLICATED = f"""<mujoco>
@@ -126,7 +126,7 @@ REPLICATED = f"""<mujoco>
 
 def test_what_is_repeated_is_one_element() -> None:
     survey, left = whole(REPLICATED)
-    findings = found(survey)
+    findings = findings_by_kind(survey)
     assert names(findings["far-body"]) == ["mujoco/worldbody/replicate[2]/body"]
     assert left.count("<replicate") == 3 and 'pos="80 0 1"' in left
     assert "idle" not in left and "jointpos" not in left
@@ -155,7 +155,7 @@ def test_tendons_equalities_and_excluded_pairs() -> None:
 </mujoco>
 """
     survey, left = whole(text)
-    findings = found(survey)
+    findings = findings_by_kind(survey)
     assert names(findings["far-body"]) == ["d"]  # `c` is coupled to what matters
     assert any("<contact>" in edit.old for edit in findings["far-body"].edits)
     assert "<sensor>" not in left and "<equality>" in left and left.count("<site") == 4
@@ -183,7 +183,9 @@ def test_composites_and_flexes_stay_as_they_are(
 </mujoco>
 """
     survey, left = whole(text)
-    assert "far-body" not in found(survey) and "contact-off" not in found(survey)
+    assert "far-body" not in findings_by_kind(survey) and "contact-off" not in findings_by_kind(
+        survey
+    )
     assert '<composite prefix="r"' in left and "<flexcomp" in left and "<clock" not in left
 
 
@@ -200,9 +202,9 @@ def test_an_attached_model_is_a_model_of_its_own() -> None:
   <joint name="knee" axis="0 1 0"/><geom size=".05" pos=".2 0 0"/><site name="idle"/>
   </body></worldbody><sensor><jointpos joint="knee"/></sensor></mujoco>""",
     }
-    survey = tried(files)
-    assert set(found(survey)) == {"unused-model"}
-    assert 'name="spare"' not in fixed(survey)
+    survey = run_survey(files)
+    assert set(findings_by_kind(survey)) == {"unused-model"}
+    assert 'name="spare"' not in fixed_text(survey)
     whole(files)
 
 

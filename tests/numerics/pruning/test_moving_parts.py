@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from coursebuild.numerics.reports.diet import PROVED, SAME
-from support.surveys import PENDULUM, field, fixed, found, names, scene, tried
+from support.surveys import PENDULUM, field, findings_by_kind, fixed_text, names, run_survey, scene
 
 
 def test_actuators_that_nobody_commands() -> None:
@@ -18,20 +18,20 @@ def test_actuators_that_nobody_commands() -> None:
   </actuator>
   <keyframe><key name="up" qpos="1" ctrl="0 0 0"/></keyframe>"""
     clock = itertools.count(step=10**6).__next__
-    survey = tried(scene(rest=rest), clock=clock)
-    finding = found(survey)["actuator-idle"]
+    survey = run_survey(scene(rest=rest), clock=clock)
+    finding = findings_by_kind(survey)["actuator-idle"]
     assert names(finding) == ["push"] and finding.label == PROVED
     assert finding.saving.time == 1.0
-    assert '<key name="up" qpos="1" ctrl="0 0"/>' in fixed(survey)
+    assert '<key name="up" qpos="1" ctrl="0 0"/>' in fixed_text(survey)
 
 
 def test_scenarios_that_number_commands_keep_actuators_from_being_changed() -> None:
     rest = '<actuator><motor name="push" joint="pivot"/></actuator>'
-    survey = tried(scene(rest=rest), has_commands=True)
-    finding = found(survey)["actuator-idle"]
+    survey = run_survey(scene(rest=rest), has_commands=True)
+    finding = findings_by_kind(survey)["actuator-idle"]
     assert finding.is_fault and not finding.fixable
     assert finding.unfixed.startswith("scenarios give commands by number")
-    assert fixed(survey) == scene(rest=rest)
+    assert fixed_text(survey) == scene(rest=rest)
 
 
 def test_tendons_along_which_nothing_acts() -> None:
@@ -44,36 +44,36 @@ def test_tendons_along_which_nothing_acts() -> None:
     <fixed><joint joint="pivot" coef="2"/></fixed>
   </tendon>
   <actuator><motor name="m" tendon="pull"/></actuator>"""
-    survey = tried(scene(rest=rest), lesson='data.ctrl[0]; data.tendon("measured").J')
-    assert names(found(survey)["tendon-idle"]) == ["lazy", "mujoco/tendon/fixed[6]"]
-    left = fixed(survey)
+    survey = run_survey(scene(rest=rest), lesson='data.ctrl[0]; data.tendon("measured").J')
+    assert names(findings_by_kind(survey)["tendon-idle"]) == ["lazy", "mujoco/tendon/fixed[6]"]
+    left = fixed_text(survey)
     assert left.count("<fixed") == 4 and "lazy" not in left
-    survey = tried(scene(rest=rest), lesson="data.ctrl[0]; data.ten_length[4]")
+    survey = run_survey(scene(rest=rest), lesson="data.ctrl[0]; data.ten_length[4]")
     assert survey.report.findings == ()
 
 
 def test_contact_is_off_where_nothing_can_touch() -> None:
     world = PENDULUM + '<geom name="far" size=".1" pos="0 0 2"/>'
-    survey = tried(scene(world))
-    finding = found(survey)["contact-off"]
+    survey = run_survey(scene(world))
+    finding = findings_by_kind(survey)["contact-off"]
     assert finding.label == PROVED and finding.proof.startswith("no two geoms can meet")
-    left = fixed(survey)
+    left = fixed_text(survey)
     assert '<option><flag contact="disable"/></option>' in left
-    assert tried(left).edits == ()
+    assert run_survey(left).edits == ()
 
 
 def test_what_only_did_not_touch_is_told_and_left() -> None:
     world = PENDULUM + '<geom name="near" size=".1" pos="0 0 1.35"/>'
-    survey = tried(scene(world))
-    finding = found(survey)["contact-idle"]
+    survey = run_survey(scene(world))
+    finding = findings_by_kind(survey)["contact-idle"]
     assert finding.label == SAME and not finding.fixable and not finding.is_fault
-    assert fixed(survey) == scene(world)
+    assert fixed_text(survey) == scene(world)
 
 
 def test_a_lesson_that_moves_geoms_takes_the_proof_away() -> None:
     world = PENDULUM + '<geom name="far" size=".1" pos="0 0 2"/>'
-    survey = tried(scene(world), lesson="model.geom_pos[1] = 0")
-    assert found(survey)["contact-idle"].label == SAME
+    survey = run_survey(scene(world), lesson="model.geom_pos[1] = 0")
+    assert findings_by_kind(survey)["contact-idle"].label == SAME
 
 
 def test_geoms_that_can_touch_nothing_need_no_contact() -> None:
@@ -83,13 +83,13 @@ def test_geoms_that_can_touch_nothing_need_no_contact() -> None:
       <geom name="s" size=".1" pos="1 0 0"/></body>
     <body name="near" pos="1.5 0 .15"><joint axis="0 1 0"/>
       <geom name="n" size=".1" pos=".2 0 0"/></body>"""
-    survey = tried(scene(world))
-    finding = found(survey)["collision-unreachable"]
+    survey = run_survey(scene(world))
+    finding = findings_by_kind(survey)["collision-unreachable"]
     assert names(finding) == ["lamp", "s"] and finding.label == PROVED
-    left = fixed(survey)
+    left = fixed_text(survey)
     assert '<geom name="lamp" size=".1" pos="0 0 9" contype="0" conaffinity="0"/>' in left
     assert '<geom name="n" size=".1" pos=".2 0 0"/>' in left
-    assert "collision-unreachable" not in found(tried(left))
+    assert "collision-unreachable" not in findings_by_kind(run_survey(left))
 
 
 @pytest.mark.site
@@ -98,19 +98,19 @@ def test_all_of_a_field_of_rubble_goes_and_the_arm_stays() -> None:
     posts = "".join(
         f'<geom type="cylinder" size=".05 1" pos="{40 + i % 10} {i // 10} 1"/>' for i in range(60)
     )
-    survey = tried(field(3, 40).replace("</worldbody>", posts + "</worldbody>"))
-    far = found(survey)["far-body"]
+    survey = run_survey(field(3, 40).replace("</worldbody>", posts + "</worldbody>"))
+    far = findings_by_kind(survey)["far-body"]
     assert len(names(far)) == 40 and far.label == SAME and far.difference < 1e-9
     assert not far.fixable and not far.is_fault and far.doubt == ""
     posts = {f"mujoco/worldbody/geom[{number}]" for number in range(2, 62)}
-    assert set(names(found(survey)["collision-idle"])) >= posts
-    assert fixed(survey).count("<freejoint/>") == 40
-    survey = tried(field(3, 2), lesson="import mujoco\nprint(data.qpos[0])")
-    assert found(survey)["far-body"].doubt == "examples/a.py may notice"
+    assert set(names(findings_by_kind(survey)["collision-idle"])) >= posts
+    assert fixed_text(survey).count("<freejoint/>") == 40
+    survey = run_survey(field(3, 2), lesson="import mujoco\nprint(data.qpos[0])")
+    assert findings_by_kind(survey)["far-body"].doubt == "examples/a.py may notice"
 
 
 def far(world: str, *, lesson: str = "", rest: str = "") -> list[str]:
-    finding = found(tried(scene(world, rest=rest), lesson=lesson)).get("far-body")
+    finding = findings_by_kind(run_survey(scene(world, rest=rest), lesson=lesson)).get("far-body")
     return [] if finding is None else names(finding)
 
 

@@ -6,7 +6,7 @@ import textwrap
 
 import pytest
 
-from support.surveys import declared, names, scene, tried
+from support.surveys import names, parse_declared, run_survey, scene
 
 MODEL = scene(
     """<geom name="wall" type="box" size=".1 .1 .1" pos="0 0 2" material="m"/>
@@ -29,7 +29,7 @@ model = mujoco.MjModel.from_xml_path(str(model_path("leg")))
 data = mujoco.MjData(model)
 """
 
-GO = declared('[[scenario]]\nname = "go"\nkeyframe = "up"\nduration = 0.1\n')
+GO = parse_declared('[[scenario]]\nname = "go"\nkeyframe = "up"\nduration = 0.1\n')
 
 HOSTILE = {
     # What of the model it uses, by the kind of a finding, and the script.
@@ -74,13 +74,13 @@ HOSTILE = {
 
 @pytest.mark.site
 def test_no_hostile_script_loses_a_part() -> None:
-    findings = tried(MODEL, declared=GO).report.findings
+    findings = run_survey(MODEL, declared=GO).report.findings
     whole = {finding.kind: names(finding) for finding in findings if finding.fixable}
     lost = []
     for title, (part, script) in HOSTILE.items():
         kind, _, name = part.partition(" ")
         assert any(kind in finding for finding in whole), kind
-        survey = tried(MODEL, lesson=HEAD + script, declared=GO)
+        survey = run_survey(MODEL, lesson=HEAD + script, declared=GO)
         faults = [
             finding
             for finding in survey.report.findings
@@ -101,7 +101,7 @@ def test_what_a_script_names_stays_and_the_rest_goes() -> None:
         mujoco.mj_resetDataKeyframe(model, data, model.key("down").id)
         print("the spare cube and spin are in the prose only")
     """)
-    survey = tried(MODEL, lesson=HEAD + script, declared=GO)
+    survey = run_survey(MODEL, lesson=HEAD + script, declared=GO)
     names_by_kind = {
         finding.kind: names(finding) for finding in survey.report.findings if finding.is_fault
     }

@@ -8,14 +8,23 @@ import time
 import pytest
 
 from coursebuild.numerics.reports.diet import PROVED
-from support.surveys import PATH, PENDULUM, field, fixed, found, names, scene, tried
+from support.surveys import (
+    PATH,
+    PENDULUM,
+    field,
+    findings_by_kind,
+    fixed_text,
+    names,
+    run_survey,
+    scene,
+)
 
 
 @pytest.mark.parametrize("world", ["", "<!-- nothing -->", "<geom size='1'/>"])
 def test_nothing_that_moves(world: str) -> None:
-    survey = tried(scene(world))
+    survey = run_survey(scene(world))
     assert survey.report.findings == ()
-    survey = tried("<mujoco/>")
+    survey = run_survey("<mujoco/>")
     assert survey.report.findings == ()
 
 
@@ -34,8 +43,8 @@ SHOWN = """<geom type="mesh" mesh="used" material="table" mass="0"/>"""
 
 def test_assets_that_nothing_uses_with_those_that_only_they_use() -> None:
     text = scene(PENDULUM.replace("</body>", SHOWN + "</body>"), head=ASSETS)
-    survey = tried(text)
-    findings = found(survey)
+    survey = run_survey(text)
+    findings = findings_by_kind(survey)
     assert {kind: names(finding) for kind, finding in findings.items()} == {
         "unused-material": ["curtain"],
         "unused-texture": ["cloth"],
@@ -46,18 +55,18 @@ def test_assets_that_nothing_uses_with_those_that_only_they_use() -> None:
     assert (
         findings["unused-texture"].saving.text > 50 and findings["unused-mesh"].saving.memory > 100
     )
-    left = fixed(survey)
+    left = fixed_text(survey)
     for asset in ("curtain", "cloth", "ünüsed", "hill"):
         assert asset not in left
     assert len(left.splitlines()) == len(text.splitlines()) - 4
-    second = tried(left)
-    assert second.report.findings == () and fixed(second) == left
+    second = run_survey(left)
+    assert second.report.findings == () and fixed_text(second) == left
 
 
 def test_a_texture_of_a_kept_material_is_used() -> None:
     text = scene(PENDULUM.replace("</body>", SHOWN + "</body>"), head=ASSETS)
-    survey = tried(text, keeps={"unused-material curtain": "for the next lesson"})
-    findings = found(survey)
+    survey = run_survey(text, keeps={"unused-material curtain": "for the next lesson"})
+    findings = findings_by_kind(survey)
     assert findings["unused-material"].kept == "for the next lesson"
     assert not findings["unused-material"].fixable and not findings["unused-material"].is_fault
     assert "unused-texture" not in findings and survey.report.stale == ()
@@ -68,8 +77,8 @@ def test_an_asset_is_called_after_its_file() -> None:
     head = '<asset><mesh file="one.obj"/><mesh file="two.obj"/></asset>'
     world = PENDULUM.replace("</body>", '<geom type="mesh" mesh="one" mass="0"/></body>')
     files = {PATH: scene(world, head=head), "models/one.obj": mesh, "models/two.obj": mesh}
-    survey = tried(files)
-    assert names(found(survey)["unused-mesh"]) == ["two"]
+    survey = run_survey(files)
+    assert names(findings_by_kind(survey)["unused-mesh"]) == ["two"]
 
 
 def test_classes_that_no_element_is_of() -> None:
@@ -83,12 +92,12 @@ def test_classes_that_no_element_is_of() -> None:
     </default> <!-- said of it -->
     <default class="read"/>
   </default>"""
-    survey = tried(
+    survey = run_survey(
         scene(PENDULUM.replace('name="ball"', 'name="ball" class="inner"'), head=head),
         lesson='show("read")',
     )
-    assert names(found(survey)["unused-default"]) == ["idle"]
-    left = fixed(survey)
+    assert names(findings_by_kind(survey)["unused-default"]) == ["idle"]
+    left = fixed_text(survey)
     assert "<!-- for later -->\n    <!-- said of it -->\n" in left
     assert "idle" not in left and 'class="outer"' in left and 'class="read"' in left
 
@@ -105,18 +114,18 @@ TENDON = """<tendon><spatial stiffness="1"><site site="held"/><site site="end"/>
 
 def test_sites_and_sensors() -> None:
     """Those of a tendon stay; one that only an unread sensor needs goes with it."""
-    survey = tried(scene(SITES, rest=TENDON), lesson='print(data.site("read").xpos)')
-    findings = found(survey)
+    survey = run_survey(scene(SITES, rest=TENDON), lesson='print(data.site("read").xpos)')
+    findings = findings_by_kind(survey)
     assert names(findings["sensor-unread"]) == ["mujoco/sensor/framepos"]
     assert names(findings["unused-site"]) == [
         'mujoco/worldbody/body[@name="arm"]/site[3]',
         "idle",
         "sensed",
     ]
-    left = fixed(survey)
+    left = fixed_text(survey)
     assert '<site name="held"/><site name="read"/>\n' in left
     assert "<sensor>" not in left and '"end"' in left
-    assert tried(left, lesson='print(data.site("read").xpos)').edits == ()
+    assert run_survey(left, lesson='print(data.site("read").xpos)').edits == ()
 
 
 @pytest.mark.parametrize(
@@ -132,18 +141,18 @@ def test_sites_and_sensors() -> None:
     ],
 )
 def test_flags_for_nobody(option: str, left: str) -> None:
-    survey = tried(scene(head=option))
-    assert set(found(survey)) <= {"energy-flag", "fwdinv-flag"}
-    rest = fixed(survey)
+    survey = run_survey(scene(head=option))
+    assert set(findings_by_kind(survey)) <= {"energy-flag", "fwdinv-flag"}
+    rest = fixed_text(survey)
     assert left in rest and rest.count("<flag") == left.count("<flag")
     assert rest.count("<option") == left.count("<option")
-    assert tried(scene(head=option), lesson="print(model.opt.enableflags)").edits == ()
+    assert run_survey(scene(head=option), lesson="print(model.opt.enableflags)").edits == ()
 
 
 def test_what_only_runs_speak_for_is_told_for_the_time_that_it_saves() -> None:
     world = """<geom type="plane" size="1 1 1"/>
     <body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1" condim="4"/></body>"""
-    survey = tried(scene(world), clock=itertools.count(step=10**6).__next__)
+    survey = run_survey(scene(world), clock=itertools.count(step=10**6).__next__)
     assert survey.report.findings == ()
     slow = {finding.kind for finding in survey.report.tried if "no time" in finding.reason}
     assert {"island", "cone"} <= slow
@@ -153,8 +162,8 @@ def test_what_only_runs_speak_for_is_told_for_the_time_that_it_saves() -> None:
 def test_an_arm_and_a_field_of_rubble_become_as_fast_as_they_can() -> None:
     """Whole scenarios are timed: in the field nothing happens that the arm could notice."""
     for links, pieces, least in ((6, 0, 1.5), (6, 24, 25)):
-        survey = tried(field(links, pieces), quick=False, clock=time.thread_time_ns)
+        survey = run_survey(field(links, pieces), quick=False, clock=time.thread_time_ns)
         assert survey.report.slim is not None and survey.report.slim.time is not None
         assert survey.report.slim.time > least, (pieces, survey.report.slim)
         if pieces:
-            assert "sleep" in found(survey) or survey.report.slim.time > least
+            assert "sleep" in findings_by_kind(survey) or survey.report.slim.time > least
