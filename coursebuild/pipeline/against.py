@@ -22,8 +22,12 @@ from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptRun
-from coursebuild.core.run.environments import check_other_version, environment, latest_version
-from coursebuild.core.run.script_environment import OtherEnvironment
+from coursebuild.core.run.environments import (
+    check_other_version,
+    latest_version,
+    prepare_environment,
+)
+from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.core.scripts.against import (
     RunStanding,
@@ -100,13 +104,13 @@ class _Work(Struct):
         """Everything that there is to tell."""
         runs = run(self.chosen, self.options, self.progress)
         self.here = {one.path: one for one in runs}
-        place = environment(self.options.root, self.other, self.progress.say)
+        interpreter = prepare_environment(self.options.root, self.other, self.progress.say)
         here = run_standings(self.course, self.here, runs)
         kept = {path: judge_comparability(standing) for path, standing in here.items()}
         compared = [e for e in self.chosen if kept[e.path] is None]
-        there = self._run(compared, place, f"running scripts with MuJoCo {self.other}")
+        there = self._run(compared, interpreter, f"running scripts with MuJoCo {self.other}")
         differing = [e for e in compared if not there[e.path].holds]
-        again = self._run(differing, place, "running scripts there again", fresh=True)
+        again = self._run(differing, interpreter, "running scripts there again", fresh=True)
         control, trouble = self._control(differing)
         lines = []
         for extraction in self.chosen:
@@ -124,7 +128,7 @@ class _Work(Struct):
             self.other,
             python_version(),
             (*lines, *blocked),
-            self._models(place),
+            self._models(interpreter),
         )
 
     def _line(
@@ -146,16 +150,18 @@ class _Work(Struct):
         if not scripts:
             return {}, ""
         try:
-            place = environment(self.options.root, engine_version(), self.progress.say)
+            interpreter = prepare_environment(
+                self.options.root, engine_version(), self.progress.say
+            )
         except EffectError as error:
             return {}, error.message
         stage = f"running scripts in a fresh environment with MuJoCo {engine_version()}"
-        return self._run(scripts, place, stage), ""
+        return self._run(scripts, interpreter, stage), ""
 
     def _run(
         self,
         scripts: Sequence[Extraction],
-        place: OtherEnvironment,
+        interpreter: Interpreter,
         stage: str,
         *,
         fresh: bool = False,
@@ -163,14 +169,14 @@ class _Work(Struct):
         """How the scripts do there, by path."""
         from coursebuild.core.run.runner import ScriptServer
 
-        there = replace(self.options, place=place)
+        there = replace(self.options, interpreter=interpreter)
         memory = there.memory(fresh=fresh)
         with ScriptServer() as server:
             served = replace(there, run_all=server.run)
             runs = run(scripts, served, self.progress, stage, memory)
         return run_standings(self.course, self.here, runs)
 
-    def _models(self, place: OtherEnvironment) -> tuple[ModelLine, ...]:
+    def _models(self, interpreter: Interpreter) -> tuple[ModelLine, ...]:
         """Of each model and MJCF block that compiles here, whether it does there."""
         from coursebuild.core.run import mjcf
 
@@ -186,7 +192,7 @@ class _Work(Struct):
         compared = [(model.source.path, model.source.text) for model in models]
         compared += [(mjcf.TEXT_PATH, text.text) for text in good]
         with self.progress.stage(f"compiling models with MuJoCo {self.other}"):
-            there = mjcf.compile_all(root, compared, python=place.python)
+            there = mjcf.compile_all(root, compared, python=interpreter.python)
         places = [(model.source.path, 1) for model in models]
         places += [(text.block.span.path, text.block.span.line) for text in good]
         return tuple(

@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.registry import feature_trials, unproven
-from coursebuild.core.run.script_environment import OtherEnvironment
+from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports import Reports
@@ -84,7 +84,7 @@ class CheckedCourse(Struct, frozen=True):
     verified: Verified | None = None
     reports: Reports = Reports()
     """Those that pages may show."""
-    place: OtherEnvironment | None = None
+    interpreter: Interpreter | None = None
     """Where the scripts ran, if not here."""
 
     @property
@@ -107,7 +107,7 @@ class CheckedCourse(Struct, frozen=True):
             documents=chosen.documents,
             labs=verified.labs,
         )
-        return replace(report, depends=depends_on(course, verified.results, self.place))
+        return replace(report, depends=depends_on(course, verified.results, self.interpreter))
 
 
 def read_and_verify(
@@ -133,7 +133,7 @@ def read_and_verify(
     verified = verify(course, options, progress, chosen.documents, static=static, shard=shard)
     reports = shown_reports(options.root, course)
     found = (*loaded.diagnostics, *verified.diagnostics, *reports.diagnostics)
-    return CheckedCourse(began, found, chosen, course, verified, reports.value, options.place)
+    return CheckedCourse(began, found, chosen, course, verified, reports.value, options.interpreter)
 
 
 def _sensitivity(

@@ -99,8 +99,8 @@ def _surroundings(
     style = tuple(OutputFile(path.name, path.read_bytes()) for path in root.glob("matplotlibrc"))
     around = zips.Surroundings((), ours, meshes, style, imports)
     modules = zips.imported_modules(library.course, around)
-    place = course_environment(root, library.course).value
-    installed = distributions(store, modules, None if place is None else place.packages)
+    interpreter = course_environment(root, library.course).value
+    installed = distributions(store, modules, None if interpreter is None else interpreter.packages)
     packages = tuple(zips.Package(*one) for one in installed)
     return replace(around, packages=packages)
 

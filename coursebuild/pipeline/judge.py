@@ -12,7 +12,7 @@ from fnmatch import fnmatchcase
 from coursebuild.core.model import Course, Silence
 from coursebuild.core.model.results import Outcome, Results, TrialLine
 from coursebuild.core.run.dependencies import sought_files
-from coursebuild.core.run.script_environment import OtherEnvironment
+from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.scripts.source_parts import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.report import Report, ScriptLine, Summary
@@ -83,7 +83,7 @@ def _silenced(diagnostic: Diagnostic, silences: Sequence[Silence]) -> bool:
 
 
 def depends_on(
-    course: Course, results: Results, place: OtherEnvironment | None
+    course: Course, results: Results, interpreter: Interpreter | None
 ) -> tuple[str, ...] | None:
     """The files beside those in the course's own folders on which the verdict depends.
 
@@ -93,8 +93,8 @@ def depends_on(
     if "." in packages:
         return None
     files = {*(page.path for page in course.pages), *shown_files(course), *packages}
-    if place is not None:
-        files |= {place.python, f"{place.prefix}/pyvenv.cfg", *place.packages}
+    if interpreter is not None:
+        files |= {interpreter.python, f"{interpreter.prefix}/pyvenv.cfg", *interpreter.packages}
     for run in results.runs:
         if run.outcome in (Outcome.NORUN, Outcome.SKIPPED):
             continue  # what is installed is looked at in any case

@@ -34,7 +34,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.theme import TEMPLATES, Theme
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.run.interpreter import course_environment
-from coursebuild.core.run.script_environment import OtherEnvironment
+from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.scripts.source_parts import check_source_parts
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
@@ -346,8 +346,8 @@ def _refuse_code(root: Path, course: Course) -> None:
         )
 
 
-def _check_engine(course: Course, place: OtherEnvironment | None) -> list[Diagnostic]:
-    installed = engine_version() if place is None else place.engine
+def _check_engine(course: Course, interpreter: Interpreter | None) -> list[Diagnostic]:
+    installed = engine_version() if interpreter is None else interpreter.engine
     if course.engine in (None, installed):
         return []
     where = "" if course.python is None else f" for `{course.python.path}`"

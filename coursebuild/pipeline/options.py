@@ -26,7 +26,7 @@ from coursebuild.core.text.diagnostics import did_you_mean, nearest
 if TYPE_CHECKING:
     from coursebuild.core.run.runner import RunAll
     from coursebuild.core.run.sandbox import Sandbox
-    from coursebuild.core.run.script_environment import OtherEnvironment
+    from coursebuild.core.run.script_environment import Interpreter
 
 
 class Options(Struct, frozen=True):
@@ -45,7 +45,7 @@ class Options(Struct, frozen=True):
     """Whether it is said of each script why it runs."""
     run_all: RunAll | None = None
     """What runs scripts, where a `ScriptServer` stays warm from run to run."""
-    place: OtherEnvironment | None = None
+    interpreter: Interpreter | None = None
     """Where scripts run, where that is not here; see `for_course`."""
     sandbox: Sandbox | None = None
     """What is around each script; then no other code of the course runs."""
@@ -57,11 +57,11 @@ class Options(Struct, frozen=True):
 
     def for_course(self, course: Course) -> Options:
         """With the environment that the map names for scripts, as far as they can run there."""
-        return replace(self, place=course_environment(self.root, course).value)
+        return replace(self, interpreter=course_environment(self.root, course).value)
 
     def memory(self, *, fresh: bool = False) -> Memory:
         """What is remembered of scripts; `fresh`: all are to run again."""
-        return Memory(self.root, self.store, fresh=fresh, place=self.place)
+        return Memory(self.root, self.store, fresh=fresh, interpreter=self.interpreter)
 
 
 def find_course(directory: str | None) -> Path:

@@ -68,7 +68,7 @@ def recorded_runs(scripts: Iterable[Extraction], options: Options) -> dict[str, 
 
 def check_recorded_runs(scripts: Iterable[Extraction], options: Options) -> Iterator[Diagnostic]:
     """A diagnostic for each script of which the course keeps no run that still counts."""
-    states = States(options.root, options.store, options.place)
+    states = States(options.root, options.store, options.interpreter)
     for extraction in scripts:
         if not extraction.script.once:
             continue
@@ -88,7 +88,7 @@ def check_recorded_runs(scripts: Iterable[Extraction], options: Options) -> Iter
 
 def keep_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], options: Options) -> None:
     """Keep the runs of scripts that are recorded once, as far as these went well."""
-    states = States(options.root, options.store, options.place)
+    states = States(options.root, options.store, options.interpreter)
     by_path = {run.path: run for run in runs}
     for extraction in scripts:
         run, path = by_path.get(extraction.path), _path(extraction.path)
@@ -103,7 +103,7 @@ def keep_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], options:
             replace(run, seconds=round(run.seconds, 1), stderr="", figures=()),
         )
         packages = tuple(one.state for one in looked if one.kind is Kind.MODULE and one.state)
-        kept = RecordedRun(machine(place=options.place), packages, record)
+        kept = RecordedRun(machine(interpreter=options.interpreter), packages, record)
         before = _read(extraction, options)
         if before is not None and replace(before.record, timestamp=0) == replace(
             record, timestamp=0

@@ -56,7 +56,7 @@ def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
     by_path = {e.path: e for e in parsed.value}
     blocked = {example.path for example in report.blocked}
     found = [*parsed.diagnostics, *(_left(b, by_path.get(b.path), course) for b in report.blocked)]
-    can_run = course.python is None or options.place is not None
+    can_run = course.python is None or options.interpreter is not None
     runnable = tuple(e for e in parsed.value if can_run and e.path not in blocked)
     return ExtractedScripts(
         parsed.value,
@@ -169,7 +169,7 @@ def _run(
             parallel=options.jobs,
             on_start=on_start,
             on_finish=on_finish,
-            place=options.place,
+            interpreter=options.interpreter,
         )
 
 

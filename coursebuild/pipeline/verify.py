@@ -111,9 +111,9 @@ def verify(
     found += check_runs(course, runs)
     found += _nothing(course, () if shard is not None else runs)
     found += figure_findings(course, runs, functools.partial(read_recorded, options.root))
-    place = options.place
-    python = python_version() if place is None else place.version
-    engine = engine_version() if place is None else place.engine
+    interpreter = options.interpreter
+    python = python_version() if interpreter is None else interpreter.version
+    engine = engine_version() if interpreter is None else interpreter.engine
     results = Results(runs, verdicts, (), models, python, engine, tried)
     scripts_ran = script_lines(chosen, runs, verdicts)
     labs = tuple(trial.line for trial in tried)

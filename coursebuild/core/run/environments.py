@@ -1,7 +1,7 @@
 """Environments with another version of MuJoCo and, apart from that, the packages installed here.
 
 Entry points: `check_other_version`, for what the user names; `latest_version`, the one that pip
-finds; `environment`, which makes one.
+finds; `prepare_environment`, which makes one.
 
 1. Environments lie in `.coursebuild/environments` and are used again. The ones used last are kept.
 2. A new one is made under a temporary name, and renamed when MuJoCo can be imported in it, so that
@@ -33,7 +33,7 @@ from coursebuild.core.engine.memo import TEMPORARY
 from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import make_private_folder
 from coursebuild.core.run.packages import site_folders
-from coursebuild.core.run.script_environment import OtherEnvironment
+from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.versions import engine_version, python_version
 
 _FOLDER = "environments"
@@ -86,7 +86,7 @@ def _without_zeros(version: str) -> str:
     return re.sub(r"(\.0)+(?=$|[a-z+]|\.(?:post|dev))", "", version)
 
 
-def environment(root: Path, engine: str, say: Callable[[str], None]) -> OtherEnvironment:
+def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> Interpreter:
     """The environment with this version of MuJoCo; made if it is not there.
 
     Only one process at a time may do this for a course: see `project_lock`.
@@ -110,7 +110,7 @@ def environment(root: Path, engine: str, say: Callable[[str], None]) -> OtherEnv
         _remove_unused(folder, prefix)
     except OSError as error:
         raise EffectError(f"{prefix.name} cannot be made: {reason(error)}") from None
-    return OtherEnvironment(
+    return Interpreter(
         name,
         f"{prefix}/bin/python",
         str(prefix),

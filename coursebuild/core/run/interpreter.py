@@ -11,7 +11,7 @@ from pathlib import Path
 
 from coursebuild.core.files.errors import reason
 from coursebuild.core.model import Course, NamedPath
-from coursebuild.core.run.script_environment import OtherEnvironment
+from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.versions import engine_version, version_in
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 
@@ -20,40 +20,38 @@ _OLDEST = (3, 11)
 _SETTING = re.compile(r"^(\w+) *= *(.*?) *$", re.MULTILINE)
 
 
-def course_environment(root: Path, course: Course) -> Parsed[OtherEnvironment | None]:
+def course_environment(root: Path, course: Course) -> Parsed[Interpreter | None]:
     """The environment that the map names, or why scripts cannot run there."""
-    interpreter = course.python
-    if interpreter is None:
+    named_path = course.python
+    if named_path is None:
         return Parsed(None, ())
-    python = root / interpreter.path
+    python = root / named_path.path
     prefix = python.parent.parent
     if not os.access(python, os.X_OK):
-        folder = interpreter.path.rpartition("/bin/")[0]
+        folder = named_path.path.rpartition("/bin/")[0]
         help = f"make it: `python -m venv {folder}`, then install there what scripts import"
-        return _reject(interpreter, f"there is no interpreter `{interpreter.path}`", help)
+        return _reject(named_path, f"there is no interpreter `{named_path.path}`", help)
     try:
         settings = dict(_SETTING.findall((prefix / "pyvenv.cfg").read_text("utf-8", "replace")))
     except OSError as error:
         message = (
-            f"`{interpreter.path}` is not of a virtual environment: no pyvenv.cfg, {reason(error)}"
+            f"`{named_path.path}` is not of a virtual environment: no pyvenv.cfg, {reason(error)}"
         )
-        return _reject(interpreter, message)
+        return _reject(named_path, message)
     version_text = settings.get("version") or settings.get("version_info", "")
     major, minor, version = _parse_version(version_text)
     if (major, minor) < _OLDEST:
-        message = (
-            f"`{interpreter.path}` is of Python {version_text}, and scripts need 3.11 or newer"
-        )
-        return _reject(interpreter, message)
+        message = f"`{named_path.path}` is of Python {version_text}, and scripts need 3.11 or newer"
+        return _reject(named_path, message)
     packages = str(prefix / "lib" / f"python{major}.{minor}" / "site-packages")
     engine = version_in((packages,), "mujoco")
     if engine is None:
         required = course.engine or engine_version()
-        help = f"run `{interpreter.path} -m pip install mujoco=={required}`"
-        return _reject(interpreter, f"MuJoCo is not installed for `{interpreter.path}`", help)
+        help = f"run `{named_path.path} -m pip install mujoco=={required}`"
+        return _reject(named_path, f"MuJoCo is not installed for `{named_path.path}`", help)
     base = str(Path(settings.get("home", "")).parent)
-    place = OtherEnvironment("", str(python), str(prefix), base, version, engine, (packages,))
-    return Parsed(place, ())
+    interpreter = Interpreter("", str(python), str(prefix), base, version, engine, (packages,))
+    return Parsed(interpreter, ())
 
 
 def _parse_version(text: str) -> tuple[int, int, str]:
@@ -62,7 +60,5 @@ def _parse_version(text: str) -> tuple[int, int, str]:
     return (int(match[1]), int(match[2]), match[0]) if match is not None else (0, 0, "")
 
 
-def _reject(
-    interpreter: NamedPath, message: str, help: str = ""
-) -> Parsed[OtherEnvironment | None]:
-    return Parsed(None, (diagnose("script-python", interpreter.span, message, help=help),))
+def _reject(named_path: NamedPath, message: str, help: str = "") -> Parsed[Interpreter | None]:
+    return Parsed(None, (diagnose("script-python", named_path.span, message, help=help),))

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from coursebuild.core.model.results import Machine
-from coursebuild.core.run.script_environment import OtherEnvironment
+from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.versions import engine_version, package_version, python_version
 
 _INFO = Path("/proc/cpuinfo")
@@ -23,18 +23,18 @@ _NAMES = ("model name", "Model", "Hardware", "cpu model", "uarch")
 _CAN_PIN = hasattr(os, "sched_setaffinity")
 
 
-def machine(*, pinned: bool = False, place: OtherEnvironment | None = None) -> Machine:
+def machine(*, pinned: bool = False, interpreter: Interpreter | None = None) -> Machine:
     """Versions, system and processor; `pinned`: times are taken on one processor alone.
 
-    `place` is another interpreter than the one that runs this.
+    `interpreter` is another one than runs the tool.
 
     Raises:
         EffectError: MuJoCo is not installed.
     """
     return Machine(
-        engine=engine_version() if place is None else place.engine,
-        python=python_version() if place is None else place.version,
-        numpy=package_version("numpy", None if place is None else place.packages),
+        engine=engine_version() if interpreter is None else interpreter.engine,
+        python=python_version() if interpreter is None else interpreter.version,
+        numpy=package_version("numpy", None if interpreter is None else interpreter.packages),
         system=f"{platform.system()} {platform.machine()}".strip(),
         cpu=cpu_name(),
         governor=_read(_GOVERNOR).strip(),

@@ -49,7 +49,7 @@ from coursebuild.core.run.dependencies import (
 )
 from coursebuild.core.run.packages import InstalledPackages
 from coursebuild.core.run.run_record import REMEMBERED, RunRecord, from_bytes, record_of, to_bytes
-from coursebuild.core.run.script_environment import OtherEnvironment, conditions, places
+from coursebuild.core.run.script_environment import Interpreter, conditions, places
 
 _RESULTS, _LAST = "scripts", "last"
 _MOST_SHARED = 32
@@ -62,12 +62,14 @@ _REASON = "{} changed while it ran"
 class States:
     """The present states of needs, each read once, when it is first asked for."""
 
-    def __init__(self, root: Path, store: Memo, place: OtherEnvironment | None = None) -> None:
+    def __init__(self, root: Path, store: Memo, interpreter: Interpreter | None = None) -> None:
         self.root = root
         self._inside = f"{str(root).rstrip('/')}/"
-        self.places = places(root, os.environ, place)
-        self.conditions = conditions(os.environ, place)
-        self._installed = InstalledPackages(store, None if place is None else place.packages)
+        self.places = places(root, os.environ, interpreter)
+        self.conditions = conditions(os.environ, interpreter)
+        self._installed = InstalledPackages(
+            store, None if interpreter is None else interpreter.packages
+        )
         self._states: dict[Need, str] = {}
 
     def __call__(self, need: Need) -> str:
@@ -103,17 +105,22 @@ class Memory:
         root: the course folder.
         store: where it is kept.
         fresh: whether all is to be run again.
-        place: another interpreter that runs them. Last runs are noted only for the course's own.
+        interpreter: another one that runs them. Last runs are noted only for the course's own.
     """
 
     def __init__(
-        self, root: Path, store: Memo, *, fresh: bool = False, place: OtherEnvironment | None = None
+        self,
+        root: Path,
+        store: Memo,
+        *,
+        fresh: bool = False,
+        interpreter: Interpreter | None = None,
     ) -> None:
-        self.is_elsewhere = place is not None and place.name != ""
+        self.is_elsewhere = interpreter is not None and interpreter.name != ""
         self.store = store
         self.fresh = fresh or store.fresh
         """Whether all is to be run, whatever is remembered."""
-        self.states = States(root, store, place)
+        self.states = States(root, store, interpreter)
         self.differing_runs: list[tuple[ScriptRun, ScriptRun]] = []
         """The remembered and the new run of scripts that differ though nothing changed."""
         self._clock = Clock(store)

@@ -36,7 +36,7 @@ from coursebuild.core.run import supervisor
 from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.sandbox import Sandbox, copied_folders, sandbox_difference, visible_places
 from coursebuild.core.run.script_environment import (
-    OtherEnvironment,
+    Interpreter,
     clean_environment,
     library_folder,
     wanted_packages,
@@ -111,7 +111,7 @@ class ScriptServer:
         parallel: int,
         on_start: OnStart = _ignore,
         on_finish: OnFinish = _ignore,
-        place: OtherEnvironment | None = None,
+        interpreter: Interpreter | None = None,
         is_unwanted: Callable[[frozenset[str]], bool] | None = None,
     ) -> tuple[ScriptRun, ...]:
         """Run scripts; only one run at a time.
@@ -122,7 +122,7 @@ class ScriptServer:
             parallel: how many at a time, at least 1.
             on_start: called in this thread; what it raises ends the run.
             on_finish: likewise.
-            place: another interpreter that is to run them.
+            interpreter: another interpreter that is to run them.
             is_unwanted: called regularly with the paths of what runs; whether to stop.
 
         Returns:
@@ -135,7 +135,9 @@ class ScriptServer:
         if not jobs:
             return ()
         with temporary_folder() as scratch:
-            work = _Work(root.resolve(), jobs, on_start, on_finish, place, self._sandbox, scratch)
+            work = _Work(
+                root.resolve(), jobs, on_start, on_finish, interpreter, self._sandbox, scratch
+            )
             self._run(work, parallel, is_unwanted)
         return tuple(work.runs[i] for i in range(len(jobs)))
 
@@ -187,7 +189,7 @@ class ScriptServer:
 
     def _get_worker(self, work: _Work) -> Worker:
         """A supervisor that waits for a job: an idle or a new one."""
-        states = _package_states(work.place)
+        states = _package_states(work.interpreter)
         if states != self._package_states:
             self.close()
             self._package_states = states
@@ -197,7 +199,7 @@ class ScriptServer:
             if worker.environment == work.environment:
                 return worker
             worker.close()
-        python = sys.executable if work.place is None else work.place.python
+        python = sys.executable if work.interpreter is None else work.interpreter.python
         return Worker(work.environment, python, fork=self._fork, enclose=work.enclose)
 
 
@@ -210,7 +212,7 @@ class _Work:
         jobs: Sequence[ScriptJob],
         on_start: OnStart,
         on_finish: OnFinish,
-        place: OtherEnvironment | None,
+        interpreter: Interpreter | None,
         sandbox: Sandbox | None,
         scratch: str,
     ) -> None:
@@ -219,12 +221,12 @@ class _Work:
         self.on_start = on_start
         self.on_finish = on_finish
         clean = clean_environment(os.environ)
-        self.environment = clean if place is None else place.environment(clean)
+        self.environment = clean if interpreter is None else interpreter.environment(clean)
         self.environment |= dict(jobs[0].environment)
         self.library = library_folder()
-        self.place = place
+        self.interpreter = interpreter
         self.scratch = scratch
-        if place is not None:  # `mjcourse` alone: what else is installed here is not for it
+        if interpreter is not None:  # `mjcourse` alone: what else is installed here is not for it
             Path(scratch, "mjcourse").symlink_to(Path(self.library, "mjcourse"))
             self.library = scratch
         self.sandbox = sandbox
@@ -232,7 +234,7 @@ class _Work:
         self.sources: dict[str, str] = {}
         self.copies: list[tuple[str, str]] = []
         if sandbox is not None:
-            self.sources = visible_places(str(root), self.library, place)
+            self.sources = visible_places(str(root), self.library, interpreter)
             self.copies = copied_folders(str(root), jobs, scratch)
             command = sandbox.command
             self.enclose = functools.partial(command, sources=self.sources, copies=self.copies)
@@ -268,8 +270,8 @@ class _Work:
                 if worker.is_reused:  # it may have been dying before it was given the job
                     self.pending.insert(0, index)
                     return False
-                if self.place is not None and worker.status() > 0:
-                    raise EffectError(f"{self.place.python} cannot run scripts")
+                if self.interpreter is not None and worker.status() > 0:
+                    raise EffectError(f"{self.interpreter.python} cannot run scripts")
                 status = worker.status() if self.sandbox is None else -signal.SIGKILL
                 self._finish(index, _lost_run(self.jobs[index].path, status))
             return False
@@ -327,10 +329,10 @@ class _Work:
         self.on_finish(run)
 
 
-def _package_states(place: OtherEnvironment | None) -> tuple[object, ...]:
+def _package_states(interpreter: Interpreter | None) -> tuple[object, ...]:
     """The folders with packages, each with the time of the last installation there."""
     states: list[object] = []
-    for folder in (*site_folders(), *(() if place is None else place.packages)):
+    for folder in (*site_folders(), *(() if interpreter is None else interpreter.packages)):
         with contextlib.suppress(OSError):
             states.append((folder, Path(folder).stat().st_mtime_ns))
     return tuple(states)

@@ -29,7 +29,7 @@ from msgspec import Struct
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob, Trace
 from coursebuild.core.run.packages import site_folders
-from coursebuild.core.run.script_environment import OtherEnvironment, library_folder
+from coursebuild.core.run.script_environment import Interpreter, library_folder
 
 SIZE = 1 << 30
 """Bytes that may be written, in memory."""
@@ -111,7 +111,7 @@ class Sandbox(Struct, frozen=True):
         return [*options, "--", *command]
 
 
-def visible_places(root: str, library: str, place: OtherEnvironment | None) -> dict[str, str]:
+def visible_places(root: str, library: str, interpreter: Interpreter | None) -> dict[str, str]:
     """The places that scripts of a course see, each with the real path of its content.
 
     `library` is where they find `mjcourse`.
@@ -119,9 +119,13 @@ def visible_places(root: str, library: str, place: OtherEnvironment | None) -> d
     ours = library_folder()
     sources = {path: path for path in (*_SYSTEM, root, f"{ours}/coursebuild")}
     sources[f"{library}/mjcourse"] = f"{ours}/mjcourse"
-    if place is None:
+    if interpreter is None:
         sources |= {path: path for path in site_folders()}
-    prefixes = (sys.prefix, sys.base_prefix) if place is None else (place.prefix, place.base)
+    prefixes = (
+        (sys.prefix, sys.base_prefix)
+        if interpreter is None
+        else (interpreter.prefix, interpreter.base)
+    )
     for prefix in prefixes:
         sources |= _interpreter_parts(prefix, root)
     return sources

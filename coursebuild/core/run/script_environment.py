@@ -1,7 +1,7 @@
 """The environment of processes that run scripts.
 
-Entry points: `clean_environment`, `library_folder`, `wanted_packages`; `OtherEnvironment`, another
-interpreter than the tool's; `conditions` and `places`, on which results depend.
+Entry points: `clean_environment`, `library_folder`, `wanted_packages`; `Interpreter`, one other
+than the tool's; `conditions` and `places`, on which results depend.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _FIXED = {
 }
 
 
-class OtherEnvironment(Struct, frozen=True):
+class Interpreter(Struct, frozen=True):
     """Another interpreter that runs scripts, and what is installed for it."""
 
     name: str
@@ -108,17 +108,17 @@ def wanted_packages(scripts: Iterable[Path]) -> tuple[str, ...]:
 
 
 def conditions(
-    outer: Mapping[str, str], place: OtherEnvironment | None = None
+    outer: Mapping[str, str], interpreter: Interpreter | None = None
 ) -> tuple[tuple[str, str], ...]:
     """The conditions under which results are the same, by name and sorted.
 
-    `outer` is the environment of the tool; `place` another interpreter than the one that runs this.
+    `outer` is the environment of the tool; `interpreter` is another one than runs the tool.
     """
     values = {f"environment variable {name}": outer[name] for name in DECISIVE if name in outer}
-    version = platform.python_version() if place is None else place.version
+    version = platform.python_version() if interpreter is None else interpreter.version
     values["Python"] = f"{platform.python_implementation()} {version}"
-    if place is not None and place.name:
-        values["environment"] = place.name
+    if interpreter is not None and interpreter.name:
+        values["environment"] = interpreter.name
     values["platform"] = f"{sys.platform} {platform.machine()} {_c_library()}".strip()
     fixed = json.dumps(_FIXED, sort_keys=True).encode()
     values["the fixed environment of scripts"] = hashlib.sha256(fixed).hexdigest()[:12]
@@ -134,17 +134,17 @@ def _c_library() -> str:
 
 
 def places(
-    root: Path, outer: Mapping[str, str], place: OtherEnvironment | None = None
+    root: Path, outer: Mapping[str, str], interpreter: Interpreter | None = None
 ) -> tuple[tuple[str, str], ...]:
     """Folders of this machine, by name, whose paths a script may print; longest first.
 
-    `place` is another interpreter than the one that runs this.
+    `interpreter` is another one than runs the tool.
     """
     folders = {
         "course": str(root),
         "library": library_folder(),
-        "prefix": sys.prefix if place is None else place.prefix,
-        "base": sys.base_prefix if place is None else place.base,
+        "prefix": sys.prefix if interpreter is None else interpreter.prefix,
+        "base": sys.base_prefix if interpreter is None else interpreter.base,
         "home": outer.get("HOME", ""),
     }
     return tuple(sorted(folders.items(), key=lambda item: (-len(item[1]), item[0])))

@@ -31,7 +31,7 @@ _CLOSING = frozenset(")]},;|")
 SameNumber = Callable[[Number, Number], bool]
 
 
-class Canon(Struct, frozen=True):
+class CanonicalText(Struct, frozen=True):
     """A line, or a part of one between two ellipses, with its numbers marked."""
 
     skeleton: str
@@ -40,18 +40,18 @@ class Canon(Struct, frozen=True):
     marks: tuple[int, ...]
     """Offsets of the numbers' marks in the skeleton."""
 
-    def numbers_at(self, part: Canon, place: int) -> tuple[Number, ...]:
+    def numbers_at(self, part: CanonicalText, place: int) -> tuple[Number, ...]:
         """The numbers of this line that pair with those of a part whose skeleton is at `place`."""
         first = bisect_left(self.marks, place)
         return self.numbers[first : first + len(part.numbers)]
 
 
-def canonicalize(text: str, offset: int = 0) -> Canon:
+def canonicalize(text: str, offset: int = 0) -> CanonicalText:
     """The skeleton and the numbers of a text that stands at `offset` of its line."""
     numbers = scan(text)
     safe = text.replace(MARK, "\ufffd")
     if not numbers:
-        return Canon(safe, (), ())
+        return CanonicalText(safe, (), ())
     marks: list[int] = []
     parts: list[str] = []
     length = previous = 0
@@ -67,7 +67,7 @@ def canonicalize(text: str, offset: int = 0) -> Canon:
     if offset:
         shifted = ((number, number.start + offset, number.end + offset) for number in numbers)
         numbers = tuple(replace(number, start=start, end=end) for number, start, end in shifted)
-    return Canon("".join(parts), numbers, tuple(marks))
+    return CanonicalText("".join(parts), numbers, tuple(marks))
 
 
 def _fold_spaces(text: str, *, after_number: bool, before_number: bool) -> str:
@@ -131,8 +131,8 @@ class LineMatcher:
         if recorded == printed:
             return True
         if self.elides(recorded):
-            parts = [Canon(part, (), ()) for part in recorded.split(ELLIPSIS)]
-            if _find_parts(parts, Canon(printed, (), ()), always_match) is not None:
+            parts = [CanonicalText(part, (), ()) for part in recorded.split(ELLIPSIS)]
+            if _find_parts(parts, CanonicalText(printed, (), ()), always_match) is not None:
                 return True
         if self.comparison.mode is Mode.EXACT:
             return False
@@ -168,9 +168,9 @@ class LineMatcher:
 
 
 @lru_cache(maxsize=256)
-def _split_at_ellipses(recorded: str) -> tuple[Canon, ...]:
+def _split_at_ellipses(recorded: str) -> tuple[CanonicalText, ...]:
     """The parts of a recorded line between its ellipses."""
-    parts: list[Canon] = []
+    parts: list[CanonicalText] = []
     offset = 0
     for text in recorded.split(ELLIPSIS):
         parts.append(canonicalize(text, offset))
@@ -178,7 +178,9 @@ def _split_at_ellipses(recorded: str) -> tuple[Canon, ...]:
     return tuple(parts)
 
 
-def _find_parts(parts: Sequence[Canon], line: Canon, numbers_match: SameNumber) -> list[int] | None:
+def _find_parts(
+    parts: Sequence[CanonicalText], line: CanonicalText, numbers_match: SameNumber
+) -> list[int] | None:
     """Where the parts of a recorded line stand in the skeleton of a printed line, if they do."""
     first, *inner, last = parts
     stop = len(line.skeleton) - len(last.skeleton)
@@ -202,6 +204,8 @@ def _find_parts(parts: Sequence[Canon], line: Canon, numbers_match: SameNumber) 
     return [*places, stop] if at <= stop else None
 
 
-def numbers_fit(part: Canon, line: Canon, place: int, numbers_match: SameNumber) -> bool:
+def numbers_fit(
+    part: CanonicalText, line: CanonicalText, place: int, numbers_match: SameNumber
+) -> bool:
     """Whether the numbers of a part match those of a line in which its skeleton is at `place`."""
     return all(map(numbers_match, part.numbers, line.numbers_at(part, place)))

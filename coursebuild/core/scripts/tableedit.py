@@ -77,7 +77,7 @@ def _update_row(
         places[id(cell)].append((recorded.start, recorded.end, new))
         edits.append(Edit(span, _with_signs_of(span.text, new)))
     texts = ((cell, replace_ranges(cell.mapped.text, places[id(cell)])) for cell in match.row)
-    return tuple(replace(cell, canon=canonicalize(text)) for cell, text in texts), edits
+    return tuple(replace(cell, canonical=canonicalize(text)) for cell, text in texts), edits
 
 
 def _with_signs_of(old: str, new: str) -> str:

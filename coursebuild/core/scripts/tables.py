@@ -24,7 +24,7 @@ from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
 from coursebuild.core.scripts.changes import number_change
 from coursebuild.core.scripts.lines import (
-    Canon,
+    CanonicalText,
     SameNumber,
     always_match,
     canonicalize,
@@ -50,7 +50,7 @@ class RowCell(Struct, frozen=True):
 
     cell: model.Cell
     mapped: MappedText
-    canon: Canon
+    canonical: CanonicalText
 
     def span(self, number: Number) -> Span:
         """Where a number of the cell stands in the lesson."""
@@ -125,7 +125,7 @@ class TableMatcher:
         self.rows = rows
         self._numbers_match = partial(same_number, comparison=comparison)
         self.lines = [plain_text(text) for text in printed.lines]
-        self._canon = cache(lambda line: canonicalize(self.lines[line]))
+        self._canonical_line = cache(lambda line: canonicalize(self.lines[line]))
 
     def match(self) -> tuple[RowMatch, ...]:
         """The line of each row: with its numbers if possible, else with the rest of it."""
@@ -138,9 +138,7 @@ class TableMatcher:
         first_line = 0
         for row in self.rows:
             lines = range(first_line, len(self.lines))
-            line = next(
-                (n for n in lines if _stands_in(row, self._canon(n), self._numbers_match)), None
-            )
+            line = next((n for n in lines if self._matches(row, n)), None)
             if line is None:
                 return None
             line_numbers.append(line)
@@ -154,21 +152,24 @@ class TableMatcher:
             line_numbers[row] = line
         return line_numbers
 
+    def _matches(self, row: Sequence[RowCell], line: int) -> bool:
+        return _stands_in(row, self._canonical_line(line), self._numbers_match)
+
     def _weight(self, row: int, line: int) -> int:
-        if _stands_in(self.rows[row], self._canon(line), self._numbers_match):
+        if self._matches(self.rows[row], line):
             return MATCH
-        return _ALIKE if _stands_in(self.rows[row], self._canon(line), always_match) else 0
+        return _ALIKE if _stands_in(self.rows[row], self._canonical_line(line), always_match) else 0
 
     def _match_row(self, row: tuple[RowCell, ...], line: int) -> RowMatch:
-        if line < 0 or _stands_in(row, self._canon(line), self._numbers_match):
+        if line < 0 or self._matches(row, line):
             return RowMatch(row, line, ())
-        canon = self._canon(line)
-        places = _nearest_places(row, canon, self._numbers_match)
+        canonical = self._canonical_line(line)
+        places = _nearest_places(row, canonical, self._numbers_match)
         pairs = tuple(
             (cell, recorded, printed)
             for cell, place in zip(row, places, strict=True)
             for recorded, printed in zip(
-                cell.canon.numbers, canon.numbers_at(cell.canon, place), strict=True
+                cell.canonical.numbers, canonical.numbers_at(cell.canonical, place), strict=True
             )
         )
         return RowMatch(row, line, pairs)
@@ -178,7 +179,9 @@ def _is_word(character: str) -> bool:
     return character.isalnum() or character == "_"
 
 
-def _find_places(cell: Canon, line: Canon, start: int, numbers_match: SameNumber) -> Iterator[int]:
+def _find_places(
+    cell: CanonicalText, line: CanonicalText, start: int, numbers_match: SameNumber
+) -> Iterator[int]:
     """Offsets from `start` on at which a cell stands in a line, whole words and numbers only."""
     text, cell_text = line.skeleton, cell.skeleton
     place = text.find(cell_text, start)
@@ -192,18 +195,20 @@ def _find_places(cell: Canon, line: Canon, start: int, numbers_match: SameNumber
         place = text.find(cell_text, place + 1)
 
 
-def _stands_in(row: Sequence[RowCell], line: Canon, numbers_match: SameNumber) -> bool:
+def _stands_in(row: Sequence[RowCell], line: CanonicalText, numbers_match: SameNumber) -> bool:
     """Whether the cells stand in a line in order, each after the one before."""
     at = 0
     for cell in row:
-        place = next(_find_places(cell.canon, line, at, numbers_match), None)
+        place = next(_find_places(cell.canonical, line, at, numbers_match), None)
         if place is None:
             return False
-        at = place + len(cell.canon.skeleton)
+        at = place + len(cell.canonical.skeleton)
     return True
 
 
-def _nearest_places(row: Sequence[RowCell], line: Canon, numbers_match: SameNumber) -> list[int]:
+def _nearest_places(
+    row: Sequence[RowCell], line: CanonicalText, numbers_match: SameNumber
+) -> list[int]:
     """Places of the cells in order such that their numbers are nearest to the line's.
 
     The row is known to stand in the line except for its numbers.
@@ -213,18 +218,18 @@ def _nearest_places(row: Sequence[RowCell], line: Canon, numbers_match: SameNumb
     for cell in row:
         extended: list[tuple[float, list[int], int]] = []
         start = min(end for _, _, end in best)
-        for place in islice(_find_places(cell.canon, line, start, always_match), _PLACES):
+        for place in islice(_find_places(cell.canonical, line, start, always_match), _PLACES):
             before = [way for way in best if way[2] <= place]
             if before:
                 cost, places, _ = min(before, key=lambda way: way[0])
-                total = cost + _cost(cell.canon, line, place, numbers_match)
-                end = place + len(cell.canon.skeleton)
+                total = cost + _cost(cell.canonical, line, place, numbers_match)
+                end = place + len(cell.canonical.skeleton)
                 extended.append((total, [*places, place], end))
         best = extended
     return min(best, key=lambda way: way[0])[1]
 
 
-def _cost(cell: Canon, line: Canon, place: int, numbers_match: SameNumber) -> float:
+def _cost(cell: CanonicalText, line: CanonicalText, place: int, numbers_match: SameNumber) -> float:
     """How far the numbers of a cell are from those of the line: relative errors, each at most 1."""
     cost = 0.0
     for recorded, printed in zip(cell.numbers, line.numbers_at(cell, place), strict=True):

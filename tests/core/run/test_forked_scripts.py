@@ -17,7 +17,7 @@ import pytest
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.script_environment import (
-    OtherEnvironment,
+    Interpreter,
     clean_environment,
     library_folder,
 )
@@ -108,29 +108,29 @@ def test_spawned_script_does_what_it_does_alone(spawning: ScriptServer, root: Pa
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> OtherEnvironment:
+def interpreter(tmp_path_factory: pytest.TempPathFactory) -> Interpreter:
     """An interpreter with no packages."""
     prefix = tmp_path_factory.mktemp("place") / "venv"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", prefix], check=True)
     (packages,) = prefix.glob("lib/python*/site-packages")
     python, base, version = str(prefix / "bin/python"), sys.base_prefix, python_version()
-    return OtherEnvironment("", python, str(prefix), base, version, "none", (str(packages),))
+    return Interpreter("", python, str(prefix), base, version, "none", (str(packages),))
 
 
 def test_package_that_is_not_installed_is_told_by_the_script(
-    place: OtherEnvironment, root: Path
+    interpreter: Interpreter, root: Path
 ) -> None:
     code = "try: import numpy\nexcept ModuleNotFoundError as error: print(error)\n"
     (root / "examples/x.py").write_text(code)
     with ScriptServer() as server:
-        (run,) = server.run(root, [job()], parallel=1, place=place)
+        (run,) = server.run(root, [job()], parallel=1, interpreter=interpreter)
     assert run.stdout == "No module named 'numpy'\n"
 
 
 def test_package_that_cannot_be_imported_before_scripts_fails_in_them(
-    place: OtherEnvironment, root: Path
+    interpreter: Interpreter, root: Path
 ) -> None:
-    module = Path(*place.packages, "numpy.py")
+    module = Path(*interpreter.packages, "numpy.py")
     thread = (
         "import threading\nthreading.Thread(target=threading.Event().wait, daemon=True).start()"
     )
@@ -139,19 +139,22 @@ def test_package_that_cannot_be_imported_before_scripts_fails_in_them(
     for code in ("1 / 0", "raise SystemExit(3)", thread):
         module.write_text(code)
         with ScriptServer() as server:
-            (run,) = server.run(root, [job()], parallel=1, place=place)
+            (run,) = server.run(root, [job()], parallel=1, interpreter=interpreter)
         outcomes.append((run.stdout, run.status))
     module.unlink()
     assert outcomes == [("begins\n", 1), ("begins\n", 3), ("begins\n", 0)]
 
 
-def test_other_version_of_a_package_is_imported_anew(place: OtherEnvironment, root: Path) -> None:
+def test_other_version_of_a_package_is_imported_anew(interpreter: Interpreter, root: Path) -> None:
     (root / "examples/x.py").write_text("import numpy\nprint(numpy.__version__)")
-    module = Path(*place.packages, "numpy.py")
+    module = Path(*interpreter.packages, "numpy.py")
     with ScriptServer() as server:
         for version in ("1", "22"):
             module.unlink(missing_ok=True)
             module.write_text(f"__version__ = '{version}'")
-            runs = [server.run(root, [job()], parallel=1, place=place)[0].stdout for _ in range(2)]
+            runs = [
+                server.run(root, [job()], parallel=1, interpreter=interpreter)[0].stdout
+                for _ in range(2)
+            ]
             assert runs == [f"{version}\n"] * 2
     module.unlink()
