@@ -89,9 +89,9 @@ def browsers() -> Iterator[Mapping[str, Browser]]:
     from support.chromium import Browsers
 
     with sync_playwright() as playwright:
-        found = Browsers(playwright)
-        yield found
-        found.close()
+        browsers_by_kind = Browsers(playwright)
+        yield browsers_by_kind
+        browsers_by_kind.close()
 
 
 @pytest.fixture

@@ -42,8 +42,8 @@ def texts() -> dict[str, str]:
 
 def trees(containing: str) -> dict[str, ast.Module]:
     """The modules in which a pattern is found."""
-    found = (path for path, text in texts().items() if re.search(containing, text))
-    return {path: tree(path) for path in found}
+    paths = (path for path, text in texts().items() if re.search(containing, text))
+    return {path: tree(path) for path in paths}
 
 
 @cache
@@ -52,8 +52,8 @@ def tree(path: str) -> ast.Module:
 
 
 def called_name(node: ast.Call) -> str:
-    named = node.func
-    return named.attr if isinstance(named, ast.Attribute) else getattr(named, "id", "")
+    function = node.func
+    return function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
 
 
 def calls(node: ast.AST) -> Iterator[str]:
@@ -94,8 +94,8 @@ def helper_calls(tree: ast.Module) -> dict[str, set[str]]:
 
 def with_helpers(names: frozenset[str], helpers: dict[str, set[str]]) -> frozenset[str]:
     """Names, and those of the functions that call one of them, or call such a function."""
-    while more := {name for name, called in helpers.items() if called & names} - names:
-        names |= more
+    while additions := {name for name, called in helpers.items() if called & names} - names:
+        names |= additions
     return names
 
 
@@ -103,15 +103,15 @@ def looks_once(
     function: ast.FunctionDef, waits: frozenset[str], acts: frozenset[str]
 ) -> Iterator[int]:
     """The lines of assertions that look at a page once after something was done to it."""
-    moved = False
+    has_acted = False
     for node in statements(function.body):
         called = set(calls(node))
         if called & waits:
-            moved = False
-        elif isinstance(node, ast.Assert) and moved and called & READINGS:
+            has_acted = False
+        elif isinstance(node, ast.Assert) and has_acted and called & READINGS:
             yield node.lineno
         elif called & acts:
-            moved = True
+            has_acted = True
 
 
 def statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
@@ -167,11 +167,11 @@ TO_MEND: dict[Rule, str] = {
 
 @pytest.mark.parametrize("rule", ADVICE, ids=lambda rule: rule.__name__)
 def test_tests_are_free_of(rule: Rule) -> None:
-    found = list(rule())
+    violations = list(rule())
     left = set(TO_MEND.get(rule, "").split())
-    new = [f"tests/{path}:{line}: {ADVICE[rule]}" for path, line in found if path not in left]
+    new = [f"tests/{path}:{line}: {ADVICE[rule]}" for path, line in violations if path not in left]
     assert new == [], "\n".join(new)
-    mended = left - {path for path, _ in found}
+    mended = left - {path for path, _ in violations}
     assert mended == set(), "take these out of TO_MEND"
 
 

@@ -52,13 +52,13 @@ class Bench:
         until = time.monotonic() + seconds
         inputs = edges = 0
         while (left := until - time.monotonic()) > 0 and (not runs or inputs < runs):
-            more = f"-runs={runs - inputs}" if runs else f"-max_total_time={left:.0f}"
-            status, said = self.worker(more, f"-seed={seed + inputs}", "corpus", "seeds")
-            executed = _EXECUTED.findall(said)
+            budget = f"-runs={runs - inputs}" if runs else f"-max_total_time={left:.0f}"
+            status, output = self.worker(budget, f"-seed={seed + inputs}", "corpus", "seeds")
+            executed = _EXECUTED.findall(output)
             if not executed:
-                raise SystemExit(f"{said[-3000:]}\nthe worker of `{self.name}` ended: {status}")
+                raise SystemExit(f"{output[-3000:]}\nthe worker of `{self.name}` ended: {status}")
             inputs += max(int(executed[-1]), 1)
-            edges = max([edges, *map(int, _COVERED.findall(said))])
+            edges = max([edges, *map(int, _COVERED.findall(output))])
             if status == 0:
                 break
         return Tried(inputs, edges, self.found())
@@ -68,10 +68,10 @@ class Bench:
         command += [f"-timeout={HANGS}", f"-rss_limit_mb={MEMORY}", "-max_len=4096"]
         command += ["-print_final_stats=1", "-verbosity=1", *options]
         paths = {"PYTHONPATH": f"{ROOT}:{ROOT / 'tests'}", "PATH": ""}
-        done = subprocess.run(
+        process = subprocess.run(
             command, cwd=self.folder, env=paths, capture_output=True, text=True, errors="replace"
         )
-        return done.returncode, done.stderr
+        return process.returncode, process.stderr
 
     def found(self) -> list[str]:
         """What was found, a line each with where its input lies."""
@@ -80,15 +80,15 @@ class Bench:
             kind, dash, _ = path.name.partition("-")
             if dash and not path.suffix:
                 note = path.with_suffix(".json")
-                what = json.loads(note.read_text())[0] if note.exists() else kind
-                lines.append(f"{what}: {path}")
+                title = json.loads(note.read_text())[0] if note.exists() else kind
+                lines.append(f"{title}: {path}")
         return lines
 
     def keep(self) -> None:
         """Put the shortest inputs that reached new code into the corpus of the repository."""
-        reached = {path.read_bytes() for path in (self.folder / "corpus").iterdir()}
-        found = reached.union(kept(self.name)).difference(TARGETS[self.name].seeds())
-        least = sorted(found, key=lambda data: (len(data), data))[:KEPT]
+        inputs = {path.read_bytes() for path in (self.folder / "corpus").iterdir()}
+        new_inputs = inputs.union(kept(self.name)).difference(TARGETS[self.name].seeds())
+        least = sorted(new_inputs, key=lambda data: (len(data), data))[:KEPT]
         text = json.dumps([data.decode("latin-1") for data in least], indent=0)
         (CORPUS / f"{self.name}.json").write_text(f"{text}\n")
 
@@ -107,22 +107,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=int(time.time()) % 10**8)
     parser.add_argument("--keep", action="store_true", help="add to the corpus")
     parser.add_argument("--out", type=Path, default=ROOT / "build/fuzz")
-    chosen = parser.parse_args(arguments)
-    names = chosen.targets or [*TARGETS]
-    everything = []
-    print(f"seed {chosen.seed}\n{'target':14}{'tried':>10}{'survived':>10}{'found':>7}{'edges':>8}")
+    options = parser.parse_args(arguments)
+    names = options.targets or [*TARGETS]
+    findings = []
+    print(
+        f"seed {options.seed}\n{'target':14}{'tried':>10}{'survived':>10}{'found':>7}{'edges':>8}"
+    )
     for name in names:
-        bench = Bench(name, chosen.out.resolve())
-        seconds = 10**6 if chosen.runs else chosen.seconds // len(names)
-        tried = bench.attempt(seconds, chosen.runs, chosen.seed)
-        survived = tried.inputs - len(tried.found)
-        print(f"{name:14}{tried.inputs:10}{survived:10}{len(tried.found):7}{tried.edges:8}")
+        bench = Bench(name, options.out.resolve())
+        seconds = 10**6 if options.runs else options.seconds // len(names)
+        outcome = bench.attempt(seconds, options.runs, options.seed)
+        survived = outcome.inputs - len(outcome.found)
+        print(f"{name:14}{outcome.inputs:10}{survived:10}{len(outcome.found):7}{outcome.edges:8}")
         sys.stdout.flush()
-        everything += tried.found
-        if chosen.keep:
+        findings += outcome.found
+        if options.keep:
             bench.keep()
-    print("\n".join(everything) or "nothing was found")
-    return 1 if everything else 0
+    print("\n".join(findings) or "nothing was found")
+    return 1 if findings else 0
 
 
 if __name__ == "__main__":

@@ -68,13 +68,13 @@ class Target(NamedTuple):
 
 def lesson(text: str) -> None:
     """Read, checked, drawn and told of."""
-    parsed = parse_document(Source(PATH, text), KINDS, lesson=True)
-    for one in parsed.diagnostics:
-        assert 0 <= one.span.start <= one.span.end <= len(text), one
-    plain_html(parsed.value)
+    parse_result = parse_document(Source(PATH, text), KINDS, lesson=True)
+    for diagnostic in parse_result.diagnostics:
+        assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text), diagnostic
+    plain_html(parse_result.value)
     course = parse_course_map(Source("content/course.toml", MAP)).value
     assert course is not None
-    describe(*parsed.diagnostics, *check_course(with_document(course, parsed.value)))
+    describe(*parse_result.diagnostics, *check_course(with_document(course, parse_result.value)))
 
 
 def with_document(course: Course, document: Document) -> Course:
@@ -84,9 +84,9 @@ def with_document(course: Course, document: Document) -> Course:
     return replace(course, levels=(replace(level, lessons=lessons),))
 
 
-def describe(*found: Diagnostic) -> None:
-    for one in found:
-        assert one.message and diagnostic_text(one, Style(colour=False))
+def describe(*diagnostics: Diagnostic) -> None:
+    for diagnostic in diagnostics:
+        assert diagnostic.message and diagnostic_text(diagnostic, Style(colour=False))
 
 
 def lessons() -> Iterator[bytes]:
@@ -103,8 +103,8 @@ def info_string(text: str) -> None:
 
 
 def info_strings() -> Iterator[bytes]:
-    found = (re.findall(rb"^```(.+)", text, re.MULTILINE) for text in lessons())
-    yield from sorted({*chain.from_iterable(found)})
+    lines = (re.findall(rb"^```(.+)", text, re.MULTILINE) for text in lessons())
+    yield from sorted({*chain.from_iterable(lines)})
 
 
 _JSON = re.compile(rb"^```(quiz|lab|mjcf|bench|io)[^\n]*\n.*?^```$", re.MULTILINE | re.DOTALL)
@@ -112,8 +112,8 @@ _JSON = re.compile(rb"^```(quiz|lab|mjcf|bench|io)[^\n]*\n.*?^```$", re.MULTILIN
 
 def json_bodies() -> Iterator[bytes]:
     """Fences that a feature reads, those of the real course last: they are long."""
-    found = {part[0] for text in lessons() for part in _JSON.finditer(text)}
-    yield from sorted(found, key=len)
+    bodies = {part[0] for text in lessons() for part in _JSON.finditer(text)}
+    yield from sorted(bodies, key=len)
 
 
 # --- TOML
@@ -152,23 +152,25 @@ def comparison(text: str) -> None:
 
     After an update all is well, or it was refused.
     """
-    how, _, rest = text.partition("\0")
+    rule, _, rest = text.partition("\0")
     recorded, _, printed = rest.partition("\0")
-    by = _COMPARISONS[len(how) % 5]
-    filters = _FILTERS[len(how) % 3]
+    by = _COMPARISONS[len(rule) % 5]
+    filters = _FILTERS[len(rule) % 3]
     if re.search(_UNWRITABLE, recorded + printed) or not printed.strip():
         return
     body = recording(recorded)
-    found = update_body(body, by, filters, printed, printed)
-    if isinstance(found, Edit):
+    edit = update_body(body, by, filters, printed, printed)
+    if isinstance(edit, Edit):
         update(body, printed, by, filters)
-    elif found is None:
+    elif edit is None:
         assert compare(body, by, filters, printed).status != "drift"
 
 
 def outputs() -> Iterator[bytes]:
-    for how in range(15):
-        yield b"x" * how + b"\0a 1.50 b\n ... 2e-3\nc |x=-0.0\0a 1.54 b\nb\n ... 2.1e-3\nc |x=nan"
+    for length in range(15):
+        yield (
+            b"x" * length + b"\0a 1.50 b\n ... 2e-3\nc |x=-0.0\0a 1.54 b\nb\n ... 2.1e-3\nc |x=nan"
+        )
 
 
 # --- entries of the memo, with a seal that is right

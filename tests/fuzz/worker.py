@@ -68,13 +68,13 @@ class Attempts:
         place = f"{Path(frames[-1].filename).name}:{frames[-1].lineno}"
         if isinstance(error, SlownessError):
             place = str(error).split()[0]
-        where = f"{type(error).__name__} {place}"
-        if where not in self.where:
-            self.where.add(where)
+        signature = f"{type(error).__name__} {place}"
+        if signature not in self.where:
+            self.where.add(signature)
             name = f"found-{hashlib.sha256(data).hexdigest()[:12]}"
             (self.folder / name).write_bytes(data)
             lines = traceback.format_exception(error)
-            (self.folder / f"{name}.json").write_text(json.dumps([where, "".join(lines)]))
+            (self.folder / f"{name}.json").write_text(json.dumps([signature, "".join(lines)]))
 
 
 def main() -> None:

@@ -184,7 +184,7 @@ def test_scripts_that_cannot_be_compared_say_why(make: Make, wheels: Path, insta
     course = make(
         "## A\n\n"
         + block("drifted.py", "print(1)", "2")
-        + block("volatile.py", random, "x", how="volatile")
+        + block("volatile.py", random, "x", comparison="volatile")
         + block("broken.py", "raise SystemExit(3)", "x")
         + block("never.py", "print(1)", "1", info="norun")
         + block("needs.py", "print(1)", "1", info="requires=nowhere")

@@ -39,27 +39,27 @@ class Rule:
     declarations: dict[str, str]
 
 
-def rules(text: str, file: str, around: str = "", outer: str = "") -> Iterator[Rule]:
+def rules(text: str, file: str, at_rules: str = "", outer: str = "") -> Iterator[Rule]:
     """The rules of a style sheet, those inside others after them."""
-    declared = ""
+    own_declarations = ""
     at = 0
     while (start := text.find("{", at)) >= 0:
         before, _, head = text[at:start].rpartition(";")
-        declared += f"{before};"
+        own_declarations += f"{before};"
         end, depth = start + 1, 1
         while depth:
             depth += {"{": 1, "}": -1}.get(text[end], 0)
             end += 1
         body, head = text[start + 1 : end - 1], head.strip()
         if head.startswith("@"):
-            yield from rules(body, file, f"{around} {head}".strip(), outer)
+            yield from rules(body, file, f"{at_rules} {head}".strip(), outer)
         else:
-            yield from rules(body, file, around, f"{outer} {head}".strip())
+            yield from rules(body, file, at_rules, f"{outer} {head}".strip())
         at = end
-    pairs = (part.partition(":") for part in (declared + text[at:]).split(";"))
-    found = {name.strip(): value.strip() for name, _, value in pairs if value.strip()}
-    if outer and found:
-        yield Rule(file, outer, around, found)
+    pairs = (part.partition(":") for part in (own_declarations + text[at:]).split(";"))
+    declarations = {name.strip(): value.strip() for name, _, value in pairs if value.strip()}
+    if outer and declarations:
+        yield Rule(file, outer, at_rules, declarations)
 
 
 def without_comments(path: Path) -> str:
@@ -79,7 +79,9 @@ def colours(value: str, theme: str) -> list[Colour]:
     value = value.strip()
     if match := re.fullmatch(r"var\((--[\w-]+)\)", value):
         assert match[1] in PROPERTIES, f"{match[1]} is set nowhere"
-        return [found for given in PROPERTIES[match[1]] for found in colours(given, theme)]
+        return [
+            colour for definition in PROPERTIES[match[1]] for colour in colours(definition, theme)
+        ]
     if match := re.fullmatch(r"light-dark\((.*)\)", value):
         light, dark = arguments(match[1])
         return colours(light if theme == "light" else dark, theme)
@@ -115,11 +117,11 @@ def over(top: Colour, ground: Colour) -> Colour:
 
 def contrast(text: Colour, ground: Colour) -> float:
     """Of what a screen shows, whose channels have 256 values."""
-    shown, behind = (
+    text_hex, ground_hex = (
         "#" + "".join(f"{round(255 * channel):02x}" for channel in colour[:3])
         for colour in (over(text, ground), ground)
     )
-    return told_apart(shown, [behind])
+    return told_apart(text_hex, [ground_hex])
 
 
 def plain(theme: str) -> list[Colour]:
@@ -155,19 +157,23 @@ def test_there_is_something_to_test() -> None:
 
 @pytest.mark.parametrize("theme", THEMES)
 def test_text(theme: str) -> None:
-    found = []
+    failures = []
     for rule in ALL:
         text = named(rule, "color")
         if text is None or "print" in rule.around:
             continue
-        own = named(rule, "background", "background-color")
+        ground_value = named(rule, "background", "background-color")
         grounds = plain(theme)
-        if own is not None:
-            grounds = [over(top, below) for top in colours(own, theme) for below in grounds]
-        least = min(contrast(one, ground) for one in colours(text, theme) for ground in grounds)
+        if ground_value is not None:
+            grounds = [
+                over(top, below) for top in colours(ground_value, theme) for below in grounds
+            ]
+        least = min(
+            contrast(colour, ground) for colour in colours(text, theme) for ground in grounds
+        )
         if least < 7:
-            found.append((rule.file, rule.selector, text, own, round(least, 2)))
-    assert found == []
+            failures.append((rule.file, rule.selector, text, ground_value, round(least, 2)))
+    assert failures == []
 
 
 WITHOUT_TEXT = ("::before", "::after", "::backdrop", "::-webkit-progress", "::-moz-progress")
@@ -179,42 +185,44 @@ LEAST = {"var(--ink)": 7.0, "var(--ink-soft)": 4.5}
 @pytest.mark.parametrize("theme", THEMES)
 def test_text_on_tints(theme: str) -> None:
     """The text of a box that has a ground of its own and no colour of its own."""
-    found = []
+    failures = []
     for rule in ALL:
         tint = named(rule, "background", "background-color")
         if tint is None or "color" in rule.declarations or "print" in rule.around:
             continue
         if any(part in rule.selector for part in WITHOUT_TEXT):
             continue
-        grounds = [over(top, below) for top in colours(tint, theme) for below in plain(theme)]
-        for name, wanted in LEAST.items():
+        grounds = [over(top, ground) for top in colours(tint, theme) for ground in plain(theme)]
+        for name, limit in LEAST.items():
             least = min(contrast(a, b) for a in colours(name, theme) for b in grounds)
-            if least < wanted:
-                found.append((rule.file, rule.selector, tint, name, round(least, 2)))
-    assert found == []
+            if least < limit:
+                failures.append((rule.file, rule.selector, tint, name, round(least, 2)))
+    assert failures == []
 
 
 @pytest.mark.parametrize("theme", THEMES)
 def test_marks_and_lines(theme: str) -> None:
     """Frames of controls, lines of plots, their labels, the ring around what has the focus."""
-    found = []
+    failures = []
     strokes = {value for rule in ALL for value in _strokes(rule)}
     assert strokes > {"var(--accent)", "var(--rule-firm)"}
     for value in sorted({*MEANT, *strokes}):
         least = min(contrast(a, b) for a in colours(value, theme) for b in plain(theme))
         if least < 4.5:
-            found.append((value, round(least, 2)))
-    assert found == []
+            failures.append((value, round(least, 2)))
+    assert failures == []
 
 
 def test_figures_of_the_course() -> None:
     """They have colours of pages, which are looked at above, but for their grid."""
     style = (CSS.parents[1] / "matplotlibrc").read_text(encoding="utf-8")
     lines = [line for line in style.splitlines() if not line.startswith(("#", "grid"))]
-    used = {f"#{digits}" for line in lines for digits in re.findall(r"\b[0-9a-f]{6}\b", line)}
+    colours_used = {
+        f"#{digits}" for line in lines for digits in re.findall(r"\b[0-9a-f]{6}\b", line)
+    }
     pairs = [pair for name in (*MEANT, "var(--ink)") for pair in PROPERTIES[name[4:-1]]]
-    assert len(used) > 6
-    assert used - {pair.partition("(")[2].partition(",")[0] for pair in pairs} == set()
+    assert len(colours_used) > 6
+    assert colours_used - {pair.partition("(")[2].partition(",")[0] for pair in pairs} == set()
 
 
 def _strokes(rule: Rule) -> Iterator[str]:
@@ -227,11 +235,11 @@ def _strokes(rule: Rule) -> Iterator[str]:
 
 def test_print() -> None:
     """On white paper, in whatever is not black."""
-    found = []
+    failures = []
     for rule in ALL:
         text = named(rule, "color")
         if text is not None and "print" in rule.around:
-            least = min(contrast(one, (1, 1, 1, 1)) for one in colours(text, "light"))
+            least = min(contrast(colour, (1, 1, 1, 1)) for colour in colours(text, "light"))
             if least < 7:
-                found.append((rule.file, rule.selector, text, round(least, 2)))
-    assert found == []
+                failures.append((rule.file, rule.selector, text, round(least, 2)))
+    assert failures == []

@@ -54,13 +54,15 @@ def test_icons_are_what_a_browser_draws(icons: Any, browsers: Mapping[str, Brows
 
 def test_icon_has_ground_where_a_system_cuts(icons: Any) -> None:
     shapes = icons.shapes(ICON)
-    found = read_png(icons.drawn(shapes, icons.Picture("x", 96, full=True, share=0.8)))
-    assert (found[..., 3] == 255).all()
+    pixels = read_png(icons.drawn(shapes, icons.Picture("x", 96, full=True, share=0.8)))
+    assert (pixels[..., 3] == 255).all()
     ground = np.array(shapes[0].colour)
     y, x = np.mgrid[0:96, 0:96] + 0.5
-    cut = np.hypot(x - 48, y - 48) > 0.4 * 96
-    assert (found[cut][:, :3] == ground).all(), "nothing of the drawing lies where it may be cut"
-    assert not (found[~cut][:, :3] == ground).all()
+    outside = np.hypot(x - 48, y - 48) > 0.4 * 96
+    assert (pixels[outside][:, :3] == ground).all(), (
+        "nothing of the drawing lies where it may be cut"
+    )
+    assert not (pixels[~outside][:, :3] == ground).all()
 
 
 @pytest.mark.site
@@ -69,7 +71,7 @@ def test_icons_are_drawn_once_for_the_same_icon(icons: Any, tmp_path: Path) -> N
         (tmp_path / name).mkdir()
     icons.main(tmp_path / "old")
     picture = tmp_path / "old/icons/icon-192.png"
-    drawn = picture.read_bytes()
+    first_picture = picture.read_bytes()
     picture.write_bytes(b"of before")
     icons.main(tmp_path / "new", tmp_path / "old")
     old = {path.name: path.read_bytes() for path in (tmp_path / "old/icons").iterdir()}
@@ -77,7 +79,7 @@ def test_icons_are_drawn_once_for_the_same_icon(icons: Any, tmp_path: Path) -> N
     assert set(old) == {picture.name for picture in icons.PICTURES} | {"source.json"}
     (tmp_path / "old/icons/source.json").write_text(json.dumps("of another icon"))
     icons.main(tmp_path / "again", tmp_path / "old")
-    assert (tmp_path / "again/icons/icon-192.png").read_bytes() == drawn
+    assert (tmp_path / "again/icons/icon-192.png").read_bytes() == first_picture
 
 
 GROUND = '<rect width="32" height="32" fill="#000000"/>'

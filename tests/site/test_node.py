@@ -28,7 +28,7 @@ def test_files_pass_under_node(files: list[Path]) -> None:
     if not (ROOT / "site" / "node_modules" / "@mujoco" / "mujoco").is_dir():
         pytest.fail("site/node_modules is not installed: run python site/bundle.py packages")
     node = runpy.run_path(str(ROOT / "site" / "bundle.py"))["find_node"]().node
-    done = subprocess.run(
+    process = subprocess.run(
         [*node, "--test-reporter=tap", "--input-type=module"],
         input="".join(f"import {json.dumps(path.as_uri())}\n" for path in files),
         cwd=ROOT,
@@ -37,8 +37,10 @@ def test_files_pass_under_node(files: list[Path]) -> None:
         text=True,
         timeout=600,
     )
-    assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
-    counts = dict(line[2:].split(" ", 1) for line in done.stdout.splitlines() if line[:2] == "# ")
+    assert process.returncode == 0, f"{process.stdout}\n{process.stderr}"
+    counts = dict(
+        line[2:].split(" ", 1) for line in process.stdout.splitlines() if line[:2] == "# "
+    )
     assert int(counts["pass"]) > 2 * len(files) > 10
     assert (counts["fail"], counts["skipped"], counts["todo"], counts["cancelled"]) == ("0",) * 4
 
@@ -46,10 +48,12 @@ def test_files_pass_under_node(files: list[Path]) -> None:
 def test_reference_values_are_those_of_this_mujoco() -> None:
     """The values that the JavaScript is compared with can be made again."""
     script = runpy.run_path(str(ROOT / "site" / "tests" / "native.py"))
-    made = json.loads(script["text"]())
-    kept = json.loads((ROOT / "site" / "tests" / "native.json").read_text("utf-8"))
-    assert list(leaves(made)) == pytest.approx(list(leaves(kept)), rel=1e-10, abs=1e-12)
-    assert shape(made) == shape(kept)
+    computed_values = json.loads(script["text"]())
+    recorded_values = json.loads((ROOT / "site" / "tests" / "native.json").read_text("utf-8"))
+    assert list(leaves(computed_values)) == pytest.approx(
+        list(leaves(recorded_values)), rel=1e-10, abs=1e-12
+    )
+    assert shape(computed_values) == shape(recorded_values)
 
 
 def leaves(value: Any) -> Iterator[float]:

@@ -32,8 +32,8 @@ ARM = """<body pos="0 0 1"><joint name="a" axis="0 1 0"/>
   </body></body>"""
 
 
-def model(body: str, option: str = "", more: str = "") -> str:
-    return f"<mujoco><option {option}/><worldbody>{body}</worldbody>{more}</mujoco>"
+def model(body: str, option: str = "", extra: str = "") -> str:
+    return f"<mujoco><option {option}/><worldbody>{body}</worldbody>{extra}</mujoco>"
 
 
 TUMBLE = model(
@@ -150,20 +150,20 @@ def test_the_same_motion(name: str, engines: tuple[NativeEngine, LabEngine]) -> 
     assert not run["modelChanged"]
     assert run["steps"] >= 300 or "moves the state" in name
     second = round(1 / reply["main"]["timestep"])
-    found = native.parity(mjb, run, horizon=second if name in LIBM else run["steps"])
-    assert found["relative"] < 1e-9, json.dumps(found)
+    comparison = native.parity(mjb, run, horizon=second if name in LIBM else run["steps"])
+    assert comparison["relative"] < 1e-9, json.dumps(comparison)
     if name not in LIBM:
-        assert found["first"] is None, json.dumps(found)
+        assert comparison["first"] is None, json.dumps(comparison)
 
 
 def test_a_difference_is_found(engines: tuple[NativeEngine, LabEngine]) -> None:
     native, browser = engines
     mjb = native.save("models/m.xml", model(GROUND + STACK))
     run = browser.trial(lab(None, None), mjb, 60.0)["main"]["parity"]
-    other = native.save("models/m.xml", model(GROUND + STACK, 'gravity="0 0 -9.80665"'))
-    found = native.parity(other, {**run, "mjb": None}, horizon=run["steps"])
-    assert found["first"] == 1
-    assert found["relative"] == 0.0 or found["relative"] > 1e-9
+    changed_model = native.save("models/m.xml", model(GROUND + STACK, 'gravity="0 0 -9.80665"'))
+    comparison = native.parity(changed_model, {**run, "mjb": None}, horizon=run["steps"])
+    assert comparison["first"] == 1
+    assert comparison["relative"] == 0.0 or comparison["relative"] > 1e-9
 
 
 def test_a_model_that_no_lab_has_changed_is_not_sent_back(
@@ -196,5 +196,5 @@ def test_a_state_that_blows_up_is_the_same_with_and_without_the_reset(
         assert (run["mjb"], run["autoreset"]) == (None, autoreset)
         last = run["steps"]
         assert native.parity(mjb, run, horizon=last)["first"] is None
-        other = {**run, "autoreset": not autoreset}
-        assert native.parity(mjb, other, horizon=last)["first"] == last
+        other_run = {**run, "autoreset": not autoreset}
+        assert native.parity(mjb, other_run, horizon=last)["first"] == last

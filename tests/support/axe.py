@@ -1,4 +1,4 @@
-"""Accessibility: what axe finds on a page."""
+"""Checks accessibility with axe."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ _RUN = """([where, options]) => axe.run(where ?? document, options).then((found)
 _CONTRAST = ("color-contrast", "color-contrast-enhanced")
 
 
-def violations(page: Page, where: str | None = None) -> list[Any]:
-    """What axe finds in light colours, and too little contrast in dark ones.
+def violations(page: Page, selector: str | None = None) -> list[Any]:
+    """Return axe's violations in light colours, and those of contrast in dark ones.
 
-    Text is held to 7 : 1, which is more than axe asks for by itself.
+    Text must have a contrast of 7 : 1, which is more than axe demands by default.
     """
     if not page.evaluate("'axe' in window"):
         page.evaluate(_AXE.read_text(encoding="utf-8"))
-    found: list[Any] = []
+    results: list[Any] = []
     for scheme, options in (
         ("dark", {"runOnly": _CONTRAST}),
         ("light", {"rules": {"color-contrast-enhanced": {"enabled": True}}}),
     ):
         page.emulate_media(color_scheme=scheme)
-        found += [[scheme, *one] for one in page.evaluate(_RUN, [where, options])]
-    return found
+        results += [[scheme, *violation] for violation in page.evaluate(_RUN, [selector, options])]
+    return results

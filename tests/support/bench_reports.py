@@ -1,4 +1,4 @@
-"""Reports that nobody measured, for tests of what is made of them."""
+"""Made-up bench reports, for tests of their presentation."""
 
 from __future__ import annotations
 
@@ -24,14 +24,16 @@ FIRST = FittedOrder(1.0, 0.01, 0.02)
 _KNOWN = (("Euler", 1, 1.0), ("implicit", 1, 1.2), ("RK4", 4, 3.9))
 
 
-def setting(integrator: str = "Euler", timestep: float = 0.002, **other: Any) -> MeasuredSetting:
-    solving = {"solver": "", "iterations": 0, "cone": "", **other}
+def setting(integrator: str = "Euler", timestep: float = 0.002, **fields: Any) -> MeasuredSetting:
+    solving = {"solver": "", "iterations": 0, "cone": "", **fields}
     return MeasuredSetting(integrator=integrator, timestep=timestep, **solving)
 
 
-def row(integrator: str = "Euler", timestep: float = 0.002, **other: Any) -> WorkPrecisionRow:
-    """A row that is well; any field can be given, and those of its setting too."""
-    named = {name: other.pop(name) for name in ("solver", "iterations", "cone") if name in other}
+def row(integrator: str = "Euler", timestep: float = 0.002, **overrides: Any) -> WorkPrecisionRow:
+    """Return a row without problems; any of its fields, and of its setting's, can be given."""
+    solver_fields = {
+        name: overrides.pop(name) for name in ("solver", "iterations", "cone") if name in overrides
+    }
     fields: dict[str, Any] = {
         "status": "ok",
         "reasons": (),
@@ -53,28 +55,28 @@ def row(integrator: str = "Euler", timestep: float = 0.002, **other: Any) -> Wor
         "front": False,
         "dominated_by": None,
     }
-    fields["setting"] = setting(integrator, timestep, **named)
-    fields |= other
+    fields["setting"] = setting(integrator, timestep, **solver_fields)
+    fields |= overrides
     for name in ("cost", "seconds"):
         fields[name] = fields[name] if fields[name] is None else interval(fields[name])
     return WorkPrecisionRow(**fields)
 
 
 def interval(value: float) -> Interval:
-    """A figure that is known to a per cent."""
+    """Return a figure with an uncertainty of one per cent."""
     return Interval(value, 0.99 * value, 1.01 * value)
 
 
 def diverged_row(
-    integrator: str = "Euler", timestep: float = 0.1, **other: Any
+    integrator: str = "Euler", timestep: float = 0.1, **overrides: Any
 ) -> WorkPrecisionRow:
-    """A row that diverged, and so was not timed."""
-    nothing = dict.fromkeys(("position", "velocity", "cost", "seconds"))
-    fields = {"status": "diverged", "reasons": ("the state is not finite",), **nothing, **other}
+    """Return a row that diverged, and so was not timed."""
+    missing = dict.fromkeys(("position", "velocity", "cost", "seconds"))
+    fields = {"status": "diverged", "reasons": ("the state is not finite",), **missing, **overrides}
     return row(integrator, timestep, **fields)
 
 
-def scenario(rows: Sequence[WorkPrecisionRow], **other: Any) -> ScenarioReport:
+def scenario(rows: Sequence[WorkPrecisionRow], **overrides: Any) -> ScenarioReport:
     fields: dict[str, Any] = {
         "name": "swing",
         "title": "A pendulum swings",
@@ -93,11 +95,11 @@ def scenario(rows: Sequence[WorkPrecisionRow], **other: Any) -> ScenarioReport:
         "stable": (),
         "verdict": VERDICT,
     }
-    return ScenarioReport(**{**fields, "rows": tuple(rows), **other})
+    return ScenarioReport(**{**fields, "rows": tuple(rows), **overrides})
 
 
 def swing() -> ScenarioReport:
-    """Three integrators over a ladder; Euler is lost at the longest timestep."""
+    """Return three integrators over a ladder of timesteps; Euler diverges at the longest."""
     rows = []
     for integrator, order, work in _KNOWN:
         for timestep in (0.05, 0.02, 0.01, 0.005, 0.002, 0.001):
@@ -133,13 +135,13 @@ def swing() -> ScenarioReport:
     )
 
 
-def scene(*scenarios: ScenarioReport, **other: Any) -> SceneReport:
-    fields = {"model": "arm", "digest": "0" * 64, "quick": False, "machine": MACHINE, **other}
+def scene(*scenarios: ScenarioReport, **overrides: Any) -> SceneReport:
+    fields = {"model": "arm", "digest": "0" * 64, "quick": False, "machine": MACHINE, **overrides}
     return SceneReport(scenarios=scenarios or (swing(),), **fields)
 
 
 def awkward() -> ScenarioReport:
-    """What is hard to show: other solvers, growth, refsafe, chaos, an odd timestep."""
+    """A report that is hard to show: other solvers, growth, refsafe, chaos, odd times."""
     newton = {"solver": "Newton", "iterations": 100, "cone": "pyramidal", "position": None}
     rows = [
         row(

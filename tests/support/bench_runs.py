@@ -1,4 +1,4 @@
-"""Models measured whole, and what is looked for in their reports."""
+"""Measures models, and looks up rows and orders in their reports."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ FAMILY = ("Euler", "implicit", "implicitfast", "discrete")
 
 def measure(model: Any, text: str = "", *, quick: bool = False) -> tuple[ScenarioReport, ...]:
     return tuple(
-        measure_scenario(model, one, quick=quick, clock=None)
-        for one in scenes(model, parse_declared(text), quick=quick)
+        measure_scenario(model, scene, quick=quick, clock=None)
+        for scene in scenes(model, parse_declared(text), quick=quick)
     )
 
 
 def row(report: ScenarioReport, integrator: str, timestep: float) -> WorkPrecisionRow:
     assert report.own_setting is not None
     like = replace(report.own_setting, integrator=integrator, timestep=timestep)
-    (found,) = (one for one in report.rows if one.setting == like)
-    return found
+    (match,) = (row for row in report.rows if row.setting == like)
+    return match
 
 
 def orders(report: ScenarioReport, part: str) -> dict[str, float]:
-    found = {one.integrator: getattr(one, part) for one in report.orders}
-    return {name: fit.value for name, fit in found.items() if fit is not None}
+    fits = {order.integrator: getattr(order, part) for order in report.orders}
+    return {name: fit.value for name, fit in fits.items() if fit is not None}

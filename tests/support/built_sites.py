@@ -1,7 +1,7 @@
 """Courses that are built once for all processes of a test run, and sites of them on a host.
 
-Which pages a site has is found out from its files, so that a new kind of page is tested as soon as
-there is one.
+The pages of a site are listed from its files, so that a new kind of page is tested as soon as there
+is one.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _KIND = re.compile(rb'<body class="on-([a-z-]+)"')
 
 
 _BASES = {"real": "/mujoco-course/", "full": "/constructs/", "nasty": "/c/", "arabic": "/c/"}
-"""The paths of the base addresses that courses say they have."""
+"""The paths of the base addresses in the courses' maps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,19 +36,19 @@ class Site:
         return self.root / "public"
 
     def pages(self) -> list[str]:
-        """The site paths of all pages."""
-        found = self.public.rglob("*.html")
-        return sorted(path.relative_to(self.public).as_posix() for path in found)
+        """Return the site paths of all pages."""
+        paths = self.public.rglob("*.html")
+        return sorted(path.relative_to(self.public).as_posix() for path in paths)
 
     def kinds(self) -> dict[str, str]:
-        """Of each kind of page the largest, which has most to it."""
-        found: dict[str, str] = {}
+        """Return the largest page of each kind, which has most in it."""
+        largest: dict[str, str] = {}
         for path in sorted(self.pages(), key=lambda path: (self.public / path).stat().st_size):
-            found[self.kind(path)] = path
-        return found
+            largest[self.kind(path)] = path
+        return largest
 
     def unlike_pages(self) -> list[str]:
-        """All pages; of those made of a template and a few words each, the largest."""
+        """Return all pages, but of kinds that are only a template and a few words the largest."""
         largest = self.kinds().values()
         alike = ("stub", "level")
         return [path for path in self.pages() if self.kind(path) not in alike or path in largest]
@@ -64,27 +64,27 @@ class Site:
 
 @dataclass(frozen=True, slots=True)
 class BuiltCourses:
-    """Courses in a folder that all processes of a run share; the first that asks builds one."""
+    """Courses in a folder that all processes of a run share; the first that needs one builds it."""
 
     shared: Path
     stores: Path
 
     def __getitem__(self, name: str) -> Folder:
-        """The course of a folder in tests/courses, or the `real` one, of this repository."""
+        """Return the course of a folder in tests/courses, or this repository's as `real`."""
         folder = Folder(ROOT if name == "real" else self.shared / name / "a course")
-        done = self.shared / name / "done"
+        marker = self.shared / name / "done"
         with _locked(self.shared / name):
-            if not done.exists():
+            if not marker.exists():
                 if name != "real":
                     shutil.rmtree(folder.root, ignore_errors=True)
                     course_copy(name, folder.root, self.stores)
                 _build(folder)
-                done.touch()
+                marker.touch()
         return folder
 
 
 class Sites(dict[str, Site]):
-    """The courses in `tests/courses`, and the `real` one, built and served when asked for."""
+    """The courses in `tests/courses`, and the `real` one, built and served on first use."""
 
     def __init__(self, courses: BuiltCourses) -> None:
         super().__init__()
@@ -97,15 +97,15 @@ class Sites(dict[str, Site]):
 
 
 def course_copy(name: str, root: Path, stores: Path) -> Folder:
-    """A copy of a course in `tests/courses`, for a test that changes it."""
+    """Copy a course in `tests/courses`, for a test that changes it."""
     folder = Folder(Path(shutil.copytree(ROOT / "tests/courses" / name / "course", root)))
     folder.borrow(stores)
     return folder
 
 
 def _build(folder: Folder) -> None:
-    done = folder.main("build", "--quiet")
-    assert done.status == 0, done.out + done.err
+    result = folder.main("build", "--quiet")
+    assert result.status == 0, result.out + result.err
 
 
 @contextlib.contextmanager

@@ -9,7 +9,7 @@ from typing import Any
 from playwright.sync_api import Browser, BrowserContext, Playwright, expect
 
 SLOW = 120_000
-"""Milliseconds that a slow machine may take until what is waited for is there."""
+"""Milliseconds that a slow machine may take for anything."""
 expect.set_options(timeout=SLOW)
 
 _KINDS = {
@@ -21,7 +21,7 @@ _KINDS = {
 class Browsers(Mapping[str, Browser]):
     """Chromium that draws labs without a graphics processor, and one without WebGL.
 
-    Each is started when it is first asked for, and once more should it have crashed.
+    Each is started on first use, and again if it has crashed.
     """
 
     def __init__(self, playwright: Playwright) -> None:
@@ -46,7 +46,7 @@ class Browsers(Mapping[str, Browser]):
 
 
 def launch(playwright: Playwright, *arguments: str) -> Browser:
-    """Debian's Chromium without a window; whatever is done in it may take `SLOW`."""
+    """Debian's Chromium without a window; every action in it may take `SLOW`."""
     program = shutil.which("chromium-headless-shell")
     assert program is not None, "install Debian's package `chromium-headless-shell`"
     browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox", *arguments])

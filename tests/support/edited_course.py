@@ -1,4 +1,4 @@
-"""A course that is edited, and what its builds draw."""
+"""A course and random edits of it, and the pages that its builds draw."""
 
 from __future__ import annotations
 
@@ -64,12 +64,12 @@ class Course:
         self.folder.write(self.path(id), text)
 
     def edit(self, id: str, old: str, new: str) -> None:
-        """An edit in a lesson, as far as there is something to edit."""
+        """Edit a lesson, if it has the old text."""
         text = self.folder.text(self.path(id))
         self.write(id, text.replace(old, new, 1))
 
     def apply(self, edit: Edit, id: str, word: str) -> None:
-        """An edit of a lesson, which may not be there."""
+        """Apply an edit to a lesson, if it exists."""
         if (self.folder.root / self.path(id)).exists() or edit in (plan, remove, turn, retitle):
             edit(self, id, word)
             self.save()
@@ -90,7 +90,7 @@ class Course:
 
 
 def drawn_pages(folder: Folder) -> set[str]:
-    """The pages that a build draws anew."""
+    """Return the pages that a build draws anew."""
     with prepare(folder.options(), Progress(quiet=True)) as (report, site):
         assert site is not None, report.diagnostics
         assert len(set(site.drawn)) == len(site.drawn)
@@ -126,7 +126,7 @@ def script(course: Course, id: str, text: str) -> None:
 
 
 def plan(course: Course, id: str, text: str) -> None:
-    """A lesson is taken back, or written."""
+    """Make a lesson planned, or write it."""
     if id in course.planned:
         course.planned.discard(id)
         n = course.ids.index(id) + 1 if id in course.ids else 9
@@ -137,7 +137,7 @@ def plan(course: Course, id: str, text: str) -> None:
 
 
 def remove(course: Course, id: str, text: str) -> None:
-    """A lesson goes, or comes back at the end of its level."""
+    """Remove a lesson, or add it at the end of its level."""
     if id in course.ids:
         course.ids.remove(id)
         (course.folder.root / course.path(id)).unlink(missing_ok=True)
@@ -152,7 +152,7 @@ def turn(course: Course, id: str, text: str) -> None:
 
 
 def term(course: Course, id: str, text: str) -> None:
-    """A term is defined in a lesson, or no more; others link to the lesson where it was."""
+    """Define a term in a lesson, or replace it by a link to the lesson."""
     path = course.folder.root / course.path(id)
     name = f"[w{id}]{{term}}"
     if name in path.read_text(encoding="utf-8"):
@@ -162,12 +162,12 @@ def term(course: Course, id: str, text: str) -> None:
 
 
 def label(course: Course, id: str, text: str) -> None:
-    """A formula gets a label, and is referred to, if it has none."""
+    """Label a formula and refer to it, if it has no label."""
     course.edit(id, "\n$$\n\n[^n]:", "\n$$ {#eq:e}\n\nBy [](#eq:e) $\\dot q$.\n\n[^n]:")
 
 
 def ask(course: Course, id: str, text: str) -> None:
-    """A lesson asks something, or something else."""
+    """Add a quiz to a lesson, or change its question."""
     path = course.folder.root / course.path(id)
     if "```quiz" in path.read_text(encoding="utf-8"):
         course.edit(id, '"why', '"why-not')
@@ -188,12 +188,12 @@ def picture(course: Course, id: str, text: str) -> None:
 
 
 def breakage(course: Course, id: str, text: str) -> None:
-    """What keeps the course from being built, or mends it."""
+    """Make a mistake that prevents builds, or correct it."""
     course.extra = "" if course.extra else '[[silence]]\nrule = "no-such-rule"\nreason = "x"\n'
 
 
 def run(course: Course, id: str, text: str) -> None:
-    """A script that runs is added, or prints another thing than is recorded."""
+    """Add a script that runs, or let it print something that differs from the recording."""
     path, name = course.path(id), f"ran{id}.py"
     if name in course.folder.text(path):
         course.edit(id, "print(17)", "print(17.0)")

@@ -1,4 +1,4 @@
-"""A desk: a course folder on which runs of scripts are made up, and files are real."""
+"""A course folder with real files, on which runs of scripts are made up."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Desk:
         full.write_bytes(data)
 
     def settle(self) -> None:
-        """Let the clock of the file system go on: what was written was written before."""
+        """Wait until the file system's clock has advanced past all earlier writes."""
         probe = self.root.with_name(f"{self.root.name}, clock")
         probe.touch()
         before = probe.stat().st_mtime_ns
@@ -49,7 +49,7 @@ class Desk:
             probe.touch()
 
     def memory(self) -> Memory:
-        """That of a new command."""
+        """Return the memory of a new command."""
         shared = None if self.shared is None else shared_cache(self.shared)
         store = Memo(self.root, fresh=self.fresh, shared=shared)
         store.listen(self.messages.append)
@@ -67,15 +67,15 @@ class Desk:
         during: object = None,
         **fields: object,
     ) -> Memory:
-        """A run that looked at these things, and what is remembered of it."""
+        """Record a run with this trace; return the memory that holds it."""
         memory = self.memory()
         memory.begin()
         memory.note_start(job.path)
         if callable(during):
             self.settle()
             during()
-        made = ScriptRun(job.path, Outcome.OK, 0, "hello\n", "", 0.5, trace=trace)
-        memory.keep(memory.inputs(job, text), replace(made, **fields))
+        run = ScriptRun(job.path, Outcome.OK, 0, "hello\n", "", 0.5, trace=trace)
+        memory.keep(memory.inputs(job, text), replace(run, **fields))
         memory.store.close()
         return memory
 

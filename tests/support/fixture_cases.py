@@ -1,8 +1,8 @@
 """Fixture files: cases of `title / . / input / . / expected / .`, with empty lines between them.
 
-Entry points: `check_cases(path, made)`; `read_cases(path)`, and `rewrite(path, cases)`, which
+Entry points: `check_cases(path, render)`; `read_cases(path)`, and `rewrite(path, cases)`, which
 writes them again. Lines before a title that are empty or begin with `#` are for readers of the
-file. `check_text(path, made)` is for a file that only holds what is expected.
+file. `check_text(path, text)` is for a file that only holds an expected text.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ class Case(Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        """The case as it stands in the file."""
+        """The case in the format of the file."""
         parts = (f"{self.title}\n", self.input, self.expected)
         return self.remarks + "".join(f"{part}.\n" for part in parts)
 
 
-def check_cases(path: Path, made: Callable[[Case], str], *, rewriting: bool) -> None:
-    """Compare what is made of each case with what is expected, or write that anew."""
+def check_cases(path: Path, render: Callable[[Case], str], *, rewriting: bool) -> None:
+    """Compare the rendering of each case with the expected one, or rewrite the expected ones."""
     cases = read_cases(path)
-    found = [replace(case, expected=made(case)) for case in cases]
+    results = [replace(case, expected=render(case)) for case in cases]
     if rewriting:
-        rewrite(path, found)
+        rewrite(path, results)
         return
-    for case, now in zip(cases, found, strict=True):
+    for case, now in zip(cases, results, strict=True):
         assert now.expected == case.expected, f"{path.name}:{case.line}: {case.title}"
 
 
@@ -81,11 +81,11 @@ def rewrite(path: Path, cases: Iterable[Case]) -> None:
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
-def check_text(path: Path, made: str, *, rewriting: bool) -> None:
-    """Compare a text with that of a file, or write the file anew."""
+def check_text(path: Path, text: str, *, rewriting: bool) -> None:
+    """Compare a text with that of a file, or rewrite the file."""
     if rewriting:
-        path.write_text(made, encoding="utf-8", newline="\n")
-    assert made == path.read_text(encoding="utf-8"), path.name
+        path.write_text(text, encoding="utf-8", newline="\n")
+    assert text == path.read_text(encoding="utf-8"), path.name
 
 
 def text_lines(text: str) -> list[str]:

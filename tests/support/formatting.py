@@ -1,4 +1,4 @@
-"""Formatting: `formatted`, a text; `check_formatting`, that it is the same to a reader."""
+"""Formats texts (`format_text`), and checks that readers see no difference (`check_formatting`)."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ def format_text(text: str, width: int, lesson: bool = True) -> Parsed[str]:
 
 
 def check_formatting(text: str, width: int, lesson: bool) -> None:
-    """What a reader sees stays, and formatting once more changes nothing."""
-    done = format_text(text, width, lesson)
-    if done.diagnostics:
-        assert done.value == text
+    """Check that a reader sees the same, and that formatting once more changes nothing."""
+    result = format_text(text, width, lesson)
+    if result.diagnostics:
+        assert result.value == text
     else:
-        assert reader_view(done.value, lesson) == reader_view(text, lesson)
-        assert format_text(done.value, width, lesson) == Parsed(done.value)
+        assert reader_view(result.value, lesson) == reader_view(text, lesson)
+        assert format_text(result.value, width, lesson) == Parsed(result.value)
 
 
 def reader_view(text: str, lesson: bool) -> list[object]:
-    """The page as HTML, in which white space counts in code only, and the JSON in fences."""
+    """Return the page as HTML, with white space folded outside of code, and the JSON in fences."""
     document = parse_document(Source("content/lessons/1.1-a.md", text), KINDS, lesson=lesson).value
     parts = re.split(r"(<pre.*?</pre>)", str(plain_html(document)), flags=re.DOTALL)
     html = [part if part.startswith("<pre") else " ".join(part.split()) for part in parts]

@@ -1,6 +1,6 @@
 """Parts of the pages in docs/ that are made from the code.
 
-Entry point: `renewed(text)`. Such a part stands between `<!-- generated: WORDS -->` and
+Entry point: `regenerate(text)`. Such a part stands between `<!-- generated: WORDS -->` and
 `<!-- end -->`. The words are those of `_MAKERS`:
 
 - `contents`: links to the page's sections;
@@ -27,11 +27,11 @@ _FENCE = re.compile(r"^(`{3,})[^`\n]*\n.*?^\1`*$", re.MULTILINE | re.DOTALL)
 
 
 def regenerate(text: str) -> str:
-    """A page with its generated parts as they should be."""
+    """Return a page with its generated parts made anew."""
 
-    def part(found: re.Match[str]) -> str:
-        name, *words = found[2].split()
-        return f"{found[1]}\n{_MAKERS[name](text, *words)}\n\n{found[3]}"
+    def part(match: re.Match[str]) -> str:
+        name, *words = match[2].split()
+        return f"{match[1]}\n{_MAKERS[name](text, *words)}\n\n{match[3]}"
 
     return _PART.sub(part, text)
 
@@ -48,8 +48,8 @@ def _contents(text: str) -> str:
 
 
 def _table(head: str, rows: Iterable[tuple[str, ...]]) -> str:
-    escaped = ([cell.replace("|", r"\|") for cell in row] for row in rows)
-    lines = (f"| {' | '.join(row)} |" for row in escaped)
+    cells = ([cell.replace("|", r"\|") for cell in row] for row in rows)
+    lines = (f"| {' | '.join(row)} |" for row in cells)
     rule = "|" + " --- |" * (head.count("|") + 1)
     return "\n".join((f"| {head} |", rule, *lines))
 
@@ -57,58 +57,60 @@ def _table(head: str, rows: Iterable[tuple[str, ...]]) -> str:
 # --------------------------------------------------------------------------------------- fields
 
 
-def _fields(text: str, schema: str, name: str, how: str = "beyond", other: str = "") -> str:
+def _fields(
+    text: str, schema: str, name: str, relation: str = "beyond", other_name: str = ""
+) -> str:
     definitions = json.loads(json_schema(schema))["$defs"]
-    known = definitions[name]
-    others = definitions[other]["properties"] if other else {}
+    structure = definitions[name]
+    other_fields = definitions[other_name]["properties"] if other_name else {}
     rows = []
-    for field, declared in known["properties"].items():
-        if (field in others) != (how == "within") or (others and field == "kind"):
+    for field, field_schema in structure["properties"].items():
+        if (field in other_fields) != (relation == "within") or (other_fields and field == "kind"):
             continue
-        about = declared.get("description") or _about(declared, definitions)
-        required = ", required" * (field in known.get("required", ()))
-        rows.append((f"`{field}`{required}", _value(declared), about))
+        meaning = field_schema.get("description") or _about(field_schema, definitions)
+        required = ", required" * (field in structure.get("required", ()))
+        rows.append((f"`{field}`{required}", _value(field_schema), meaning))
     return _table("field | value | meaning", rows)
 
 
-def _about(declared: dict[str, Any], definitions: dict[str, Any]) -> str:
-    """What is said of the structure that a field holds."""
-    found = re.search(r'"\$ref": "#/\$defs/(\w+)"', json.dumps(declared))
-    about = definitions[found[1]]["description"].partition("\n")[0] if found else ""
-    return about[:1].lower() + about[1:].rstrip(".")
+def _about(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
+    """Return the description of the structure that a field holds."""
+    match = re.search(r'"\$ref": "#/\$defs/(\w+)"', json.dumps(schema))
+    meaning = definitions[match[1]]["description"].partition("\n")[0] if match else ""
+    return meaning[:1].lower() + meaning[1:].rstrip(".")
 
 
-def _value(declared: dict[str, Any]) -> str:
-    value = _kind(declared)
-    default = declared.get("default")
+def _value(schema: dict[str, Any]) -> str:
+    value = _kind(schema)
+    default = schema.get("default")
     if default not in (None, "", [], {}, False):
         value += f"; `{json.dumps(default)}` without it"
     return value
 
 
-def _kind(declared: dict[str, Any]) -> str:
-    if "anyOf" in declared:
-        kinds = [_kind(one) for one in declared["anyOf"] if one.get("type") != "null"]
+def _kind(schema: dict[str, Any]) -> str:
+    if "anyOf" in schema:
+        kinds = [_kind(choice) for choice in schema["anyOf"] if choice.get("type") != "null"]
         return " or ".join(dict.fromkeys(kinds))
-    if "enum" in declared:
-        return ", ".join(f"`{json.dumps(one)}`" for one in declared["enum"])
-    match declared.get("type"):
+    if "enum" in schema:
+        return ", ".join(f"`{json.dumps(choice)}`" for choice in schema["enum"])
+    match schema.get("type"):
         case "array":
-            inner = declared.get("items", {})
+            inner = schema.get("items", {})
             return f"list of {_kind(inner)}" if inner else "list"
         case "string":
-            return "Markdown" if "contentMediaType" in declared else "text"
+            return "Markdown" if "contentMediaType" in schema else "text"
         case "boolean":
             return "`true` or `false`"
         case "integer" | "number" as kind:
-            return ("whole " * (kind == "integer")) + "number" + _bounds(declared)
+            return ("whole " * (kind == "integer")) + "number" + _bounds(schema)
     return "table"
 
 
-def _bounds(declared: dict[str, Any]) -> str:
-    low, high = declared.get("minimum"), declared.get("maximum")
-    if "exclusiveMinimum" in declared:
-        return f" above {declared['exclusiveMinimum']:g}"
+def _bounds(schema: dict[str, Any]) -> str:
+    low, high = schema.get("minimum"), schema.get("maximum")
+    if "exclusiveMinimum" in schema:
+        return f" above {schema['exclusiveMinimum']:g}"
     if low is not None and high is not None:
         return f", {low} to {high}"
     return f" from {low}" if low is not None else ""
@@ -118,7 +120,10 @@ def _bounds(declared: dict[str, Any]) -> str:
 
 
 def _commands(text: str) -> str:
-    rows = ((f"[`{one.name}`](#{one.name})", one.summary) for one in known_commands().values())
+    rows = (
+        (f"[`{command.name}`](#{command.name})", command.summary)
+        for command in known_commands().values()
+    )
     return _table("command | what it does", rows)
 
 
@@ -129,12 +134,12 @@ def _actions(name: str) -> Iterator[argparse.Action]:
 
 def _shared() -> dict[tuple[str, str], list[str]]:
     """Options that at least three commands take, with the commands."""
-    found: dict[tuple[str, str], list[str]] = {}
+    commands_by_row: dict[tuple[str, str], list[str]] = {}
     for name in known_commands():
         for action in _actions(name):
             if action.option_strings:
-                found.setdefault(_row(action), []).append(name)
-    return {row: names for row, names in found.items() if len(names) > 2}
+                commands_by_row.setdefault(_row(action), []).append(name)
+    return {row: names for row, names in commands_by_row.items() if len(names) > 2}
 
 
 def _row(action: argparse.Action) -> tuple[str, str]:
@@ -148,8 +153,8 @@ def _row(action: argparse.Action) -> tuple[str, str]:
 
 def _options(text: str) -> str:
     rows = (
-        (name, ", ".join(f"`{command}`" for command in commands), about)
-        for (name, about), commands in _shared().items()
+        (name, ", ".join(f"`{command}`" for command in commands), meaning)
+        for (name, meaning), commands in _shared().items()
     )
     return _table("option | of | meaning", rows)
 
@@ -176,7 +181,7 @@ def _kinds(action: Any) -> Iterator[list[tuple[str, str]]]:
     for name, parser in action.choices.items():
         yield [(f"`{name}`", helps[name])]
         rows = [_row(one) for one in parser._actions if one.dest not in ("help", "root")]
-        yield [(f"`{name}` {argument}", about) for argument, about in rows]
+        yield [(f"`{name}` {argument}", meaning) for argument, meaning in rows]
 
 
 _MAKERS: dict[str, Callable[..., str]] = {

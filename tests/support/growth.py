@@ -1,4 +1,4 @@
-"""How the work that something takes grows with its size: there is no limit in seconds."""
+"""Measures how work grows with size, for tests without limits in seconds."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 
 def processor_time_growth(action: Callable[[int], object], size: int) -> float:
-    """How often the processor time of a size that of eight times it is: 8, or 64 for a square."""
+    """Return the ratio of processor times at eight times the size: 8 if linear, 64 if quadratic."""
 
     def least(size: int) -> float:
         times = []

@@ -97,37 +97,37 @@ def rotate(q: Sequence[mpmath.mpf], vector: Sequence[mpmath.mpf]) -> Vector:
     return [sum(rows[3 * i + j] * vector[j] for j in range(3)) for i in range(3)]
 
 
-def ulps_of(size: mpmath.mpf, got: ArrayLike, want: Iterable[mpmath.mpf]) -> float:
+def ulps_of(size: mpmath.mpf, actual: ArrayLike, expected: Iterable[mpmath.mpf]) -> float:
     """The largest error, in ulp of one common size."""
-    pairs = zip(exact(got), want, strict=True)
+    pairs = zip(exact(actual), expected, strict=True)
     return _largest(abs(g - w) / (ULP * size) for g, w in pairs)
 
 
-def entry_ulps(got: ArrayLike, want: Iterable[mpmath.mpf]) -> float:
+def entry_ulps(actual: ArrayLike, expected: Iterable[mpmath.mpf]) -> float:
     """The largest error, each in ulp of its entry, or in denormal steps if those are larger."""
-    pairs = zip(exact(got), want, strict=True)
+    pairs = zip(exact(actual), expected, strict=True)
     return _largest(abs(g - w) / max(ULP * abs(w), DENORMAL) for g, w in pairs)
 
 
 def _largest(errors: Iterable[mpmath.mpf]) -> float:
-    """The largest, or nan where there is one, which `max` alone may pass over."""
+    """Return the largest error, or nan if there is one, which `max` alone may skip."""
     return float(max(errors, key=lambda error: (mpmath.isnan(error), error)))
 
 
-def errors_over(bound: float, errors: Mapping[object, float]) -> list[str]:
-    """What to say of each case whose error, in ulp, is over the bound or is no number."""
+def errors_over(limit: float, errors: Mapping[object, float]) -> list[str]:
+    """Return a message for each case whose error, in ulp, is over the limit or not a number."""
     assert errors, "no case was looked at"
     return [
-        f"{case}: {error:.4g} ulp, over {bound}"
+        f"{case}: {error:.4g} ulp, over {limit}"
         for case, error in errors.items()
-        if not error <= bound
+        if not error <= limit
     ]
 
 
-def same_up_to_sign(got: ArrayLike, want: Sequence[mpmath.mpf]) -> Vector:
-    """The one of q and −q that is nearer."""
-    agree = sum(g * w for g, w in zip(exact(got), want, strict=True))
-    return list(want) if agree >= 0 else [-entry for entry in want]
+def same_up_to_sign(actual: ArrayLike, expected: Sequence[mpmath.mpf]) -> Vector:
+    """Return the one of q and −q that is nearer."""
+    agree = sum(g * w for g, w in zip(exact(actual), expected, strict=True))
+    return list(expected) if agree >= 0 else [-entry for entry in expected]
 
 
 def _next(value: float, toward: float) -> float:

@@ -1,4 +1,4 @@
-"""Texts with HTML in them that nobody should write, and somebody does."""
+"""Texts with HTML that nobody should write, but somebody does."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ HOSTILE = [
 ]  # fmt: skip
 
 REFUSED = [text for text in HOSTILE if text.startswith(("<b>bold\n", "</textarea"))]
-"""Those that a check calls a mistake: elements that are not closed, or not open."""
+"""Those that a check rejects: elements that are not closed, or not open."""
 
 _PIECES = (
     "a|&nbsp;|&lt;|&|<|>|<p>|</p>|<br>|<div class=x>|</div>|<ul><li>|<li>|</ul>|<table><tr><td>"

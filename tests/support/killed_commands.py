@@ -1,4 +1,4 @@
-"""Runs commands in forked children that meet their end, or a fault, at a given call of the system.
+"""Runs commands in forked children that are killed, or meet a fault, at a given system call.
 
     python killed_commands.py < requests > replies
 
@@ -44,7 +44,7 @@ READY = (
     "coursebuild.core.pages.pages",
     "coursebuild.features.authoring.commands.rename",
 )
-"""Modules that children need not import, each for itself."""
+"""Modules that are imported once, before children are forked."""
 TOOL = str(Path(coursebuild.__file__).parent)
 OPENING = frozenset({"open", "os.scandir", "os.listdir", "socket.__new__", "os.pipe"})
 STARTING = frozenset({"os.fork", "os.posix_spawn", "subprocess.Popen"})
@@ -60,7 +60,7 @@ class Doom:
         self.calls: list[str] = []
 
     def meets(self, name: str) -> bool:
-        """Note a call; whether it is the fatal one."""
+        """Count a call; return whether it is the fatal one."""
         self.calls.append(name)
         return len(self.calls) == self.fatal
 
@@ -80,12 +80,12 @@ class Doom:
             return ""
 
     def wrap(self, name: str, really: Callable[..., Any]) -> Callable[..., Any]:
-        def call(*arguments: Any, **named: Any) -> Any:
+        def call(*arguments: Any, **keywords: Any) -> Any:
             if self.concerns(name, arguments) and self.meets(name):
                 if name == "write":
                     really(arguments[0], bytes(arguments[1])[: len(arguments[1]) // 2])
                 os._exit(DIED)
-            return really(*arguments, **named)
+            return really(*arguments, **keywords)
 
         return call
 
@@ -111,7 +111,7 @@ class Fault(Doom):
         self.process = os.getpid()
 
     def __call__(self, event: str, _arguments: object = None) -> None:
-        """Hear of a call before it is made."""
+        """Called by the interpreter before each audited call."""
         if event not in OPENING | STARTING | {THREAD} or os.getpid() != self.process:
             return
         self.meets(f"{event}@{self.caller()}")
@@ -125,7 +125,7 @@ class Fault(Doom):
         raise OSError(number, os.strerror(number))
 
     def caller(self) -> str:
-        """The place in the tool that makes a call."""
+        """Return the place in the tool that makes the call."""
         frame = sys._getframe(2)
         while not frame.f_code.co_filename.startswith(TOOL):
             if "importlib" in frame.f_code.co_filename or frame.f_back is None:
@@ -163,12 +163,12 @@ def serve() -> None:
                 calls = pipe.read()
             status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
             errors.seek(0)
-            said = errors.read().decode()
-        print(json.dumps({"status": status, "calls": calls.split(), "said": said}), flush=True)
+            output = errors.read().decode()
+        print(json.dumps({"status": status, "calls": calls.split(), "said": output}), flush=True)
 
 
 def run(request: dict[str, Any], report: int) -> None:
-    """Be the child."""
+    """Run the command in the child, which never returns."""
     folder = Path(request["folder"])
     if not request["exchanges"]:
         publishing.exchange = lambda a, b: False

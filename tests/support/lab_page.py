@@ -36,16 +36,16 @@ def watch_page(context: BrowserContext) -> tuple[Page, list[str]]:
 
     What was still on its way when the next page was opened is no failure.
     """
-    page, said = context.new_page(), list[str]()
+    page, console = context.new_page(), list[str]()
 
     def failed(request: Request) -> None:
         if request.failure != "net::ERR_ABORTED":
-            said.append(f"failed: {request.url}")
+            console.append(f"failed: {request.url}")
 
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("console", lambda message: console.append(message.text))
+    page.on("pageerror", lambda error: console.append(str(error)))
     page.on("requestfailed", failed)
-    return page, said
+    return page, console
 
 
 def fetch_text(route: Route) -> str:
@@ -63,14 +63,14 @@ def until(page: Page, true: str, argument: object = None) -> None:
     raise AssertionError(f"never true: {true}")
 
 
-def becomes(page: Page, value: Callable[[], object], wanted: object) -> None:
+def becomes(page: Page, value: Callable[[], object], expected: object) -> None:
     """Wait until a value is what is wanted; the last one is told if it never is."""
     for _ in range(SLOW // 25):
-        found = value()
-        if found == wanted:
+        last = value()
+        if last == expected:
             return
         page.wait_for_timeout(25)
-    assert found == wanted
+    assert last == expected
 
 
 def wait_until_settled(page: Page) -> None:
@@ -82,11 +82,11 @@ def wait_until_settled(page: Page) -> None:
 
 def lab(page: Page, number: int = SWING, state: str | None = "paused") -> Locator:
     """A lab of the page, in the window and started."""
-    found = page.locator(".lab").nth(number)
-    found.scroll_into_view_if_needed()
+    locator = page.locator(".lab").nth(number)
+    locator.scroll_into_view_if_needed()
     if state is not None:
         reach(page, number, state)
-    return found
+    return locator
 
 
 def reach(page: Page, number: int, state: str) -> None:
@@ -97,18 +97,18 @@ def reach(page: Page, number: int, state: str) -> None:
     )
 
 
-def press(found: Locator, name: str) -> None:
-    found.get_by_role("button", name=name, exact=True).click()
+def press(lab: Locator, name: str) -> None:
+    lab.get_by_role("button", name=name, exact=True).click()
 
 
-def readout(found: Locator, label: str) -> str:
-    row = found.locator(".lab-live .lab-readouts > div").filter(has_text=label)
+def readout(lab: Locator, label: str) -> str:
+    row = lab.locator(".lab-live .lab-readouts > div").filter(has_text=label)
     return row.locator("dd").inner_text().strip().replace("−", "-")
 
 
-def shows(found: Locator, label: str, text: str) -> None:
+def shows(lab: Locator, label: str, text: str) -> None:
     """A readout comes to show a text; a page draws when it gets to it."""
-    wait_for_condition(found.page, lambda: readout(found, label) == text)
+    wait_for_condition(lab.page, lambda: readout(lab, label) == text)
 
 
 def wait_for_condition(page: Page, true: Callable[[], bool]) -> None:
@@ -142,15 +142,15 @@ def wait_until_still(page: Page, view: Locator) -> bytes:
     raise AssertionError("the picture never stays as it is")
 
 
-def time_of(found: Locator) -> float:
-    return float(found.locator(".lab-time").inner_text().removesuffix("s").strip())
+def time_of(lab: Locator) -> float:
+    return float(lab.locator(".lab-time").inner_text().removesuffix("s").strip())
 
 
-def state_of(page: Page, found: Locator) -> dict[str, object]:
+def state_of(page: Page, lab: Locator) -> dict[str, object]:
     """What the link of a lab's state holds."""
     page.evaluate("() => history.replaceState(null, '', location.pathname)")  # so that it is news
     before = page.evaluate("() => location.href")
-    found.get_by_role("button", name="Copy link").click()
+    lab.get_by_role("button", name="Copy link").click()
     until(page, "before => location.href !== before", before)
     return parse_link(page.evaluate("() => location.href"))
 

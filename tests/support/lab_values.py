@@ -54,13 +54,13 @@ def try_labs(
     options: Options,
     engines: Engines,
     models: Mapping[str, CompileResult] | None = None,
-    wrong: Sequence[Diagnostic] = (),
+    diagnostics: Sequence[Diagnostic] = (),
     documents: frozenset[str] | None = None,
     seconds: float = SECONDS,
 ) -> TrialOutcome:
     """What comes of the labs of a course, or of some of its documents, without static forms."""
     memory = Memory(options.root, options.store)
-    context = TrialContext(options.root, course, models or {}, memory, wrong)
+    context = TrialContext(options.root, course, models or {}, memory, diagnostics)
     trials = [t for t in lab_trials(course) if documents is None or t.block.span.path in documents]
     return LabTrials(context, engines, seconds).run(trials)
 

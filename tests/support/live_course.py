@@ -45,8 +45,8 @@ class Live:
     def site(self) -> dict[str, bytes]:
         """Everything, once all is known."""
         self.rebuild.once()
-        found = {path: self.find(path) for path in self.session.files.paths}
-        return {p: d for p, d in found.items() if d is not None and _is_compared(p)}
+        files = {path: self.find(path) for path in self.session.files.paths}
+        return {p: d for p, d in files.items() if d is not None and _is_compared(p)}
 
     def close(self) -> None:
         self.rebuild.close()
@@ -58,15 +58,15 @@ class Live:
 
 @pytest.fixture
 def live() -> Iterator[Callable[[Folder], Live]]:
-    made: list[Live] = []
+    previews: list[Live] = []
 
     def make(folder: Folder) -> Live:
-        made.append(Live(folder))
-        return made[-1]
+        previews.append(Live(folder))
+        return previews[-1]
 
     yield make
-    for one in made:
-        one.close()
+    for preview in previews:
+        preview.close()
 
 
 def share(folder: Folder, trials: Path) -> None:
@@ -79,9 +79,9 @@ def share(folder: Folder, trials: Path) -> None:
 class Builds:
     """Clean builds of what a folder holds, each in a folder of its own."""
 
-    def __init__(self, where: Path, stores: Path) -> None:
-        self.where, self.stores, self.numbers = where, stores, itertools.count()
-        self.trials = where / "trials"
+    def __init__(self, folder: Path, stores: Path) -> None:
+        self.where, self.stores, self.numbers = folder, stores, itertools.count()
+        self.trials = folder / "trials"
 
     def __call__(self, folder: Folder) -> dict[str, bytes] | None:
         """The published files, or nothing for a course with mistakes."""
@@ -89,8 +89,8 @@ class Builds:
         fresh.copy(folder.root)
         fresh.borrow(self.stores)
         share(fresh, self.trials)
-        done = fresh.main("build")
-        if done.status != 0:
+        result = fresh.main("build")
+        if result.status != 0:
             return None
         site = fresh.tree("public")
         return {path: data for path, data in site.items() if _is_compared(path)}

@@ -40,7 +40,7 @@ BOX = "<mujoco>\n  <worldbody/>\n</mujoco>\n"
 def make_course(
     first: str = "Text.\n",
     second: str = "Text.\n",
-    about: str = "Text.\n",
+    page_text: str = "Text.\n",
     *,
     models: Mapping[str, str] | None = None,
     declared: Mapping[str, str] | None = None,
@@ -53,10 +53,10 @@ def make_course(
     course = parse_course_map(Source("content/course.toml", MAP)).value
     assert course is not None
     (level,) = course.levels
-    one, two, planned = level.lessons
+    first_lesson, second_lesson, planned = level.lessons
     lessons = (
-        replace(one, document=document(one.path, first)),
-        replace(two, document=document(two.path, second)),
+        replace(first_lesson, document=document(first_lesson.path, first)),
+        replace(second_lesson, document=document(second_lesson.path, second)),
         planned,
     )
     (page,) = course.pages
@@ -67,13 +67,13 @@ def make_course(
     return replace(
         course,
         levels=(replace(level, lessons=lessons),),
-        pages=(replace(page, document=document(page.path, about)),),
+        pages=(replace(page, document=document(page.path, page_text)),),
         models=tuple(
             MjcfModel(name, Source(f"models/{name}.xml", text))
             for name, text in (models or {}).items()
         ),
         files=tuple(files),
-        declarations=tuple(one for one in declarations if one is not None),
+        declarations=tuple(parsed for parsed in declarations if parsed is not None),
     )
 
 

@@ -88,9 +88,9 @@ def anchors(path: Path) -> set[str]:
     return {re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", title)) for title in plain}
 
 
-def write_files(root: Path, found: Iterable[Fence]) -> None:
+def write_files(root: Path, fences: Iterable[Fence]) -> None:
     """Write each fence that has `file=` to that path below a folder."""
-    for fence in found:
+    for fence in fences:
         path = fence.value("file")
         if path is not None:
             target = root / path

@@ -33,8 +33,8 @@ TOML = '[[scenario]]\nname = "swing"\nduration = 0.2\nsample = 0.02\nqvel = [1.0
 class Fake:
     """Says what it was told to, and what it was asked."""
 
-    def __init__(self, *found: ScenarioReport | Diagnostic | BaseException) -> None:
-        self.found = list(found) or [swing()]
+    def __init__(self, *outcomes: ScenarioReport | Diagnostic | BaseException) -> None:
+        self.found = list(outcomes) or [swing()]
         self.calls: list[tuple[str, int, bool, bool]] = []
 
     def compile_scene(self, root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
@@ -57,12 +57,12 @@ class Fake:
     ) -> ScenarioReport:
         tell("swing: Euler")
         self.calls.append((compiled.scene.name, number, quick, timed))
-        found = self.found[number]
-        if isinstance(found, Diagnostic):
-            raise CannotMeasureError(found)
-        if isinstance(found, BaseException):
-            raise found
-        return found
+        outcome = self.found[number]
+        if isinstance(outcome, Diagnostic):
+            raise CannotMeasureError(outcome)
+        if isinstance(outcome, BaseException):
+            raise outcome
+        return outcome
 
 
 def bench_course(tmp_path: Path) -> Path:
@@ -78,8 +78,8 @@ def write(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def options(root: Path, **other: Any) -> Options:
-    return Options(root, 1, True, Memo(root, **other))
+def options(root: Path, **fields: Any) -> Options:
+    return Options(root, 1, True, Memo(root, **fields))
 
 
 def take_calls(fake: Fake) -> list[str]:

@@ -37,7 +37,7 @@ def box(card: SceneCard | None = CARD) -> SceneReport:
     return scene(swing(), replace(awkward(), name="awkward"), model="box", card=card)
 
 
-def finding(kind: str = "sensor-unread", **other: object) -> Finding:
+def finding(kind: str = "sensor-unread", **overrides: object) -> Finding:
     fields: dict[str, object] = {
         "kind": kind,
         "message": "nobody reads <this> sensor",
@@ -52,7 +52,7 @@ def finding(kind: str = "sensor-unread", **other: object) -> Finding:
         "unfixed": "",
         "kept": "",
         "doubt": "",
-        **other,
+        **overrides,
     }
     return Finding(**fields)
 
@@ -74,7 +74,7 @@ def diet(*findings: Finding) -> DietReport:
     )
 
 
-def run(**other: object) -> ErrorLine:
+def run(**overrides: object) -> ErrorLine:
     """A run of a hard case that is well."""
     fields: dict[str, object] = {
         "integrator": "Euler",
@@ -84,13 +84,13 @@ def run(**other: object) -> ErrorLine:
         "penetration": 0.0,
         "refsafe": False,
         **dict.fromkeys(("position", "attitude", "velocity", "energy_drift", "momentum_drift")),
-        **other,
+        **overrides,
     }
     return ErrorLine(**fields)
 
 
-def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
-    tried = ((1e-3, 1.0), None, 50.0, 250, 60, 2.5)
+def case(name: str = "spring", number: int = 5, **overrides: object) -> CaseReport:
+    search = ((1e-3, 1.0), None, 50.0, 250, 60, 2.5)
     fields: dict[str, object] = {
         "name": name,
         "title": f"A <{name}>",
@@ -101,13 +101,13 @@ def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
             "closed", "the oscillator", "Bulirsch–Stoer", 1e-13, 0.0, 3.9e-13
         ),
         "boundaries": (
-            BoundaryLine("Euler", 0.2, *tried, 0.2001, "2/ω", -5e-4, "diverged", 1.5),
+            BoundaryLine("Euler", 0.2, *search, 0.2001, "2/ω", -5e-4, "diverged", 1.5),
             replace(
-                BoundaryLine("RK4", 0.28, *tried, None, "", None, "slow-growth", None),
+                BoundaryLine("RK4", 0.28, *search, None, "", None, "slow-growth", None),
                 islands=(0.3, 0.31),
             ),
-            BoundaryLine("implicit", None, *tried, None, "", None, "", None),
-            BoundaryLine("discrete", None, *tried, None, "", None, "", None),
+            BoundaryLine("implicit", None, *search, None, "", None, "", None),
+            BoundaryLine("discrete", None, *search, None, "", None, "", None),
         ),
         "figures": (
             FigureLine("period", "s", "Euler", 6.283, 6.2831853, "2π√(m/k)"),
@@ -121,18 +121,20 @@ def case(name: str = "spring", number: int = 5, **other: object) -> CaseReport:
             run(timestep=0.5, status="diverged", reasons=("1e9 rad/s",), refsafe=True),
         ),
         "costs": (StepCost("Euler", Interval(1e-6, 0.9e-6, 1.1e-6)),),
-        **other,
+        **overrides,
     }
     return CaseReport(**fields)
 
 
 def reports() -> Reports:
     """All of it."""
-    kept = finding("geom-far", kept="it is the horizon", proof="", label="equal within tolerance")
-    told = {"label": SAME, "doubt": "examples/a.py names <it>"}
-    doubted = finding("site-unused", **told)
+    kept_finding = finding(
+        "geom-far", kept="it is the horizon", proof="", label="equal within tolerance"
+    )
+    fields = {"label": SAME, "doubt": "examples/a.py names <it>"}
+    doubted = finding("site-unused", **fields)
     return Reports(
         {"box": box()},
-        {"box": diet(finding(), kept, doubted)},
+        {"box": diet(finding(), kept_finding, doubted)},
         (case("spring", 5), case("other", 5, note=""), case("top", 3, errors=())),
     )

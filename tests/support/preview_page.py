@@ -52,6 +52,6 @@ def lesson_page(folder: Folder, browser: Browser) -> Iterator[Page]:
     """The page of a lesson, which stays the same document, with nothing that goes wrong in it."""
     with serve_preview(folder) as preview:
         preview.wait_for_line("checked: ")
-        with PreviewPage(browser, preview, LESSON) as opened:
-            yield opened.page
-            opened.check_unbroken()
+        with PreviewPage(browser, preview, LESSON) as preview_page:
+            yield preview_page.page
+            preview_page.check_unbroken()

@@ -93,8 +93,8 @@ class Preview:
     def events(self, page: str = "lessons/1.1-one.html") -> Iterator[Events]:
         """What an open page is told."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=120) as link:
-            asked = f"GET {PREFIX}events?page={page} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}"
-            link.sendall(f"{asked}\r\n\r\n".encode())
+            request = f"GET {PREFIX}events?page={page} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}"
+            link.sendall(f"{request}\r\n\r\n".encode())
             with link.makefile("rb") as stream:
                 head = b""
                 while not head.endswith(b"\r\n\r\n"):

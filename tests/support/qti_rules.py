@@ -173,8 +173,8 @@ RULES: dict[str, Rule] = {
 def mistakes(data: bytes) -> list[str]:
     """What is wrong with an item or a test."""
     root = etree.fromstring(data)
-    found = [f"{_name(node)}: {what}" for node in root.iter() for what in _element(node)]
-    return found + list(_references(root))
+    messages = [f"{_name(node)}: {message}" for node in root.iter() for message in _element(node)]
+    return messages + list(_references(root))
 
 
 def _name(node: etree._Element) -> str:
@@ -201,11 +201,11 @@ def _element(node: etree._Element) -> Iterator[str]:
 
 
 def _attributes(node: etree._Element, rule: Rule) -> Iterator[str]:
-    allowed = rule.required | rule.optional
+    patterns = rule.required | rule.optional
     for key, value in node.attrib.items():
-        if key not in allowed:
+        if key not in patterns:
             yield f"has no attribute {key}"
-        elif not re.fullmatch(allowed[key], value):
+        elif not re.fullmatch(patterns[key], value):
             yield f"{key} is not {value!r}"
     yield from (f"lacks {key}" for key in rule.required if key not in node.attrib)
 
@@ -225,19 +225,19 @@ def _references(root: etree._Element) -> Iterator[str]:
         names = [node.get("identifier") for node in root.iter(f"{{{QTI}}}assessmentItemRef")]
         yield from ["an item twice"] if len(set(names)) < len(names) else []
         return
-    declared = {
+    nodes_by_identifier = {
         node.get("identifier"): node
         for kind in ("responseDeclaration", "outcomeDeclaration")
         for node in root.iter(f"{{{QTI}}}{kind}")
     }
     for node in root.iter():
         for key in ("responseIdentifier", "outcomeIdentifier"):
-            if node.get(key) not in (None, *declared):
+            if node.get(key) not in (None, *nodes_by_identifier):
                 yield f"{_name(node)}: {key} {node.get(key)} is declared nowhere"
-        used = _name(node) in ("variable", "correct", "setOutcomeValue")
-        if used and node.get("identifier") not in declared:
+        refers = _name(node) in ("variable", "correct", "setOutcomeValue")
+        if refers and node.get("identifier") not in nodes_by_identifier:
             yield f"{_name(node)}: {node.get('identifier')} is declared nowhere"
-    yield from _choices(root, declared["RESPONSE"])
+    yield from _choices(root, nodes_by_identifier["RESPONSE"])
 
 
 def _choices(root: etree._Element, response: etree._Element) -> Iterator[str]:

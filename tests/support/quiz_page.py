@@ -22,12 +22,12 @@ KEY = "() => Object.keys(localStorage).find((key) => key.startsWith('coursebuild
 
 def clean_page(context: BrowserContext, site: str) -> Iterator[Page]:
     """The lesson, with its quiz alive; nothing may go wrong in it."""
-    page, said = watch_page(context)
+    page, console = watch_page(context)
     visit(page, site + PATH)
     yield page
     # A page that is left while a lab loads loads no further; there may be no service worker.
     ours = ("/assets/labs/", "blocked by Playwright")
-    assert [text for text in said if not any(part in text for part in ours)] == []
+    assert [text for text in console if not any(part in text for part in ours)] == []
 
 
 def visit(page: Page, address: str) -> None:
@@ -60,16 +60,16 @@ def stored_answer(page: Page, number: int) -> dict[str, Any] | None:
     key = question(page, number).get_attribute("data-question")
     text = page.evaluate(f"localStorage[({KEY})()] ?? null")
     entry = json.loads(text)["answers"].get("check", {}).get(key) if text else None
-    found: dict[str, Any] | None = entry and entry["answer"]
-    return found
+    answer: dict[str, Any] | None = entry and entry["answer"]
+    return answer
 
 
 def items(page: Page) -> list[str]:
     return texts(question(page, ORDER).locator(".item-text"))
 
 
-def texts(found: Locator) -> list[str]:
-    return [" ".join(text.split()) for text in found.all_inner_texts()]
+def texts(locator: Locator) -> list[str]:
+    return [" ".join(text.split()) for text in locator.all_inner_texts()]
 
 
 def answer_all(page: Page) -> None:

@@ -17,15 +17,16 @@ def question(page: Page, key: str) -> Locator:
     return page.locator(f'[data-question="{key}"]')
 
 
-def choose(found: Locator, option: str) -> None:
-    found.scroll_into_view_if_needed()  # questions come alive when they come near
-    found.get_by_label(option, exact=False).check()
-    found.locator(".quiz-check").click()
+def choose(part: Locator, option: str) -> None:
+    part.scroll_into_view_if_needed()  # questions come alive when they come near
+    part.get_by_label(option, exact=False).check()
+    part.locator(".quiz-check").click()
 
 
 def stored_progress(page: Page) -> dict[str, object]:
-    found: dict[str, object] = json.loads(page.evaluate("key => localStorage.getItem(key)", KEY))
-    return found
+    stored = page.evaluate("key => localStorage.getItem(key)", KEY)
+    progress: dict[str, object] = json.loads(stored)
+    return progress
 
 
 WAY = {"quiz": "fall", "key": "way", "lesson": "1.2"}
@@ -34,12 +35,12 @@ WAY = {"quiz": "fall", "key": "way", "lesson": "1.2"}
 
 def store_answers(page: Page, *answers: dict[str, object]) -> None:
     """Write answers into the storage as a visit two days ago would have."""
-    when = datetime.datetime.now(datetime.UTC) - datetime.timedelta(days=2)
-    tick = int(when.timestamp() * 1000)
+    time = datetime.datetime.now(datetime.UTC) - datetime.timedelta(days=2)
+    tick = int(time.timestamp() * 1000)
     quizzes: dict[str, dict[str, object]] = {}
-    for number, given in enumerate(answers, 1):
+    for number, fields in enumerate(answers, 1):
         answer = {"kind": "mcq", "given": [], "right": False, "tries": 1, "hints": 0, "number": 1}
-        answer |= {"lesson": "1.1", "at": when.strftime("%Y-%m-%dT%H:%M:%S.000Z")} | given
+        answer |= {"lesson": "1.1", "at": time.strftime("%Y-%m-%dT%H:%M:%S.000Z")} | fields
         quiz, key = str(answer.pop("quiz")), str(answer.pop("key"))
         recalls = [] if answer["right"] else [[tick + number, 0, tick]]
         entry = {"answer": {"tick": tick + number, **answer}, "recalls": recalls}

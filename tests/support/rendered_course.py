@@ -131,11 +131,11 @@ class Made(Struct, frozen=True):
     def page(self, lesson: str = "0.1") -> PageContext:
         """The context of a lesson's page."""
         library = Library.of(self.course, self.results, self.assets)
-        found = library.lessons[lesson]
-        assert found.document is not None
-        place = Place(lesson_path(found))
-        shown = document_inputs(library, place, found.document)
-        return PageContext(library.renderer, shown, place, found.document)
+        entry = library.lessons[lesson]
+        assert entry.document is not None
+        place = Place(lesson_path(entry))
+        inputs = document_inputs(library, place, entry.document)
+        return PageContext(library.renderer, inputs, place, entry.document)
 
     def html(self, lesson: str = "0.1") -> str:
         """The text of a lesson as HTML."""
@@ -156,11 +156,15 @@ class Made(Struct, frozen=True):
             options = Options(root, 1, quiet=True, cache=Memo(Path(KEPT.name)))
             with Documents(options.store, 1) as documents:
                 site = SiteMaker(library, self.assets, documents, options).made()
-                made = {file.path: file.make() for file in site.files}
-        assert [file.path for file in site.files] == sorted(made)
+                files_by_path = {file.path: file.make() for file in site.files}
+        assert [file.path for file in site.files] == sorted(files_by_path)
         assert site.file_list is not None
-        facts = [FileFacts(path, sha256(d).hexdigest(), len(d)) for path, d in made.items()]
-        return dict(sorted({**made, site.file_list.path: site.file_list.make(facts)}.items()))
+        facts = [
+            FileFacts(path, sha256(d).hexdigest(), len(d)) for path, d in files_by_path.items()
+        ]
+        return dict(
+            sorted({**files_by_path, site.file_list.path: site.file_list.make(facts)}.items())
+        )
 
 
 KEPT = TemporaryDirectory()
@@ -184,19 +188,19 @@ class Make(Struct, frozen=True):
         """A course of one lesson's text (0.1); other texts by id."""
         parsed = parse_course_map(Source("content/course.toml", course))
         assert parsed.value is not None and not parsed.diagnostics, parsed.diagnostics
-        made = with_documents(
+        built = with_documents(
             parsed.value, {"0.1": text, "1.1": "Text.", "about": "About it.", **texts}
         )
-        return Made(made, results_of(made, runs or {}, status), self.assets)
+        return Made(built, results_of(built, runs or {}, status), self.assets)
 
 
 def with_documents(course: Course, texts: Mapping[str, str]) -> Course:
-    known = frozenset(kind.name for kind in (*CALLOUTS, *course.callouts))
+    kinds = frozenset(kind.name for kind in (*CALLOUTS, *course.callouts))
 
     def document(id: str, path: str, lesson: bool) -> Document | None:
         if id not in texts:
             return None
-        parsed = parse_document(Source(path, texts[id]), known, lesson=lesson)
+        parsed = parse_document(Source(path, texts[id]), kinds, lesson=lesson)
         assert not parsed.diagnostics, parsed.diagnostics
         return parsed.value
 
@@ -216,14 +220,14 @@ def with_documents(course: Course, texts: Mapping[str, str]) -> Course:
 
 def results_of(course: Course, runs: Mapping[str, ScriptRun], status: str) -> Results:
     """Every script printed `one`, `two` unless `runs` says otherwise; every formula is its TeX."""
-    made: list[ScriptRun] = []
+    script_runs: list[ScriptRun] = []
     verdicts: list[Verdict] = []
     formulas: dict[Formula, str] = {}
     for document in course.documents:
         for block in document_blocks(document):
             if isinstance(block, Script):
-                ran = ScriptRun(block.path, Outcome.OK, 0, "one\ntwo\n", "", 0.1)
-                made.append(runs.get(block.path, ran))
+                default_run = ScriptRun(block.path, Outcome.OK, 0, "one\ntwo\n", "", 0.1)
+                script_runs.append(runs.get(block.path, default_run))
             elif isinstance(block, Recording):
                 comparison = block.comparison or course.comparison
                 verdicts.append(Verdict(block, comparison, status))
@@ -236,7 +240,7 @@ def results_of(course: Course, runs: Mapping[str, ScriptRun], status: str) -> Re
                 )
     facts = ModelFacts(1, 2, 1, 7, 6, 0, 0.002, "RK4", 1.5, ("start", ""), (), ("box",))
     return Results(
-        tuple(made),
+        tuple(script_runs),
         tuple(verdicts),
         tuple(formulas.items()),
         (("box", CompileResult("", None, facts)),),

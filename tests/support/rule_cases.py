@@ -121,8 +121,8 @@ class Layout:
                 self.folders.append(path)
             case "without":
                 del self.files[path]
-            case other:
-                raise ValueError(f"no kind of file {other!r}")
+            case unknown:
+                raise ValueError(f"no kind of file {unknown!r}")
 
     def write(self, root: Path) -> None:
         """Put all but the later files into a folder, which is made."""
@@ -155,21 +155,21 @@ def parts(text: str) -> Iterator[tuple[str, str, str]]:
     header: re.Match[str] | None = None
     body: list[str] = []
     for line in text_lines(text):
-        found = _HEADER.fullmatch(line.rstrip("\n"))
-        if found is None:
+        header_match = _HEADER.fullmatch(line.rstrip("\n"))
+        if header_match is None:
             body.append(line)
             continue
         if header is not None:
             yield header[1] or "", header[2], "".join(body)
-        header, body = found, []
+        header, body = header_match, []
     assert header is not None
     yield header[1] or "", header[2], "".join(body)
 
 
-def _byte(found: re.Match[bytes]) -> bytes:
-    if found[1]:
-        return bytes([int(found[1], 16)])
-    return {b"n": b"\n", b"r": b"\r", b"t": b"\t", b"\\": b"\\"}[found[2]]
+def _byte(match: re.Match[bytes]) -> bytes:
+    if match[1]:
+        return bytes([int(match[1], 16)])
+    return {b"n": b"\n", b"r": b"\r", b"t": b"\t", b"\\": b"\\"}[match[2]]
 
 
 class Workshop:
@@ -193,17 +193,19 @@ class Workshop:
         return Options(root, jobs=1, quiet=True, cache=store, run_all=self._scripts.run)
 
     def try_labs(
-        self, root: Path, changed: Callable[[LabEngine], Any] = lambda engine: engine
+        self, root: Path, wrap: Callable[[LabEngine], Any] = lambda engine: engine
     ) -> tuple[Diagnostic, ...]:
         """What is found in a course whose scripts are not run; the browser engine is `changed`."""
-        loaded = load(root)
-        assert loaded.value is not None
+        course_load = load(root)
+        assert course_load.value is not None
         options = self.options(root)
-        models, wrong = compile_models(loaded.value, options, Progress(quiet=True))
+        models, model_diagnostics = compile_models(course_load.value, options, Progress(quiet=True))
         engines = copy.copy(self._engines)
-        engines.browser = changed(engines.browser)
+        engines.browser = wrap(engines.browser)
         # What labs did is not shared: it would not be tried by another engine.
-        own = replace(options, cache=Memo(root))
-        _, found = try_labs(loaded.value, own, engines, dict(models), wrong)
-        diagnostics = [*loaded.diagnostics, *wrong, *found]
-        return judge(loaded.value, diagnostics).diagnostics
+        unshared = replace(options, cache=Memo(root))
+        _, lab_diagnostics = try_labs(
+            course_load.value, unshared, engines, dict(models), model_diagnostics
+        )
+        diagnostics = [*course_load.diagnostics, *model_diagnostics, *lab_diagnostics]
+        return judge(course_load.value, diagnostics).diagnostics

@@ -24,11 +24,13 @@ SLUGS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 HELLO = 'print("hello", 3.14159)\n'
 
 
-def block(path: str, code: str, output: str | None = None, how: str = "", info: str = "") -> str:
+def block(
+    path: str, code: str, output: str | None = None, comparison: str = "", info: str = ""
+) -> str:
     """A script of a lesson and, with an output, what it prints."""
     text = f"```python file=examples/{path}{info and ' '}{info}\n{code.rstrip()}\n```\n\n"
     if output is not None:
-        text += f"Output:\n\n```text{how and ' '}{how}\n{output.rstrip()}\n```\n\n"
+        text += f"Output:\n\n```text{comparison and ' '}{comparison}\n{output.rstrip()}\n```\n\n"
     return text
 
 
@@ -80,9 +82,9 @@ class Folder:
 
     def duplicate(self, root: Path) -> Folder:
         """The same course elsewhere, with all that is kept of it."""
-        made = Folder(Path(shutil.copytree(self.root, root, symlinks=True)))
-        made.tmp.mkdir()
-        return made
+        copy = Folder(Path(shutil.copytree(self.root, root, symlinks=True)))
+        copy.tmp.mkdir()
+        return copy
 
     @property
     def tmp(self) -> Path:
@@ -167,7 +169,7 @@ class Folder:
         seconds: float = 600.0,
     ) -> CommandResult:
         """Run a command in a process of its own."""
-        done = subprocess.run(
+        process = subprocess.run(
             command(*arguments),
             cwd=cwd or self.root,
             env=self.environment(env),
@@ -175,7 +177,7 @@ class Folder:
             capture_output=True,
             timeout=seconds,
         )
-        return CommandResult(done.returncode, done.stdout.decode(), done.stderr.decode())
+        return CommandResult(process.returncode, process.stdout.decode(), process.stderr.decode())
 
     def start(
         self, *arguments: str, env: Mapping[str, str] | None = None, code: str = "", **pipes: int
@@ -190,7 +192,7 @@ class Folder:
             **pipes,
         )
 
-    def environment(self, more: Mapping[str, str] | None = None) -> dict[str, str]:
+    def environment(self, variables: Mapping[str, str] | None = None) -> dict[str, str]:
         """Of a command: nothing of how the tests were started decides what it shows."""
         unsaid = ("NO_COLOR", "FORCE_COLOR", "COLUMNS", "LINES", "TERM", "CI")
         outer = {name: value for name, value in os.environ.items() if name not in unsaid}
@@ -198,7 +200,7 @@ class Folder:
         ours["LOGNAME"] = str(
             self.tmp
         )  # of what is passed on to children, that which nothing reads
-        return outer | ours | dict(more or {})
+        return outer | ours | dict(variables or {})
 
 
 Make = Callable[..., Folder]
@@ -228,17 +230,17 @@ def course_map(lessons: int) -> str:
 def processes(folder: Folder) -> list[str]:
     """The command lines of live processes that work in a course or were started for it."""
     marks = (os.fsencode(folder.root), os.fsencode(folder.tmp))
-    found = []
+    command_lines = []
     for entry in Path("/proc").iterdir():
         if not entry.name.isdecimal() or int(entry.name) == os.getpid():
             continue
         with contextlib.suppress(OSError):
-            where = os.fsencode((entry / "cwd").readlink())
+            cwd = os.fsencode((entry / "cwd").readlink())
             environment = (entry / "environ").read_bytes()
             state = (entry / "stat").read_text().rpartition(")")[2].split()[0]
-            if state != "Z" and (where.startswith(marks) or any(m in environment for m in marks)):
-                found.append((entry / "cmdline").read_bytes().replace(b"\0", b" ").decode())
-    return found
+            if state != "Z" and (cwd.startswith(marks) or any(m in environment for m in marks)):
+                command_lines.append((entry / "cmdline").read_bytes().replace(b"\0", b" ").decode())
+    return command_lines
 
 
 def wait_until_alone(folder: Folder) -> None:

@@ -70,15 +70,15 @@ class Host(contextlib.AbstractContextManager["Host"]):
 
     def take_requests(self) -> list[str]:
         """What was asked for since this was asked the last time."""
-        found, self.requests = self.requests, []
-        return sorted(found)
+        requests, self.requests = self.requests, []
+        return sorted(requests)
 
     def file(self, address: str) -> tuple[int, Path]:
         path = unquote(urlsplit(address).path)
         inner = path.removeprefix(self.base)
-        found = self.folder / (inner + "index.html" if not inner or inner[-1] == "/" else inner)
-        known = path.startswith(self.base) and found.is_file()
-        return (200, found) if known else (404, self.folder / "404.html")
+        target = self.folder / (inner + "index.html" if not inner or inner[-1] == "/" else inner)
+        exists = path.startswith(self.base) and target.is_file()
+        return (200, target) if exists else (404, self.folder / "404.html")
 
 
 class _Server(http.server.ThreadingHTTPServer):
@@ -143,8 +143,8 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         self.send_header("Vary", "Accept-Encoding")
         self.send_header("ETag", tag)
         lasting = _LASTING.fullmatch(urlsplit(self.path).path)
-        kept = "max-age=31536000, immutable" if lasting else "max-age=0, must-revalidate"
-        self.send_header("Cache-Control", kept)
+        lifetime = "max-age=31536000, immutable" if lasting else "max-age=0, must-revalidate"
+        self.send_header("Cache-Control", lifetime)
         self.send_header("Content-Length", str(len(data)))
         self.end_headers()
         if self.command != "HEAD":

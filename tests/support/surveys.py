@@ -52,8 +52,11 @@ def field(links: int, pieces: int) -> str:
 
 def open_files(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:
     """A model whose files are given; assets are found by their names."""
-    data = {name: one.encode() if isinstance(one, str) else one for name, one in files.items()}
-    assets = {name.rpartition("/")[2]: one for name, one in data.items() if name != path}
+    data = {
+        name: content.encode() if isinstance(content, str) else content
+        for name, content in files.items()
+    }
+    assets = {name.rpartition("/")[2]: content for name, content in data.items() if name != path}
 
     def compiled(text: bytes) -> mujoco.MjModel:
         return mujoco.MjModel.from_xml_string(text.decode("utf-8-sig"), assets)
@@ -77,7 +80,7 @@ def run_survey(
     lesson: str = "",
     keeps: Mapping[str, str] | None = None,
     has_commands: bool = False,
-    declared: Declarations = NOTHING,
+    declarations: Declarations = NOTHING,
     quick: bool = True,
     clock: Clock | None = None,
 ) -> Survey:
@@ -89,7 +92,7 @@ def run_survey(
         "",
         MACHINE,
         model,
-        pruning_scenes(model.model, declared, quick=quick),
+        pruning_scenes(model.model, declarations, quick=quick),
         (read_code("examples/a.py", lesson),) if lesson else (),
         {key: Keep(key, reason, finding_span=place) for key, reason in (keeps or {}).items()},
         {},
@@ -103,10 +106,10 @@ def run_survey(
 
 def findings_by_kind(survey: Survey) -> dict[str, Finding]:
     """Findings that are no settings, by kind; where nothing is timed, all that there is."""
-    things = [one for one in survey.report.findings if one.kind not in SETTINGS]
-    kinds = [one.kind for one in things]
+    things = [content for content in survey.report.findings if content.kind not in SETTINGS]
+    kinds = [content.kind for content in things]
     assert len(set(kinds)) == len(kinds)
-    return {one.kind: one for one in things}
+    return {content.kind: content for content in things}
 
 
 def names(finding: Finding) -> list[str]:
@@ -116,5 +119,5 @@ def names(finding: Finding) -> list[str]:
 
 def fixed_text(survey: Survey, path: str = PATH) -> str:
     """The file after all that is proved was changed."""
-    files = {one.path: one.data for one in survey.text.documents}
+    files = {content.path: content.data for content in survey.text.documents}
     return (files | survey.text.files(survey.edits))[path].decode()

@@ -27,7 +27,7 @@ def _told(texts: str, read: Reader) -> str:
     lines = []
     for line in texts.splitlines():
         value, diagnostics = read(ast.literal_eval(line))
-        lines += [line, *(f"  {one}" for one in format_diagnostics(diagnostics))]
+        lines += [line, *(f"  {message}" for message in format_diagnostics(diagnostics))]
         if value is not None:
             lines.append("  and it is read")
     return "".join(f"{line}\n" for line in lines)

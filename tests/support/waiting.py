@@ -7,11 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 
-def wait_until(happened: Callable[[], object], what: str) -> None:
+def wait_until(happened: Callable[[], object], event: str) -> None:
     """Look again and again; what takes five minutes hangs."""
     until = time.monotonic() + 300
     while not happened():
-        assert time.monotonic() < until, f"this never came: {what}"
+        assert time.monotonic() < until, f"this never came: {event}"
         time.sleep(0.005)
 
 

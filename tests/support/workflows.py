@@ -67,13 +67,15 @@ class Runner:
         values |= {f"secrets.{name}": value for name, value in self.secrets.items()}
         values["github.sha"] = git(self.repository, "rev-parse", ref)
         (self.folder / "summary").write_text("")
-        done: dict[str, list[Step]] = {}
+        steps_by_job: dict[str, list[Step]] = {}
         for name, job in workflow["jobs"].items():
-            wanted = job.get("needs", name) in {name, *done} and _holds(job.get("if"), values)
-            if wanted:
-                done[name] = self._job(name, job["steps"], ref, values)
+            applies = job.get("needs", name) in {name, *steps_by_job} and _holds(
+                job.get("if"), values
+            )
+            if applies:
+                steps_by_job[name] = self._job(name, job["steps"], ref, values)
         self.summary = (self.folder / "summary").read_text()
-        return done
+        return steps_by_job
 
     def action(self, place: Path, steps: list[dict[str, Any]], **inputs: str) -> list[Step]:
         """Run the steps of an action in a folder."""
@@ -86,42 +88,46 @@ class Runner:
         place = self.folder / "work" / name
         shutil.rmtree(place, ignore_errors=True)
         place.mkdir(parents=True)
-        done: list[Step] = []
-        saved: dict[str, Any] | None = None
+        finished: list[Step] = []
+        cache_inputs: dict[str, Any] | None = None
         for step in steps:
-            if any(one.status for one in done) and "cancelled" not in step.get("if", ""):
+            if any(step_done.status for step_done in finished) and "cancelled" not in step.get(
+                "if", ""
+            ):
                 continue
             if "run" in step:
-                done.append(self._command(place, step, values))
+                finished.append(self._command(place, step, values))
                 continue
-            uses, given = step["uses"].partition("@")[0], step.get("with", {})
-            given = {key: _filled(str(value), values) for key, value in given.items()}
+            uses, inputs = step["uses"].partition("@")[0], step.get("with", {})
+            inputs = {key: _filled(str(value), values) for key, value in inputs.items()}
             match uses:
                 case "actions/checkout":
-                    depth = f"--depth={given.get('fetch-depth', 1)}"
+                    depth = f"--depth={inputs.get('fetch-depth', 1)}"
                     url = f"file://{self.repository}"
                     git(place, "clone", "-q", depth, f"--branch={ref}", url, ".")
                 case "actions/setup-python":
                     pass
                 case "actions/cache" | "actions/cache/restore":
-                    self._restore(place, given)
-                    saved = given if uses == "actions/cache" else saved
+                    self._restore(place, inputs)
+                    cache_inputs = inputs if uses == "actions/cache" else cache_inputs
                 case "actions/upload-pages-artifact":
-                    self._upload(place / given["path"])
+                    self._upload(place / inputs["path"])
                 case "actions/download-artifact":
-                    shutil.copy(self.folder / "artifacts" / f"{given['name']}.tar", place)
-                    (place / f"{given['name']}.tar").rename(place / "artifact.tar")
+                    shutil.copy(self.folder / "artifacts" / f"{inputs['name']}.tar", place)
+                    (place / f"{inputs['name']}.tar").rename(place / "artifact.tar")
                 case "actions/deploy-pages":
                     with tarfile.open(self.folder / "artifacts" / "github-pages.tar") as archive:
                         archive.extractall(self.folder / "pages", filter="data")
                 case _:
                     raise AssertionError(f"nobody knows what {uses} does")
-        if saved is not None and not any(step.status for step in done):
-            self._save(place, saved)
-        return done
+        if cache_inputs is not None and not any(step.status for step in finished):
+            self._save(place, cache_inputs)
+        return finished
 
     def _command(self, place: Path, step: dict[str, Any], values: dict[str, str]) -> Step:
-        own = {key: _filled(value, values) for key, value in step.get("env", {}).items()}
+        step_environment = {
+            key: _filled(value, values) for key, value in step.get("env", {}).items()
+        }
         system = {name: os.environ[name] for name in ("LANG", "LC_ALL") if name in os.environ}
         environment = {
             "PATH": f"{self.folder / 'bin'}:/usr/bin:/bin",
@@ -133,32 +139,32 @@ class Runner:
             "GITHUB_STEP_SUMMARY": str(self.folder / "summary"),
             "GITHUB_ACTION_PATH": str(ROOT),
         }
-        done = subprocess.run(
+        process = subprocess.run(
             ["bash", "-e", "-c", step["run"]],
             cwd=place / _filled(step.get("working-directory", "."), values),
-            env=system | environment | self.environment | own,
+            env=system | environment | self.environment | step_environment,
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
         )
-        return Step(step["run"], done.returncode, done.stdout, done.stderr)
+        return Step(step["run"], process.returncode, process.stdout, process.stderr)
 
-    def _restore(self, place: Path, given: dict[str, str]) -> None:
+    def _restore(self, place: Path, inputs: dict[str, str]) -> None:
         """The cache of the key, else the newest whose key begins as one of the others does."""
         newest = list(reversed(self.caches))
-        wanted = [key for key in newest if key == given["key"]]
-        for start in given.get("restore-keys", "").split():
-            wanted += [key for key in newest if key.startswith(start)]
-        if wanted:
-            shutil.copytree(self.caches[wanted[0]], place, symlinks=True, dirs_exist_ok=True)
+        applies = [key for key in newest if key == inputs["key"]]
+        for start in inputs.get("restore-keys", "").split():
+            applies += [key for key in newest if key.startswith(start)]
+        if applies:
+            shutil.copytree(self.caches[applies[0]], place, symlinks=True, dirs_exist_ok=True)
 
-    def _save(self, place: Path, given: dict[str, str]) -> None:
-        if given["key"] in self.caches:  # which is never replaced
+    def _save(self, place: Path, inputs: dict[str, str]) -> None:
+        if inputs["key"] in self.caches:  # which is never replaced
             return
-        kept = self.folder / "caches" / given["key"]
-        for path in given["path"].split():
-            shutil.copytree(place / path, kept / path, symlinks=True)
-        self.caches[given["key"]] = kept
+        target = self.folder / "caches" / inputs["key"]
+        for path in inputs["path"].split():
+            shutil.copytree(place / path, target / path, symlinks=True)
+        self.caches[inputs["key"]] = target
 
     def _upload(self, site: Path) -> None:
         with tarfile.open(self.folder / "artifacts" / "github-pages.tar", "w") as archive:
@@ -170,18 +176,20 @@ class Runner:
 def git(place: Path, *arguments: str) -> str:
     """What git prints, where nobody's settings count."""
     names = {
-        f"GIT_{who}_{what}": "a@b" for who in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")
+        f"GIT_{role}_{part}": "a@b"
+        for role in ("AUTHOR", "COMMITTER")
+        for part in ("NAME", "EMAIL")
     }
     quiet = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1"}
-    done = subprocess.run(
+    process = subprocess.run(
         ["git", *arguments],
         cwd=place,
         env=os.environ | names | quiet,
         capture_output=True,
         text=True,
     )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
+    assert process.returncode == 0, process.stderr
+    return process.stdout.strip()
 
 
 def commit(place: Path) -> None:

@@ -74,13 +74,13 @@ HOSTILE = {
 
 @pytest.mark.site
 def test_no_hostile_script_loses_a_part() -> None:
-    findings = run_survey(MODEL, declared=GO).report.findings
+    findings = run_survey(MODEL, declarations=GO).report.findings
     whole = {finding.kind: names(finding) for finding in findings if finding.fixable}
     lost = []
     for title, (part, script) in HOSTILE.items():
         kind, _, name = part.partition(" ")
         assert any(kind in finding for finding in whole), kind
-        survey = run_survey(MODEL, lesson=HEAD + script, declared=GO)
+        survey = run_survey(MODEL, lesson=HEAD + script, declarations=GO)
         faults = [
             finding
             for finding in survey.report.findings
@@ -101,7 +101,7 @@ def test_what_a_script_names_stays_and_the_rest_goes() -> None:
         mujoco.mj_resetDataKeyframe(model, data, model.key("down").id)
         print("the spare cube and spin are in the prose only")
     """)
-    survey = run_survey(MODEL, lesson=HEAD + script, declared=GO)
+    survey = run_survey(MODEL, lesson=HEAD + script, declarations=GO)
     names_by_kind = {
         finding.kind: names(finding) for finding in survey.report.findings if finding.is_fault
     }
