@@ -130,7 +130,7 @@ def dependencies_of(
     places: Iterable[tuple[str, str]],
     state: Callable[[Need], str],
 ) -> tuple[Dependency, ...]:
-    """All that the result of a run depends on, sorted; nothing where nobody watched.
+    """All that the result of a run depends on, sorted; nothing for a run that was not traced.
 
     `places` are folders of this machine by name: `library` is the one that holds `mjcourse`.
     """

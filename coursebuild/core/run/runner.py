@@ -158,7 +158,7 @@ class ScriptServer:
                 for worker in busy.values():
                     if time.monotonic() > worker.deadline:
                         worker.kill()
-                if is_unwanted is not None and is_unwanted(work.running(busy.values())):
+                if is_unwanted is not None and is_unwanted(work.running_paths(busy.values())):
                     raise RunStoppedError
         finally:
             for worker in busy.values():
@@ -240,7 +240,7 @@ class _Work:
             self.enclose = functools.partial(command, sources=self.sources, copies=self.copies)
         self.runs: dict[int, ScriptRun] = {}
         self.pending = list(range(len(jobs)))
-        self.announced: set[int] = set()
+        self.announced_jobs: set[int] = set()
         """The jobs for which `on_start` was called."""
         folders = {self.root / folder for job in jobs for folder in job.packages}
         files = [file for folder in folders for file in folder.rglob("*.py")]
@@ -252,8 +252,8 @@ class _Work:
         if not self.pending:
             return
         index = self.pending.pop(0)
-        if index not in self.announced:
-            self.announced.add(index)
+        if index not in self.announced_jobs:
+            self.announced_jobs.add(index)
             self.on_start(self.jobs[index].path)
         worker.give(index, self._message(self.jobs[index]))
         if self.sandbox is not None:  # a script can stop its supervisor
@@ -300,7 +300,7 @@ class _Work:
         if self.sandbox is None:
             self.give_next_job(worker)
 
-    def running(self, busy: Iterable[Worker]) -> frozenset[str]:
+    def running_paths(self, busy: Iterable[Worker]) -> frozenset[str]:
         """The paths of the scripts that these supervisors run."""
         return frozenset(self.jobs[w.job].path for w in busy if w.job is not None)
 

@@ -48,7 +48,7 @@ _PLACES = (
     *(*_IN_MEMORY, "/", "--proc", "/proc", "--remount-ro", "/proc"),
     *("--dev", "/dev", *_IN_MEMORY, "/dev/shm", "--remount-ro", "/dev"),
 )
-"""The system's own; to root, files of /proc belong that change the whole machine."""
+"""The system's own places; /proc is read-only, as root can change the machine by its files."""
 _ALLOW = (
     "it takes Bubblewrap 0.8 or newer, and user namespaces: on Ubuntu, `sudo sysctl "
     "kernel.apparmor_restrict_unprivileged_userns=0` allows them; containers often forbid them"

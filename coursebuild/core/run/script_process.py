@@ -78,7 +78,7 @@ class Preloaded:
     """
 
     def __init__(self) -> None:
-        self.broken = False
+        self.is_broken = False
         """Whether importing a package fails: then scripts run without this, and fail themselves."""
         self._groups: dict[str, dict[str, ModuleType]] = {}
         """For each package the modules that importing it loads, without the standard library."""
@@ -96,9 +96,9 @@ class Preloaded:
             for name in _IMPORTS[package]:
                 importlib.import_module(name)
         except ModuleNotFoundError as error:  # a script that asks for it says so
-            self.broken = self.broken or error.name != package
+            self.is_broken = self.is_broken or error.name != package
         except BaseException:
-            self.broken = True
+            self.is_broken = True
         excluded = sys.stdlib_module_names | {"coursebuild"}
         names = [n for n in sys.modules if n not in before and n.partition(".")[0] not in excluded]
         new_modules = {name: sys.modules[name] for name in names}

@@ -212,7 +212,7 @@ class _Supervisor:
 
     def _can_fork(self, job: Job) -> bool:
         """Whether this script cannot tell a copy of this process from a fresh interpreter."""
-        if not self.may_fork or self.preloaded.broken or _has_threads():
+        if not self.may_fork or self.preloaded.is_broken or _has_threads():
             return False
         return _sibling_names(job).isdisjoint(self.preloaded.names())
 

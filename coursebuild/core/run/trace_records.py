@@ -34,11 +34,13 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
                 effects.append(Effect(EffectKind(kind), target, file, int(line)))
             elif kind == "d":
                 divergences.append(_parse_divergence(value))
-    files = {_resolved(path, top) for path in values_by_kind["r"]}
+    files = {_resolve(path, top) for path in values_by_kind["r"]}
     inside = {path.removeprefix(f"{top}/") for path in files if path.startswith(f"{top}/")}
     return Trace(
         files=tuple(sorted(inside - {os.path.normpath(script)})),
-        folders=tuple(sorted({_relative(folder, top) or "." for folder in values_by_kind["l"]})),
+        folders=tuple(
+            sorted({_make_relative(folder, top) or "." for folder in values_by_kind["l"]})
+        ),
         outside=tuple(sorted(path for path in files if not path.startswith(f"{top}/"))),
         modules=tuple(sorted(set(values_by_kind["m"]))),
         opaque=next(iter(values_by_kind["o"]), ""),
@@ -50,12 +52,12 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
     )
 
 
-def _relative(folder: str, top: str) -> str:
+def _make_relative(folder: str, top: str) -> str:
     """A folder relative to the project's; empty for the project's own."""
     return folder.removeprefix(top).lstrip("/")
 
 
-def _resolved(path: str, top: str) -> str:
+def _resolve(path: str, top: str) -> str:
     """The path of a compiled module's source, or of the project's file that a link leads to."""
     folder, _, name = path.rpartition("/")
     if name.endswith(".pyc") and folder.endswith("/__pycache__"):
@@ -78,7 +80,7 @@ def _join_sought(records: Iterable[str], top: str) -> tuple[str, ...]:
     names_by_folder: dict[str, set[str]] = defaultdict(set)
     for record in records:
         folder, _, names = record.partition("\t")
-        names_by_folder[_relative(folder, top)].update(names.split(","))
+        names_by_folder[_make_relative(folder, top)].update(names.split(","))
     return tuple(
         f"{folder}/{{{','.join(sorted(n))}}}" for folder, n in sorted(names_by_folder.items())
     )

@@ -81,7 +81,7 @@ class RunningScript:
         Exit when `tool` closes its pipe, and when `parent`, which was the parent of this process
         before the script was started, no longer is.
         """
-        while not self._has_ended():
+        while not self._reap_children():
             now = time.monotonic()
             if now >= self.deadline:
                 self._request_position()
@@ -119,7 +119,7 @@ class RunningScript:
         with contextlib.suppress(OSError):
             os.kill(self.pid, signal.SIGABRT)
         until = time.monotonic() + GRACE
-        while not self._has_ended() and (left := until - time.monotonic()) > 0:
+        while not self._reap_children() and (left := until - time.monotonic()) > 0:
             self._wait(left, [])
             if len(self.stdout) > STDOUT_LIMIT:
                 return
@@ -152,7 +152,7 @@ class RunningScript:
             del buffer[:-STDERR_KEPT]
         return buffer is self.stderr or len(buffer) <= STDOUT_LIMIT
 
-    def _has_ended(self) -> bool:
+    def _reap_children(self) -> bool:
         """Reap every child that has ended; return whether the script has."""
         with contextlib.suppress(ChildProcessError):
             while (child := os.waitpid(-1, os.WNOHANG))[0]:
@@ -163,7 +163,7 @@ class RunningScript:
     def _kill_descendants(self, until: float) -> None:
         """Kill every process that the script left: when one dies, its children become ours."""
         while time.monotonic() < until:
-            self._has_ended()
+            self._reap_children()
             children = list(_children())
             if not children and self.status is not None:
                 return

@@ -30,7 +30,7 @@ class RunStanding(Struct, frozen=True):
     """A run compared with what is recorded, or else with what the script prints here."""
 
     run: ScriptRun
-    compared: bool
+    is_compared: bool
     """Whether there was anything to compare it with."""
     changes: tuple[Change, ...] = ()
     diff: str = ""
@@ -90,7 +90,7 @@ def judge_comparability(standing: RunStanding) -> Judgement | None:
             pass
         case _:
             return Judgement("uncompared", "it does not run to its end here")
-    if not standing.compared:
+    if not standing.is_compared:
         return Judgement("uncompared", "its output is volatile")
     if not standing.holds:
         return Judgement("drifted", "what is recorded is not what it prints here")

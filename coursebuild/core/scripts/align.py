@@ -110,7 +110,7 @@ def _line_pairs(
 ) -> list[tuple[int, int]]:
     """Pairs of recorded lines, as indices of `literal`, and printed lines."""
     lines, texts = [recorded.lines[i] for i in literal], printed.lines
-    # A `...` line stands just before line `k` of those that are none.
+    # `is_free[k]`: a `...` line stands just before `lines[k]`, or at the end.
     following = [*literal, len(recorded.lines)]
     is_free = [before != after - 1 for before, after in zip([-1, *literal], following, strict=True)]
     words = {line: Counter(_WORD.findall(line)) for line in {*lines, *texts}}

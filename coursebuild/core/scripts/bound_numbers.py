@@ -1,7 +1,7 @@
 """The printed lines with their numbers, and which of these a bound number may mean.
 
 Entry points: `printed_lines` (a recorded output), `lines_of_run` (the output of a run);
-`Shown.of`, `shows`, `text_places`.
+`BoundText.of`, `shows`, `text_places`.
 """
 
 from __future__ import annotations
@@ -80,9 +80,9 @@ def _row_line(row: tuple[RowCell, ...]) -> PrintedLine:
 
 def shows(number: Number, printed: Number) -> bool:
     """Whether a number in prose is a printed one, rounded to the digits shown."""
-    if not (number.finite and printed.finite):
+    if not (number.is_finite and printed.is_finite):
         return (number.value.is_nan() and printed.value.is_nan()) or number.value == printed.value
-    if number.integer and printed.integer:
+    if number.is_integer and printed.is_integer:
         return number.value == printed.value
     return within_half_unit(number, printed.value)
 
@@ -137,7 +137,7 @@ class BoundText(Struct, frozen=True):
         """
         places: list[tuple[int, int, str]] = []
         for number, printed in zip(self.numbers, window.numbers, strict=True):
-            rounded = round_like(number, printed.value) if printed.finite else None
+            rounded = round_like(number, printed.value) if printed.is_finite else None
             if rounded is None:
                 return None
             places.append((number.start, number.end, rounded))

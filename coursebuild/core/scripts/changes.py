@@ -50,12 +50,12 @@ def number_kind(recorded: Number, printed: Number) -> DriftKind:
     It is rounding where a number with a point or an exponent is off by at most one unit of its last
     recorded place; a count that is off by one is not. The same value in another notation is text.
     """
-    if not (recorded.finite and printed.finite):
+    if not (recorded.is_finite and printed.is_finite):
         return DriftKind.NUMERIC
     gap = difference(recorded.value, printed.value)
     if gap == 0:
         return DriftKind.TEXT
-    is_rounding = recorded.inexact and gap <= unit(recorded.place)
+    is_rounding = recorded.is_inexact and gap <= unit(recorded.place)
     return DriftKind.ROUNDING if is_rounding else DriftKind.NUMERIC
 
 

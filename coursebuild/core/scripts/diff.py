@@ -34,7 +34,7 @@ class DiffPiece(Struct, frozen=True):
 
 
 class DiffRow(Struct, frozen=True):
-    """A line: as recorded (`-`), as it ran (`+`), or both (a space)."""
+    """A line: as recorded (`-`), as printed (`+`), or both (a space)."""
 
     mark: Mark
     pieces: tuple[DiffPiece, ...]

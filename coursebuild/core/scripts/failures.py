@@ -270,7 +270,7 @@ def divergence_diagnostics(
         yield _incident_diagnostic(
             "script-diverged", extraction, lost, extractions, message, _DIVERGES
         )
-    elif deep and not script.deep:  # what is lost may as well lie anywhere
+    elif deep and not script.deep:  # bodies of a lost simulation may lie anywhere
         message = f"bodies of `{script.path}` lie deep in each other"
         yield _incident_diagnostic(
             "script-penetration", extraction, deep, extractions, message, _DEEP

@@ -28,9 +28,10 @@ from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
 TOLERANCE = 1e-3
-"""Of the longer side of a drawing in SVG; of the largest number in a column of data."""
+"""How much numbers may differ: this part of the longer side of a drawing in SVG, or of the largest
+number in a column of data."""
 PIXEL_TOLERANCE = 1.0
-"""Root mean square over all channels of all pixels, of 255."""
+"""How much pixels may differ: root mean square over all channels, of 255 steps."""
 
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _SVG = "{http://www.w3.org/2000/svg}"

@@ -92,9 +92,11 @@ def same_number(recorded: Number, printed: Number, comparison: Comparison) -> bo
     if recorded.text == printed.text:
         return True
     if comparison.mode is Mode.DIGITS:
-        return recorded.inexact and printed.inexact and within_half_unit(recorded, printed.value)
+        return (
+            recorded.is_inexact and printed.is_inexact and within_half_unit(recorded, printed.value)
+        )
     if comparison.mode is Mode.TOLERANCE:
-        if recorded.finite and printed.finite:
+        if recorded.is_finite and printed.is_finite:
             return within_tolerance(recorded.value, printed.value, comparison.rtol, comparison.atol)
         return (
             recorded.value.is_nan() and printed.value.is_nan()

@@ -38,7 +38,7 @@ class MappingSegment(Struct, frozen=True):
     """Offset in the origin."""
     end: int
     """Offset in the origin."""
-    verbatim: bool
+    is_verbatim: bool
     """Copied character by character; otherwise all of the stretch stands for `[start, end)`."""
 
 
@@ -71,8 +71,8 @@ class MappedText(Struct, frozen=True):
         """The smallest range of the origin that `text[start:end]` came from; empty for no text."""
         first = self.segments[self._segment_index(start)]
         last = self.segments[self._segment_index(max(start, end - 1))]
-        low = first.start + start - first.at if first.verbatim else first.start
-        high = last.start + end - last.at if last.verbatim else last.end
+        low = first.start + start - first.at if first.is_verbatim else first.start
+        high = last.start + end - last.at if last.is_verbatim else last.end
         return low, low if start == end else max(low, high)
 
     def substitute(self, pattern: re.Pattern[str], text: str) -> MappedText:
@@ -107,7 +107,7 @@ class MappedText(Struct, frozen=True):
         that: no character of the origin lies between its characters.
         """
         segment = self.segments[self._segment_index(start)]
-        if start == end and not segment.verbatim and start > segment.at:
+        if start == end and not segment.is_verbatim and start > segment.at:
             return segment.start, segment.end
         return self.origin(start, end)
 
@@ -120,7 +120,7 @@ class MappedText(Struct, frozen=True):
             if segment.at >= end:
                 break
             new_at = at + max(segment.at, start) - start
-            if segment.verbatim:
+            if segment.is_verbatim:
                 first = segment.start + max(0, start - segment.at)
                 stop = min(segment.end, segment.start + end - segment.at)
                 segments.append(MappingSegment(new_at, first, stop, True))

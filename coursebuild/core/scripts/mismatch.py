@@ -125,7 +125,7 @@ def _distance(
     for s, p in zip(bound_numbers, printed, strict=True):
         if shows(s, p):
             continue
-        if not (s.finite and p.finite):
+        if not (s.is_finite and p.is_finite):
             return Decimal("Infinity"), absolute
         shown_size, printed_size = s.value.copy_abs(), p.value.copy_abs()
         relative += _QUOTIENT.divide(

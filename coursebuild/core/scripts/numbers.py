@@ -38,7 +38,7 @@ _LOOKS_LIKE_A_NUMBER = "|".join(
         r"(?<![0-9]:)[0-9]{1,3}(?::[0-9]{2})+(?:[.,][0-9]+)?(?![0-9:])",  # time of day
         r"[0-9]+(?:\.[0-9]+){2,}[\w.]*(?:[-+:][\w.]+)*",  # version, address
         r"(?<![0-9]-)[0-9]+(?:-[0-9]+)+(?![\w.])",  # 10-20
-        rf"[0-9]+(?:\.[0-9]*)?[eE]{_SIGN}?[0-9]{{5,}}",  # past any exponent
+        rf"[0-9]+(?:\.[0-9]*)?[eE]{_SIGN}?[0-9]{{5,}}",  # exponent too large
     )
 )
 _SPECIAL = rf"{_SIGN}?(?:nan|NaN|NAN|inf|Inf|INF|[iI]nfinity)(?!\w)"
@@ -73,26 +73,26 @@ class Number(Struct, frozen=True):
     """Exact; NaN and infinities for `nan` and `inf`."""
     place: int
     """Power of ten of the last written place: -3 for `6.641`, -4 for `1.5e-3`, 0 for `nan`."""
-    integer: bool
+    is_integer: bool
     """Written without a point and without an exponent."""
 
     @property
-    def finite(self) -> bool:
+    def is_finite(self) -> bool:
         """Whether it is neither `nan` nor `inf`."""
         return self.value.is_finite()
 
     @property
-    def inexact(self) -> bool:
+    def is_inexact(self) -> bool:
         """Whether it has a point or an exponent, so that it stands for a rounded value."""
-        return self.finite and not self.integer
+        return self.is_finite and not self.is_integer
 
 
 def _number(start: int, text: str) -> Number:
     value = Decimal(text.replace("\u2212", "-"))
     exponent = value.as_tuple().exponent
     place = exponent if isinstance(exponent, int) else 0
-    integer = value.is_finite() and not any(c in text for c in ".eE")
-    return Number(start, start + len(text), text, value, place, integer)
+    is_integer = value.is_finite() and not any(c in text for c in ".eE")
+    return Number(start, start + len(text), text, value, place, is_integer)
 
 
 def scan(text: str) -> tuple[Number, ...]:
@@ -114,7 +114,7 @@ def scan_prose(text: str) -> tuple[Number, ...]:
         if numbers and number.start < numbers[-1].end:
             continue
         power = _POWER.match(text, number.end)
-        if power is None or not number.finite:
+        if power is None or not number.is_finite:
             numbers.append(number)
             continue
         exponent = power["caret"] or power["raised"].translate(_SUPERSCRIPTS)
@@ -127,7 +127,7 @@ def scan_prose(text: str) -> tuple[Number, ...]:
                 text=text[number.start : end],
                 value=number.value.scaleb(shift, _EXACT),
                 place=number.place + shift,
-                integer=False,
+                is_integer=False,
             )
         )
     return tuple(numbers)

@@ -162,7 +162,7 @@ def _find_doubts(
         if any(value != printed for value in values):
             yield _judge_number(span, recorded, printed, values, half, comparison)
         elif half is not None and half != printed:
-            number = _whole_number(printed)
+            number = _only_number(printed)
             if number is not None:
                 yield _unconverged(span, number, half)
 
@@ -183,13 +183,13 @@ def _judge_number(
     halved: str | None,
     comparison: Comparison,
 ) -> Doubt | Flip:
-    number, recorded_number = _whole_number(printed), _whole_number(recorded)
-    numbers = [n for value in values if (n := _whole_number(value)) is not None]
+    number, recorded_number = _only_number(printed), _only_number(recorded)
+    numbers = [n for value in values if (n := _only_number(value)) is not None]
     other_value = next(value for value in values if value != printed)
     if number is None or recorded_number is None or len(numbers) < len(values):
         return Flip(span, printed, other_value, compared=True)
     compared = any(not same_number(recorded_number, n, comparison) for n in numbers)
-    finite = sorted((n for n in (number, *numbers) if n.finite), key=lambda n: n.value)
+    finite = sorted((n for n in (number, *numbers) if n.is_finite), key=lambda n: n.value)
     repeat, ends = 0, (number.text, "no number")
     if len(finite) > len(numbers):
         spread = max(difference(number.value, n.value) for n in numbers)
@@ -221,14 +221,14 @@ def _unconverged(span: Span, number: Number, halved: str) -> Doubt:
 
 def _count_converged(number: Number, halved_text: str) -> int:
     """How many digits a run with half the timestep bears out."""
-    halved_number = _whole_number(halved_text)
-    if halved_number is None or not halved_number.finite or not number.finite:
+    halved_number = _only_number(halved_text)
+    if halved_number is None or not halved_number.is_finite or not number.is_finite:
         return 0
     change = difference(number.value, halved_number.value)
     return _count_repeating(number, 2 * change) if change else _digits(number)
 
 
-def _whole_number(text: str) -> Number | None:
+def _only_number(text: str) -> Number | None:
     """The number that makes up the whole text, if one does."""
     numbers = scan(text.strip())
     return numbers[0] if len(numbers) == 1 and numbers[0].text == text.strip() else None
@@ -236,7 +236,7 @@ def _whole_number(text: str) -> Number | None:
 
 def _digits(number: Number) -> int:
     """Significant digits of a number as printed; for zero, those behind the point and one more."""
-    if not number.finite:
+    if not number.is_finite:
         return 0
     if number.value == 0:
         return max(0, -number.place) + 1
@@ -258,7 +258,7 @@ def _round_to(number: Number, digits: int) -> str:
 
     In its own notation where possible; a large number with few digits gets an exponent.
     """
-    if digits < 1 or number.integer or not number.finite:
+    if digits < 1 or number.is_integer or not number.is_finite:
         return ""
     decimals = digits - 1 - number.value.adjusted()
     mantissa, mark, power = number.text.lower().partition("e")
@@ -359,7 +359,7 @@ def _describe_doubt(doubt: Doubt) -> str:
     if not doubt.repeat:
         return f"no digit repeats: {values}"
     repeat = "1 digit repeats" if doubt.repeat == 1 else f"{doubt.repeat} digits repeat"
-    number = _whole_number(doubt.printed)
+    number = _only_number(doubt.printed)
     instead = "" if number is None else _round_to(number, doubt.repeat)
     return f"{repeat}{f', print {instead}' if instead else ''}: {values}"
 

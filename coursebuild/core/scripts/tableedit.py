@@ -88,7 +88,7 @@ def _with_signs_of(old: str, new: str) -> str:
 
 def _format_like(recorded: Number, printed: Number, comparison: Comparison) -> str:
     """A printed number as the table shows it."""
-    if comparison.mode is Mode.DIGITS and recorded.inexact and printed.place < recorded.place:
+    if comparison.mode is Mode.DIGITS and recorded.is_inexact and printed.place < recorded.place:
         return round_like(recorded, printed.value) or printed.text
     return printed.text
 

@@ -182,9 +182,9 @@ def find_claims(text: str) -> Iterator[Number]:
     if _DIGIT.search(text) is None:
         return  # saves time: most texts have no number, and scanning is slow
     for number in scan_prose(text):
-        if not number.finite:
+        if not number.is_finite:
             continue
-        is_whole = number.integer or number.text.endswith(".")
+        is_whole = number.is_integer or number.text.endswith(".")
         is_small = is_whole and (number.value in _YEARS or abs(number.value) <= _COUNTS)
         if not is_small or _UNIT.match(text, number.end):
             yield number

@@ -95,7 +95,7 @@ def test_text_stays_text(text: str) -> None:
 )
 def test_powers_of_ten_in_prose(text: str, value: str, place: int) -> None:
     (number,) = scan_prose(text)
-    assert (number.value, number.place, number.integer) == (Decimal(value), place, False)
+    assert (number.value, number.place, number.is_integer) == (Decimal(value), place, False)
     assert number.text == text
 
 
