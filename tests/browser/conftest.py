@@ -50,8 +50,8 @@ def site(sites: Sites) -> str:
 def scorm(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
     """A SCORM package, unpacked as a platform does."""
     folder = course_copy("scorm", tmp_path_factory.mktemp("scorm") / "course", stores)
-    done = folder.main("export", "scorm")
-    assert done.status == 0, done.out + done.err
+    result = folder.main("export", "scorm")
+    assert result.status == 0, result.out + result.err
     shutil.unpack_archive(folder.root / "course-scorm.zip", folder.root / "package")
     return folder.root / "package"
 
@@ -78,16 +78,16 @@ when the next page is opened.
 
 
 @pytest.fixture
-def opened(calm: BrowserContext) -> Iterator[Callable[[str], Page]]:
+def open_address(calm: BrowserContext) -> Iterator[Callable[[str], Page]]:
     """Opens pages, in which nothing may go wrong."""
-    said: list[list[str]] = []
+    consoles: list[list[str]] = []
 
-    def opened(address: str) -> Page:
+    def open_address(address: str) -> Page:
         page, lines = watch_page(calm)
-        said.append(lines)
+        consoles.append(lines)
         page.goto(address)
         return page
 
-    yield opened
-    wrong = [line for lines in said for line in lines]
-    assert [line for line in wrong if not any(part in line for part in OURS)] == []
+    yield open_address
+    all_lines = [line for lines in consoles for line in lines]
+    assert [line for line in all_lines if not any(part in line for part in OURS)] == []

@@ -70,36 +70,36 @@ GREENS = """(n) => {
 
 def ready(page: Page, number: int) -> None:
     """A lab that shows its first picture."""
-    found = lab(page, number)
-    found.locator(".lab-poster").wait_for(state="detached")
+    lab_element = lab(page, number)
+    lab_element.locator(".lab-poster").wait_for(state="detached")
 
 
 @pytest.fixture(scope="module")
-def shown(
+def drawn_page(
     browsers: Mapping[str, Browser], sites: Mapping[str, Site]
 ) -> Iterator[tuple[Page, list[str]]]:
     """The page, and what it says to the console."""
     with browsers["webgl"].new_context(viewport=WINDOW) as context:
-        page, said = watch_page(context)
+        page, console = watch_page(context)
         page.goto(sites["drawing"].url(LESSON))
-        yield page, said
+        yield page, console
 
 
-def test_the_recorded_picture_is_the_live_one(shown: tuple[Page, list[str]]) -> None:
+def test_the_recorded_picture_is_the_live_one(drawn_page: tuple[Page, list[str]]) -> None:
     """Up to the edges, which fall between other pixels."""
-    page, said = shown
-    wrong = []
+    page, console = drawn_page
+    failures = []
     for number in range(LABS):
         ready(page, number)
-        found = page.evaluate(COMPARE, number)
-        if found["middle"] > 2 or found["most"] > 16:
-            wrong.append((number, found))
-    assert wrong == []
-    assert said == []
+        comparison = page.evaluate(COMPARE, number)
+        if comparison["middle"] > 2 or comparison["most"] > 16:
+            failures.append((number, comparison))
+    assert failures == []
+    assert console == []
 
 
-def test_a_mirror_shows_what_stands_on_it(shown: tuple[Page, list[str]]) -> None:
-    page, _ = shown
+def test_a_mirror_shows_what_stands_on_it(drawn_page: tuple[Page, list[str]]) -> None:
+    page, _ = drawn_page
     ready(page, MIRROR)
     ready(page, DULL)
     mirrored, plain = (page.evaluate(REDS, number) for number in (MIRROR, DULL))
@@ -107,11 +107,11 @@ def test_a_mirror_shows_what_stands_on_it(shown: tuple[Page, list[str]]) -> None
 
 
 def test_with_a_graphics_processor_there_are_shadows_too(
-    browsers: Mapping[str, Browser], sites: Mapping[str, Site], shown: tuple[Page, list[str]]
+    browsers: Mapping[str, Browser], sites: Mapping[str, Site], drawn_page: tuple[Page, list[str]]
 ) -> None:
     """By way of a browser that says it had one: mirrors, and maps for all kinds of lights."""
-    ready(shown[0], ENDLESS)
-    without = np.array(shown[0].evaluate(GREENS, ENDLESS))
+    ready(drawn_page[0], ENDLESS)
+    plain_greens = np.array(drawn_page[0].evaluate(GREENS, ENDLESS))
     with browsers["webgl"].new_context(viewport=WINDOW, device_scale_factor=2) as context:
         context.add_init_script(
             "const { prototype } = WebGL2RenderingContext, { getParameter } = prototype\n"
@@ -119,13 +119,13 @@ def test_with_a_graphics_processor_there_are_shadows_too(
             "  return name === 0x9246 ? 'A graphics processor' : getParameter.call(this, name)\n"
             "}"
         )
-        page, said = watch_page(context)
+        page, console = watch_page(context)
         page.goto(sites["drawing"].url(LESSON))
         ready(page, ENDLESS)
         assert page.evaluate(COMPARE, ENDLESS)["middle"] <= 2, "the rest is as without"
-        darker = without - np.array(page.evaluate(GREENS, ENDLESS)) > 15
+        darker = plain_greens - np.array(page.evaluate(GREENS, ENDLESS)) > 15
         assert 500 < darker.sum() < 0.2 * darker.size
-        assert said == []
+        assert console == []
 
 
 def test_text_of_plots_has_its_size_on_dense_screens(

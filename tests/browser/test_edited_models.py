@@ -22,88 +22,88 @@ ENDLESS = '<option iterations="2000000000" tolerance="0" ls_iterations="9" solve
 def page(browsers: Mapping[str, Browser], base: str) -> Iterator[Page]:
     """A phone's window, in which the lab is near."""
     with browsers["webgl"].new_context(viewport={"width": 390, "height": 800}) as context:
-        page, said = watch_page(context)
+        page, console = watch_page(context)
         page.goto(base + PAGE)
         lab(page, EDITED)
         yield page
-        assert said == []
+        assert console == []
 
 
-def edited(page: Page) -> tuple[Locator, Locator]:
+def editor_of(page: Page) -> tuple[Locator, Locator]:
     """The lab with the lesson's model, and its text."""
-    found = page.locator(".lab").nth(EDITED)
-    return found, found.get_by_label("The model, as MJCF")
+    lab_element = page.locator(".lab").nth(EDITED)
+    return lab_element, lab_element.get_by_label("The model, as MJCF")
 
 
 def test_mistakes_are_told_at_their_lines_and_a_mended_model_runs(page: Page) -> None:
-    found, text = edited(page)
-    press(found, "Back to the lesson’s model")
+    lab_element, text = editor_of(page)
+    press(lab_element, "Back to the lesson’s model")
     lesson = text.input_value()
     assert lesson.startswith("<mujoco>")
-    wrong = lesson.replace('<joint axis="0 1 0"', '<joint axle="0 1 0"')
-    text.fill(wrong)
+    mistaken = lesson.replace('<joint axis="0 1 0"', '<joint axle="0 1 0"')
+    text.fill(mistaken)
     text.press("Control+Enter")
-    alert = found.get_by_role("alert").filter(has_text="Schema violation")
+    alert = lab_element.get_by_role("alert").filter(has_text="Schema violation")
     expect(alert).to_contain_text("unrecognized attribute: 'axle'\nElement 'joint', line 5")
     expect(text).to_have_attribute("aria-invalid", "true")
     expect(text).to_have_accessible_description(re.compile("Line 5: Schema violation"))
-    expect(found.locator(".lab-numbers mark")).to_have_text("5")
+    expect(lab_element.locator(".lab-numbers mark")).to_have_text("5")
     assert violations(page, ".lab-editor") == []
-    press(found, "Line 5:")
+    press(lab_element, "Line 5:")
     expect(text).to_be_focused()
     line = text.evaluate("field => field.value.slice(field.selectionStart, field.selectionEnd)")
     assert line.strip() == '<joint axle="0 1 0" range="-20 20"/>'
     text.press("Tab")
     expect(text).not_to_be_focused()
-    text.fill(wrong.replace("axle", "axis").replace("0.06", "0.04"))
-    press(found, "Compile and run")
-    expect(found).to_have_attribute("data-state", "playing")
-    expect(found.locator(".lab-time")).not_to_have_text("0.00 s")
+    text.fill(mistaken.replace("axle", "axis").replace("0.06", "0.04"))
+    press(lab_element, "Compile and run")
+    expect(lab_element).to_have_attribute("data-state", "playing")
+    expect(lab_element.locator(".lab-time")).not_to_have_text("0.00 s")
     expect(alert).to_be_hidden()
     expect(text).not_to_have_attribute("aria-invalid", "true")
     assert violations(page, ".lab") == []
     for part in (".lab-editor", ".lab-source textarea", ".lab-transport"):
         until(page, HOLDS, [part, 390])
-    press(found, "Pause")
-    press(found, "Back to the lesson’s model")
+    press(lab_element, "Pause")
+    press(lab_element, "Back to the lesson’s model")
     expect(text).to_have_value(lesson)
-    expect(found).to_have_attribute("data-state", "playing")
-    press(found, "Back to my model")
+    expect(lab_element).to_have_attribute("data-state", "playing")
+    press(lab_element, "Back to my model")
     expect(text).to_have_value(re.compile("0.04"))
-    expect(found).to_have_attribute("data-state", "playing")
+    expect(lab_element).to_have_attribute("data-state", "playing")
 
 
 def test_link_carries_the_edited_model(page: Page, base: str) -> None:
-    found, text = edited(page)
+    lab_element, text = editor_of(page)
     mine = '<mujoco>\n  <worldbody><geom name="μ" size="0.3"/></worldbody>\n</mujoco>'
     text.fill(mine)
-    press(found, "Copy link to this model")
+    press(lab_element, "Copy link to this model")
     expect(page).to_have_url(re.compile("#lab=1.1-lab-5&z="))
-    other = page.context.new_page()
-    other.goto(page.url)
-    linked, its_text = edited(other)
+    second_page = page.context.new_page()
+    second_page.goto(page.url)
+    linked_lab, its_text = editor_of(second_page)
     expect(its_text).to_have_value(mine)
-    expect(linked).to_have_attribute("data-state", "paused")
-    expect(linked.locator(".lab-message:visible")).to_have_count(0)
-    other.close()
+    expect(linked_lab).to_have_attribute("data-state", "paused")
+    expect(linked_lab.locator(".lab-message:visible")).to_have_count(0)
+    second_page.close()
     text.fill("".join(str(i**0.5) for i in range(3000)))
-    press(found, "Copy link to this model")
-    expect(found.get_by_role("alert").filter(has_text="too long for a link")).to_be_visible()
+    press(lab_element, "Copy link to this model")
+    expect(lab_element.get_by_role("alert").filter(has_text="too long for a link")).to_be_visible()
 
 
 def test_model_that_never_comes_to_an_end_holds_nothing_up(page: Page) -> None:
-    found, text = edited(page)
-    press(found, "Back to the lesson’s model")
+    lab_element, text = editor_of(page)
+    press(lab_element, "Back to the lesson’s model")
     lesson = text.input_value()
     endless = lesson.replace("<worldbody>", f"{ENDLESS}<worldbody>").replace("0 0 0.3", "0 0 0.02")
     text.fill(endless)
-    press(found, "Compile and run")
-    expect(found).to_have_attribute("data-state", "loading")
-    expect(found.get_by_role("alert").filter(has_text="too long")).to_be_visible()
-    expect(found).to_have_attribute("data-state", "ended")
+    press(lab_element, "Compile and run")
+    expect(lab_element).to_have_attribute("data-state", "loading")
+    expect(lab_element.get_by_role("alert").filter(has_text="too long")).to_be_visible()
+    expect(lab_element).to_have_attribute("data-state", "ended")
     text.fill(endless.replace("0 0 0.02", "0 0 0.021"))
-    press(found, "Compile and run")
-    expect(found).to_have_attribute("data-state", "loading")
-    press(found, "Back to the lesson’s model")
+    press(lab_element, "Compile and run")
+    expect(lab_element).to_have_attribute("data-state", "loading")
+    press(lab_element, "Back to the lesson’s model")
     expect(text).to_have_value(lesson)
-    expect(found).to_have_attribute("data-state", "playing")
+    expect(lab_element).to_have_attribute("data-state", "playing")

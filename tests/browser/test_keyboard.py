@@ -58,7 +58,7 @@ def page(browsers: Mapping[str, Browser]) -> Iterator[Page]:
         yield context.new_page()
 
 
-def opened(page: Page, site: Site) -> None:
+def open_site(page: Page, site: Site) -> None:
     page.goto(site.url(site.kinds()["lesson"]))
     until(page, "document.fonts.status === 'loaded'")
     for quiz in page.locator(".quiz:visible").all():
@@ -79,7 +79,7 @@ def test_every_stop_is_seen_and_none_is_a_trap(
     sites: Mapping[str, Site], page: Page, name: str
 ) -> None:
     """In the order of the text, there and back, with a ring around each kind of stop."""
-    opened(page, sites[name])
+    open_site(page, sites[name])
     stops: list[dict[str, Any]] = []
     looked: set[str] = set()
     for _ in range(MOST):
@@ -118,7 +118,7 @@ def has_a_ring(page: Page, stop: dict[str, Any]) -> None:
 def test_everything_that_folds_opens_by_key(
     sites: Mapping[str, Site], page: Page, name: str
 ) -> None:
-    opened(page, sites[name])
+    open_site(page, sites[name])
     summaries = page.locator("main summary:visible")
     assert summaries.count() >= 2
     kinds = dict.fromkeys(summaries.evaluate_all("all => all.map(s => s.parentElement.className)"))
@@ -133,17 +133,17 @@ def test_everything_that_folds_opens_by_key(
 
 def test_the_focus_goes_on_in_a_lab_that_starts(sites: Mapping[str, Site], page: Page) -> None:
     """The static form that had it is hidden, so the focus would be at no visible place."""
-    held: list[Route] = []
+    held_routes: list[Route] = []
     configs = re.compile(r"/assets/labs/.*\.json$")
-    page.route(configs, lambda route: held.append(route))
+    page.route(configs, lambda route: held_routes.append(route))
     site = sites["full"]
     page.goto(site.url(site.kinds()["lesson"]))
     page.locator(".lab-static a:visible").first.focus()
-    becomes(page, lambda: len(held) > 0, True)
+    becomes(page, lambda: len(held_routes) > 0, True)
 
     def goes_on() -> object:
-        while held:
-            held.pop().continue_()
+        while held_routes:
+            held_routes.pop().continue_()
         return page.evaluate("document.activeElement.closest('.lab-live') !== null")
 
     becomes(page, goes_on, True)

@@ -36,12 +36,12 @@ def test_motion_that_is_not_welcome_begins_with_a_press_or_a_move(
     with browsers["webgl"].new_context(reduced_motion="reduce") as context:
         page, _ = watch_page(context)
         page.goto(base + PAGE)
-        found = lab(page, AUTO)
-        press(found, "One step")
+        lab_element = lab(page, AUTO)
+        press(lab_element, "One step")
         # Had it run before, this were not its first step.
-        assert state_of(page, found)["n"] == 1
-        expect(found).to_have_attribute("data-state", "paused")
-        press(found, "Kick")
+        assert state_of(page, lab_element)["n"] == 1
+        expect(lab_element).to_have_attribute("data-state", "paused")
+        press(lab_element, "Kick")
         reach(page, AUTO, "playing")
         swing = lab(page)
         swing.get_by_label("gravity").fill("5")
@@ -55,7 +55,7 @@ def test_goal_is_reached_kept_and_its_motion_shown_to_others(
     browsers: Mapping[str, Browser], base: str
 ) -> None:
     with browsers["webgl"].new_context(has_touch=True) as context:
-        page, said = watch_page(context)
+        page, console = watch_page(context)
         page.goto(base + PAGE)
         swing = lab(page)
         goal = swing.locator(".lab-live .lab-goal")
@@ -72,26 +72,26 @@ def test_goal_is_reached_kept_and_its_motion_shown_to_others(
         assert state["l"] == [[9.8, 2.5, None], [[0, 2], [0, 2]]]
         link = page.evaluate("() => location.href")
 
-        other, also_said = watch_page(context)
-        other.goto(link)
-        again = lab(other)
+        second_page, also_said = watch_page(context)
+        second_page.goto(link)
+        again = lab(second_page)
         expect(again.locator(".lab-live .lab-goal")).to_contain_text("Reached before.")
         press(again, "Play the motion of this link")
-        reach(other, SWING, "playing")
-        reach(other, SWING, "paused")
-        shown = state_of(other, again)
-        assert (shown["n"], shown["l"]) == (state["n"], state["l"])
-        assert floats(shown).tobytes() == floats(state).tobytes()
-        other.goto(base + "progress/index.html")
-        expect(other.locator('[data-progress="overall"]')).to_contain_text("1 of 1 task done")
-        assert [*said, *also_said] == []
+        reach(second_page, SWING, "playing")
+        reach(second_page, SWING, "paused")
+        shown_state = state_of(second_page, again)
+        assert (shown_state["n"], shown_state["l"]) == (state["n"], state["l"])
+        assert floats(shown_state).tobytes() == floats(state).tobytes()
+        second_page.goto(base + "progress/index.html")
+        expect(second_page.locator('[data-progress="overall"]')).to_contain_text("1 of 1 task done")
+        assert [*console, *also_said] == []
 
 
 # ------------------------------------------------------------------------- what goes wrong
 
 
 def test_state_too_large_for_a_link_is_told(context: BrowserContext, base: str) -> None:
-    page, said = watch_page(context)
+    page, console = watch_page(context)
     page.goto(base + PAGE)
     page.evaluate(MOUNT, SWING)
     page.evaluate(
@@ -105,7 +105,7 @@ def test_state_too_large_for_a_link_is_told(context: BrowserContext, base: str) 
     expect(message).to_have_class(re.compile(r"\blab-is-warning\b"))
     state = parse_link(page.evaluate("() => location.href"))
     assert (state["v"], state["physics"]) == ([3, 0.5, None], b"")
-    assert said == []
+    assert console == []
 
 
 BAD_PUSH = """
@@ -155,12 +155,12 @@ def test_without_webgl_everything_else_works(browsers: Mapping[str, Browser], ba
 
 
 def test_from_disk_the_recorded_form_stays(context: BrowserContext, course: Site) -> None:
-    page, said = watch_page(context)
+    page, console = watch_page(context)
     page.goto((course.public / PAGE).as_uri())
     swing = page.locator(".lab").first
     expect(swing.locator(".lab-message")).to_contain_text("http.server")
     expect(swing.locator(".lab-static")).to_be_visible()
-    assert said == []
+    assert console == []
 
 
 def test_missing_file_is_told(context: BrowserContext, base: str) -> None:

@@ -49,8 +49,8 @@ class Lesson:
     """The page that tests share."""
 
     page: Page
-    said: list[str]
-    asked: list[str]
+    console: list[str]
+    requests: list[str]
     """Addresses that were asked for before any lab was near."""
 
 
@@ -58,37 +58,37 @@ class Lesson:
 def lesson(browsers: Mapping[str, Browser], base: str) -> Iterator[Lesson]:
     size = {"width": 1000, "height": 800}
     with browsers["webgl"].new_context(viewport=size) as context:  # type: ignore[arg-type]
-        page, said = watch_page(context)
-        asked: list[str] = []
-        page.on("request", lambda request: asked.append(request.url))
+        page, console = watch_page(context)
+        requests: list[str] = []
+        page.on("request", lambda request: requests.append(request.url))
         page.goto(base + PAGE, wait_until="networkidle")
-        first = list(asked)
-        yield Lesson(page, said, first)
+        first = list(requests)
+        yield Lesson(page, console, first)
 
 
 @pytest.fixture
 def swing(lesson: Lesson) -> Iterator[Locator]:
     """The swing of the shared page, at rest and as it is at first."""
     page = lesson.page
-    found = lab(page, SWING, None)
-    reach_rest(found)
-    press(found, "One step")  # so that no control starts the motion
-    if found.get_by_label("gravity").input_value() != "9.8":
-        found.get_by_label("gravity").fill("9.8")
-    found.get_by_label("start").select_option("high")
-    found.get_by_role("button", name="Reset").click()
-    expect(found.locator(".lab-time")).to_have_text(re.compile(r"^0\.00"))
-    expect(found.locator(".lab-live dd").first).to_contain_text("2.500")
-    yield found
-    assert lesson.said == []
+    swing_lab = lab(page, SWING, None)
+    reach_rest(swing_lab)
+    press(swing_lab, "One step")  # so that no control starts the motion
+    if swing_lab.get_by_label("gravity").input_value() != "9.8":
+        swing_lab.get_by_label("gravity").fill("9.8")
+    swing_lab.get_by_label("start").select_option("high")
+    swing_lab.get_by_role("button", name="Reset").click()
+    expect(swing_lab.locator(".lab-time")).to_have_text(re.compile(r"^0\.00"))
+    expect(swing_lab.locator(".lab-live dd").first).to_contain_text("2.500")
+    yield swing_lab
+    assert lesson.console == []
 
 
-def reach_rest(found: Locator) -> None:
+def reach_rest(lab_element: Locator) -> None:
     """A lab that is there and does not run."""
-    expect(found).to_have_attribute("data-state", re.compile("paused|playing"))
-    if found.get_attribute("data-state") == "playing":
-        press(found, "Pause")
-    expect(found).to_have_attribute("data-state", "paused")
+    expect(lab_element).to_have_attribute("data-state", re.compile("paused|playing"))
+    if lab_element.get_attribute("data-state") == "playing":
+        press(lab_element, "Pause")
+    expect(lab_element).to_have_attribute("data-state", "paused")
 
 
 def pictures(page: Page, count: int) -> None:
@@ -112,12 +112,12 @@ def native(course: Site, steps: int, angle: float, gravity: float = -9.8) -> np.
 
 
 def test_engine_is_fetched_once_and_only_when_a_lab_is_near(lesson: Lesson, swing: Locator) -> None:
-    assert not [url for url in lesson.asked if "/labs/" in url and not url.endswith(".png")]
+    assert not [url for url in lesson.requests if "/labs/" in url and not url.endswith(".png")]
     entries = "() => performance.getEntriesByType('resource').map(({ name }) => name)"
-    asked: list[str] = lesson.page.evaluate(entries)
+    addresses: list[str] = lesson.page.evaluate(entries)
     (worker,) = lesson.page.workers
-    asked += worker.evaluate(entries)
-    names = [re.sub(r"\.[0-9a-f]{8}", "", url.rsplit("/", 1)[1]) for url in asked]
+    addresses += worker.evaluate(entries)
+    names = [re.sub(r"\.[0-9a-f]{8}", "", url.rsplit("/", 1)[1]) for url in addresses]
     assert "lab.js" in names
     assert names.count("mujoco.wasm") == 1
 
@@ -170,20 +170,20 @@ def test_link_leads_back_to_the_state(lesson: Lesson, swing: Locator) -> None:
     for _ in range(7):
         press(swing, "One step")
     state = state_of(page, swing)
-    other, said = watch_page(page.context)
-    other.goto(page.evaluate("() => location.href"))
-    again = other.locator(".lab").nth(SWING)
+    second_page, console = watch_page(page.context)
+    second_page.goto(page.evaluate("() => location.href"))
+    again = second_page.locator(".lab").nth(SWING)
     expect(again).to_have_attribute("data-state", "paused")
     expect(again.locator(".lab-time")).to_have_text(re.compile(r"^0\.01"))
     expect(again.locator(".lab-view")).to_be_in_viewport()
     expect(again.get_by_label("start")).to_have_value("0")
     press(swing, "One step")
     press(again, "One step")
-    there, here = state_of(page, swing), state_of(other, again)
-    assert there["n"] == here["n"] == int(str(state["n"])) + 1
-    assert floats(there)[:3].tobytes() == floats(here)[:3].tobytes()
-    assert said == []
-    other.close()
+    first_state, second_state = state_of(page, swing), state_of(second_page, again)
+    assert first_state["n"] == second_state["n"] == int(str(state["n"])) + 1
+    assert floats(first_state)[:3].tobytes() == floats(second_state)[:3].tobytes()
+    assert console == []
+    second_page.close()
 
 
 def test_keys_on_the_picture(lesson: Lesson, swing: Locator) -> None:
@@ -195,9 +195,9 @@ def test_keys_on_the_picture(lesson: Lesson, swing: Locator) -> None:
     expect(view.locator(".lab-scale")).to_have_accessible_name("Scale: the bar is 0.5 m long")
     first = wait_until_still(page, view)
     page.keyboard.press("ArrowLeft")
-    turned = wait_for_change(page, view, first)
+    turned_picture = wait_for_change(page, view, first)
     page.keyboard.press("+")
-    wait_for_change(page, view, turned)
+    wait_for_change(page, view, turned_picture)
     page.keyboard.press("0")
     wait_for_condition(page, lambda: view.screenshot() == first)
     page.keyboard.press(" ")
@@ -277,30 +277,30 @@ def test_every_kind_of_geom_and_overlay_is_drawn_and_a_large_state_fits_into_a_l
     lesson: Lesson,
 ) -> None:
     page = lesson.page
-    found = lab(page, ALL)
-    before = wait_until_still(page, found.locator(".lab-view"))
-    for box in found.locator(".lab-check input").all():
+    lab_element = lab(page, ALL)
+    before = wait_until_still(page, lab_element.locator(".lab-view"))
+    for box in lab_element.locator(".lab-check input").all():
         box.check()
-    for arrow in found.locator(".lab-arrow").all():
+    for arrow in lab_element.locator(".lab-arrow").all():
         arrow.click()
         expect(arrow).to_have_attribute("aria-pressed", "true")
-    press(found, "Play")
-    wait_for_condition(page, lambda: time_of(found) > 0.6)  # by then bodies touch the ground
-    wait_for_change(page, found.locator(".lab-view"), before)
-    press(found, "Pause")
+    press(lab_element, "Play")
+    wait_for_condition(page, lambda: time_of(lab_element) > 0.6)  # by then bodies touch the ground
+    wait_for_change(page, lab_element.locator(".lab-view"), before)
+    press(lab_element, "Pause")
     reach(page, ALL, "paused")
-    state = state_of(page, found)
+    state = state_of(page, lab_element)
     assert floats(state).size > 500
-    expect(found.locator(".lab-message")).not_to_contain_text("controls only")
-    other, said = watch_page(page.context)
-    other.goto(page.evaluate("() => location.href"))
-    again = lab(other, ALL)
-    wait_for_condition(other, lambda: time_of(again) > 0)
-    back = state_of(other, again)
+    expect(lab_element.locator(".lab-message")).not_to_contain_text("controls only")
+    second_page, console = watch_page(page.context)
+    second_page.goto(page.evaluate("() => location.href"))
+    again = lab(second_page, ALL)
+    wait_for_condition(second_page, lambda: time_of(again) > 0)
+    back = state_of(second_page, again)
     assert (back["n"], back["t"]) == (state["n"], state["t"])
     assert floats(back).tobytes() == floats(state).tobytes()
-    assert [*lesson.said, *said] == []
-    other.close()
+    assert [*lesson.console, *console] == []
+    second_page.close()
 
 
 def test_lab_of_a_kind_of_the_course_runs_two_simulations(lesson: Lesson) -> None:
@@ -316,11 +316,11 @@ def test_lab_of_a_kind_of_the_course_runs_two_simulations(lesson: Lesson) -> Non
         wait_for_change(page, view, before)
     expect(twins.locator(".lab-plot canvas")).to_be_visible()
     expect(twins.locator(".lab-message:visible")).to_have_count(0)
-    assert lesson.said == []
+    assert lesson.console == []
 
 
 def test_lab_starts_by_itself_where_motion_is_welcome(lesson: Lesson) -> None:
-    found = lab(lesson.page, AUTO, "playing")
-    wait_for_condition(lesson.page, lambda: time_of(found) > 0)
-    press(found, "Pause")
+    lab_element = lab(lesson.page, AUTO, "playing")
+    wait_for_condition(lesson.page, lambda: time_of(lab_element) > 0)
+    press(lab_element, "Pause")
     reach(lesson.page, AUTO, "paused")

@@ -76,17 +76,17 @@ class Kept:
     """Address of the end of what is in use there."""
 
 
-def kept(page: Page, session: CDPSession) -> Kept:
+def memory_in_use(page: Page, session: CDPSession) -> Kept:
     (worker,) = page.workers
-    found = []
+    samples = []
     for _ in range(8):
         session.send("HeapProfiler.collectGarbage")
         page.evaluate(DRAW, 10)
         metrics = session.send("Performance.getMetrics")["metrics"]
         values = {metric["name"]: int(metric["value"]) for metric in metrics}
         memory, end = worker.evaluate("() => self.engineMemory()")
-        found.append((values["JSEventListeners"], values["Nodes"], memory, end))
-    return Kept(*map(min, zip(*found, strict=True)))
+        samples.append((values["JSEventListeners"], values["Nodes"], memory, end))
+    return Kept(*map(min, zip(*samples, strict=True)))
 
 
 def reveal(route: Route) -> None:
@@ -97,16 +97,16 @@ def test_two_hundred_labs_that_come_and_go_leave_nothing(
     context: BrowserContext, base: str
 ) -> None:
     context.route(re.compile(r"/worker\.[0-9a-f]+\.js$"), reveal)
-    page, said = watch_page(context)
+    page, console = watch_page(context)
     page.set_viewport_size({"width": 400, "height": 500})
     page.goto(base + PAGE)
     session = context.new_cdp_session(page)
     session.send("Performance.enable")
     page.evaluate(COPY, SWING)
     page.evaluate(COME_AND_GO, 10)
-    before = kept(page, session)
+    before = memory_in_use(page, session)
     page.evaluate(COME_AND_GO, 190)
-    after = kept(page, session)
+    after = memory_in_use(page, session)
     # A lab has dozens of listeners, hundreds of nodes and megabytes of the engine's memory: one of
     # any left behind by each would be 190 more.
     assert after.listeners <= before.listeners + 40, (before, after)
@@ -114,4 +114,4 @@ def test_two_hundred_labs_that_come_and_go_leave_nothing(
     assert after.memory == before.memory, (before, after)
     assert after.end <= before.end + 16 * 200, (before, after)  # the engine's own, for each model
     assert len(page.workers) == 1
-    assert said == []
+    assert console == []

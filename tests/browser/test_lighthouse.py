@@ -43,21 +43,21 @@ def lighthouse(url: str, folder: Path, *options: str) -> dict[str, Any]:
     assert LIGHTHOUSE.is_file(), "no lighthouse: run python site/bundle.py packages"
     out = folder / "report.json"
     quiet = ("--quiet", "--no-enable-error-reporting", "--output=json", f"--output-path={out}")
-    done = subprocess.run(
+    process = subprocess.run(
         [NODE, LIGHTHOUSE, url, *quiet, f"--chrome-flags={FLAGS}", *options],
         env={**os.environ, "CHROME_PATH": chromium, "NODE_OPTIONS": "", "HOME": str(folder)},
         cwd=folder,
         capture_output=True,
         text=True,
     )
-    assert done.returncode == 0, done.stderr
+    assert process.returncode == 0, process.stderr
     report: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))
     assert "runtimeError" not in report, report["runtimeError"]
     return report
 
 
 def scores(report: dict[str, Any]) -> dict[str, int]:
-    return {name: round(100 * one["score"]) for name, one in report["categories"].items()}
+    return {name: round(100 * category["score"]) for name, category in report["categories"].items()}
 
 
 def lost(report: dict[str, Any], category: str) -> list[tuple[str, float, str]]:
@@ -81,14 +81,14 @@ def test_lighthouse_gives_its_points(
     request.addfinalizer(host.stop)
     url = host.url + path.removesuffix("index.html")
     report = lighthouse(url, tmp_path, f"--only-categories={','.join(CATEGORIES)}")
-    found = scores(report)
-    assert set(found) == set(CATEGORIES)
-    told = {name: lost(report, name) for name in CATEGORIES}
-    best = found.pop("performance")
-    assert found == dict.fromkeys(found, 100), told
+    points = scores(report)
+    assert set(points) == set(CATEGORIES)
+    lost_points = {name: lost(report, name) for name in CATEGORIES}
+    best = points.pop("performance")
+    assert points == dict.fromkeys(points, 100), lost_points
     for _ in range(RUNS - 1):
         if best >= PERFORMANCE[path]:
             break
         report = lighthouse(url, tmp_path, "--only-categories=performance")
         best = max(best, scores(report)["performance"])
-    assert best >= PERFORMANCE[path], told["performance"]
+    assert best >= PERFORMANCE[path], lost_points["performance"]

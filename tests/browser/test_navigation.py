@@ -51,9 +51,9 @@ def test_the_anchor_of_a_formula_is_seen_when_it_is_pointed_at_or_focused(
     expect(page.locator(f"{NEWTON}:target")).to_have_count(1)
 
 
-def large_enough(found: Locator) -> bool:
+def large_enough(controls: Locator) -> bool:
     """For a finger."""
-    box = found.bounding_box()
+    box = controls.bounding_box()
     return box is not None and min(box["width"], box["height"]) >= 24
 
 

@@ -48,9 +48,9 @@ window.MessageChannel = class extends Channel {
   }
 }
 const open = CacheStorage.prototype.open
-let opened = 0
+let openCalls = 0
 CacheStorage.prototype.open = async function (name) {
-  if (++opened === 1) await done
+  if (++openCalls === 1) await done
   return open.call(this, name)
 }
 """
@@ -66,7 +66,7 @@ QUIET = """async () => {
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     """A course, built once; tests that change it copy its site."""
     folder = Folder(tmp_path_factory.mktemp("offline") / "course")
     folder.fill(TEXTS, stores)
@@ -77,9 +77,9 @@ def made(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
 
 
 @pytest.fixture
-def host(made: Folder, tmp_path: Path) -> Iterator[Host]:
+def host(course: Folder, tmp_path: Path) -> Iterator[Host]:
     """Serves a copy of the site, in a folder of its host."""
-    shutil.copytree(made.root / "first", tmp_path / "site")
+    shutil.copytree(course.root / "first", tmp_path / "site")
     with Host(tmp_path / "site", "/course/") as host:
         yield host
 
@@ -91,13 +91,15 @@ def settle(page: Page) -> None:
 
 def settled_page(context: BrowserContext, host: Host, path: str = "") -> tuple[Page, list[str]]:
     """A page whose worker has kept what it keeps."""
-    page, said = watch_page(context)
+    page, console = watch_page(context)
     page.goto(host.url + path)
     page.evaluate("navigator.serviceWorker.ready.then(() => 0)")
-    own = "new URL(document.documentElement.dataset.root + 'service-worker.js', document.baseURI)"
-    until(page, f"navigator.serviceWorker.controller?.scriptURL === {own}.href")
+    worker_address = (
+        "new URL(document.documentElement.dataset.root + 'service-worker.js', document.baseURI)"
+    )
+    until(page, f"navigator.serviceWorker.controller?.scriptURL === {worker_address}.href")
     settle(page)
-    return page, said
+    return page, console
 
 
 def visited(page: Page, host: Host, path: str) -> None:
@@ -112,33 +114,35 @@ def see(page: Page, text: str) -> None:
     expect(page.get_by_text(text)).to_be_visible()
 
 
-def edited(made: Folder, site: Path, *edits: tuple[str, str, str]) -> None:
+def build_edited(course: Folder, site: Path, *edits: tuple[str, str, str]) -> None:
     """Another build of the course in the place of the one that is served."""
     for path, old, new in edits:
-        made.replace(path, old, new)
+        course.replace(path, old, new)
     try:
-        assert made.main("build").status == 0
+        assert course.main("build").status == 0
         shutil.rmtree(site)
-        shutil.copytree(made.root / "public", site)
+        shutil.copytree(course.root / "public", site)
     finally:
         for path, old, new in edits:
-            made.replace(path, new, old)
+            course.replace(path, new, old)
 
 
 @pytest.fixture(scope="module")
-def kept(browsers: Mapping[str, Browser], made: Folder) -> Iterator[tuple[Page, Host]]:
+def stored_page(browsers: Mapping[str, Browser], course: Folder) -> Iterator[tuple[Page, Host]]:
     """A page of a site that was visited once, and that the tests leave as it is."""
     with (
-        Host(made.root / "first", "/course/") as host,
+        Host(course.root / "first", "/course/") as host,
         browsers["plain"].new_context() as context,
     ):
-        page, said = settled_page(context, host)
-        assert said == []
+        page, console = settled_page(context, host)
+        assert console == []
         yield page, host
 
 
-def test_every_page_is_there_without_a_network_after_one_visit(kept: tuple[Page, Host]) -> None:
-    page, host = kept
+def test_every_page_is_there_without_a_network_after_one_visit(
+    stored_page: tuple[Page, Host],
+) -> None:
+    page, host = stored_page
     with host.away():
         for path, text in ((FIRST, "Text of one."), (SECOND, "Text of two."), ("", "Lesson one")):
             page.goto(host.url + path)
@@ -153,9 +157,9 @@ def test_every_page_is_there_without_a_network_after_one_visit(kept: tuple[Page,
 
 
 def test_page_that_is_not_there_leads_back_when_there_is_a_network(
-    kept: tuple[Page, Host],
+    stored_page: tuple[Page, Host],
 ) -> None:
-    page, host = kept
+    page, host = stored_page
     with host.away():
         page.goto(f"{host.url}lessons/9.9-none.html?x=<b>&y")
         expect(page).to_have_url(re.compile(rf"^{re.escape(host.url)}offline/\?from="))
@@ -163,15 +167,15 @@ def test_page_that_is_not_there_leads_back_when_there_is_a_network(
         missing = page.locator(".keep-missing")
         expect(missing).to_contain_text("/course/lessons/9.9-none.html?x=%3Cb%3E&y")
         again = missing.get_by_role("link", name="Try again")
-        wanted = f"{host.url}lessons/9.9-none.html?x=%3Cb%3E&y"
-        expect(again).to_have_attribute("href", wanted)
+        address = f"{host.url}lessons/9.9-none.html?x=%3Cb%3E&y"
+        expect(again).to_have_attribute("href", address)
     again.click()
-    expect(page).to_have_url(wanted)
+    expect(page).to_have_url(address)
     expect(page.locator("h1")).to_have_text("Page not found")
 
 
-def test_no_way_back_leads_elsewhere(kept: tuple[Page, Host]) -> None:
-    page, host = kept
+def test_no_way_back_leads_elsewhere(stored_page: tuple[Page, Host]) -> None:
+    page, host = stored_page
     for from_ in ("https://example.com/x", "//example.com/", "/a/", "data:,"):
         page.goto(f"{host.url}offline/?from={from_}")
         page.locator(".keep input").first.wait_for()
@@ -183,10 +187,10 @@ def test_nothing_is_asked_for_before_the_page_has_loaded_and_only_once(
 ) -> None:
     page, _ = watch_page(context)
     page.goto(host.url + FIRST)
-    loaded = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd")
+    load_end = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd")
     until(page, "navigator.serviceWorker.controller !== null")
     list_ = "performance.getEntriesByType('resource').filter(({ name }) => /files.json/.test(name))"
-    assert page.evaluate(f"{list_}.every(({{ startTime }}) => startTime > {loaded})")
+    assert page.evaluate(f"{list_}.every(({{ startTime }}) => startTime > {load_end})")
     settle(page)
     host.take_requests()
     page.goto(host.url + SECOND)
@@ -195,12 +199,14 @@ def test_nothing_is_asked_for_before_the_page_has_loaded_and_only_once(
 
 
 def test_page_that_was_kept_says_when_there_is_a_newer_one(
-    context: BrowserContext, host: Host, made: Folder
+    context: BrowserContext, host: Host, course: Folder
 ) -> None:
     page, _ = settled_page(context, host)
     with host.away():
         visited(page, host, FIRST)  # which hears of no newer list
-        edited(made, host.folder, ("content/lessons/1.1-one.md", "Text of one.", "Other text."))
+        build_edited(
+            course, host.folder, ("content/lessons/1.1-one.md", "Text of one.", "Other text.")
+        )
         see(page, "Text of one.")
     page.evaluate("window.dispatchEvent(new Event('online'))")
     expect(page.locator(".notice")).to_contain_text("This page has changed")
@@ -210,10 +216,10 @@ def test_page_that_was_kept_says_when_there_is_a_newer_one(
 
 
 def test_several_courses_on_one_origin(
-    context: BrowserContext, made: Folder, tmp_path: Path
+    context: BrowserContext, course: Folder, tmp_path: Path
 ) -> None:
-    shutil.copytree(made.root / "first", tmp_path / "both")
-    shutil.copytree(made.root / "first", tmp_path / "both" / "inner")
+    shutil.copytree(course.root / "first", tmp_path / "both")
+    shutil.copytree(course.root / "first", tmp_path / "both" / "inner")
     with Host(tmp_path / "both") as host:
         settled_page(context, host)
         page, _ = settled_page(context, host, "inner/")
@@ -228,14 +234,14 @@ def test_several_courses_on_one_origin(
 
 
 def test_reader_chooses_what_is_kept(context: BrowserContext, host: Host) -> None:
-    page, said = watch_page(context)
+    page, console = watch_page(context)
     page.goto(f"{host.url}offline/")
     see(page, "files of the course are here.")
     expect(page.get_by_label("all text and pictures")).to_be_checked()
     expect(page.locator(".keep")).to_contain_text("MB")
     page.get_by_label("everything, with all simulations").check()
-    listed = json.loads((host.folder / "files.json").read_text())
-    total = sum(len(listed[group]["files"]) for group in ("shell", "text", "rest"))
+    file_list = json.loads((host.folder / "files.json").read_text())
+    total = sum(len(file_list[group]["files"]) for group in ("shell", "text", "rest"))
     see(page, f"{total} of {total} files of the course are here.")
     expect(page.locator(".keep-status")).to_have_attribute("role", "status")
     page.get_by_label("nothing", exact=True).check()
@@ -248,40 +254,40 @@ def test_reader_chooses_what_is_kept(context: BrowserContext, host: Host) -> Non
     page.get_by_label("what you have read").check()
     see(page, "files of the course are here.")
     expect(page.get_by_label("what you have read")).to_be_checked()
-    assert said == []
+    assert console == []
 
 
 def test_last_report_stands_where_the_store_opens_after_it(
     context: BrowserContext, host: Host
 ) -> None:
-    page, said = watch_page(context)
+    page, console = watch_page(context)
     page.add_init_script(SLOW_STORE)
     page.goto(f"{host.url}offline/")
     see(page, "files of the course are here.")
-    assert said == []
+    assert console == []
 
 
 def test_browser_that_lets_no_worker_keep_files_is_no_matter(
-    opened: Callable[[str], Page], host: Host
+    open_address: Callable[[str], Page], host: Host
 ) -> None:
-    page = opened("about:blank")
+    page = open_address("about:blank")
     page.clock.install()
     page.goto(host.url + FIRST)
     page.clock.run_for(10_000)
     becomes(page, lambda: page.evaluate(NOTHING_KEPT), [0, 0])
 
 
-def test_site_can_be_installed(kept: tuple[Page, Host]) -> None:
-    page, host = kept
+def test_site_can_be_installed(stored_page: tuple[Page, Host]) -> None:
+    page, host = stored_page
     page.goto(host.url)
     client = page.context.new_cdp_session(page)
     errors = client.send("Page.getInstallabilityErrors")["installabilityErrors"]
     # A context of Playwright's is a private window, in which nothing can be installed.
     assert [error["errorId"] for error in errors if error["errorId"] != "in-incognito"] == []
-    found = client.send("Page.getAppManifest")
-    assert found["errors"] == []
-    assert found["url"] == f"{host.url}manifest.webmanifest"
-    manifest = json.loads(found["data"])
+    reply = client.send("Page.getAppManifest")
+    assert reply["errors"] == []
+    assert reply["url"] == f"{host.url}manifest.webmanifest"
+    manifest = json.loads(reply["data"])
     assert manifest["name"] == "Scratch" and manifest["short_name"] == "Scratch"
     for icon in manifest["icons"]:
         sides = page.evaluate(
@@ -346,10 +352,10 @@ class OneScript(Answers):
 
 @pytest.mark.parametrize("script", ["preview.js", "worker.js"])
 def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
-    context: BrowserContext, made: Folder, tmp_path: Path, script: str
+    context: BrowserContext, course: Folder, tmp_path: Path, script: str
 ) -> None:
     """Either of two things sees the worker off: the page's script, and the worker in its place."""
-    shutil.copytree(made.root / "first", tmp_path / "site")
+    shutil.copytree(course.root / "first", tmp_path / "site")
     host = Host(tmp_path / "site")
     page, _ = settled_page(context, host)
     host.stop()

@@ -23,9 +23,9 @@ def lesson(quizzes: str) -> str:
 
 @pytest.fixture
 def page(context: BrowserContext) -> Iterator[Page]:
-    page, said = watch_page(context)
+    page, console = watch_page(context)
     yield page
-    assert [text for text in said if "/assets/labs/" not in text] == []
+    assert [text for text in console if "/assets/labs/" not in text] == []
 
 
 def answer(page: Page, number: int) -> None:
@@ -38,8 +38,8 @@ def test_text_below_opens_when_all_is_predicted_and_stays_open(page: Page, lesso
     page.goto(lesson)
     for hidden in ("It swings down", "Far it is"):
         expect(page.get_by_text(hidden)).to_be_hidden()
-    for seen in (".lab", "#after-it", ".gate"):
-        expect(page.locator(seen).first).to_be_visible()
+    for selector in (".lab", "#after-it", ".gate"):
+        expect(page.locator(selector).first).to_be_visible()
     assert violations(page, ".prose") == []
     answer(page, 0)
     expect(page.get_by_text("It swings down")).to_be_hidden()

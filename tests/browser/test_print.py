@@ -55,7 +55,7 @@ def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
         "all => all.map(h => h.innerText.replace('#', '').trim())"
     )
     assert len(headings) > 20
-    known = {words(heading).casefold() for heading in headings}
+    known_headings = {words(heading).casefold() for heading in headings}
     sheets = printed(page)
     assert 10 < len(sheets) < 35, "of text, five drawings and four labs"
     for number, sheet in enumerate(sheets, 1):
@@ -63,13 +63,13 @@ def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
         assert ("Mass and inertia · Simulation with MuJoCo" in sheet) == (number > 1)
         lines = [line.strip() for line in sheet.splitlines()]
         lines = [line for line in lines if not FURNITURE.fullmatch(line)]
-        assert words(lines[-1]).casefold() not in known, f"a heading ends sheet {number}"
+        assert words(lines[-1]).casefold() not in known_headings, f"a heading ends sheet {number}"
     text = words(" ".join(sheets))
     address = "example.org/mujoco-course/lessons/4.2-mass-and-inertia.html"
     for lab in (1, 2, 3):
         assert f"{address}#4.2-lab-{lab}" in text.replace(" ", "")
-    for gone in ("On this page", "Course map", "Copy", "Download", "Mark as read"):
-        assert gone not in text, gone
+    for removed_text in ("On this page", "Course map", "Copy", "Download", "Mark as read"):
+        assert removed_text not in text, removed_text
     for there in ("The centre of mass is at", "if __name__", "IEEE Robotics and Automation"):
         assert there in text, "what is folded on a screen"
 

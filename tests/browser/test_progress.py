@@ -26,7 +26,7 @@ pytestmark = pytest.mark.browser
 Opened = Callable[[str], Page]
 
 
-def marked(page: Page, id: str, text: str) -> None:
+def expect_mark(page: Page, id: str, text: str) -> None:
     """The mark of a lesson, as it is read out, comes to begin with a text."""
     place = page.locator(f'[data-lesson="{id}"] [data-mark]')
     wait_for_condition(
@@ -39,31 +39,31 @@ def lesson_end(page: Page) -> Locator:
 
 
 def test_answers_and_lessons_show_on_the_map_at_once_in_another_tab(
-    opened: Opened, site: str
+    open_address: Opened, site: str
 ) -> None:
-    home, lesson = opened(site), opened(site + PUSH_PAGE)
+    home, lesson = open_address(site), open_address(site + PUSH_PAGE)
     expect(home.locator(".start a")).to_have_text("Start with 1.1 Push & <em>pull</em>")
     expect(home.locator("[data-mark]")).to_have_text([""] * 3)
     choose(question(lesson, "smoke"), "Up")
-    marked(home, "1.1", "begun1/3, 1 of 3 tasks done")
+    expect_mark(home, "1.1", "begun1/3, 1 of 3 tasks done")
     end = lesson_end(lesson)
     expect(end.get_by_role("status")).to_have_text("Not marked as read.")
     end.get_by_role("button", name="Mark as read").click()
     expect(end.get_by_role("status")).to_have_text("You have read this lesson.")
     expect(end.get_by_role("button")).to_have_text("Mark as not read")
-    marked(home, "1.1", "read1/3")
+    expect_mark(home, "1.1", "read1/3")
     summary = home.locator('[data-progress="summary"]')
     expect(summary).to_have_text(re.compile(r"1 of 3 read\s*1 of 7 tasks done"))
     expect(home.locator(".start a")).to_contain_text("Continue with 1.2 Free fall")
     choose(question(lesson, "smoke"), "Down")
-    marked(home, "1.1", "read0/3")
+    expect_mark(home, "1.1", "read0/3")
     choose(question(lesson, "smoke"), "Up")
     choose(lesson.locator(".question").nth(0), "Down")
     lesson.locator(".question").nth(1).get_by_role("textbox").fill("4")
     lesson.locator(".question").nth(1).locator(".quiz-check").click()
-    marked(home, "1.1", "right3/3, 3 of 3 tasks done")
+    expect_mark(home, "1.1", "right3/3, 3 of 3 tasks done")
     home.goto(site + "levels/1.html")
-    marked(home, "1.1", "right3/3")
+    expect_mark(home, "1.1", "right3/3")
 
 
 def test_home_page_leads_back_to_the_section(calm: BrowserContext, site: str) -> None:
@@ -71,8 +71,8 @@ def test_home_page_leads_back_to_the_section(calm: BrowserContext, site: str) ->
     page.clock.install()
     page.goto(site + PUSH_PAGE)
     page.evaluate("() => document.getElementById('law').scrollIntoView()")
-    written = f"() => localStorage.getItem('{KEY}') !== null"
-    wait_for_condition(page, lambda: page.clock.run_for(1000) or page.evaluate(written))
+    is_written = f"() => localStorage.getItem('{KEY}') !== null"
+    wait_for_condition(page, lambda: page.clock.run_for(1000) or page.evaluate(is_written))
     page.goto(site)
     start = page.locator('[data-progress="start"]')
     expect(start.locator("a")).to_have_text("Continue with 1.1 Push & <em>pull</em>")
@@ -117,25 +117,25 @@ MARKED = """() => new Promise((done) => {
 })"""
 
 
-def test_marks_move_nothing(opened: Opened, site: str) -> None:
+def test_marks_move_nothing(open_address: Opened, site: str) -> None:
     """Neither on a wide screen nor on a narrow one, and not when they come after the text.
 
     The fonts are left out: what they move is another matter, measured in `test_lighthouse.py`.
     """
-    page = opened(site + FALL_PAGE)
+    page = open_address(site + FALL_PAGE)
     store_answers(page, WAY, {"quiz": "push.check_1", "key": "smoke", "right": True, "number": 3})
     quiet = page.context.new_page()
     quiet.route("**/*.woff2", lambda route: route.abort())
     quiet.add_init_script(DRAWN_FIRST)
-    held: list[Route] = []
-    quiet.route("**/assets/site.*.js", lambda route: held.append(route))
+    held_routes: list[Route] = []
+    quiet.route("**/assets/site.*.js", lambda route: held_routes.append(route))
     for width in (320, 1440):
         quiet.set_viewport_size({"width": width, "height": 900})
         for path in ("", "levels/1.html", "progress/", "review/"):
             quiet.goto(site + path, wait_until="commit")
-            wait_for_condition(quiet, lambda: len(held) > 0)
+            wait_for_condition(quiet, lambda: len(held_routes) > 0)
             quiet.evaluate(MARKED)  # the page is drawn before its script comes
-            held.pop().continue_()
+            held_routes.pop().continue_()
             quiet.wait_for_load_state()
             expect(quiet.locator("[data-tools] select")).to_have_count(1)
             becomes(quiet, lambda: (path, quiet.evaluate(MARKED)), (path, []))  # noqa: B023
@@ -157,10 +157,10 @@ Storage.prototype.setItem = () => { throw new DOMException('full', 'QuotaExceede
     ids=["closed", "full"],
 )
 def test_without_storage_every_page_works_and_says_so(
-    calm: BrowserContext, opened: Opened, site: str, script: str, message: str
+    calm: BrowserContext, open_address: Opened, site: str, script: str, message: str
 ) -> None:
     calm.add_init_script(script)
-    page = opened(site + PUSH_PAGE)
+    page = open_address(site + PUSH_PAGE)
     page.get_by_role("button", name="Mark as read").click()
     expect(lesson_end(page).get_by_role("status")).to_have_text("You have read this lesson.")
     expect(lesson_end(page).locator(".lesson-trouble")).to_contain_text(message)
@@ -179,9 +179,9 @@ def test_without_storage_every_page_works_and_says_so(
 
 
 def test_damaged_storage_is_put_aside_and_can_be_saved(
-    opened: Opened, site: str, tmp_path: Path
+    open_address: Opened, site: str, tmp_path: Path
 ) -> None:
-    page = opened(site)
+    page = open_address(site)
     page.evaluate("key => localStorage.setItem(key, '{\"coursebuild\"')", KEY)
     page.goto(site + PUSH_PAGE)
     page.get_by_role("button", name="Mark as read").click()
@@ -200,8 +200,8 @@ def test_damaged_storage_is_put_aside_and_can_be_saved(
     expect(part).to_have_count(0)
 
 
-def test_newer_version_is_left_alone(opened: Opened, site: str) -> None:
-    page = opened(site)
+def test_newer_version_is_left_alone(open_address: Opened, site: str) -> None:
+    page = open_address(site)
     newer = '{"coursebuild":"progress","version":2,"course":"motion"}'
     page.evaluate("([key, text]) => localStorage.setItem(key, text)", [KEY, newer])
     page.goto(site + PUSH_PAGE)

@@ -33,21 +33,21 @@ def focus_on(page: Page, text: str) -> None:
 
 
 def test_saving_forgetting_and_bringing_in(
-    opened: Opened, browsers: Mapping[str, Browser], site: str, tmp_path: Path
+    open_address: Opened, browsers: Mapping[str, Browser], site: str, tmp_path: Path
 ) -> None:
-    lesson = opened(site + FALL_PAGE)
+    lesson = open_address(site + FALL_PAGE)
     choose(question(lesson, "way"), "Up")
     lesson.get_by_role("button", name="Mark as read").click()
-    page = opened(site + "progress/")
+    page = open_address(site + "progress/")
     overall = page.locator(OVERALL)
     expect(overall).to_contain_text("1 of 3 lessons read")
     expect(overall).to_contain_text("0 of 8 tasks done")
     today = "() => `progress-motion-${new Date().toISOString().slice(0, 10)}.json`"
-    named = [page.evaluate(today)]
+    dates = [page.evaluate(today)]
     with page.expect_download() as saving:
         page.get_by_role("button", name="Save as a file").first.click()
-    named.append(page.evaluate(today))
-    assert saving.value.suggested_filename in named
+    dates.append(page.evaluate(today))
+    assert saving.value.suggested_filename in dates
     file = tmp_path / "saved.json"
     saving.value.save_as(file)
     assert json.loads(file.read_text("utf-8")) == stored_progress(page)
@@ -61,17 +61,17 @@ def test_saving_forgetting_and_bringing_in(
     expect(question(lesson, "way").get_by_label("Up", exact=False)).not_to_be_checked()
 
     page.locator("input[type=file]").set_input_files(file)
-    told = page.locator(TOLD)
-    expect(told).to_contain_text("2 things in the file are not here")
+    status = page.locator(TOLD)
+    expect(status).to_contain_text("2 things in the file are not here")
     expect(overall).to_contain_text("Nothing yet.")  # what was forgotten stays so
-    told.get_by_role("button", name="Bring back what was forgotten").click()
-    expect(told).to_contain_text("Imported: 1 answer and 1 lesson")
+    status.get_by_role("button", name="Bring back what was forgotten").click()
+    expect(status).to_contain_text("Imported: 1 answer and 1 lesson")
     expect(overall).to_contain_text("1 of 3 lessons read")
     page.locator("input[type=file]").set_input_files(file)
-    expect(told).to_have_text("Everything in the file was here already.")
+    expect(status).to_have_text("Everything in the file was here already.")
 
-    with browsers["plain"].new_context() as other:
-        phone = other.new_page()
+    with browsers["plain"].new_context() as second_context:
+        phone = second_context.new_page()
         phone.goto(site + PUSH_PAGE)
         phone.get_by_role("button", name="Mark as read").click()
         phone.goto(site + "progress/")
@@ -97,8 +97,8 @@ WRONG_FILES = (
 )
 
 
-def test_wrong_files_change_nothing(opened: Opened, site: str, tmp_path: Path) -> None:
-    page = opened(site)
+def test_wrong_files_change_nothing(open_address: Opened, site: str, tmp_path: Path) -> None:
+    page = open_address(site)
     store_answers(page, WAY)
     page.goto(site + "progress/")
     before = stored_progress(page)
@@ -110,9 +110,9 @@ def test_wrong_files_change_nothing(opened: Opened, site: str, tmp_path: Path) -
 
 
 def test_what_is_no_longer_in_the_course_is_shown_and_can_be_forgotten(
-    opened: Opened, site: str
+    open_address: Opened, site: str
 ) -> None:
-    page = opened(site)
+    page = open_address(site)
     store_answers(
         page,
         {"quiz": "<i>gone", "key": "x", "lesson": "7.7", "number": 3},
@@ -134,8 +134,8 @@ def test_what_is_no_longer_in_the_course_is_shown_and_can_be_forgotten(
     expect(orphans).to_be_hidden()
 
 
-def test_everything_works_from_the_keyboard(opened: Opened, site: str) -> None:
-    page = opened(site)
+def test_everything_works_from_the_keyboard(open_address: Opened, site: str) -> None:
+    page = open_address(site)
     store_answers(page, WAY)
     page.goto(site + "review/")
     press(page, "Begin")
@@ -179,8 +179,8 @@ SMALLEST = """(part) => Math.min(...[...part.querySelectorAll('button, input[typ
   .map(({ width, height }) => Math.min(width, height)))"""
 
 
-def test_what_can_be_pressed_is_large_enough(opened: Opened, site: str) -> None:
-    page = opened(site)
+def test_what_can_be_pressed_is_large_enough(open_address: Opened, site: str) -> None:
+    page = open_address(site)
     store_answers(page, {**WAY, "quiz": "gone"})
     page.set_viewport_size({"width": 320, "height": 640})
     for path, part, button in (

@@ -103,17 +103,17 @@ def test_answers_are_there_again_and_those_that_do_not_fit_are_left_out(page: Pa
         expect(verdict(page, number)).to_contain_text(text)
     for number, entered in ((NUMBER, ""), (ANGLE, "pi/2"), (OPEN, "So.")):
         expect(answer_field(page, number)).to_have_value(entered)
-    chosen = question(page, PREDICT).get_by_role("radio", name="it rests")
-    expect(chosen).to_be_checked()
-    expect(chosen).to_be_disabled()  # there is no way back
+    option = question(page, PREDICT).get_by_role("radio", name="it rests")
+    expect(option).to_be_checked()
+    expect(option).to_be_disabled()  # there is no way back
     expect(question(page, PREDICT).locator(".lab")).to_be_visible()
     expect(question(page, OPEN).get_by_role("radio", name="In part")).to_be_checked()
     becomes(page, lambda: items(page), order)
     becomes(
         page, lambda: (stored_answer(page, MCQ) or {})["tries"], 1
     )  # loading answers nothing again
-    for given in MISFITS:
-        page.evaluate(MISFIT, given)
+    for misfit in MISFITS:
+        page.evaluate(MISFIT, misfit)
         visit(page, page.url)
         expect(question(page, MCQ).get_by_role("radio")).to_have_count(4)
         expect(verdict(page, MCQ)).to_be_empty()
@@ -123,9 +123,9 @@ def test_answers_are_there_again_and_those_that_do_not_fit_are_left_out(page: Pa
 def test_each_answer_is_told_to_scripts_and_to_another_tab(
     page: Page, calm: BrowserContext
 ) -> None:
-    other = calm.new_page()
-    visit(other, page.url)
-    answer_field(other, ANGLE).fill("half")
+    second_page = calm.new_page()
+    visit(second_page, page.url)
+    answer_field(second_page, ANGLE).fill("half")
     page.evaluate(
         """() => {
           window.told = []
@@ -136,8 +136,8 @@ def test_each_answer_is_told_to_scripts_and_to_another_tab(
     answer_field(page, NUMBER).fill("0.08")
     press(page, NUMBER)
     becomes(page, lambda: page.evaluate("told"), [["check", "inertia", True]])
-    expect(verdict(other, NUMBER)).to_contain_text("Right.")
-    expect(answer_field(other, ANGLE)).to_have_value("half")
+    expect(verdict(second_page, NUMBER)).to_contain_text("Right.")
+    expect(answer_field(second_page, ANGLE)).to_have_value("half")
 
 
 def test_quizzes_work_from_a_disk(sites: Mapping[str, Site], calm: BrowserContext) -> None:
@@ -182,13 +182,13 @@ def test_script_of_quizzes_comes_when_a_quiz_comes_near(
     text = file.read_text(encoding="utf-8")
     file.write_text(text.replace("<section class=", "<p>Much.</p>" * 400 + "<section class="))
     page = calm.new_page()
-    asked: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
+    requests: list[str] = []
+    page.on("request", lambda request: requests.append(request.url))
     page.goto(file.as_uri(), wait_until="networkidle")
-    assert not any("/quiz." in url for url in asked)
+    assert not any("/quiz." in url for url in requests)
     page.locator(".question").first.scroll_into_view_if_needed()
     expect(page.locator(".question.is-live")).to_have_count(QUESTIONS)
-    assert sum("/quiz." in url for url in asked) == 1
+    assert sum("/quiz." in url for url in requests) == 1
 
 
 # ------------------------------------------------------------------------------ the preview

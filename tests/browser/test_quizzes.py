@@ -50,29 +50,29 @@ def lesson(browsers: Mapping[str, Browser], quizzes: str) -> Iterator[Page]:
 
 
 def test_one_right_option_of_several(lesson: Page) -> None:
-    one = question(lesson, MCQ)
-    radios = one.get_by_role("group", name="Four times as long:").get_by_role("radio")
+    part = question(lesson, MCQ)
+    radios = part.get_by_role("group", name="Four times as long:").get_by_role("radio")
     expect(radios).to_have_count(4)
-    said = verdict(lesson, MCQ)
+    verdict_part = verdict(lesson, MCQ)
     press(lesson, MCQ)
-    expect(said).to_have_text("Choose one first.")
+    expect(verdict_part).to_have_text("Choose one first.")
     assert stored_answer(lesson, MCQ) is None
     radios.nth(0).check()
-    expect(said).to_be_empty()
+    expect(verdict_part).to_be_empty()
     press(lesson, MCQ)
-    expect(said).to_contain_text("Not right.")
-    expect(said).to_contain_text("Not the same.")
-    expect(said).not_to_contain_text("Since")
-    expect(one.get_by_role("radio", name="the same, T not this")).to_be_checked()
+    expect(verdict_part).to_contain_text("Not right.")
+    expect(verdict_part).to_contain_text("Not the same.")
+    expect(verdict_part).not_to_contain_text("Since")
+    expect(part.get_by_role("radio", name="the same, T not this")).to_be_checked()
     radios.nth(1).check()
     press(lesson, MCQ)
-    expect(said).to_contain_text("Right.")
-    expect(said.get_by_text("The root of four.")).to_be_visible()
-    expect(said.get_by_text("If you chose B")).to_be_hidden()
-    expect(said).to_contain_text("Since")
-    expect(said).to_have_attribute("role", "status")
-    expect(one.get_by_role("button", name="Check")).to_be_focused()
-    expect(one.get_by_role("button", name="Check")).to_have_attribute("aria-disabled", "true")
+    expect(verdict_part).to_contain_text("Right.")
+    expect(verdict_part.get_by_text("The root of four.")).to_be_visible()
+    expect(verdict_part.get_by_text("If you chose B")).to_be_hidden()
+    expect(verdict_part).to_contain_text("Since")
+    expect(verdict_part).to_have_attribute("role", "status")
+    expect(part.get_by_role("button", name="Check")).to_be_focused()
+    expect(part.get_by_role("button", name="Check")).to_have_attribute("aria-disabled", "true")
     answer = stored_answer(lesson, MCQ) or {}
     assert (answer["right"], answer["tries"], answer["number"]) == (True, 2, 1)
     assert (answer["kind"], answer["lesson"], len(answer["given"])) == ("mcq", "1.1", 1)
@@ -97,13 +97,13 @@ def test_several_right_options(lesson: Page) -> None:
 
 
 def test_number_is_judged_and_told_what_is_wrong_with_it(lesson: Page) -> None:
-    field, said = answer_field(lesson, NUMBER), verdict(lesson, NUMBER)
+    field, verdict_part = answer_field(lesson, NUMBER), verdict(lesson, NUMBER)
     field.fill("<img src=x onerror=alert(1)>")
     press(lesson, NUMBER)
-    expect(said).to_contain_text("This cannot be read.")
-    expect(said).to_contain_text("something unexpected at “<img src=x onerror=alert(1)>”")
+    expect(verdict_part).to_contain_text("This cannot be read.")
+    expect(verdict_part).to_contain_text("something unexpected at “<img src=x onerror=alert(1)>”")
     assert stored_answer(lesson, NUMBER) is None  # it is no try
-    for tries, (entered, text, wrong) in enumerate(
+    for tries, (entered, text, explanation) in enumerate(
         (
             ("80", "the power of ten is not", "true"),
             ("800 kg cm²", "Right.Read as 0.08 kg m2", "false"),
@@ -112,71 +112,74 @@ def test_number_is_judged_and_told_what_is_wrong_with_it(lesson: Page) -> None:
     ):
         field.fill(entered)
         field.press("Enter")
-        expect(said).to_contain_text(text)
+        expect(verdict_part).to_contain_text(text)
         expect(field).to_be_focused()
-        becomes(lesson, lambda: field.get_attribute("aria-invalid") or "false", wrong)
+        becomes(lesson, lambda: field.get_attribute("aria-invalid") or "false", explanation)
         answer = stored_answer(lesson, NUMBER) or {}
-        found = (answer["given"], answer["right"], answer["tries"])
-        assert found == (entered, wrong == "false", tries)
+        stored = (answer["given"], answer["right"], answer["tries"])
+        assert stored == (entered, explanation == "false", tries)
     # It is mended beside what is wrong with it.
     field.fill("80")
     press(lesson, NUMBER)
     field.press("End")
     field.press_sequentially("0")
-    expect(said).to_contain_text("the power of ten is not")
+    expect(verdict_part).to_contain_text("the power of ten is not")
     field.fill("0.08")
     press(lesson, NUMBER)
-    expect(said).to_contain_text("So much.")
+    expect(verdict_part).to_contain_text("So much.")
     field.press_sequentially("1")
-    expect(said).to_be_empty()
+    expect(verdict_part).to_be_empty()
 
 
 def test_prediction_is_committed_to_before_its_simulation_opens(lesson: Page) -> None:
-    one = question(lesson, PREDICT)
-    expect(one.locator(".lab")).to_be_hidden()
+    part = question(lesson, PREDICT)
+    expect(part.locator(".lab")).to_be_hidden()
     press(lesson, PREDICT, "Commit to this answer")
     expect(verdict(lesson, PREDICT)).to_have_text("Choose what you predict first.")
-    one.get_by_role("radio", name="it rests").check()
+    part.get_by_role("radio", name="it rests").check()
     press(lesson, PREDICT, "Commit to this answer")
     expect(verdict(lesson, PREDICT)).to_contain_text("Something else happens.")
-    expect(one.locator(".outcome > div")).to_have_text(
+    expect(part.locator(".outcome > div")).to_have_text(
         ["You predicted" + "it rests", "What happens" + "it swings"]
     )
     expect(verdict(lesson, PREDICT)).to_contain_text("It does not.")
     expect(verdict(lesson, PREDICT)).to_contain_text("Gravity pulls.")
-    expect(one.get_by_role("radio").first).to_be_disabled()
-    expect(one.get_by_role("button", name="Try again")).to_be_hidden()
-    expect(one.get_by_role("button", name="Show the answer")).to_be_hidden()
-    one.locator(".lab").scroll_into_view_if_needed()
-    expect(one.locator(".lab")).to_have_attribute("data-state", "paused")
-    expect(one.get_by_role("button", name="Play")).to_be_visible()
+    expect(part.get_by_role("radio").first).to_be_disabled()
+    expect(part.get_by_role("button", name="Try again")).to_be_hidden()
+    expect(part.get_by_role("button", name="Show the answer")).to_be_hidden()
+    part.locator(".lab").scroll_into_view_if_needed()
+    expect(part.locator(".lab")).to_have_attribute("data-state", "paused")
+    expect(part.get_by_role("button", name="Play")).to_be_visible()
 
 
 def test_open_question_is_compared_and_marked_by_the_learner(lesson: Page) -> None:
-    one = question(lesson, OPEN)
+    part = question(lesson, OPEN)
     press(lesson, OPEN, "Compare")
     expect(verdict(lesson, OPEN)).to_have_text("Write an answer first.")
     answer_field(lesson, OPEN).fill("It <b>is</b>\nso.")
     press(lesson, OPEN, "Compare")
     expect(verdict(lesson, OPEN)).to_contain_text("Since so.")
     assert (stored_answer(lesson, OPEN) or {})["right"] is None
-    for name, said, right in (
+    for name, message, right in (
         ("In part", "Marked as right in part.", False),
         ("It says the same", "Marked as right.", True),
         ("Not yet", "Marked as not right yet.", False),
     ):
-        one.get_by_role("radio", name=name).check()
-        expect(verdict(lesson, OPEN)).to_contain_text(said)
+        part.get_by_role("radio", name=name).check()
+        expect(verdict(lesson, OPEN)).to_contain_text(message)
         answer = stored_answer(lesson, OPEN) or {}
         assert (answer["right"], answer["tries"]) == (right, 1)
 
 
 def test_line_that_is_printed(lesson: Page) -> None:
     field = answer_field(lesson, OUTPUT)
-    for entered, said in (("t = 2.0061 s", "Only capitals"), ("T  =  2.00610 s ", "Right.")):
+    for entered, message in (
+        ("t = 2.0061 s", "Only capitals"),
+        ("T  =  2.00610 s ", "Right."),
+    ):
         field.fill(entered)
         press(lesson, OUTPUT)
-        expect(verdict(lesson, OUTPUT)).to_contain_text(said)
+        expect(verdict(lesson, OUTPUT)).to_contain_text(message)
     expect(verdict(lesson, OUTPUT)).to_contain_text("Four places.")
 
 
@@ -194,8 +197,8 @@ def test_order_by_dragging_and_by_buttons(lesson: Page) -> None:
     lesson.mouse.move(x, end["y"] + 1.2 * end["height"], steps=6)
     lesson.mouse.up()
     becomes(lesson, lambda: items(lesson), [*before[1:], before[0]])
-    said = question(lesson, ORDER).locator("p[role=status]")
-    expect(said).to_have_text(f"{before[0]}: place 4 of 4")
+    verdict_part = question(lesson, ORDER).locator("p[role=status]")
+    expect(verdict_part).to_have_text(f"{before[0]}: place 4 of 4")
     press(lesson, ORDER)
     expect(verdict(lesson, ORDER)).to_contain_text("of 4 are where they belong.")
     for place, name in enumerate(sorted_items):
@@ -203,7 +206,7 @@ def test_order_by_dragging_and_by_buttons(lesson: Page) -> None:
             button = question(lesson, ORDER).get_by_role("button", name=f"Move up {name}")
             button.click()
             expect(button).to_be_focused()
-            expect(said).to_have_text(f"{name}: place {at} of 4")
+            expect(verdict_part).to_have_text(f"{name}: place {at} of 4")
     expect(verdict(lesson, ORDER)).to_be_empty()
     press(lesson, ORDER)
     expect(verdict(lesson, ORDER)).to_contain_text("Right. By length.")
@@ -267,9 +270,9 @@ def test_hints_come_one_by_one_and_the_answer_after_a_try(page: Page) -> None:
     press(page, MCQ)
     expect(verdict(page, MCQ)).to_contain_text("Not right.")
     assert (stored_answer(page, MCQ) or {})["hints"] == 1
-    one, field = question(page, NUMBER), answer_field(page, NUMBER)
-    reveal = one.get_by_role("button", name="Show the answer")
-    again = one.get_by_role("button", name="Try again")
+    part, field = question(page, NUMBER), answer_field(page, NUMBER)
+    reveal = part.get_by_role("button", name="Show the answer")
+    again = part.get_by_role("button", name="Try again")
     expect(reveal).to_be_hidden()
     field.fill("5")
     press(page, NUMBER)
@@ -285,8 +288,8 @@ def test_hints_come_one_by_one_and_the_answer_after_a_try(page: Page) -> None:
     expect(field).to_be_focused()
     press(page, ORDER)
     press(page, ORDER, "Show the answer")
-    shown = verdict(page, ORDER).locator("ol > li")
-    becomes(page, lambda: texts(shown), ["1 m", "2 m", "3 m", "4 m"])
+    solution = verdict(page, ORDER).locator("ol > li")
+    becomes(page, lambda: texts(solution), ["1 m", "2 m", "3 m", "4 m"])
 
 
 def test_formulas_code_and_markup_in_options_choose_them(page: Page) -> None:

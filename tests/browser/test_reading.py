@@ -28,8 +28,8 @@ def open_page(browsers: Mapping[str, Browser], sites: Mapping[str, Site]) -> Ite
 
         def open_page(name: str = "nasty", at: str = "", width: int = 1440, **options: Any) -> Page:
             viewport: Any = {"width": width, "height": 900}
-            made = browsers["plain"].new_context(viewport=viewport, **options)
-            page = stack.enter_context(made).new_page()
+            context = browsers["plain"].new_context(viewport=viewport, **options)
+            page = stack.enter_context(context).new_page()
             page.goto(sites[name].url(LESSON) + at)
             wait_until_settled(page)
             return page
@@ -73,8 +73,8 @@ def test_code_in_a_callout_is_as_wide_as_elsewhere(open_page: OpenPage) -> None:
 
     def ends(*selectors: str) -> bool:
         boxes = [page.locator(selector).first.bounding_box() for selector in selectors]
-        one, other = (box["x"] + box["width"] for box in boxes if box is not None)
-        return bool(one == pytest.approx(other, abs=1))
+        first_end, second_end = (box["x"] + box["width"] for box in boxes if box is not None)
+        return bool(first_end == pytest.approx(second_end, abs=1))
 
     for width in (800, 1200, 1440):
         page.set_viewport_size({"width": width, "height": 900})
@@ -86,17 +86,17 @@ def test_formulas_of_usual_height_leave_lines_where_they_are(open_page: OpenPage
     page = open_page()
     item = page.locator("li:has(msqrt)")
     height = "e => e.getBoundingClientRect().height"
-    without = item.locator("xpath=following-sibling::li[1]")
-    assert item.evaluate(height) == without.evaluate(height)
+    plain_item = item.locator("xpath=following-sibling::li[1]")
+    assert item.evaluate(height) == plain_item.evaluate(height)
     end = "getBoundingClientRect().right"
     gap = item.locator("msqrt").evaluate(f"e => e.{end} - e.querySelector('mi').{end}")
     assert gap < 2, "nothing behind a root"
 
 
 def test_text_code_and_formulas_are_set_in_the_fonts_of_the_site(open_page: OpenPage) -> None:
-    found = "[...document.fonts].filter(f => f.status === 'loaded').map(f => f.family)"
-    loaded = {name.strip('"') for name in open_page().evaluate(found)}
-    assert loaded >= {"Source Serif 4 Variable", "Source Code Pro Variable", "STIX Two Math"}
+    families_script = "[...document.fonts].filter(f => f.status === 'loaded').map(f => f.family)"
+    families = {name.strip('"') for name in open_page().evaluate(families_script)}
+    assert families >= {"Source Serif 4 Variable", "Source Code Pro Variable", "STIX Two Math"}
 
 
 def test_colours_are_kept_and_set_before_anything_is_drawn(open_page: OpenPage) -> None:
@@ -119,25 +119,25 @@ def test_colours_are_kept_and_set_before_anything_is_drawn(open_page: OpenPage) 
 # ------------------------------------------------------------------------------- line links
 
 
-def marked(page: Page) -> list[str]:
-    found: list[str] = page.evaluate("[...document.querySelectorAll('.marked')].map(e => e.id)")
-    return found
+def marked_ids(page: Page) -> list[str]:
+    ids: list[str] = page.evaluate("[...document.querySelectorAll('.marked')].map(e => e.id)")
+    return ids
 
 
 def test_a_line_in_a_fold_is_shown_and_marked(open_page: OpenPage) -> None:
     page = open_page(at="#sub/wide.L60-L62")
-    becomes(page, lambda: marked(page), ["sub/wide.L60", "sub/wide.L61", "sub/wide.L62"])
+    becomes(page, lambda: marked_ids(page), ["sub/wide.L60", "sub/wide.L61", "sub/wide.L62"])
     expect(page.locator("[id='sub/wide.L60']")).to_be_in_viewport()
     page.evaluate("location.hash = '#sub/wide.L4'")
-    becomes(page, lambda: marked(page), ["sub/wide.L4"])
+    becomes(page, lambda: marked_ids(page), ["sub/wide.L4"])
 
 
 def test_a_long_line_is_shown_from_its_beginning(open_page: OpenPage) -> None:
     page = open_page(at="#sub/wide.L5", width=800)
-    becomes(page, lambda: marked(page), ["sub/wide.L5"])
+    becomes(page, lambda: marked_ids(page), ["sub/wide.L5"])
     box = page.locator("pre:has([id='sub/wide.L5'])")
-    shown = "b => [b.scrollWidth > b.clientWidth, b.scrollLeft]"
-    becomes(page, lambda: box.evaluate(shown), [True, 0])
+    measure = "b => [b.scrollWidth > b.clientWidth, b.scrollLeft]"
+    becomes(page, lambda: box.evaluate(measure), [True, 0])
 
 
 def test_a_link_opens_the_section_that_it_leads_into(
@@ -160,12 +160,12 @@ def test_an_address_of_no_line_does_no_harm(open_page: OpenPage) -> None:
     page = open_page(at="#sub/wide.L3")
     for address in ("#sub/wide.L0", "#sub/wide.L9999", "#%", "#x.L1-L99999999"):
         page.evaluate("location.hash = '#sub/wide.L3'")
-        becomes(page, lambda: marked(page), ["sub/wide.L3"])
+        becomes(page, lambda: marked_ids(page), ["sub/wide.L3"])
         page.evaluate("to => { location.hash = to }", address)
-        becomes(page, lambda: marked(page), [])
+        becomes(page, lambda: marked_ids(page), [])
         page.reload()
         wait_until_settled(page)
-        assert marked(page) == [], address
+        assert marked_ids(page) == [], address
     expect(page.locator(".lines").first).to_be_visible()
 
 
@@ -177,14 +177,14 @@ def test_lines_are_marked_by_pointer_and_by_keys(open_page: OpenPage) -> None:
     box = column.bounding_box()
     height = box["height"] / column.inner_text().count("\n", 0) if box else 0
     column.click(position={"x": 20, "y": height * 2.2})
-    wait_for_condition(page, lambda: len(marked(page)) == 1)
+    wait_for_condition(page, lambda: len(marked_ids(page)) == 1)
     expect(page).to_have_url(re.compile(r"#sub/wide\.L\d+$"))
-    becomes(page, lambda: marked(page), [page.url.partition("#")[2]])
+    becomes(page, lambda: marked_ids(page), [page.url.partition("#")[2]])
     column.press("Shift+ArrowDown")
-    wait_for_condition(page, lambda: len(marked(page)) == 2)
+    wait_for_condition(page, lambda: len(marked_ids(page)) == 2)
     expect(page).to_have_url(re.compile(r"#sub/wide\.L\d+-L\d+$"))
     column.press("Home")
-    becomes(page, lambda: marked(page), [f"sub/wide.L{first}"])
+    becomes(page, lambda: marked_ids(page), [f"sub/wide.L{first}"])
     expect(column).to_have_attribute("aria-valuenow", str(first))
     expect(page.locator(".lines").first).to_have_attribute("role", "slider")  # one control
 
@@ -199,12 +199,12 @@ def test_numbers_are_neither_copied_nor_selected(
     script.get_by_role("button", name="Copied").wait_for()
     text = page.evaluate("navigator.clipboard.readText()")
     assert text == (sites["nasty"].public / "examples/sub/wide.py").read_text()
-    chosen = page.evaluate(
+    selection = page.evaluate(
         "() => { const chosen = getSelection()\n"
         "chosen.selectAllChildren(document.querySelector('.script pre'))\n"
         "return chosen.toString() }"
     )
-    assert not re.search(r"^\d+$", chosen, re.MULTILINE)
+    assert not re.search(r"^\d+$", selection, re.MULTILINE)
 
 
 # ------------------------------------------------------------------------------- side notes
@@ -230,14 +230,20 @@ def misplaced(page: Page, from_right: bool) -> list[Any]:
     prose = page.locator(".prose > p").first.bounding_box()
     assert prose is not None
     end = prose["x"] + prose["width"]
-    around = page.evaluate(IN_THE_WAY, [notes[0]["left"], notes[0]["right"]])
-    beside = [note["right"] <= prose["x"] if from_right else note["left"] >= end for note in notes]
-    near = [abs(note["top"] - note["mark"]) < 720 for note in notes]
-    free = [all(n["bottom"] <= a + 1 or n["top"] >= b - 1 for a, b in around) for n in notes]
-    wrong: list[Any] = [
-        note for note, *good in zip(notes, beside, near, free, strict=True) if not all(good)
+    obstacles = page.evaluate(IN_THE_WAY, [notes[0]["left"], notes[0]["right"]])
+    is_beside = [
+        note["right"] <= prose["x"] if from_right else note["left"] >= end for note in notes
     ]
-    return wrong + [two for two in itertools.pairwise(notes) if two[0]["bottom"] > two[1]["top"]]
+    is_near = [abs(note["top"] - note["mark"]) < 720 for note in notes]
+    is_clear = [all(n["bottom"] <= a + 1 or n["top"] >= b - 1 for a, b in obstacles) for n in notes]
+    bad_notes: list[Any] = [
+        note
+        for note, *good in zip(notes, is_beside, is_near, is_clear, strict=True)
+        if not all(good)
+    ]
+    return bad_notes + [
+        two for two in itertools.pairwise(notes) if two[0]["bottom"] > two[1]["top"]
+    ]
 
 
 @pytest.mark.parametrize("name", ["nasty", "arabic"])
@@ -257,13 +263,13 @@ def test_each_note_is_there_once_and_folded_ones_wait(open_page: OpenPage) -> No
     page.set_viewport_size({"width": 1000, "height": 900})
     until(page, "document.querySelector('.footnotes .aside') === null")
 
-    def listed() -> bool:
+    def is_listed() -> bool:
         order = page.evaluate(NOTES)
         ids = [int(note["id"][3:]) for note in order]
-        below = all(a["bottom"] <= b["top"] for a, b in itertools.pairwise(order))
-        return below and ids == sorted(ids)
+        is_ordered = all(a["bottom"] <= b["top"] for a, b in itertools.pairwise(order))
+        return is_ordered and ids == sorted(ids)
 
-    wait_for_condition(page, listed)  # at the end
+    wait_for_condition(page, is_listed)  # at the end
 
 
 # ------------------------------------------------------------------------- from the right
@@ -273,9 +279,9 @@ def test_a_page_from_the_right_is_mirrored_and_its_code_is_not(open_page: OpenPa
     page = open_page("arabic")
 
     def box(selector: str) -> dict[str, float]:
-        found = page.locator(selector).first.bounding_box()
-        assert found is not None, selector
-        return {**found, "end": found["x"] + found["width"]}
+        bounds = page.locator(selector).first.bounding_box()
+        assert bounds is not None, selector
+        return {**bounds, "end": bounds["x"] + bounds["width"]}
 
     assert page.locator("html").get_attribute("dir") == "rtl"
     assert box(".toc")["x"] > box(".prose > p")["end"] > box(".dock-lab")["end"]
@@ -315,9 +321,9 @@ QUANTITIES = {
 def test_quantities_read_from_the_left(open_page: OpenPage) -> None:
     page = open_page("arabic")
     for selector, text in QUANTITIES.items():
-        found = page.evaluate(POSITIONS, selector)
-        assert "".join(letter for letter, _ in found) == text
-        places = [left for letter, left in found if letter != "\n"]
+        positions = page.evaluate(POSITIONS, selector)
+        assert "".join(letter for letter, _ in positions) == text
+        places = [left for letter, left in positions if letter != "\n"]
         assert places == sorted(places), selector
 
 
@@ -334,10 +340,10 @@ def test_axe_finds_nothing(open_page: OpenPage, name: str) -> None:
 def test_colours_of_the_reader_are_kept(open_page: OpenPage) -> None:
     """High contrast: what is told by a colour of ours is told by one of the system's."""
     page = open_page(at="#sub/wide.L6", forced_colors="active")
-    becomes(page, lambda: marked(page), ["sub/wide.L6"])
-    line, other = (page.locator(f"[id='sub/wide.L{n}']") for n in (6, 3))
+    becomes(page, lambda: marked_ids(page), ["sub/wide.L6"])
+    line, second_line = (page.locator(f"[id='sub/wide.L{n}']") for n in (6, 3))
     colour = "e => getComputedStyle(e).backgroundColor"
-    assert line.evaluate(colour) != other.evaluate(colour)
+    assert line.evaluate(colour) != second_line.evaluate(colour)
     shape = page.locator(".status").first.evaluate(
         "e => getComputedStyle(e, '::before').borderTopStyle"
     )

@@ -23,13 +23,13 @@ def review_of(page: Page) -> Locator:
     return page.locator('[data-progress="review"]')
 
 
-def is_chosen(found: Locator, option: str) -> None:
-    found.scroll_into_view_if_needed()  # it comes alive when it comes near
-    expect(found.get_by_label(option)).to_be_checked()
+def is_chosen(part: Locator, option: str) -> None:
+    part.scroll_into_view_if_needed()  # it comes alive when it comes near
+    expect(part.get_by_label(option)).to_be_checked()
 
 
-def test_missed_questions_come_back(opened: Opened, site: str) -> None:
-    page = opened(site)
+def test_missed_questions_come_back(open_address: Opened, site: str) -> None:
+    page = open_address(site)
     store_answers(
         page,
         {"quiz": "push.check_1", "key": "smoke", "number": 3},
@@ -41,8 +41,8 @@ def test_missed_questions_come_back(opened: Opened, site: str) -> None:
     page.goto(site + "review/")
     due, following = page.locator(".due"), page.get_by_role("button", name="Next question")
     expect(due).to_have_text("3 questions are due.")
-    gone = "One more was missed, but its question is no longer in the course."
-    expect(review_of(page)).to_contain_text(gone)
+    orphan_text = "One more was missed, but its question is no longer in the course."
+    expect(review_of(page)).to_contain_text(orphan_text)
     page.get_by_role("button", name="Begin").click()
     expect(page.locator(":focus")).to_have_text("Question 1 of 3")
     # Nothing is shown of what was answered before.
@@ -71,8 +71,8 @@ def test_missed_questions_come_back(opened: Opened, site: str) -> None:
     is_chosen(question(page, "way"), "Up")
 
 
-def test_question_that_cannot_be_fetched_is_linked(opened: Opened, site: str) -> None:
-    page = opened(site + "about.html")
+def test_question_that_cannot_be_fetched_is_linked(open_address: Opened, site: str) -> None:
+    page = open_address(site + "about.html")
     store_answers(page, WAY)
     page = page.context.new_page()
     page.route("**/lessons/*", lambda route: route.fulfill(status=500, body="no"))
@@ -85,9 +85,9 @@ def test_question_that_cannot_be_fetched_is_linked(opened: Opened, site: str) ->
 
 
 def test_review_opened_from_disk_links_to_questions(
-    opened: Opened, sites: Mapping[str, Site]
+    open_address: Opened, sites: Mapping[str, Site]
 ) -> None:
-    page = opened((sites["reader"].public / "review/index.html").as_uri())
+    page = open_address((sites["reader"].public / "review/index.html").as_uri())
     store_answers(page, WAY)
     page.reload()
     expect(review_of(page)).to_contain_text("Pages opened from disk")
@@ -96,12 +96,12 @@ def test_review_opened_from_disk_links_to_questions(
 
 
 def test_reworded_question_keeps_its_answer_and_its_turn(
-    opened: Opened, sites: Mapping[str, Site], tmp_path: Path
+    open_address: Opened, sites: Mapping[str, Site], tmp_path: Path
 ) -> None:
     folder = Folder(tmp_path / "course")
     shutil.copytree(sites["reader"].root, folder.root, symlinks=True)
     with Host(folder.root / "public") as host:
-        page = opened(host.url + PUSH_PAGE)
+        page = open_address(host.url + PUSH_PAGE)
         first = page.locator(".question").first
         choose(first, "Up")
         expect(first.locator(".verdict")).to_contain_text("Not right.")

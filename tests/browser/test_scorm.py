@@ -60,10 +60,10 @@ def visit(calm: BrowserContext, platform: str) -> Iterator[Callable[..., Page]]:
     """Opens the lesson in the platform; nothing may go wrong, and nothing be refused."""
     pages: list[Page] = []
 
-    def visit(who: str = "ada") -> Page:
+    def visit(learner: str = "ada") -> Page:
         page = calm.new_page()
         page.on("pageerror", lambda error: pytest.fail(str(error)))
-        page.goto(f"{platform}platform.html?who={who}")
+        page.goto(f"{platform}platform.html?who={learner}")
         lesson(page).locator("[data-question]").first.wait_for()
         pages.append(page)
         return page
@@ -111,19 +111,21 @@ def test_answers_points_and_status_reach_the_platform(visit: Visit) -> None:
     live(page, "much").get_by_role("textbox").fill("0.08")
     live(page, "much").locator(".quiz-check").click()
     until(page, "API.cmi.core.lesson_status === 'passed'")
-    found: Any = page.evaluate("JSON.parse(JSON.stringify(API.cmi))")
-    points = {key: found["core"]["score"][key] for key in ("raw", "min", "max")}
+    model: Any = page.evaluate("JSON.parse(JSON.stringify(API.cmi))")
+    points = {key: model["core"]["score"][key] for key in ("raw", "min", "max")}
     assert points == {"raw": "100", "min": "0", "max": "100"}
     parts = ("id", "type", "student_response", "result")
-    told = [[one[part] for part in parts] for one in found["interactions"].values()]
-    assert told[:2] == [
+    interactions = [
+        [interaction[part] for part in parts] for interaction in model["interactions"].values()
+    ]
+    assert interactions[:2] == [
         ["check.which", "choice", "c", "wrong"],
         ["check.which", "choice", "b", "correct"],
     ]
-    assert told[2][0] == "check.much" and told[2][3] == "correct"
+    assert interactions[2][0] == "check.much" and interactions[2][3] == "correct"
     left(page)
-    kept = page.evaluate("JSON.parse(localStorage.getItem('platform'))")
-    assert kept["core"]["exit"] == "suspend"
+    stored = page.evaluate("JSON.parse(localStorage.getItem('platform'))")
+    assert stored["core"]["exit"] == "suspend"
 
 
 FORGET = (
@@ -149,9 +151,9 @@ def test_another_learner_at_this_machine_starts_anew(visit: Visit) -> None:
     scored(page, "50")
     left(page)
     page.evaluate(FORGET.replace("PLATFORM", "true"))
-    other = visit("emmy")
-    expect(live(other, "which").get_by_label("green")).not_to_be_checked()
-    becomes(other, lambda: other.evaluate("API.cmi.core.score.raw") in ("", "0"), True)
+    second_page = visit("emmy")
+    expect(live(second_page, "which").get_by_label("green")).not_to_be_checked()
+    becomes(second_page, lambda: second_page.evaluate("API.cmi.core.score.raw") in ("", "0"), True)
 
 
 def test_visit_goes_on_over_other_pages_of_the_course(visit: Visit) -> None:
@@ -181,9 +183,9 @@ def test_platform_in_a_window_of_its_own(calm: BrowserContext, platform: str) ->
     opener = calm.new_page()
     opener.goto(f"{platform}platform.html")
     opener.evaluate("document.querySelector('iframe').remove(); API.reset()")
-    with calm.expect_page() as opened:
+    with calm.expect_page() as popup:
         opener.evaluate("window.open('sco/1.1-one.html')")
-    window = opened.value
+    window = popup.value
     window.frame_locator("iframe").locator("[data-question]").first.wait_for()
     until(opener, "API.cmi.core.lesson_status === 'incomplete'")
     window.close(run_before_unload=True)

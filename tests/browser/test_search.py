@@ -53,8 +53,8 @@ LOADED = """() => performance.getEntriesByType('resource').map((entry) => entry.
   .filter((name) => name.includes('search')).map((name) => name.split('/').at(-1))"""
 
 
-def test_nothing_is_loaded_before_it_is_asked_for(opened: Opened, site: str) -> None:
-    page = opened(site + ONE)
+def test_nothing_is_loaded_before_it_is_asked_for(open_address: Opened, site: str) -> None:
+    page = open_address(site + ONE)
     wait_until_settled(page)
     assert page.evaluate(LOADED) == []
     open_by_key(page)
@@ -74,13 +74,15 @@ QUERIES = {
 
 
 def test_what_a_learner_types_is_found_and_what_authors_wrote_is_text(
-    opened: Opened, site: str
+    open_address: Opened, site: str
 ) -> None:
-    page = opened(site + "lessons/1.5-more5.html")
+    page = open_address(site + "lessons/1.5-more5.html")
     page.on("dialog", lambda dialog: pytest.fail(dialog.message))
     open_by_key(page)
-    found = {query: ask(page, query)[0] for query in QUERIES}
-    assert [(q, found[q]) for q, title in QUERIES.items() if not found[q].startswith(title)] == []
+    results = {query: ask(page, query)[0] for query in QUERIES}
+    assert [
+        (q, results[q]) for q, title in QUERIES.items() if not results[q].startswith(title)
+    ] == []
     expect(page.locator(".search-option mark").first).to_be_visible()
     expect(page.locator(".search-dialog :is(img, script, b)")).to_have_count(0)
     ask(page, "drfit")
@@ -89,8 +91,8 @@ def test_what_a_learner_types_is_found_and_what_authors_wrote_is_text(
     expect(status(page)).to_have_text(re.compile("^Nothing found for “qzxwv”. "))
 
 
-def test_arrows_choose_and_enter_goes_there(opened: Opened, site: str) -> None:
-    page = opened(site + "lessons/1.5-more5.html")
+def test_arrows_choose_and_enter_goes_there(open_address: Opened, site: str) -> None:
+    page = open_address(site + "lessons/1.5-more5.html")
     page.locator(".search-open").focus()
     page.keyboard.press("Enter")
     until(page, "() => document.querySelectorAll('.search-option').length > 0")
@@ -98,9 +100,9 @@ def test_arrows_choose_and_enter_goes_there(opened: Opened, site: str) -> None:
     page.keyboard.type("inertia tensor")
     until(page, SHOWN, "inertia tensor")
     active = page.locator(".search-option[aria-selected=true]")
-    for key, chosen in (("ArrowDown", "The inertia tensor"), ("ArrowUp", "1.1 Lesson one")):
+    for key, title in (("ArrowDown", "The inertia tensor"), ("ArrowUp", "1.1 Lesson one")):
         page.keyboard.press(key)
-        expect(active).to_contain_text(chosen)
+        expect(active).to_contain_text(title)
         expect(page.locator("#_search-field")).to_have_attribute(
             "aria-activedescendant", active.get_attribute("id") or ""
         )
@@ -112,8 +114,8 @@ def test_arrows_choose_and_enter_goes_there(opened: Opened, site: str) -> None:
     page.wait_for_url("**/lessons/1.1-one.html#tensor")
 
 
-def test_escape_closes_and_the_focus_goes_back(opened: Opened, site: str) -> None:
-    page = opened(site + ONE)
+def test_escape_closes_and_the_focus_goes_back(open_address: Opened, site: str) -> None:
+    page = open_address(site + ONE)
     page.locator(".search-open").click()
     until(page, "() => document.querySelectorAll('.search-option').length > 0")
     expect(page.locator(".search-input")).to_be_focused()
@@ -137,10 +139,10 @@ AGAIN = """async (query) => {
 
 
 def test_what_is_typed_at_once_after_opening_is_searched_and_enter_waits(
-    opened: Opened, site: str
+    open_address: Opened, site: str
 ) -> None:
     """The event that a dialog was closed can come after the next opening and the first keys."""
-    page = opened(site + ONE)
+    page = open_address(site + ONE)
     open_by_key(page)
     for query in ("mj_forward 1", "mj_forward 2", "mj_forward 3"):
         page.evaluate(AGAIN, query)
@@ -151,8 +153,8 @@ def test_what_is_typed_at_once_after_opening_is_searched_and_enter_waits(
     page.wait_for_url("**/lessons/1.2-two.html")
 
 
-def test_single_keys_can_be_switched_off(opened: Opened, site: str) -> None:
-    page = opened(site + ONE)
+def test_single_keys_can_be_switched_off(open_address: Opened, site: str) -> None:
+    page = open_address(site + ONE)
     open_by_key(page)
     page.locator(".search-keys input").uncheck()
     page.keyboard.press("Escape")
@@ -173,13 +175,13 @@ NOTE_WHAT_IS_SAID = """() => {
 """It is shown for three seconds, in which a busy machine may not get to look."""
 
 
-def test_commands(opened: Opened, calm: BrowserContext, site: str) -> None:
+def test_commands(open_address: Opened, calm: BrowserContext, site: str) -> None:
     calm.grant_permissions(["clipboard-read", "clipboard-write"])
-    page = opened(site + "lessons/1.1-one.html#tensor")
+    page = open_address(site + "lessons/1.1-one.html#tensor")
     open_by_key(page)
-    listed = ask(page, ">")
+    commands = ask(page, ">")
     for title in ("Next lesson: 1.2 Lesson two", "Print this page", "Course map", "Search"):
-        assert any(option.startswith(title) for option in listed), listed
+        assert any(option.startswith(title) for option in commands), commands
     assert ask(page, "> dark") == ["Colours: Dark"]
     page.keyboard.press("Enter")
     expect(page.locator("html")).to_have_attribute("data-theme", "dark")
@@ -192,14 +194,14 @@ def test_commands(opened: Opened, calm: BrowserContext, site: str) -> None:
     page.evaluate(NOTE_WHAT_IS_SAID)
     page.keyboard.press("Enter")
     until(page, "window.said === 'The link is copied.'")
-    copied = page.evaluate("() => navigator.clipboard.readText()")
-    assert copied.endswith("/lessons/1.1-one.html#tensor")
+    clipboard = page.evaluate("() => navigator.clipboard.readText()")
+    assert clipboard.endswith("/lessons/1.1-one.html#tensor")
 
 
 def test_what_was_searched_before_is_offered_and_can_be_forgotten(
-    opened: Opened, site: str
+    open_address: Opened, site: str
 ) -> None:
-    page = opened(site + ONE)
+    page = open_address(site + ONE)
     open_by_key(page)
     ask(page, "mj_forward")
     page.keyboard.press("Enter")
@@ -216,9 +218,9 @@ def test_what_was_searched_before_is_offered_and_can_be_forgotten(
     until(page, "!Object.keys(localStorage).some((key) => /search/.test(key))")
 
 
-def test_from_a_disk(sites: Mapping[str, Site], opened: Opened) -> None:
+def test_from_a_disk(sites: Mapping[str, Site], open_address: Opened) -> None:
     folder = f"{sites['search'].public.as_uri()}/"
-    page = opened(folder + ONE)
+    page = open_address(folder + ONE)
     open_by_key(page)
     assert ask(page, "mj_forwrad")[0].startswith("1.2 Lesson two")
     page.keyboard.press("Enter")
@@ -227,8 +229,8 @@ def test_from_a_disk(sites: Mapping[str, Site], opened: Opened) -> None:
     expect(page.locator(".found-pages a").first).to_have_text("1.1 Lesson one")
 
 
-def test_all_results_are_on_a_page_of_their_own(opened: Opened, site: str) -> None:
-    page = opened(site + ONE)
+def test_all_results_are_on_a_page_of_their_own(open_address: Opened, site: str) -> None:
+    page = open_address(site + ONE)
     open_by_key(page)
     assert ask(page, "pendulum")[-1] == "All results"
     page.keyboard.press("ArrowUp")
@@ -282,9 +284,9 @@ SMALL = """[...document.querySelectorAll('dialog[open] :is(button, label, [role=
   .filter((box) => box.height < 24 || box.width < 24).map((box) => [box.width, box.height])"""
 
 
-def test_dialog_is_accessible_and_within_the_window(opened: Opened, site: str) -> None:
+def test_dialog_is_accessible_and_within_the_window(open_address: Opened, site: str) -> None:
     """Axe finds nothing, nothing is wider than a window, or too small for a finger."""
-    page = opened(site + ONE)
+    page = open_address(site + ONE)
     open_by_key(page)
     for query in ("inertia tensor", ">", "qzxwv"):
         ask(page, query)

@@ -40,13 +40,13 @@ DRAW = """(n) => new Promise((done) => {
 
 def run(context: BrowserContext, base: str) -> tuple[Page, list[str]]:
     """The swing with its plot, running for a while."""
-    page, said = watch_page(context)
+    page, console = watch_page(context)
     page.goto(base + PAGE)
     swing = lab(page)
     swing.get_by_role("button", name="Play").click()
     reach(page, SWING, "playing")
     wait_for_condition(page, lambda: time_of(swing) > 1)
-    return page, said
+    return page, console
 
 
 def tasks(page: Page, pictures: int) -> tuple[list[float], float]:
@@ -64,33 +64,33 @@ def tasks(page: Page, pictures: int) -> tuple[list[float], float]:
         for event in events
         if event["name"] == "thread_name" and event["args"]["name"] == "CrRendererMain"
     }
-    found: dict[tuple[int, int], list[float]] = defaultdict(list)
+    task_times: dict[tuple[int, int], list[float]] = defaultdict(list)
     for event in events:
         thread = event["pid"], event["tid"]
         if event["name"] == "RunTask" and thread in main:
-            found[thread].append(event.get("tdur", 0) / 1000)
-    return max(found.values(), key=sum), elapsed
+            task_times[thread].append(event.get("tdur", 0) / 1000)
+    return max(task_times.values(), key=sum), elapsed
 
 
 def test_no_task_is_long_and_the_thread_is_free(context: BrowserContext, base: str) -> None:
-    page, said = run(context, base)
-    found, elapsed = tasks(page, PICTURES)
-    assert [ms for ms in found if ms > LONG] == []
-    assert sum(found) < BUSY * elapsed
+    page, console = run(context, base)
+    task_times, elapsed = tasks(page, PICTURES)
+    assert [ms for ms in task_times if ms > LONG] == []
+    assert sum(task_times) < BUSY * elapsed
     assert page.locator(".lab").first.get_attribute("data-state") == "playing"
-    assert said == []
+    assert console == []
 
 
 def test_page_that_works_on_each_picture_is_found_out(context: BrowserContext, base: str) -> None:
     """What the test above measures is there to be measured."""
     page, _ = run(context, base)
     page.evaluate(BURDEN, 30)
-    found, _ = tasks(page, 30)
-    assert [ms for ms in found if ms > LONG] == []
-    assert sum(found) > BUSY * 30 * 1000 / 60  # at sixty pictures in a second
+    task_times, _ = tasks(page, 30)
+    assert [ms for ms in task_times if ms > LONG] == []
+    assert sum(task_times) > BUSY * 30 * 1000 / 60  # at sixty pictures in a second
     page.evaluate(BURDEN, 500)  # of which a processor that others want gives it a part
-    found, _ = tasks(page, 5)
-    assert len([ms for ms in found if ms > LONG]) >= 4
+    task_times, _ = tasks(page, 5)
+    assert len([ms for ms in task_times if ms > LONG]) >= 4
 
 
 def test_simulated_time_never_runs_ahead_and_lateness_is_told(
@@ -100,20 +100,20 @@ def test_simulated_time_never_runs_ahead_and_lateness_is_told(
     clock = "() => [performance.now() / 1000, document.querySelector('.lab-time').textContent]"
 
     def window() -> tuple[float, float, str]:
-        begun, first = page.evaluate(clock)
+        start, first = page.evaluate(clock)
         page.evaluate(DRAW, 120)
-        ended, last = page.evaluate(clock)
+        end, last = page.evaluate(clock)
         late = page.inner_text(".lab-late")
-        return float(last.split()[0]) - float(first.split()[0]), ended - begun, late
+        return float(last.split()[0]) - float(first.split()[0]), end - start, late
 
-    found = []
+    samples = []
 
     def holds() -> bool:
         simulated, elapsed, late = window()
-        found.append((simulated, elapsed, late))
+        samples.append((simulated, elapsed, late))
         # A number may be shown late, so that from there on more seems to have passed than has; a
         # clock that runs ahead does so in every window. How fast a machine is decides nothing;
         # that it could not keep up must be said.
         return 0 < simulated < elapsed + 0.2 and (simulated > 0.8 * elapsed or "×" in late)
 
-    assert any(holds() for _ in range(6)), found
+    assert any(holds() for _ in range(6)), samples

@@ -69,8 +69,8 @@ def test_nu_checker_finds_nothing(
     urls = [sites[name].url() + path for name in NAMES for path in sites[name].unlike_pages()]
     options = ("--format", "json", "--stdout", "--exit-zero-always")
     command = [java, allow, "-jar", str(VNU), *options, *urls, live_quizzes, launch_page]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    messages = json.loads(done.stdout)["messages"]
+    process = subprocess.run(command, capture_output=True, text=True, check=True)
+    messages = json.loads(process.stdout)["messages"]
     assert [(m["url"], m.get("lastLine"), m["message"]) for m in messages] == []
 
 
@@ -88,23 +88,23 @@ class Fetched(HTMLParser):
         self.found: list[str] = []
 
     def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
-        given = {name: value or "" for name, value in attributes}
-        if tag == "link" and self.LINKS & set(given.get("rel", "").split()):
-            self.found.append(given["href"])
+        values = {name: value or "" for name, value in attributes}
+        if tag == "link" and self.LINKS & set(values.get("rel", "").split()):
+            self.found.append(values["href"])
         if tag in self.SOURCES:
-            self.found += [given[name] for name in ("src", "poster") if name in given]
-            sets = given.get("srcset", "").split(",")
+            self.found += [values[name] for name in ("src", "poster") if name in values]
+            sets = values.get("srcset", "").split(",")
             self.found += [part.split()[0] for part in sets if part.split()]
         if tag in ("image", "use"):
-            self.found += [given[name] for name in ("href", "xlink:href") if name in given]
+            self.found += [values[name] for name in ("href", "xlink:href") if name in values]
         if tag == "object":
-            self.found.append(given.get("data", ""))
+            self.found.append(values.get("data", ""))
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_no_page_names_anything_to_fetch_elsewhere(sites: Mapping[str, Site], name: str) -> None:
     site = sites[name]
-    own = urlsplit(site.host.url).netloc
+    host = urlsplit(site.host.url).netloc
     elsewhere = []
     for path in site.pages():
         parser = Fetched()
@@ -112,7 +112,7 @@ def test_no_page_names_anything_to_fetch_elsewhere(sites: Mapping[str, Site], na
         assert len(parser.found) >= 4, "style, scripts, icons"
         for address in parser.found:
             parts = urlsplit(urljoin(site.host.url + path, address))
-            if parts.netloc != own and parts.scheme != "data":
+            if parts.netloc != host and parts.scheme != "data":
                 elsewhere.append((path, address))
     assert elsewhere == []
 
@@ -160,11 +160,11 @@ def test_every_page_keeps_the_standards(
 
 def keeps_the_standards(browser: Browser, site: Site, paths: list[str], closely: bool) -> None:
     """Axe finds nothing, no narrow window is too narrow, nothing is said, nobody else is asked."""
-    wrong: list[Any] = []
+    failures: list[Any] = []
     with browser.new_context(viewport=WINDOW) as context:
-        asked: list[str] = []
-        context.on("request", lambda request: asked.append(request.url))
-        page, said = watch_page(context)
+        requests: list[str] = []
+        context.on("request", lambda request: requests.append(request.url))
+        page, console = watch_page(context)
         for path in paths:
             page.goto(site.url(path))
             wait_until_settled(page)
@@ -172,16 +172,16 @@ def keeps_the_standards(browser: Browser, site: Site, paths: list[str], closely:
                 run_labs(page)
             page.evaluate(WHOLE)
             if closely:
-                wrong += [(path, one) for one in violations(page)]
+                failures += [(path, violation) for violation in violations(page)]
             for width in NARROW:
                 page.set_viewport_size({"width": width, "height": 900})
                 until(page, "document.documentElement.scrollWidth <= innerWidth")
             page.set_viewport_size(WINDOW)
         page.goto(site.url(site.kinds()["offline"]))
         expect(page.get_by_text("files of the course are here.")).to_be_visible()
-        others = [url for url in asked if not url.startswith((site.host.url, "blob:", "data:"))]
-        assert wrong + others + [text for text in said if "404" not in text] == []
-        assert len(asked) > 3 * len(paths)
+        foreign = [url for url in requests if not url.startswith((site.host.url, "blob:", "data:"))]
+        assert failures + foreign + [text for text in console if "404" not in text] == []
+        assert len(requests) > 3 * len(paths)
 
 
 def test_every_kind_of_page_opens_from_disk(
@@ -190,9 +190,9 @@ def test_every_kind_of_page_opens_from_disk(
     """Without a word to the console; what cannot work from there says so."""
     site = sites["full"]
     with browsers["webgl"].new_context(viewport=WINDOW) as context:
-        page, said = watch_page(context)
-        asked: list[str] = []
-        page.on("request", lambda request: asked.append(request.url))
+        page, console = watch_page(context)
+        requests: list[str] = []
+        page.on("request", lambda request: requests.append(request.url))
         for kind, path in site.kinds().items():
             if kind == "notfound":  # it is served at any address, and names its files for that
                 continue
@@ -200,5 +200,5 @@ def test_every_kind_of_page_opens_from_disk(
             wait_until_settled(page)
             for lab in page.locator("main [data-lab][data-config]").all():
                 expect(lab).to_contain_text("when the page comes from a web server")
-        assert said == []
-        assert all(url.startswith(("file:", "blob:", "data:")) for url in asked)
+        assert console == []
+        assert all(url.startswith(("file:", "blob:", "data:")) for url in requests)

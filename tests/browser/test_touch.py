@@ -52,10 +52,10 @@ class Fingers:
 
     def move(self, *targets: tuple[float, float], steps: int = 8) -> None:
         """Draw all fingers to their targets, at the same time."""
-        begun = dict(self._down)
+        starts = dict(self._down)
         for k in range(1, steps + 1):
             for i, (x, y) in enumerate(targets):
-                x0, y0 = begun[i]
+                x0, y0 = starts[i]
                 self._down[i] = (x0 + (x - x0) * k / steps, y0 + (y - y0) * k / steps)
             self._send("touchMove")
             self.page.evaluate(PICTURE)
@@ -75,31 +75,31 @@ def screen(browsers: Mapping[str, Browser], base: str) -> Iterator[Phone]:
     with browsers["webgl"].new_context(
         viewport={"width": 390, "height": 700}, has_touch=True, is_mobile=True
     ) as context:
-        page, said = watch_page(context)
+        page, console = watch_page(context)
         page.goto(base + PAGE)
         # Fonts that come later move the text, and the page with it.
         page.evaluate("() => document.fonts.ready.then(() => 0)")
-        yield page, Fingers(page, context.new_cdp_session(page)), said
+        yield page, Fingers(page, context.new_cdp_session(page)), console
 
 
 @pytest.fixture
 def phone(screen: Phone) -> Iterator[Phone]:
     """The swing as it is at first, at rest in the middle of the window."""
-    page, _, said = screen
+    page, _, console = screen
     page.evaluate("() => window.made?.dispose()")
     page.evaluate(MOUNT, SWING)
     until(page, "() => made.state === 'paused' && made.view.frame !== null && made.view.height > 0")
     page.evaluate(RESTS, 10)
     yield screen
-    assert said == []
+    assert console == []
 
 
 def camera(page: Page) -> dict[str, Any]:
-    found: dict[str, Any] = page.evaluate(
+    camera_state: dict[str, Any] = page.evaluate(
         "() => { const { azimuth, elevation, distance, target } = window.made.view.camera\n"
         "return { azimuth, elevation, distance, target: [...target] } }"
     )
-    return found
+    return camera_state
 
 
 def middle(page: Page) -> tuple[float, float]:
@@ -117,15 +117,15 @@ def focused(page: Page) -> bool:
     return bool(page.evaluate("() => document.activeElement === window.made.view.element"))
 
 
-def turned(page: Page, before: dict[str, Any], **pixels: float) -> None:
+def expect_turned(page: Page, before: dict[str, Any], **pixels: float) -> None:
     """Wait until the view has turned by so many pixels; its height is half a turn."""
-    wanted = {name: before[name] - 180 * by / HEIGHT for name, by in pixels.items()}
+    expected = {name: before[name] - 180 * by / HEIGHT for name, by in pixels.items()}
 
-    def there() -> bool:
+    def has_turned() -> bool:
         now = camera(page)
-        return all(abs(now[name] - angle) <= 1 for name, angle in wanted.items())
+        return all(abs(now[name] - angle) <= 1 for name, angle in expected.items())
 
-    wait_for_condition(page, there)
+    wait_for_condition(page, has_turned)
 
 
 def test_one_finger_turns(phone: Phone) -> None:
@@ -137,7 +137,7 @@ def test_one_finger_turns(phone: Phone) -> None:
     # A finger that began sideways may go on up and down.
     fingers.move((x + 60, y + 60))
     fingers.up()
-    turned(page, before, azimuth=120, elevation=60)
+    expect_turned(page, before, azimuth=120, elevation=60)
     assert camera(page)["distance"] == before["distance"]
     assert scrolled(page) == scroll
 
@@ -146,10 +146,10 @@ def test_finger_that_goes_up_or_down_scrolls_the_page_each_time(phone: Phone) ->
     page, fingers, _ = phone
     for way in (-1, 1, -1):
         x, y = middle(page)
-        beside = x + 100  # not on the body, which a finger that rests would pull
+        free_x = x + 100  # not on the body, which a finger that rests would pull
         before, scroll = camera(page), scrolled(page)
-        fingers.down((beside, y))
-        fingers.move((beside, y + way * 120), steps=12)
+        fingers.down((free_x, y))
+        fingers.move((free_x, y + way * 120), steps=12)
         fingers.up()
         wait_for_condition(page, lambda: (scroll - scrolled(page)) * way > 60)  # noqa: B023
         page.evaluate(RESTS, 20)
@@ -166,7 +166,7 @@ def test_tap_gives_the_picture_every_gesture(phone: Phone) -> None:
     fingers.down((x, y - 40))
     fingers.move((x, y + 40), steps=12)
     fingers.up()
-    turned(page, before, elevation=80)
+    expect_turned(page, before, elevation=80)
     assert scrolled(page) == scroll
 
     def left() -> bool:
@@ -181,10 +181,10 @@ def test_tap_gives_the_picture_every_gesture(phone: Phone) -> None:
 def test_two_fingers_zoom_and_move(phone: Phone, sideways: bool) -> None:
     page, fingers, _ = phone
     x, y = middle(page)
-    across = (1.0, 0.0) if sideways else (0.0, 1.0)
+    direction = (1.0, 0.0) if sideways else (0.0, 1.0)
 
-    def at(along: float, dx: float = 0.0, dy: float = 0.0) -> tuple[float, float]:
-        return x + along * across[0] + dx, y + along * across[1] + dy
+    def at(distance: float, dx: float = 0.0, dy: float = 0.0) -> tuple[float, float]:
+        return x + distance * direction[0] + dx, y + distance * direction[1] + dy
 
     before, scroll = camera(page), scrolled(page)
     fingers.down(at(-30), at(30))
@@ -196,12 +196,15 @@ def test_two_fingers_zoom_and_move(phone: Phone, sideways: bool) -> None:
     fingers.move(at(-90, 0, 45), at(90, 0, 45))
     height = 2 * wide["distance"] * math.tan(math.pi / 8)
     up = height * math.cos(math.radians(wide["elevation"])) * 45 / HEIGHT
-    raised = pytest.approx(wide["target"][2] + up, abs=0.1 * abs(up))
-    wait_for_condition(page, lambda: camera(page)["target"][2] == raised)
-    moved = camera(page)
+    expected_height = pytest.approx(wide["target"][2] + up, abs=0.1 * abs(up))
+    wait_for_condition(page, lambda: camera(page)["target"][2] == expected_height)
+    moved_camera = camera(page)
     fingers.up()
-    assert moved["distance"] == pytest.approx(wide["distance"], rel=0.02)
-    assert (moved["azimuth"], moved["elevation"]) == (before["azimuth"], before["elevation"])
+    assert moved_camera["distance"] == pytest.approx(wide["distance"], rel=0.02)
+    assert (moved_camera["azimuth"], moved_camera["elevation"]) == (
+        before["azimuth"],
+        before["elevation"],
+    )
     assert scrolled(page) == scroll
     until(page, "window.visualViewport.scale === 1")
 
@@ -237,7 +240,7 @@ def test_finger_that_rests_where_nothing_is_turns_as_ever(phone: Phone) -> None:
     until(page, "() => made.hands.pointers.size === 1 && made.hands.restingFinger === null")
     fingers.move((x - 50, y + 100))
     fingers.up()
-    turned(page, before, azimuth=100)
+    expect_turned(page, before, azimuth=100)
     assert page.evaluate("() => window.made.view.frame[3]") == 0
 
 
