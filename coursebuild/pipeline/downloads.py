@@ -47,9 +47,9 @@ class Downloads(Struct, frozen=True):
         """Those of a course whose documents were read."""
         imports = _imports(library, documents)
         around = _surroundings(library, root, store, imports)
-        archives = {archive.path: archive for archive in zips.archives(library, around)}
+        archives = {archive.path: archive for archive in zips.make_archives(library, around)}
         packed = (
-            CachedFile(one.path, step_key("archive", one.key), one.packed)
+            CachedFile(one.path, step_key("archive", one.key), one.pack)
             for one in archives.values()
         )
         files = (*_scripts_and_models(library), *_files(library, assets, root), *packed)
@@ -98,7 +98,7 @@ def _surroundings(
     )
     style = tuple(OutputFile(path.name, path.read_bytes()) for path in root.glob("matplotlibrc"))
     around = zips.Surroundings((), ours, meshes, style, imports)
-    modules = zips.imported_modules(library.course, around)
+    modules = zips.foreign_modules(library.course, around)
     interpreter = course_environment(root, library.course).value
     installed = distributions(store, modules, None if interpreter is None else interpreter.packages)
     packages = tuple(zips.Package(*one) for one in installed)

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.pages.added_files import NotedPage
-from coursebuild.core.pages.links import Reference, has
+from coursebuild.core.pages.links import Reference, has_anchor
 from coursebuild.core.pages.page_list import PageEntry
 from coursebuild.core.pages.record import PageRecord
 
@@ -67,7 +67,7 @@ class SitePage(Struct, frozen=True, array_like=True):
             record.mathematics,
             record.declarations,
             tuple((path, "" if anchor == "top" else anchor) for path, anchor in away),
-            all(has(ids, anchor) for anchor in own),
+            all(has_anchor(ids, anchor) for anchor in own),
         )
 
 

@@ -25,7 +25,7 @@ from coursebuild.core.pages.added_files import NotedPage
 from coursebuild.core.pages.common_files import PageFacts
 from coursebuild.core.pages.frame import Names, PageFrame
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.links import Reference, has
+from coursebuild.core.pages.links import Reference, has_anchor
 from coursebuild.core.pages.page_list import PageEntry, page_list, page_title
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.text.source import key_of
@@ -96,7 +96,7 @@ class Pages:
         ids = {path: page.ids for path, page in self._pages.items()}
 
         def leads(path: str, anchor: str) -> bool:
-            return anchor == "" or has(ids[path], anchor) if path in ids else path in files
+            return anchor == "" or has_anchor(ids[path], anchor) if path in ids else path in files
 
         pages = self._pages.values()
         links = set[Reference]().union(*(page.links for page in pages))

@@ -184,6 +184,6 @@ def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnosti
         written = escape(broken.url)
         at = max(page.text.find(f'"{written}"') + 1, 0)
         span = page.span(at, at + len(written) if at else 0)
-        help = f"did you mean `{broken.near}`?" if broken.near else ""
+        help = f"did you mean `{broken.suggestion}`?" if broken.suggestion else ""
         message = f"`{broken.url}` leads nowhere: {broken.reason}"
         yield diagnose("link-broken", span, message, help=help)

@@ -23,7 +23,7 @@ from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.theme import PICTURES, TEMPLATES, Theme, ThemeFile
 from coursebuild.core.pages.font_files import course_face
-from coursebuild.core.pages.templates import TemplateFailure, template_mistake
+from coursebuild.core.pages.templates import TemplateFailure, find_template_error
 from coursebuild.core.pages.theme import picture_size
 from coursebuild.core.scripts.figures import prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
@@ -120,7 +120,7 @@ def _check_templates(theme: Theme) -> Iterator[Diagnostic]:
             message, help = f"coursebuild has no template `{name}`", did_you_mean(name, originals)
             yield diagnose("template-unknown", source.span(0, 0), message, help=help)
             continue
-        mistake = template_mistake(source.text)
+        mistake = find_template_error(source.text)
         if mistake is not None:
             yield _broken(source, *mistake)
         first = source.text.partition("\n")[0]

@@ -15,7 +15,7 @@ from typing import Literal
 from markupsafe import Markup
 
 from coursebuild.core import model
-from coursebuild.core.pages.html_context import Context, OwnBlock
+from coursebuild.core.pages.html_context import Context, SpecialBlock
 from coursebuild.core.pages.markup import render_blocks, render_footnotes, render_inlines
 from coursebuild.core.pages.strings import Strings, parse_strings
 
@@ -78,7 +78,7 @@ class PlainContext(Context):
     def binding(self, binding: model.NumberBinding) -> Markup:
         return Markup(f"<code>{escape(binding.text)}</code>")
 
-    def block(self, block: OwnBlock) -> Markup:
+    def block(self, block: SpecialBlock) -> Markup:
         match block:
             case model.Callout():
                 title = render_inlines(block.title, self)

@@ -83,13 +83,13 @@ def needed_fonts(assets: Assets, facts: PageFacts, theme: Theme) -> tuple[fonts.
 
 def common_files(
     assets: Assets,
-    cut: Callable[[fonts.FontJob], bytes] | None,
+    cut_font: Callable[[fonts.FontJob], bytes] | None,
     facts: PageFacts,
     theme: Theme,
 ) -> tuple[tuple[SiteFile, ...], Names]:
     """The files for pages with these facts, merged, and their names.
 
-    Without a function `cut`, fonts are published whole.
+    Without a function `cut_font`, fonts are published whole.
     """
     files: list[SiteFile] = []
 
@@ -107,13 +107,13 @@ def common_files(
 
     def font(job: fonts.FontJob) -> str:
         stem, _, ending = job.face.file.rpartition(".")
-        if cut is None:
+        if cut_font is None:
             ending = "woff2" if job.data.startswith(b"wOF2") else ending
             return publish(f"fonts/{stem}.{ending}", job.data)
         # The name comes from the input, so that it can be cut while pages are written.
         key = job.key
         name = f"assets/fonts/{stem}.{key[:8]}.woff2"
-        files.append(CachedFile(name, key, functools.partial(cut, job)))
+        files.append(CachedFile(name, key, functools.partial(cut_font, job)))
         return name
 
     def picture(name: str, file: ThemeFile | None) -> str:

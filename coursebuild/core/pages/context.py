@@ -38,7 +38,7 @@ from coursebuild.core.pages import blocks, formulas, markup, urls
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.document_inputs import file_address
 from coursebuild.core.pages.equations import number_equations
-from coursebuild.core.pages.html_context import Context, OwnBlock
+from coursebuild.core.pages.html_context import Context, SpecialBlock
 from coursebuild.core.pages.page_inputs import DocumentInputs
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
@@ -125,12 +125,12 @@ class PageContext(Context, Struct, frozen=True, dict=True):
         """A number that was compared with the output of a script."""
         return blocks.binding(self, binding)
 
-    def block(self, block: OwnBlock) -> Markup:
+    def block(self, block: SpecialBlock) -> Markup:
         """A special block, with its line end."""
         html = self._block(block)
         return html + Markup("\n") if html else html
 
-    def _block(self, block: OwnBlock) -> Markup:
+    def _block(self, block: SpecialBlock) -> Markup:
         match block:
             case Callout():
                 return blocks.callout(self, block)

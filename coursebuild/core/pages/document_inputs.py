@@ -78,11 +78,11 @@ def _shown_run(run: ScriptRun, numbers: set[int]) -> ShownRun:
     if run.outcome is not Outcome.OK or not numbers:
         return ShownRun(run.outcome, run.missing, recorded=run.recorded)
     lines = run.stdout.split("\n")
-    quoted = (
+    quoted_lines = (
         (n, visible(lines[n - 1].rstrip()) if 1 <= n <= len(lines) else None)
         for n in sorted(numbers)
     )
-    return ShownRun(run.outcome, run.missing, tuple(quoted), run.recorded)
+    return ShownRun(run.outcome, run.missing, tuple(quoted_lines), run.recorded)
 
 
 def address(library: Library, place: urls.Place, path: str, target: model.Target) -> str:

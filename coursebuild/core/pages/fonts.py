@@ -92,15 +92,15 @@ def font_jobs(
     letters = BASE | set(text)
     course_characters: dict[str, set[str]] = {}
     for face, data in course_faces:
-        used = letters & characters_in(face.characters)
-        jobs.append(FontJob(face, data, "".join(sorted(used))))
-        course_characters.setdefault(face.family, set()).update(used)
+        used_characters = letters & characters_in(face.characters)
+        jobs.append(FontJob(face, data, "".join(sorted(used_characters))))
+        course_characters.setdefault(face.family, set()).update(used_characters)
     assigned: dict[tuple[str, str], set[str]] = {}
     for face, data in faces:
         missing = letters - course_characters.get(_OWN.get(face.family, ""), set())
-        needed = missing if face.family != MATH else _mathematical(mathematics)
+        needed_characters = missing if face.family != MATH else _mathematical(mathematics)
         assigned_characters = assigned.setdefault((face.family, face.style), set())
-        characters = (needed & characters_in(face.characters)) - assigned_characters
+        characters = (needed_characters & characters_in(face.characters)) - assigned_characters
         if face.unicode_range is not None:
             characters &= characters_in(face.unicode_range)
         if characters and (mathematics or face.family != MATH):

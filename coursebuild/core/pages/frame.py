@@ -196,10 +196,10 @@ def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:
     """The keys of the interface texts that the page carries for its scripts."""
     keys = library.words.texts
     known_parts = parts_by_mark()
-    used = [key for mark in parts for key in known_parts[mark].texts]
-    prefixes = tuple(key for key in used if key.endswith("."))
+    used_keys = [key for mark in parts for key in known_parts[mark].texts]
+    prefixes = tuple(key for key in used_keys if key.endswith("."))
     prefixed = sorted(key for key in keys if prefixes and key.startswith(prefixes))
-    return (*PAGE_WORDS, *prefixed, *(key for key in used if key in keys))
+    return (*PAGE_WORDS, *prefixed, *(key for key in used_keys if key in keys))
 
 
 def _links(place: urls.Place, pages: Iterable[tuple[str, str]]) -> tuple[NavLink, ...]:

@@ -2,11 +2,10 @@
 
 Entry point: `highlight_lines(language, code)`.
 
-1. tree-sitter reads Python, which most code of a course is, and takes an eighth of the time of
-   Pygments, which reads the other languages. Pygments tells tokens apart far finer than a page
-   should show; they are folded into few classes, and what belongs to none gets no element at all.
-2. Characters that HTML forbids (control characters, non-characters) are shown as the symbols that
-   stand for them.
+1. tree-sitter reads Python, the language of most code, eight times as fast as Pygments, which reads
+   the other languages. Pygments distinguishes more kinds of tokens than a page should show; they
+   are mapped to few classes, and a token of none gets no element.
+2. Characters that HTML forbids (control characters, non-characters) are replaced by symbols.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.highlight_python import python_runs
 
 Run: TypeAlias = tuple[str, str]
-"""A class, or nothing, and the text that has it."""
+"""A class, perhaps empty, and the text that has it."""
 
 _CLASSES: tuple[tuple[_TokenType, str], ...] = (
     (Comment, "c"),
@@ -47,33 +46,33 @@ _CLASSES: tuple[tuple[_TokenType, str], ...] = (
     (Token.Generic.Deleted, "x"),
     (Token.Generic.Inserted, "y"),
 )
-"""Kinds of token and their class, the special before the general."""
+"""Kinds of tokens and their classes, the special before the general."""
 _PYTHON = ("python", "py", "python3", "py3")
 _LONGEST = 20_000
-"""Characters of Python that tree-sitter reads. An absurd text, such as of backslashes alone, takes
-it time with the square of its length, and Pygments not; at this length that is a second."""
+"""The most characters of Python that tree-sitter reads. For absurd texts, such as backslashes only,
+its time grows with the square of the length, unlike that of Pygments: a second at this length."""
 _ALIASES = {"mjcf": "xml", "urdf": "xml"}
 _WITHOUT_OUTER_SPACE = re.compile(r"\S(?:.*\S)?")
 
 
 def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
-    """The code's lines, each marked by itself: no element reaches over the end of a line.
+    """The lines of code as HTML; no element crosses the end of a line.
 
-    Where no lexer knows the language, they are plain escaped text.
+    If no lexer knows the language, they are escaped text.
     """
     text = visible(code)
     # Lexers drop a byte order mark at the start.
     mark = "\ufeff" if text.startswith("\ufeff") else ""
-    runs = _merge(chain([("", mark)], _runs(language.lower(), text.removeprefix(mark))))
+    runs = _merge(chain([("", mark)], _runs_of(language.lower(), text.removeprefix(mark))))
     html = "".join(_element(css, escape(run, quote=False)) for css, run in runs)
     return tuple(map(Markup, html.split("\n")))
 
 
-def _runs(language: str, code: str) -> Iterable[Run]:
+def _runs_of(language: str, code: str) -> Iterable[Run]:
     if language in _PYTHON and len(code) <= _LONGEST:
         return python_runs(code)
     lexer = _lexer(_ALIASES.get(language, language))
-    return [("", code)] if lexer is None else _lexed(lexer, code)
+    return [("", code)] if lexer is None else _lex(lexer, code)
 
 
 @functools.cache
@@ -84,29 +83,29 @@ def _lexer(language: str) -> Lexer | None:
         return None
 
 
-def _lexed(lexer: Lexer, code: str) -> list[Run]:
-    """Runs of a text, each with its class. A lexer that leaves anything out marks nothing."""
-    # Lexers of sessions only see lines that end.
+def _lex(lexer: Lexer, code: str) -> list[Run]:
+    """The runs of a text. If the lexer leaves anything out, nothing is marked."""
+    # Lexers of sessions need a line end.
     for end in ("", "\n"):
-        found = [(_class_of(token), text) for token, text in lexer.get_tokens(code + end)]
-        if "".join(text for _, text in found) == code + end:
+        runs = [(_class_of(token), text) for token, text in lexer.get_tokens(code + end)]
+        if "".join(text for _, text in runs) == code + end:
             break
     else:
         return [("", code)]
     if end:
-        css, text = found.pop()
-        found.append((css, text.removesuffix(end)))
-    return found
+        css, text = runs.pop()
+        runs.append((css, text.removesuffix(end)))
+    return runs
 
 
 @functools.cache
 def _class_of(token: _TokenType) -> str:
-    """The class of a kind of token; empty where it belongs to none."""
+    """The class of a kind of token; empty if it has none."""
     return next((css for kind, css in _CLASSES if token in kind), "")
 
 
 def _merge(runs: Iterator[Run]) -> Iterator[Run]:
-    """Neighbours of one class as one run, with the space between them on a line."""
+    """Merge neighbours of the same class, with the space between them on a line."""
     css, run = "", ""
     for kind, text in runs:
         if kind == css or not text or (text.isspace() and "\n" not in text):
@@ -118,7 +117,7 @@ def _merge(runs: Iterator[Run]) -> Iterator[Run]:
 
 
 def _element(css: str, html: str) -> str:
-    """An element on each line; white space around it stays outside."""
+    """Put each line into an element, without the white space around it."""
     if not css:
         return html
     return _WITHOUT_OUTER_SPACE.sub(rf'<span class="{css}">\g<0></span>', html)

@@ -1,7 +1,7 @@
-"""Python code as runs of text that are shown alike.
+"""Python code as runs of text with the same class.
 
-Entry point: `python_runs(code)`. tree-sitter also reads what does not parse: a fragment, or a
-mistake that a lesson makes on purpose.
+Entry point: `python_runs(code)`. tree-sitter also reads code that does not parse, such as a
+fragment or a mistake that a lesson makes on purpose.
 """
 
 from __future__ import annotations
@@ -31,25 +31,25 @@ _QUERY = """
     (decorator ["@" (identifier) (attribute)] @a)
     (decorator (call function: (_) @a))
 """
-"""What has which class of `highlight.py`, and what none; a string that is a statement of its own is
-a docstring."""
+"""The nodes of each class of `highlight.py`, and (`_`) those of none. A string that is a statement
+of its own is a docstring."""
 _ORDER = "sd_icnkfa"
-"""From the outside in: where two overlap, the later one shows."""
+"""The classes from the outside in: where two overlap, the later one wins."""
 
 
 def python_runs(code: str) -> Iterator[tuple[str, str]]:
-    """All of the code in runs, each with its class or an empty one."""
+    """The code in runs, each with its class, perhaps an empty one."""
     data = code.encode()
-    found = QueryCursor(_query()).captures(_parser().parse(data).root_node)
-    painted = bytearray(b"_") * len(data)
+    nodes_by_class = QueryCursor(_query()).captures(_parser().parse(data).root_node)
+    classes = bytearray(b"_") * len(data)
     edges = {0, len(data)}
     for css in _ORDER:
-        for node in found.get(css, ()):
+        for node in nodes_by_class.get(css, ()):
             start, end = node.byte_range
-            painted[start:end] = css.encode() * (end - start)
+            classes[start:end] = css.encode() * (end - start)
             edges.update((start, end))
     for start, end in pairwise(sorted(edges)):
-        yield chr(painted[start]).strip("_"), data[start:end].decode()
+        yield chr(classes[start]).strip("_"), data[start:end].decode()
 
 
 @functools.cache

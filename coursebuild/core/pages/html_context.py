@@ -1,7 +1,7 @@
-"""What the writer of HTML (`markup.py`) asks, since it depends on the course.
+"""What the writer of HTML (`markup.py`) needs to know about the course.
 
-Entry points: `Context`, the answers for text that stands on no page; `OwnBlock`, the blocks that
-are more than Markdown.
+Entry points: `Context`, with the values for text that is on no page; `SpecialBlock`, the blocks
+beyond Markdown.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.pages.strings import Strings
 
-OwnBlock: TypeAlias = Callout | Mjcf | PlainCode | FeatureBlock | Recording | Script
-"""The blocks that are more than Markdown."""
+SpecialBlock: TypeAlias = Callout | Mjcf | PlainCode | FeatureBlock | Recording | Script
+"""The blocks beyond Markdown."""
 
 
 class Context:
-    """Answers for text that stands on no page. A `Markup` is HTML already, a string is not."""
+    """The context of text that is on no page. A `Markup` is HTML already, a string is not."""
 
     @property
     def words(self) -> Strings:
-        """The interface's words, which headings, tables, tasks and footnotes need."""
+        """The interface texts, which headings, tables, tasks and footnotes need."""
         return Strings({})
 
     @property
     def direction(self) -> Literal["", "ltr", "rtl"]:
-        """Which way text runs, so that numbers are kept with their units; empty: they are not."""
+        """The direction of text, to keep numbers with their units; empty not to do that."""
         return ""
 
     def href(self, target: Target) -> str:
@@ -45,7 +45,7 @@ class Context:
         return ""
 
     def reference(self, target: Target) -> str:
-        """What a link without a text says; empty where it says nothing."""
+        """The text of a link that has none; perhaps empty."""
         return ""
 
     def url(self, url: str) -> str:
@@ -57,21 +57,21 @@ class Context:
         return Markup()
 
     def math(self, tex: str) -> Markup:
-        """A formula in a line of text, set."""
+        """An inline formula, typeset."""
         return Markup(rf'<span class="math">\({escape(tex)}\)</span>')
 
     def display(self, tex: str, start: int) -> Markup:
-        """A formula on a line of its own, which begins at an offset of the document."""
+        """A formula on a line of its own, at an offset in the document."""
         return Markup(rf'<span class="math">\[{escape(tex)}\]</span>')
 
     def code(self, language: str, text: str) -> Markup:
-        """A whole block of code that is only shown."""
+        """A block of code that is only shown, not run."""
         return Markup(f"<pre><code>{escape(text)}</code></pre>\n")
 
     def binding(self, binding: NumberBinding) -> Markup:
         """A number that is bound to an output."""
         return escape(binding.text)
 
-    def block(self, block: OwnBlock) -> Markup:
-        """A block that is more than Markdown."""
+    def block(self, block: SpecialBlock) -> Markup:
+        """A block beyond Markdown."""
         return Markup()

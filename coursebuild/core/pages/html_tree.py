@@ -1,9 +1,9 @@
-"""HTML as a tree, read as a browser reads it, whatever an author wrote.
+"""HTML as a tree, parsed as a browser does, however malformed.
 
 Entry points: `parse_html`, and `to_html` and `to_xml`, which write a tree; `elements_with`, which
 finds elements by their attributes.
 
-The parser is Lexbor: it puts in what HTML lets a writer leave out, and mends what is misplaced.
+The parser is Lexbor: it adds what HTML allows a writer to omit, and repairs what is misplaced.
 Comments are left out.
 """
 
@@ -20,11 +20,11 @@ from selectolax.lexbor import LexborHTMLParser, LexborNode
 from coursebuild.core.text.xml import clean_xml
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
-"""Elements that have no content and no end."""
+"""Elements without content and end tag."""
 _RAW = frozenset("script style xmp iframe noembed noframes plaintext".split())
-"""Elements in which a text is written as it is."""
+"""Elements whose text is not escaped."""
 _DEEPEST = 200
-"""Levels of a tree; what lies deeper is brought up, so that whoever walks a tree may recurse."""
+"""The most levels of a tree, so that recursion is safe; deeper text is moved up."""
 _NAMESPACES = {
     "svg": "http://www.w3.org/2000/svg",
     "math": "http://www.w3.org/1998/Math/MathML",
@@ -37,7 +37,7 @@ class HtmlElement(Struct):
     """An element."""
 
     name: str
-    """In lower case, but for elements of SVG."""
+    """In lower case, except for SVG."""
     attributes: dict[str, str] = field(default_factory=dict)
     children: list[HtmlContent] = field(default_factory=list)
 
@@ -57,7 +57,7 @@ class HtmlElement(Struct):
         return "".join(child if isinstance(child, str) else child.text for child in self.children)
 
     def nearest(self, *names: str) -> Iterator[HtmlElement]:
-        """The elements of these names in it, but none inside another of them."""
+        """The elements of these names in it, without those inside another one."""
         for child in self.elements:
             if child.name in names:
                 yield child
@@ -70,44 +70,46 @@ HtmlContent: TypeAlias = HtmlElement | str
 
 
 def parse_html(html: str) -> list[HtmlContent]:
-    """What stands in the body of a page with this HTML."""
-    page = _parsed(html)
+    """The content of the body of a page with this HTML."""
+    page = _parse(html)
     root = HtmlElement("body")
     if page.body is not None:
-        _read(page.body, root, _DEEPEST)
+        _copy_children(page.body, root, _DEEPEST)
     return root.children
 
 
 def elements_with(
     html: str, attributes: Iterable[str]
 ) -> Iterator[tuple[str, Mapping[str, str | None]]]:
-    """Names and attributes of the elements that have any of some attributes."""
-    for node in _parsed(html).css(",".join(f"[{name}]" for name in attributes)):
+    """The names and attributes of elements that have any of these attributes."""
+    for node in _parse(html).css(",".join(f"[{name}]" for name in attributes)):
         yield node.tag or "", node.attributes
 
 
-def _parsed(html: str) -> LexborHTMLParser:
-    # The parser takes UTF-8. Half a surrogate pair has no form there.
+def _parse(html: str) -> LexborHTMLParser:
+    # The parser takes UTF-8, which cannot represent a lone surrogate.
     return LexborHTMLParser(f"<!DOCTYPE html><body>{html}".encode("utf-8", "replace").decode())
 
 
-def _read(parent: LexborNode, into: HtmlElement, levels: int) -> None:
+def _copy_children(parent: LexborNode, target: HtmlElement, levels: int) -> None:
     node = parent.child
     while node is not None:
         if node.is_text_node:
             text = node.text_content or ""
-            if into.children and isinstance(into.children[-1], str):
-                into.children[-1] += text
+            if target.children and isinstance(target.children[-1], str):
+                target.children[-1] += text
             else:
-                into.children.append(text)
+                target.children.append(text)
         elif node.is_element_node:
             name = node.tag or ""
-            made = HtmlElement(name, {key: value or "" for key, value in node.attributes.items()})
-            into.children.append(made)
+            element = HtmlElement(
+                name, {key: value or "" for key, value in node.attributes.items()}
+            )
+            target.children.append(element)
             if levels:
-                _read(node, made, levels - 1)
+                _copy_children(node, element, levels - 1)
             else:
-                into.children.append(node.text(deep=True))
+                target.children.append(node.text(deep=True))
         node = node.next
 
 
@@ -127,13 +129,13 @@ def _html(content: Iterable[HtmlContent], *, raw: bool) -> Iterator[str]:
         yield ">"
         if child.name not in VOID:
             if child.name in ("pre", "textarea", "listing"):
-                yield "\n"  # the first line end in these is not part of them
+                yield "\n"  # parsers drop the first line end in these
             yield from _html(child.children, raw=child.name in _RAW)
             yield f"</{child.name}>"
 
 
 def to_xml(content: Iterable[HtmlContent]) -> str:
-    """A tree as XHTML; what XML has no name for is left out, but for its content."""
+    """A tree as XHTML; of elements with names that XML forbids only the content is kept."""
     return "".join(_xml(content))
 
 
@@ -161,8 +163,8 @@ def _xml_attribute(name: str, value: str) -> str:
     space, _, local = name.rpartition(":")
     if space not in ("", "xml", "xlink") or not _XML_NAME.fullmatch(local) or name == "xmlns":
         return ""
-    declared = f' xmlns:xlink="{_XLINK}"' if space == "xlink" else ""
-    return f'{declared} {name}="{_xml_text(value).replace(chr(34), "&quot;")}"'
+    namespace = f' xmlns:xlink="{_XLINK}"' if space == "xlink" else ""
+    return f'{namespace} {name}="{_xml_text(value).replace(chr(34), "&quot;")}"'
 
 
 def _xml_text(text: str) -> str:

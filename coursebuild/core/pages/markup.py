@@ -1,9 +1,9 @@
-"""Blocks and inlines into HTML.
+"""Writing blocks and inlines as HTML.
 
 Entry points: `render_blocks`, `render_inlines`, `render_footnotes`.
 
-What depends on the course (where a lesson's page lies, how a formula is set, what a lab looks like)
-is asked of the context (`html_context.py`), which may call back for what its blocks hold. All else
+What depends on the course (the address of a lesson, the look of a formula or a lab) comes from the
+context (`html_context.py`), which may call back to write the content of its blocks. Everything else
 is Markdown, and is written here.
 """
 
@@ -19,13 +19,13 @@ from markupsafe import Markup
 
 from coursebuild.core import model
 from coursebuild.core.pages.html_context import Context
-from coursebuild.core.pages.quantities import in_order, joined, quantities, unit_length
+from coursebuild.core.pages.quantities import isolate_ltr, join_units, split_quantities, unit_length
 
 
 def escape(text: str) -> str:
     """Text as HTML, also for attributes in double quotes.
 
-    Where there is nothing to escape, as is the rule, nothing is copied.
+    Usually there is nothing to escape, and then nothing is copied.
     """
     text = str.replace(text, "&", "&amp;").replace("<", "&lt;")
     return text.replace(">", "&gt;").replace('"', "&quot;")
@@ -46,22 +46,22 @@ def render_inlines(inlines: Iterable[model.Inline], context: Context) -> Markup:
 
 
 def render_footnotes(footnotes: Iterable[model.Footnote], context: Context) -> Markup:
-    """The footnotes of a document in a section at its end; empty where there are none."""
+    """The footnotes of a document as a section; empty if there are none."""
     return Markup(_Writer(context).footnotes(footnotes))
 
 
 def raw_html(node: model.HtmlBlock | model.RawInline, url: Callable[[str], str]) -> str:
-    """Raw HTML; `url` gives the addresses that files of the course have where it is shown."""
-    parts, at = list[str](), 0
+    """Raw HTML; `url` returns the addresses of the course's files on the page."""
+    parts, position = list[str](), 0
     for media in node.media:
-        if (address := url(media.url)) != media.url:  # what stays is left as it is written
-            parts += (node.html[at : media.start], escape(address))
-            at = media.end
-    return "".join((*parts, node.html[at:]))
+        if (address := url(media.url)) != media.url:  # otherwise it stays as written
+            parts += (node.html[position : media.start], escape(address))
+            position = media.end
+    return "".join((*parts, node.html[position:]))
 
 
 def reference_id(number: int, occurrence: int) -> str:
-    """The id of a reference to a footnote; no anchor made from a heading's text has a colon."""
+    """The id of a reference to a footnote, with a colon, unlike anchors of headings."""
     return f"fnref:{number}" if occurrence == 1 else f"fnref:{number}:{occurrence}"
 
 
@@ -71,7 +71,7 @@ def is_tight(block: model.Block) -> bool:
 
 
 class _Writer:
-    """Writes in a context; every string that it gives is HTML."""
+    """A writer in a context; every string that it returns is HTML."""
 
     def __init__(self, context: Context) -> None:
         self.context, self.words, self.direction = context, context.words, context.direction
@@ -85,39 +85,45 @@ class _Writer:
         return "".join(self._with_units(tuple(inlines)))
 
     def _with_units(self, inlines: tuple[model.Inline, ...]) -> list[str]:
-        """Inlines, of which formulas and bound numbers are held together with their units."""
-        written: list[str] = []
-        taken = 0
+        """Inlines, with formulas and bound numbers joined to their units."""
+        parts: list[str] = []
+        unit_end = 0
         for inline, after in zip_longest(inlines, inlines[1:]):
             if isinstance(inline, model.Text):
-                written.append(self._text(inline.text[taken:]))
-                taken = 0
+                parts.append(self._text(inline.text[unit_end:]))
+                unit_end = 0
                 continue
             html = self.inline(inline)
-            number = isinstance(inline, model.NumberBinding) or (
+            is_number = isinstance(inline, model.NumberBinding) or (
                 isinstance(inline, model.Math) and not inline.display
             )
-            if number and isinstance(after, model.Text) and (taken := unit_length(after.text)):
-                html += escape(after.text[:taken].replace(" ", "\u00a0"))
+            if (
+                is_number
+                and isinstance(after, model.Text)
+                and (unit_end := unit_length(after.text))
+            ):
+                html += escape(after.text[:unit_end].replace(" ", "\u00a0"))
                 if self.direction == "rtl":
-                    html = in_order(Markup(html))
-            written.append(html)
-        return written
+                    html = isolate_ltr(Markup(html))
+            parts.append(html)
+        return parts
 
     def _text(self, text: str) -> str:
-        """Text whose quantities are in one line and in order."""
+        """Text with quantities joined to their units, and isolated in text from the right."""
         if _SIMPLE.fullmatch(text):  # as most are
             return text
-        text = joined(text)
+        text = join_units(text)
         if self.direction == "ltr":
             return escape(text)
-        pieces = ((escape(piece), kept) for piece, kept in quantities(text))
-        return "".join(in_order(Markup(piece)) if kept else piece for piece, kept in pieces)
+        pieces = ((escape(piece), is_quantity) for piece, is_quantity in split_quantities(text))
+        return "".join(
+            isolate_ltr(Markup(piece)) if is_quantity else piece for piece, is_quantity in pieces
+        )
 
     # -- blocks
 
     def block(self, block: model.Block) -> str:
-        """One block, with its line end unless it is a paragraph of a tight list."""
+        """A block, with its line end unless it is a paragraph of a tight list."""
         match block:
             case model.Paragraph() if block.figure:
                 return self._figure(block)
@@ -151,8 +157,8 @@ class _Writer:
 
     def _figure(self, paragraph: model.Paragraph) -> str:
         """An image with the rest of its paragraph as its caption."""
-        image = next(one for one in paragraph.children if isinstance(one, model.Image))
-        words = self.inlines(one for one in paragraph.children if one is not image)
+        image = next(inline for inline in paragraph.children if isinstance(inline, model.Image))
+        words = self.inlines(inline for inline in paragraph.children if inline is not image)
         return self.context.figure(image, Markup(words.removeprefix("Figure:").strip()))
 
     def _heading(self, heading: model.Heading) -> str:
@@ -171,7 +177,7 @@ class _Writer:
         return f"<{name}{start}{mark}>\n{''.join(map(self._item, block.items))}</{name}>\n"
 
     def _item(self, item: model.ListItem) -> str:
-        """An item; a tight paragraph stands on the line of what is before it."""
+        """An item; a tight paragraph follows on the same line."""
         parts = ["<li>"]
         if item.checked is not None:
             parts.append(self._box(item.checked))
@@ -183,9 +189,9 @@ class _Writer:
             line_end = not is_tight(block)
         return "".join([*parts, "</li>\n"])
 
-    def _box(self, checked: bool) -> str:
-        label = escape(self.words("markup.done" if checked else "markup.not_done"))
-        state = " checked" if checked else ""
+    def _box(self, is_done: bool) -> str:
+        label = escape(self.words("markup.done" if is_done else "markup.not_done"))
+        state = " checked" if is_done else ""
         return f'<input type="checkbox" disabled{state} aria-label="{label}"> '
 
     def table(self, table: model.Table) -> str:
@@ -201,8 +207,8 @@ class _Writer:
         parts = ["<tr>\n"]
         for cell, align in zip(cells, table.align, strict=True):
             mark = f' class="align-{align}"' if align else ""
-            shown = tag if cell.children else "td"  # what is empty is the header of nothing
-            parts.append(f"<{shown}{mark}>{self.inlines(cell.children)}</{shown[:2]}>\n")
+            cell_tag = tag if cell.children else "td"  # an empty header is none
+            parts.append(f"<{cell_tag}{mark}>{self.inlines(cell.children)}</{cell_tag[:2]}>\n")
         return "".join([*parts, "</tr>\n"])
 
     # -- inlines
@@ -248,8 +254,8 @@ class _Writer:
         title = f' title="{escape(link.title)}"' if link.title else ""
         href = escape(self.context.href(link.target))
         inner = self.inlines(link.children) or escape(self.context.reference(link.target))
-        own = ' class="url"' if inner == href else ""  # an address that stands for itself
-        return f'<a href="{href}"{title}{own}>{inner}</a>'
+        url_class = ' class="url"' if inner == href else ""  # an address as its own text
+        return f'<a href="{href}"{title}{url_class}>{inner}</a>'
 
     def _image(self, image: model.Image) -> str:
         title = f' title="{escape(image.title)}"' if image.title else ""
@@ -276,7 +282,7 @@ class _Writer:
         return f"{start}\n<ol>\n{items}</ol>\n</section>\n"
 
     def _footnote(self, footnote: model.Footnote) -> str:
-        """A footnote; the ways back stand at the end of its last paragraph."""
+        """A footnote; the links back are at the end of its last paragraph."""
         back = " ".join(self._back(footnote.number, k + 1) for k in range(footnote.references))
         last = footnote.blocks[-1] if footnote.blocks else None
         inner = self.blocks(footnote.blocks[:-1])

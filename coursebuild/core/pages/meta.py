@@ -1,8 +1,8 @@
-"""What machines read: titles, social cards, structured data, sitemap, robots.
+"""Metadata for machines: titles, social cards, structured data, sitemap, robots.
 
 Entry points: `head_title`, `social`, `course_data`, `lesson_data`, `sitemap`, `robots`.
 
-Everything that needs the site's full address is left out where the course does not give one.
+Whatever needs the site's full address is left out if the course does not give that.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Json: TypeAlias = "str | int | list[Json] | dict[str, Json]"
 
 
 def head_title(course: Course, title: str, kind: str) -> str:
-    """The title of the browser's tab: the page first, then the course."""
+    """The title for the browser's tab: the page, then the course."""
     return title if kind == "home" or title == course.title else f"{title} · {course.title}"
 
 
@@ -99,7 +99,7 @@ def _filled(data: dict[str, Json]) -> dict[str, Json]:
 
 
 def _script(data: dict[str, Json]) -> Markup:
-    """JSON that may stand in a `script` element: nothing in it can end that element."""
+    """JSON for a `script` element, with nothing in it that could end the element."""
     text = visible(json.dumps(data, ensure_ascii=False, separators=(",", ":")))
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
 
@@ -117,7 +117,7 @@ def sitemap(course: Course, paths: Iterable[str]) -> bytes:
 
 
 def robots(course: Course) -> bytes:
-    """Everything may be read; where the sitemap is."""
+    """A robots.txt that allows everything and names the sitemap."""
     lines = ["User-agent: *", "Allow: /"]
     if course.base_url:
         lines.append(f"Sitemap: {urls.absolute(course, urls.SITEMAP)}")

@@ -1,9 +1,9 @@
-"""Every page of a site, in order: the one place that says which there are.
+"""The list of all pages of a site, in order.
 
 Entry point: `page_list(library)`.
 
-An entry may be asked with another library of the same course: while a course is edited its
-documents change, and its pages stay as long as the course map does.
+An entry works with any library of the same course: edits change documents, but the pages stay the
+same as long as the course map does.
 """
 
 from __future__ import annotations
@@ -28,22 +28,21 @@ class PageEntry(Struct, frozen=True):
     kind: str
     """One of `CORE_PAGES`, or the name of a `PageKind`."""
     id: str = ""
-    """Of the level, lesson, model or page that it shows; empty where there is one page of its
-    kind."""
+    """The id of its level, lesson, model or page; empty if there is only one page of its kind."""
 
     def inputs(self, library: Library) -> PageInputs:
-        """What it shows; summaries of documents are enough."""
+        """The inputs of the page; summaries of documents are enough."""
         kind = page_kind(self.kind)
         return _course_inputs(self, library) if kind is None else _added_inputs(kind, library)
 
     def may_show_notes(self, library: Library) -> bool:
-        """Whether its inputs may be made of what features note of documents (`Feature.summary`)."""
+        """Whether its inputs may depend on summaries by features (`Feature.summary`)."""
         if self.kind not in ("level", "lesson", "page", "notfound"):
             return True
         document = self.document(library)
         blocks = () if document is None else document_blocks(document)
-        ours = (block for block in blocks if isinstance(block, FeatureBlock))
-        return any(kind_of_block(block).values is not None for block in ours)
+        feature_blocks = (block for block in blocks if isinstance(block, FeatureBlock))
+        return any(kind_of_block(block).values is not None for block in feature_blocks)
 
     def document(self, library: Library) -> Document | None:
         """The document that it shows, if any."""
@@ -94,7 +93,7 @@ def _added_inputs(kind: PageKind, library: Library) -> PageInputs:
 
 
 def _course_inputs(entry: PageEntry, library: Library) -> PageInputs:
-    # Imported when there are inputs to make: after an edit these are few.
+    # Imported only if there are inputs to make: after an edit these are few.
     from coursebuild.core.pages import lesson, pages
 
     match entry.kind:
@@ -103,10 +102,10 @@ def _course_inputs(entry: PageEntry, library: Library) -> PageInputs:
         case "level":
             return pages.level_inputs(library, library.levels[entry.id])
         case "lesson":
-            found = library.lessons[entry.id]
-            if found.document is None:
-                return lesson.stub_inputs(library, found)
-            return lesson.lesson_inputs(library, found, found.document)
+            entry_lesson = library.lessons[entry.id]
+            if entry_lesson.document is None:
+                return lesson.stub_inputs(library, entry_lesson)
+            return lesson.lesson_inputs(library, entry_lesson, entry_lesson.document)
         case "models":
             return pages.gallery_inputs(library)
         case "model":

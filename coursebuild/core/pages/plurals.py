@@ -1,8 +1,8 @@
-"""Which of a text's forms a number takes in a language.
+"""Plural forms: which form of a text goes with a number in a language.
 
 Entry point: `category(language, n)`, one of the categories of CLDR.
 
-Source: the cardinal plural rules of CLDR 48, for numbers of things: whole ones, without decimals;
+Source: the cardinal plural rules of CLDR 48 for whole numbers;
 https://www.unicode.org/cldr/charts/48/supplemental/language_plural_rules.html
 """
 
@@ -13,13 +13,13 @@ from typing import Literal, TypeAlias
 Category: TypeAlias = Literal["zero", "one", "two", "few", "many", "other"]
 
 CATEGORIES: tuple[Category, ...] = ("zero", "one", "two", "few", "many", "other")
-"""All of them; every language has the last."""
+"""All categories; every language has the last."""
 
 
 def category(language: str, n: float) -> Category:
-    """The form of a text that goes with a number of things; a number with decimals takes `other`.
+    """The form of a text that goes with a number; one with decimals takes `other`.
 
-    A language without texts of the interface counts as English does, whose texts it has.
+    A language without interface texts follows English, whose texts it shows.
     """
     if n != int(n):
         return "other"

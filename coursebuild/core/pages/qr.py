@@ -1,7 +1,7 @@
 """QR codes for paper, as SVG.
 
-Entry point: `qr_svg(text, label)`. Each row of the code is one line of strokes, so that the picture
-takes few bytes in its page; around it is the white space that ISO/IEC 18004 asks for.
+Entry point: `qr_svg(text, label)`. Each row of the code is a line of strokes, which takes few
+bytes; around it is the white space that ISO/IEC 18004 demands.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _QUIET = 4
 def qr_svg(text: str, label: str) -> Markup:
     """The QR code of a text as an `svg` element with a label; empty for a text that is too long.
 
-    A seventh of the code may be damaged (level M), or more where that takes no more room.
+    Up to a seventh of the code may be damaged (level M), or more if that takes no more room.
     """
     import segno  # only pages with labs need it
 

@@ -1,15 +1,14 @@
-"""Numbers and their units in running text: in one line, and in order in text from the right.
+"""Numbers and their units in running text.
 
-Entry points: `text_html(text, direction)`; its steps `joined` and `quantities`; `unit_length`;
-`in_order(html)`; `number(value)`.
+Entry points: `text_html(text, direction)`; its steps `join_units` and `split_quantities`;
+`unit_length`; `isolate_ltr(html)`; `number(value)`.
 
-1. No line ends between a number and its unit, nor inside a unit (`kg m²`): the space becomes one
-   that does not break.
-2. In text from the right a sign, or a unit, would come to stand on the wrong side of its number,
-   since neither belongs to the one direction or the other. Such a quantity is a text of its own.
+1. A no-break space replaces each space between a number and its unit, and inside a unit (`kg m²`).
+2. In text from the right, a sign or a unit would end up on the wrong side of its number, since
+   neither has a direction of its own. Such quantities are isolated as text from the left.
 
-Units are those of the SI, those used with it, and a few of computing; a single letter that is a
-word or a label (`Figure 2 A`) loses nothing by a space that does not break.
+Units are those of the SI, those used with it, and a few of computing. If a word or a label (`Figure
+2 A`) is taken for a unit, the no-break space does no harm.
 """
 
 from __future__ import annotations
@@ -46,48 +45,50 @@ _LATIN_BEFORE = re.compile("[A-Za-z]\\s*$")
 
 
 def text_html(text: str, direction: Literal["ltr", "rtl"]) -> Markup:
-    """Text as HTML, where text runs in a direction."""
-    text = joined(text)
+    """Text as HTML, in text of this direction."""
+    text = join_units(text)
     if direction == "ltr":
         return escape(text)
-    pieces = ((escape(piece), kept) for piece, kept in quantities(text))
-    return Markup("").join(in_order(piece) if kept else piece for piece, kept in pieces)
+    pieces = ((escape(piece), is_quantity) for piece, is_quantity in split_quantities(text))
+    return Markup("").join(
+        isolate_ltr(piece) if is_quantity else piece for piece, is_quantity in pieces
+    )
 
 
-def in_order(html: Markup) -> Markup:
-    """What runs from the left wherever it stands."""
+def isolate_ltr(html: Markup) -> Markup:
+    """Isolate HTML as running from the left in text of any direction."""
     return Markup('<bdi dir="ltr">') + html + Markup("</bdi>")
 
 
-def joined(text: str) -> str:
-    """The text with no line end between a number and its unit, nor inside the unit."""
-    return _WITH_UNITS.sub(lambda found: found[0].replace(" ", "\u00a0"), text)
+def join_units(text: str) -> str:
+    """Put no-break spaces between numbers and their units, and inside units."""
+    return _WITH_UNITS.sub(lambda match: match[0].replace(" ", "\u00a0"), text)
 
 
 def unit_length(text: str) -> int:
-    """How many characters at the start of a text are the unit of a number that stands before it."""
-    found = re.match(_UNITS_FIRST, text)
-    return 0 if found is None else found.end()
+    """The length of the unit at the start of a text that follows a number."""
+    match = re.match(_UNITS_FIRST, text)
+    return 0 if match is None else match.end()
 
 
-def quantities(text: str) -> Iterator[tuple[str, bool]]:
-    """The text in pieces, each with whether it is a quantity that must be kept in order.
+def split_quantities(text: str) -> Iterator[tuple[str, bool]]:
+    """Split a text into pieces, each with whether it is a quantity to isolate.
 
-    A number after a word in Latin letters is in its order already.
+    A number after a word in Latin letters is in order already.
     """
-    at = 0
-    for found in re.finditer(_QUANTITY, text):
-        if _LATIN_BEFORE.search(text, at, found.start()):
+    position = 0
+    for match in re.finditer(_QUANTITY, text):
+        if _LATIN_BEFORE.search(text, position, match.start()):
             continue
-        if found.start() > at:
-            yield text[at : found.start()], False
-        yield found[0], True
-        at = found.end()
-    if at < len(text):
-        yield text[at:], False
+        if match.start() > position:
+            yield text[position : match.start()], False
+        yield match[0], True
+        position = match.end()
+    if position < len(text):
+        yield text[position:], False
 
 
 def number(value: float, digits: int | None = None) -> str:
-    """A number as a reader writes it: no trailing zeros, a real minus sign."""
+    """A number as people write it: no trailing zeros, a real minus sign."""
     text = f"{value:.{digits}f}" if digits is not None else f"{value:.12g}"
     return text.replace("-", "\u2212")

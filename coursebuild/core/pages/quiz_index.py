@@ -1,9 +1,9 @@
-"""Which questions a document asks, as the lists of lessons name them for the page's script.
+"""Quiz indexes: the questions of a document, listed for the scripts of other pages.
 
-Entry points: `quiz_index(document)`; `count`, of the questions in it.
+Entry points: `quiz_index(document)`; `count`, the number of questions in it.
 
-From it the script knows, without another page, how many questions a lesson has, whether all are
-answered right, and where to find one that is to be reviewed.
+From the index a script knows, without loading the lesson, how many questions it has, whether all
+were answered right, and where to find one to review.
 """
 
 from __future__ import annotations
@@ -21,5 +21,5 @@ def quiz_index(document: Document) -> str:
 
 
 def count(text: str) -> int:
-    """How many questions `quiz_index` names."""
+    """The number of questions in a quiz index."""
     return sum(len(part.partition(":")[2].split(",")) for part in text.split(" ")) if text else 0

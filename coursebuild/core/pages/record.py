@@ -1,10 +1,11 @@
-"""A drawn page, ready for its frame, and what the rest of the site must know of it.
+"""Records of drawn pages: what the rest of the site must know of a page.
 
 Entry point: `record(head, body, base_url)`.
 
-1. Formulas are set to what stands beside them (`formulas.glue`), styles in single elements become
-   classes (`styles.hoist`), and forbidden characters are made visible (`characters.visible`).
-2. Of what is left, the characters, the anchors and the addresses are noted.
+1. Formulas are glued to punctuation and units (`formulas.glue_formulas`), inline styles become
+   classes (`styles.hoist_styles`), and forbidden characters are made visible
+   (`characters.visible`).
+2. The record has the characters, anchors and addresses of the result.
 """
 
 from __future__ import annotations
@@ -15,43 +16,43 @@ from coursebuild.core.pages import fonts, formulas, styles
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.common_files import page_characters
 from coursebuild.core.pages.frame import parts_of
-from coursebuild.core.pages.links import Reference, ids_and_addresses, references, without_lines
+from coursebuild.core.pages.links import Reference, ids_and_addresses, merge_line_ids, references
 from coursebuild.core.pages.page_inputs import PageHead
 
 
 class PageRecord(Struct, frozen=True):
-    """What the site must know of a page to put it together, but for the page's body."""
+    """What the site must know of a page, without its body."""
 
     head: PageHead
     parts: tuple[str, ...]
     """See `frame.parts_of`."""
     text: str
-    """Characters of its text, as `PageFacts` has them, sorted; so are the others."""
+    """Characters of its text, as in `PageFacts`, sorted, like those of formulas."""
     mathematics: str
     declarations: tuple[str, ...]
-    """Styles that were written in its elements, sorted."""
+    """Styles taken out of its elements, sorted."""
     ids: tuple[str, ...]
-    """Anchors, sorted; see `links.without_lines`."""
+    """Anchors, sorted; see `links.merge_line_ids`."""
     references: tuple[Reference, ...]
-    """Where its links lead, sorted, each once."""
+    """The targets of its links, sorted, each once."""
     notes: tuple[tuple[str, str], ...] = ()
-    """What features noted of the page: the feature's name and a digest; see `added_files`."""
+    """The features' notes of the page: a feature's name and a digest; see `added_files`."""
 
 
 def record(head: PageHead, body: str, base_url: str) -> tuple[PageRecord, str]:
-    """The record of a page that was just drawn, and its body as it will be published."""
-    # Text: what is put into `Markup` would be escaped.
-    html, declarations = styles.hoist(formulas.glue_formulas(str(body)))
+    """The record of a page just drawn, and its body as it will be published."""
+    # A plain string, since `Markup` would escape what is inserted.
+    html, declarations = styles.hoist_styles(formulas.glue_formulas(str(body)))
     text, mathematics = page_characters(html)
     html = visible(html)
     ids, addresses = ids_and_addresses(html)
-    found = PageRecord(
+    page_record = PageRecord(
         head=head,
         parts=parts_of(html, head.kind),
         text="".join(sorted(text.union(head.title) - fonts.BASE)),
         mathematics="".join(sorted(mathematics)),
         declarations=tuple(sorted(declarations)),
-        ids=tuple(sorted(without_lines(ids))),
+        ids=tuple(sorted(merge_line_ids(ids))),
         references=tuple(sorted(references(head.path, addresses, base_url))),
     )
-    return found, html
+    return page_record, html

@@ -1,4 +1,4 @@
-"""What pages are drawn with, whatever they show: words, templates, formulas.
+"""The renderer of pages: words, templates, formulas.
 
 Entry points: `Renderer`; `known_mathml`.
 """
@@ -21,17 +21,17 @@ from coursebuild.core.pages.templates import TemplateFailure
 
 
 def known_mathml(formulas: Mapping[Formula, str | MathError]) -> Mathml:
-    """Gives formulas as MathML, as far as they are set."""
+    """A function that returns formulas as MathML, empty for those with an error."""
 
     def mathml(tex: str, display: bool) -> str:
-        found = formulas.get(Formula(tex, display))
-        return found if isinstance(found, str) else ""
+        html = formulas.get(Formula(tex, display))
+        return html if isinstance(html, str) else ""
 
     return mathml
 
 
 class Renderer(Struct, frozen=True):
-    """The interface's words in the course's language, the templates, and formulas as MathML."""
+    """The interface texts in the course's language, the templates, and formulas as MathML."""
 
     words: Strings
     templates: Environment
@@ -40,27 +40,27 @@ class Renderer(Struct, frozen=True):
     def render(self, template: str, **values: object) -> Markup:
         """A filled-in template, without its last line end.
 
-        It sees `t`, the interface's words, and `authored`, see `text`.
+        Templates can use `t`, the interface texts, and `authored`, see `text`.
         """
-        seen = {"t": self.words, "authored": self.text, **values}
+        variables = {"t": self.words, "authored": self.text, **values}
         try:
-            return Markup(self.templates.get_template(template).render(seen).rstrip("\n"))
+            return Markup(self.templates.get_template(template).render(variables).rstrip("\n"))
         except Exception as error:
             if (failure := TemplateFailure.of(error)) is not None:
                 raise failure from error
             raise
 
     def text(self, text: str) -> Markup:
-        """Text of an author that is not Markdown, with its quantities kept together."""
+        """An author's plain text, with numbers joined to their units."""
         return text_html(text, direction(self.words.language))
 
     def highlight(self, language: str, code: str) -> Markup:
-        """Code with its tokens marked."""
+        """Code with its syntax highlighted."""
         return Markup("\n".join(highlight_lines(language, code)))
 
     def mathml(self, tex: str, display: bool) -> Markup:
         """A formula's MathML; one that does not parse is never rendered (`ValueError`)."""
-        found = self.formulas[Formula(tex, display)]
-        if isinstance(found, MathError):
-            raise ValueError(f"formula {tex!r} does not parse: {found.message}")
-        return Markup(found)
+        html = self.formulas[Formula(tex, display)]
+        if isinstance(html, MathError):
+            raise ValueError(f"formula {tex!r} does not parse: {html.message}")
+        return Markup(html)

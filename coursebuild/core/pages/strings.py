@@ -1,14 +1,14 @@
-"""The words of the interface: one file a language, read as an asset.
+"""The interface texts: one file for each language.
 
-Entry point: `parse_strings(text, fallback, language)`, which gives `Strings`; a template says
+Entry point: `parse_strings(text, fallback, language)`, which returns `Strings`; templates call
 `t("lesson.minutes", n=25)`.
 
-1. A file is TOML: tables of texts, addressed by their dotted path. `{name}` in a text is replaced
-   by a value.
-2. A text that depends on a number is a table with the forms that its language has, `other` among
-   them; the value `n` chooses (`plurals`).
-3. A key that a language lacks is taken from English; a key that English lacks is a programming
-   error (`KeyError`). Of a text with forms all are of one language.
+1. A file is TOML: tables of texts, addressed by dotted path. `{name}` in a text is replaced by a
+   value.
+2. A text that depends on a number is a table with the plural forms of its language, `other` among
+   them; the value `n` selects one (`plurals`).
+3. A key missing in a language is taken from English; one missing in English is a programming error
+   (`KeyError`). All forms of a text are of one language.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ DEFAULT_LANGUAGE = "en"
 
 
 class Strings(Struct, frozen=True):
-    """The interface's words in one language."""
+    """The interface texts in one language."""
 
     texts: Mapping[str, str]
     """By dotted key, sorted."""
     language: str = DEFAULT_LANGUAGE
-    """Of the course that they are for."""
+    """The language of the course."""
 
     def __call__(self, key: str, **values: str | int | float) -> str:
-        """The text of a key, with its values put in."""
+        """The text of a key, with values inserted."""
         text = self.texts.get(key)
         if text is None and "n" in values:
             text = self._form(key, values["n"])
@@ -55,14 +55,14 @@ def parse_strings(
     """Read a file of texts; what it lacks comes from `fallback`."""
     import tomllib
 
-    own = dict(_flatten(tomllib.loads(text), ""))
+    texts = dict(_flatten(tomllib.loads(text), ""))
     table = dict(fallback.texts) if fallback is not None else {}
-    for key in own:
+    for key in texts:
         stem, _, form = key.rpartition(".")
-        if form in CATEGORIES and f"{stem}.other" in own:
-            for other in CATEGORIES:
-                table.pop(f"{stem}.{other}", None)
-    table.update(own)
+        if form in CATEGORIES and f"{stem}.other" in texts:
+            for other_form in CATEGORIES:
+                table.pop(f"{stem}.{other_form}", None)
+    table.update(texts)
     return Strings(dict(sorted(table.items())), language)
 
 

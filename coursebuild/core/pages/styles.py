@@ -1,11 +1,10 @@
-"""Styles that are written in single elements, as classes of the style sheet.
+"""Inline styles turned into classes of the style sheet.
 
-Entry points: `hoist(html)`, which takes `style` attributes out of a page's text, and `style_rules`,
-the rules that take their place.
+Entry points: `hoist_styles(html)`, which replaces the `style` attributes of a page by classes, and
+`style_rules`, the rules of these classes.
 
-The page's Content-Security-Policy allows no style in the page. Formulas come with some (the padding
-of a matrix's columns), and so may an author's HTML; each different declaration gets one class,
-named by its content.
+The Content-Security-Policy forbids inline styles. Formulas have some (the padding of a matrix's
+columns), and so may an author's HTML; each distinct declaration gets a class named after a hash.
 """
 
 from __future__ import annotations
@@ -22,44 +21,43 @@ _PIECE = re.compile(
     r"""|<(?P<tag>[a-zA-Z](?:[^"'>]|"[^"]*"|'[^']*')*)>""",
     re.DOTALL | re.IGNORECASE,
 )
-"""A comment, an element of raw text, or a tag: nothing that only looks like an attribute is taken
-for one."""
+"""A comment, an element of raw text, or a tag, so that only real attributes are found."""
 
-_OTHERS = re.compile(
+_WITHOUT_STYLE = re.compile(
     r"""(?:[^<]++|<(?![a-z]|!--)"""
     r"""|<(?!(?:script|style|textarea|title)\b|[^<>]*style)"""
     r"""[a-z](?:[^"'<>]++|"[^"<>]*+"|'[^'<>]*+')*+>)*+""",
     re.IGNORECASE,
 )
-"""What has no style in it: texts, end tags, most tags. Where it ends, `_PIECE` may begin."""
+"""Text, end tags and tags without a style, after which `_PIECE` may match."""
 
 _ATTRIBUTE = re.compile(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
 
 
-def hoist(html: str) -> tuple[str, frozenset[str]]:
-    """The page with classes in place of `style` attributes, and what they stand for."""
-    found: set[str] = set()
+def hoist_styles(html: str) -> tuple[str, frozenset[str]]:
+    """Replace `style` attributes by classes; return the page and the declarations."""
+    declarations: set[str] = set()
     parts: list[str] = []
-    at = 0
-    while at < len(html):
-        others = _OTHERS.match(html, at)
-        end = at if others is None else others.end()
+    position = 0
+    while position < len(html):
+        skipped = _WITHOUT_STYLE.match(html, position)
+        end = position if skipped is None else skipped.end()
         piece = _PIECE.match(html, end)
         if piece is None:
-            parts.append(html[at : end + 1])
-            at = end + 1
+            parts.append(html[position : end + 1])
+            position = end + 1
         else:
             tag, declaration = _without_style(piece["tag"]) if piece["tag"] else (piece[0], "")
             if declaration:
-                found.add(declaration)
-            parts += (html[at:end], tag)
-            at = piece.end()
-    return "".join(parts), frozenset(found)
+                declarations.add(declaration)
+            parts += (html[position:end], tag)
+            position = piece.end()
+    return "".join(parts), frozenset(declarations)
 
 
 @functools.lru_cache(maxsize=4096)
 def _without_style(tag: str) -> tuple[str, str]:
-    """The tag with this inside with a class in place of its style, and the style, if it has one."""
+    """A tag, given its inside, with a class instead of its style; and the style, if any."""
     names = {name.lower(): value for name, value in _ATTRIBUTE.findall(tag)}
     if "style" not in names:
         return f"<{tag}>", ""
@@ -72,12 +70,12 @@ def _without_style(tag: str) -> tuple[str, str]:
 
 
 def class_name(declaration: str) -> str:
-    """The class of a declaration."""
+    """The name of the class of a declaration."""
     return "s" + hashlib.sha256(declaration.encode()).hexdigest()[:7]
 
 
 def style_rules(declarations: Iterable[str]) -> str:
-    """The rules of the classes, in the order of their names."""
+    """The rules of the classes, sorted."""
     rules = sorted(
         f".{class_name(declaration)}{{{declaration}}}" for declaration in set(declarations)
     )
@@ -85,7 +83,7 @@ def style_rules(declarations: Iterable[str]) -> str:
 
 
 def _normal(declaration: str) -> str:
-    """One spelling of a declaration; empty for one that would reach out of its rule."""
+    """Normalize a declaration; empty for one that would break out of its rule."""
     text = " ".join(declaration.split()).strip("; ")
     quotes = text.count('"') % 2 or text.count("'") % 2
     return "" if quotes or re.search(r"[{}<\\]|/\*", text) else text
@@ -93,15 +91,15 @@ def _normal(declaration: str) -> str:
 
 def _with_class(tag: str, value: str) -> str:
     """The inside of a tag with `class="value"` in place of its `style` and `class`."""
-    placed = False
+    has_class = False
 
     def replace(match: re.Match[str]) -> str:
-        nonlocal placed
+        nonlocal has_class
         if match[1].lower() not in ("style", "class"):
             return match[0]
-        if placed or not value:
+        if has_class or not value:
             return ""
-        placed = True
+        has_class = True
         return f' class="{value}"'
 
     return _ATTRIBUTE.sub(replace, tag)

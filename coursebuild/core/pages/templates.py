@@ -1,13 +1,13 @@
 """The templates of pages, in Jinja's language.
 
-Entry points: `templates_of`; `compile_templates`, for who bundles the tool; `TemplateFailure`.
+Entry points: `templates_of`; `compile_templates`, for bundling the tool; `TemplateFailure`.
 
-1. What is not `Markup` is escaped where it is written.
-2. A name or an attribute that is not there is an error.
-3. Templates that are those which the tool was bundled with are loaded from the Python that they
-   were compiled to then. Others, in a source tree, are compiled when they are asked for.
-4. A course may have templates of its own in the place of some. What goes wrong in these is its
-   author's to mend, and is told with its place.
+1. Values that are not `Markup` are escaped.
+2. An undefined name or attribute is an error.
+3. Templates that the tool was bundled with are loaded as the Python they were compiled to then.
+   Others, in a source tree, are compiled on use.
+4. A course may replace templates by its own. Errors in these are its author's, and are reported
+   with their place.
 """
 
 from __future__ import annotations
@@ -36,23 +36,25 @@ Texts: TypeAlias = tuple[tuple[str, str], ...]
 
 
 @functools.lru_cache(maxsize=8)
-def templates_of(texts: Texts, folder: Path | None = None, own: Texts = ()) -> Environment:
-    """The templates among files of the tool; `folder` has those that were compiled before.
+def templates_of(
+    texts: Texts, folder: Path | None = None, course_templates: Texts = ()
+) -> Environment:
+    """The templates among the tool's files; `folder` holds compiled ones.
 
-    `own` are those of the course, which come first.
+    `course_templates` are those of the course, which come first.
     """
-    compiled = None if folder is None else folder / compiled_name(texts)
-    found: list[BaseLoader] = [DictLoader(_pages(texts))]
-    if compiled is not None and compiled.is_dir():
-        found = [ModuleLoader(compiled)]
-    if own:
-        theirs = {name: (text, f"{TEMPLATES}{name}", None) for name, text in own}
-        found = [FunctionLoader(theirs.get), *found]
-    return _environment(ChoiceLoader(found))
+    compiled_folder = None if folder is None else folder / compiled_name(texts)
+    loaders: list[BaseLoader] = [DictLoader(_pages(texts))]
+    if compiled_folder is not None and compiled_folder.is_dir():
+        loaders = [ModuleLoader(compiled_folder)]
+    if course_templates:
+        sources = {name: (text, f"{TEMPLATES}{name}", None) for name, text in course_templates}
+        loaders = [FunctionLoader(sources.get), *loaders]
+    return _environment(ChoiceLoader(loaders))
 
 
 class TemplateFailure(Exception):  # noqa: N818
-    """What a template of the course does wrong: its path, the line, and what, in words."""
+    """An error in a template of the course: path, line and message."""
 
     def __init__(self, path: str, line: int, message: str) -> None:
         super().__init__(path, line, message)
@@ -60,7 +62,7 @@ class TemplateFailure(Exception):  # noqa: N818
 
     @classmethod
     def of(cls, error: Exception) -> TemplateFailure | None:
-        """That of an error which came about in a template of the course, if it did."""
+        """The failure for an exception, if that was raised in a template of the course."""
         if isinstance(error, TemplateFailure):
             return error
         for frame, line in reversed(tuple(traceback.walk_tb(error.__traceback__))):
@@ -70,8 +72,8 @@ class TemplateFailure(Exception):  # noqa: N818
         return None
 
 
-def template_mistake(text: str) -> tuple[int, str] | None:
-    """The line at which a text is no template, and why."""
+def find_template_error(text: str) -> tuple[int, str] | None:
+    """The line and message of the first syntax error in a template; `None` if it is valid."""
     try:
         _environment(DictLoader({})).from_string(text)
     except TemplateSyntaxError as error:
@@ -80,14 +82,14 @@ def template_mistake(text: str) -> tuple[int, str] | None:
 
 
 def compile_templates(texts: Texts, folder: Path) -> None:
-    """Write templates into a folder as Python that `templates_of` loads."""
+    """Compile templates into a folder, for `templates_of` to load."""
     environment = _environment(DictLoader(_pages(texts)))
     target = folder / compiled_name(texts)
     environment.compile_templates(target, zip=None, ignore_errors=False)
 
 
 def compiled_name(texts: Texts) -> str:
-    """The name of the folder of these templates as Python."""
+    """The name of the folder of these templates, compiled."""
     digest = hashlib.sha256(repr(sorted(_pages(texts).items())).encode())
     return f"templates-{digest.hexdigest()[:16]}"
 

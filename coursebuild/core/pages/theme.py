@@ -1,4 +1,4 @@
-"""The course's own look in what all pages share.
+"""A course's own look in the files that all pages share.
 
 Entry points: `theme_faces`, its fonts; `theme_style`, the end of the style sheet; `picture_size`.
 """
@@ -13,7 +13,7 @@ from coursebuild.core.pages.font_files import course_face
 from coursebuild.core.pages.fonts import Face
 
 _ACCENT = "#17487a", "#9fc6ef"
-"""That of the style sheet, on light and dark pages."""
+"""The accent of the style sheet, on light and dark pages."""
 _BOLD = 600
 """The weight of headings."""
 _BOX = re.compile(r"""<svg\b[^>]*?\sviewBox=["']\s*\S+?[\s,]+\S+?[\s,]+([\d.]+)[\s,]+([\d.]+)""")
@@ -21,14 +21,14 @@ _SIDE = r"""<svg\b[^>]*?\s{}=["']\s*([\d.]+)"""
 
 
 def theme_faces(theme: Theme) -> list[tuple[Face, bytes]]:
-    """The faces of its fonts, each with the font; those that cannot be read are told elsewhere."""
-    named = ((family.use, file) for family in theme.fonts for file in family.files)
-    found = (course_face(use, file.path.rpartition("/")[2], file.data) for use, file in named)
-    return [face for face in found if not isinstance(face, str)]
+    """The faces of its fonts, each with its file; checks report unreadable ones."""
+    files = ((family.use, file) for family in theme.fonts for file in family.files)
+    faces = (course_face(use, file.path.rpartition("/")[2], file.data) for use, file in files)
+    return [face for face in faces if not isinstance(face, str)]
 
 
 def theme_style(theme: Theme) -> str:
-    """What stands at the end of the style sheet."""
+    """The rules at the end of the style sheet."""
     css = (f"{file.text.rstrip()}\n" for file in theme.css)
     return "".join((_accent(theme), _synthesis(theme), *css))
 
@@ -49,7 +49,7 @@ def _accent(theme: Theme) -> str:
 
 
 def _synthesis(theme: Theme) -> str:
-    """Where a font has no bold or no italics, the browser makes them of what there is."""
+    """Let the browser synthesize bold or italics if a font lacks them."""
     for family in theme.fonts:
         faces = [face for face, _ in theme_faces(Theme(fonts=(family,)))]
         if not any(face.weight[1] >= _BOLD for face in faces) or not any(
@@ -60,7 +60,7 @@ def _synthesis(theme: Theme) -> str:
 
 
 def picture_size(file: ThemeFile) -> tuple[float, float] | None:
-    """Width and height of a picture, as far as their ratio goes; `None` where it does not say."""
+    """Width and height of a picture, of which only the ratio counts; `None` if not given."""
     if file.ending == "png":
         width, height = (int.from_bytes(file.data[at : at + 4], "big") for at in (16, 20))
         return width, height
@@ -71,5 +71,5 @@ def picture_size(file: ThemeFile) -> tuple[float, float] | None:
 
 
 def _side(svg: str, name: str) -> str | None:
-    found = re.search(_SIDE.format(name), svg)
-    return found and found[1]
+    match = re.search(_SIDE.format(name), svg)
+    return match and match[1]

@@ -1,10 +1,10 @@
-"""Where each thing of the course stands in the site, and how one page refers to another.
+"""The paths of pages and files in the site, and addresses from one page to another.
 
 Entry points: `lesson_path` and its siblings (site paths: POSIX, relative to the site's root), and
-`Place`, the point from which a page refers to others.
+`Place`, from which a page refers to others.
 
-1. A site path is plain text, as the file is named on disk; it is percent-encoded only when it
-   becomes part of an address.
+1. A site path is plain text, the name of the file on disk; it is percent-encoded only as part of an
+   address.
 2. Every address is relative, so that the site works in any folder, from a disk and under any base.
    The page for missing addresses is served at every depth, so its addresses begin with the path of
    the course's base address instead.
@@ -26,14 +26,14 @@ NOT_FOUND = "404.html"
 EXAMPLES_ZIP = "examples.zip"
 MODELS = "models/index.html"
 NUMERICS = "numerics/index.html"
-"""In a folder that no page of a course can have."""
+"""In a folder that no page of a course can occupy."""
 SITEMAP = "sitemap.xml"
 ROBOTS = "robots.txt"
 MANIFEST = "manifest.webmanifest"
 WORKER = "service-worker.js"
-"""In the root, since a worker serves the folder that it lies in."""
+"""In the root, since a worker serves its own folder."""
 FILES = "files.json"
-"""The list of what the worker may keep."""
+"""The list of files that the worker may keep."""
 
 
 def lesson_path(lesson: Lesson) -> str:
@@ -52,7 +52,7 @@ def copy_path(page: str, ending: str) -> str:
 
 
 def has_copies(page: str) -> bool:
-    """Whether there are copies of a page: of one that scripts fill in there are none."""
+    """Whether there are copies of a page; pages filled in by scripts have none."""
     filled = (kind.path for kind in page_kinds() if not kind.indexed)
     return page != NOT_FOUND and page not in filled
 
@@ -85,7 +85,7 @@ def owner_path(owner: Owner) -> str:
 def file_path(path: str) -> str:
     """`files/lessons/sketch.svg`: a file of the course that pages show or link to.
 
-    What a model pulls in lies beside the model, as in the course.
+    A file that a model includes is beside the model, as in the course.
     """
     return path if path.startswith("models/") else "files/" + path.removeprefix("content/")
 
@@ -96,7 +96,7 @@ def dark_path(path: str) -> str:
 
 
 def absolute(course: Course, path: str) -> str:
-    """The full address of a site path, or the empty text where the course has no base address."""
+    """The full address of a site path; empty if the course has no base address."""
     if not course.base_url:
         return ""
     return course.base_url.rstrip("/") + "/" + encode("" if path == HOME else path)
@@ -109,7 +109,7 @@ def base_path(course: Course) -> str:
 
 
 _UNRESERVED = re.compile("[A-Za-z0-9/~._+@,-]*+")
-"""What stays as it is in an address."""
+"""Paths that need no encoding in an address."""
 
 
 def encode(path: str) -> str:
@@ -117,18 +117,18 @@ def encode(path: str) -> str:
     return path if _UNRESERVED.fullmatch(path) else quote(path, safe="/~-._+@,")
 
 
-def quoted(anchor: str) -> str:
+def quote_anchor(anchor: str) -> str:
     """An anchor as part of an address."""
     return quote(anchor, safe="-._~:")
 
 
 class Place(Struct, frozen=True):
-    """The page that addresses are written for."""
+    """A page that addresses are relative to."""
 
     path: str
     """Its site path."""
     root: str | None = None
-    """What every address begins with; `None`: addresses are relative to `path`."""
+    """The prefix of every address; `None` to make addresses relative to `path`."""
 
     def href(self, path: str, anchor: str | None = None) -> str:
         """The address of a site path, and of an anchor there."""
@@ -141,7 +141,7 @@ class Place(Struct, frozen=True):
 
 
 def _relative(path: str, start: str) -> str:
-    """A site path as seen from the page at `start`."""
+    """A site path relative to the page at `start`."""
     ends, starts = path.split("/"), start.split("/")[:-1]
     shared = 0
     while shared < min(len(ends) - 1, len(starts)) and ends[shared] == starts[shared]:

@@ -1,7 +1,7 @@
-"""Elements of XML, and names that it allows.
+"""XML: elements, files from templates, valid names.
 
-Entry points: `element`; `render_xml`, a file by its template, in which `markup` stands
-for elements; `identifier`, a name out of any text.
+Entry points: `element`; `render_xml`, a file from a template, in which `markup` inserts elements;
+`identifier`, a name made from any text.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ Child: TypeAlias = "Element | str | None"
 
 def element(name: str, attributes: dict[str, str] | None = None, *children: Child) -> Element:
     """An element; a child that is `None` is left out."""
-    made = Element(name, {key: clean_xml(value) for key, value in (attributes or {}).items()})
-    add(made, *children)
-    return made
+    node = Element(name, {key: clean_xml(value) for key, value in (attributes or {}).items()})
+    add(node, *children)
+    return node
 
 
 def add(parent: Element, *children: Child) -> None:
@@ -44,7 +44,7 @@ def add(parent: Element, *children: Child) -> None:
 
 
 def render_xml(template: Path, **values: Any) -> bytes:
-    """A whole file; what is not `Markup` is escaped."""
+    """A whole file; values that are not `Markup` are escaped."""
     return clean_xml(_template(template).render(values)).encode()
 
 
@@ -57,17 +57,17 @@ def _template(path: Path) -> Template:
 
 
 def markup(content: Iterable[Element | str]) -> Markup:
-    """Elements and texts as they stand in a file."""
+    """Elements and texts as markup for a template."""
     parts = (escape(c) if isinstance(c, str) else Markup(tostring(c, "unicode")) for c in content)
     return Markup("").join(parts)
 
 
 def identifier(prefix: str, text: str, *, most: int = 0) -> str:
-    """An NCName of ASCII; other texts, other names.
+    """An ASCII NCName made from a text; different texts give different names.
 
-    With `most` characters, a longer one ends with digits of its hash.
+    With a limit of `most` characters, a longer name ends with digits of its hash.
     """
-    name = prefix + re.sub("[^A-Za-z0-9.-]", lambda found: f"_{ord(found[0]):x}_", text)
+    name = prefix + re.sub("[^A-Za-z0-9.-]", lambda match: f"_{ord(match[0]):x}_", text)
     if most and len(name) > most:
         digest = hashlib.sha256(name.encode()).hexdigest()[:12]
         name = f"{name[: most - 13]}_{digest}"

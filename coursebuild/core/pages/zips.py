@@ -1,11 +1,11 @@
-"""Scripts as archives that run elsewhere, with models, `mjcourse` and exact requirements.
+"""Archives of scripts that run elsewhere, with models, `mjcourse` and exact requirements.
 
-Entry points: `archives`; `imported_modules` says which packages whoever calls should give the
-versions of. What scripts import of `mjcourse` and of the course's own packages lies beside them,
-where Python looks first.
+Entry points: `make_archives`; `foreign_modules`, the modules of packages whose versions the caller
+should provide. What scripts import of `mjcourse` and of the course's own packages is put beside
+them, where Python looks first.
 
-The bytes depend on the content alone: entries in order of their paths, one fixed date, one fixed
-way to compress.
+The bytes depend on the content only: entries are sorted by path, with one fixed date and one fixed
+compression.
 """
 
 from __future__ import annotations
@@ -34,39 +34,39 @@ class Package(Struct, frozen=True):
     """An installed package that scripts import."""
 
     module: str
-    """What a script imports: `yaml`."""
+    """Its name in imports, such as `yaml`."""
     name: str
-    """What an installer calls it: `PyYAML`."""
+    """Its name for installers, such as `PyYAML`."""
     version: str
 
 
 class Surroundings(Struct, frozen=True):
-    """What scripts need around them, besides the course itself."""
+    """What scripts need to run, besides the course itself."""
 
     packages: tuple[Package, ...] = ()
     library: Callable[[str], tuple[OutputFile, ...]] = lambda _: ()
-    """The files of a module of `mjcourse` or of the course's own, by path relative to the folder
-    that holds it; none of any other module."""
+    """Returns the files of a module of `mjcourse` or of the course's own, by path relative to the
+    module's parent folder; none for other modules."""
     model_files: tuple[OutputFile, ...] = ()
-    """Files in `models/` that are no MJCF (meshes, height fields), by path relative to the project
+    """Other files than MJCF in `models/` (meshes, height fields), by path relative to the project
     root."""
     style: tuple[OutputFile, ...] = ()
     """The course's `matplotlibrc`, if it has one: the style of all figures."""
     imports: Callable[[str], frozenset[str]] = find_imports
-    """What a Python text imports: whoever calls may know it already."""
+    """Returns what a Python text imports; the caller may know it already."""
 
 
 class Archive(Struct, frozen=True):
-    """An archive that is not packed yet."""
+    """An archive before it is packed."""
 
     path: str
     """Site path."""
     parts: Mapping[str, bytes | Excerpt]
-    """What is in it by path: code, or bytes."""
+    """Its content by path: code or bytes."""
 
     @property
     def files(self) -> dict[str, bytes]:
-        """What is in it, all as bytes."""
+        """Its content by path, as bytes."""
         return {
             path: part if isinstance(part, bytes) else part.text.encode()
             for path, part in self.parts.items()
@@ -74,97 +74,99 @@ class Archive(Struct, frozen=True):
 
     @property
     def key(self) -> str:
-        """A hash of all that is in it."""
+        """A hash of its content."""
         digest = hashlib.sha256()
         for path in sorted(self.parts):
             part = self.parts[path]
-            own = hashlib.sha256(part).digest() if isinstance(part, bytes) else part.digest
-            digest.update(f"{path}\0".encode() + own)
+            part_digest = hashlib.sha256(part).digest() if isinstance(part, bytes) else part.digest
+            digest.update(f"{path}\0".encode() + part_digest)
         return digest.hexdigest()
 
-    def packed(self) -> bytes:
-        """Its bytes."""
-        return pack(self.files)
+    def pack(self) -> bytes:
+        """The bytes of the archive."""
+        return pack_files(self.files)
 
 
-def archives(library: Library, around: Surroundings) -> Iterator[Archive]:
-    """That of the course and those of its lessons, as far as they have scripts."""
+def make_archives(library: Library, surroundings: Surroundings) -> Iterator[Archive]:
+    """The archives of the course and of each lesson with scripts."""
     by_module = {_module(path): script for path, (script, _) in library.scripts.items()}
     if library.scripts:
         scripts = tuple(script for script, _ in library.scripts.values())
         folder = _slug(library.course.title)
-        files = _files(library, around, scripts, folder, by_module)
+        files = _files(library, surroundings, scripts, folder, by_module)
         yield Archive(urls.EXAMPLES_ZIP, files)
     for lesson in library.order:
         scripts = document_scripts(lesson.document) if lesson.document is not None else ()
         if scripts:
-            needed = _with_siblings(by_module, around, scripts)
-            files = _files(library, around, needed, f"{lesson.id}-{lesson.slug}", by_module)
+            lesson_scripts = _with_imported_scripts(by_module, surroundings, scripts)
+            files = _files(
+                library, surroundings, lesson_scripts, f"{lesson.id}-{lesson.slug}", by_module
+            )
             yield Archive(urls.lesson_zip_path(lesson), files)
 
 
-def imported_modules(course: Course, around: Surroundings) -> tuple[str, ...]:
-    """Top-level modules of others that the scripts, and the packages they come with, import."""
+def foreign_modules(course: Course, surroundings: Surroundings) -> tuple[str, ...]:
+    """The top-level modules of other packages that scripts import, directly or not."""
     scripts = [script for script, _ in course_scripts(course).values()]
-    own = {_module(script.path) for script in scripts}
-    return tuple(sorted(_imported(scripts, around, own)[1]))
+    script_modules = {_module(script.path) for script in scripts}
+    return tuple(sorted(_follow_imports(scripts, surroundings, script_modules)[1]))
 
 
-def _imported(
-    scripts: Iterable[Script], around: Surroundings, own: Collection[str]
+def _follow_imports(
+    scripts: Iterable[Script], surroundings: Surroundings, script_modules: Collection[str]
 ) -> tuple[list[OutputFile], set[str]]:
-    """The library's files that scripts import, maybe through each other, and others' modules.
+    """Follow imports; return the files of the course's modules, and the names of foreign modules.
 
-    `own` are the modules that scripts are themselves.
+    `script_modules` are the modules that scripts themselves are.
     """
     files: list[OutputFile] = []
-    others: set[str] = set()
-    seen: set[str] = set()
-    waiting = [script.code.text for script in scripts]
-    for text in waiting:
-        for name in around.imports(text) - seen:
-            seen.add(name)
-            found = () if name in own else around.library(name)
-            files += found
-            waiting += [file.data.decode() for file in found if file.path.endswith(".py")]
-            if not found and name not in own:
-                others.add(name)
-    return files, others - _NEVER_REQUIRED
+    foreign: set[str] = set()
+    modules: set[str] = set()
+    texts = [script.code.text for script in scripts]
+    for text in texts:
+        for name in surroundings.imports(text) - modules:
+            modules.add(name)
+            module_files = () if name in script_modules else surroundings.library(name)
+            files += module_files
+            texts += [file.data.decode() for file in module_files if file.path.endswith(".py")]
+            if not module_files and name not in script_modules:
+                foreign.add(name)
+    return files, foreign - _NEVER_REQUIRED
 
 
 def _module(path: str) -> str:
     return path.removeprefix("examples/").removesuffix(".py").partition("/")[0]
 
 
-def _with_siblings(
-    by_module: Mapping[str, Script], around: Surroundings, scripts: Iterable[Script]
+def _with_imported_scripts(
+    by_module: Mapping[str, Script], surroundings: Surroundings, scripts: Iterable[Script]
 ) -> tuple[Script, ...]:
-    found: dict[str, Script] = {}
-    waiting = list(scripts)
-    while waiting:
-        script = waiting.pop()
-        if script.path not in found:
-            found[script.path] = script
-            named = around.imports(script.code.text)
-            waiting += [by_module[name] for name in named if name in by_module]
-    return tuple(found[path] for path in sorted(found))
+    scripts_by_path: dict[str, Script] = {}
+    stack = list(scripts)
+    while stack:
+        script = stack.pop()
+        if script.path not in scripts_by_path:
+            scripts_by_path[script.path] = script
+            names = surroundings.imports(script.code.text)
+            stack += [by_module[name] for name in names if name in by_module]
+    return tuple(scripts_by_path[path] for path in sorted(scripts_by_path))
 
 
 def _files(
     library: Library,
-    around: Surroundings,
+    surroundings: Surroundings,
     scripts: tuple[Script, ...],
     folder: str,
-    own: Mapping[str, Script],
+    script_modules: Mapping[str, Script],
 ) -> dict[str, bytes | Excerpt]:
-    """What is in an archive of one folder; `own` are the modules that scripts are themselves."""
+    """The content of an archive in one folder; `script_modules` are those of scripts themselves."""
     files: dict[str, bytes | Excerpt] = {script.path: script.code for script in scripts}
-    beside, others = _imported(scripts, around, own)
-    files |= {f"examples/{file.path}": file.data for file in beside}
-    files |= _models(library, around, scripts)
-    if "matplotlib" in others:
-        files |= {file.path: file.data for file in around.style}
-    files["requirements.txt"] = _requirements(library, around.packages, others)
+    library_files, foreign = _follow_imports(scripts, surroundings, script_modules)
+    files |= {f"examples/{file.path}": file.data for file in library_files}
+    files |= _models(library, surroundings, scripts)
+    if "matplotlib" in foreign:
+        files |= {file.path: file.data for file in surroundings.style}
+    files["requirements.txt"] = _requirements(library, surroundings.packages, foreign)
     first = scripts[0].path
     readme = library.words("zip.readme", title=library.course.title, script=first)
     files["README.md"] = f"{readme.strip()}\n".encode()
@@ -172,39 +174,39 @@ def _files(
 
 
 def _models(
-    library: Library, around: Surroundings, scripts: tuple[Script, ...]
+    library: Library, surroundings: Surroundings, scripts: tuple[Script, ...]
 ) -> Mapping[str, bytes]:
-    """The models that scripts name, and the files that these pull in."""
+    """The models that scripts name, and the files that these include."""
     if not library.course.models:
         return {}
     sources = {model.source.path: model.source.text.encode() for model in library.course.models}
-    others = {file.path: file.data for file in around.model_files}
-    named = {name for script in scripts for name in models_named(script)}
-    found: dict[str, bytes] = {}
+    model_files = {file.path: file.data for file in surroundings.model_files}
+    names = {name for script in scripts for name in models_named(script)}
+    model_data: dict[str, bytes] = {}
     for model in library.course.models:
-        if model.name in named:
-            found[model.source.path] = sources[model.source.path]
+        if model.name in names:
+            model_data[model.source.path] = sources[model.source.path]
             facts = library.facts.get(model.name)
             for path in facts.includes if facts is not None else ():
-                if (data := sources.get(path, others.get(path))) is not None:
-                    found[path] = data
-    return found
+                if (data := sources.get(path, model_files.get(path))) is not None:
+                    model_data[path] = data
+    return model_data
 
 
 def _requirements(library: Library, packages: Iterable[Package], modules: Iterable[str]) -> bytes:
-    """One line for each package that is imported, with its exact version where it is known."""
-    known = {package.module: f"{package.name}=={package.version}" for package in packages}
-    known.setdefault("mujoco", f"mujoco=={library.results.engine}")
-    used = (known.get(name, name) for name in modules)
-    return "".join(f"{line}\n" for line in sorted(used)).encode()
+    """A line for each imported package, with its exact version if known."""
+    lines_by_module = {package.module: f"{package.name}=={package.version}" for package in packages}
+    lines_by_module.setdefault("mujoco", f"mujoco=={library.results.engine}")
+    lines = (lines_by_module.get(name, name) for name in modules)
+    return "".join(f"{line}\n" for line in sorted(lines)).encode()
 
 
 def _slug(title: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "course"
 
 
-def pack(files: Mapping[str, bytes]) -> bytes:
-    """An archive of these files, by path."""
+def pack_files(files: Mapping[str, bytes]) -> bytes:
+    """Pack files, given by path, into an archive."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
         for path, data in sorted(files.items()):

@@ -231,7 +231,7 @@ class _Epub:
         name = self._chapters.get(path)
         if name is None:
             return site_address(self._context, path, anchor)
-        return f"{name}#{urls.quoted(xml_id(anchor))}" if anchor else name
+        return f"{name}#{urls.quote_anchor(xml_id(anchor))}" if anchor else name
 
     def _picture(self, path: str) -> str:
         """Add a picture to the package and return its address; empty if that is impossible."""

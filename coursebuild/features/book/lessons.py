@@ -68,7 +68,7 @@ def render_lesson(
 def site_address(context: ExportContext, path: str, anchor: str) -> str:
     """Return the address of a page on the site; empty if the course has none."""
     address = urls.absolute(context.course, path)
-    return f"{address}#{urls.quoted(anchor)}" if address and anchor else address
+    return f"{address}#{urls.quote_anchor(anchor)}" if address and anchor else address
 
 
 def style_path(context: ExportContext) -> str:

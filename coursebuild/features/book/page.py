@@ -45,7 +45,7 @@ def page_file(context: ExportContext) -> OutputFile:
 
     def address(path: str, anchor: str) -> str:
         if path in ids:
-            return f"#{urls.quoted(_anchor(ids[path], anchor))}"
+            return f"#{urls.quote_anchor(_anchor(ids[path], anchor))}"
         return site_address(context, path, anchor)
 
     def text(lesson: Lesson) -> Markup:
@@ -77,7 +77,7 @@ def page_file(context: ExportContext) -> OutputFile:
         levels=levels,
         level_anchor=level_anchor,
         lesson_anchor=lambda lesson: _anchor(lesson.id),
-        quoted=urls.quoted,
+        quoted=urls.quote_anchor,
         text=text,
     )
     return OutputFile("course.html", visible(html).encode())

@@ -110,7 +110,7 @@ def _rewrite_attribute(
 
 def _rewrite_address(url: str, rules: RewriteRules) -> str | None:
     if url.startswith("#"):
-        return f"#{urls.quoted(rules.id(unquote(url[1:])))}" if len(url) > 1 else "#"
+        return f"#{urls.quote_anchor(rules.id(unquote(url[1:])))}" if len(url) > 1 else "#"
     path, anchor = site_target(rules.path, url)
     return url if path is None else rules.address(path, anchor) or None
 

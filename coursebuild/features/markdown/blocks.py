@@ -17,7 +17,7 @@ from collections.abc import Iterable
 from typing import assert_never
 
 from coursebuild.core import model
-from coursebuild.core.pages.html_context import OwnBlock
+from coursebuild.core.pages.html_context import SpecialBlock
 from coursebuild.core.pages.marks import (
     block_quote,
     code_span,
@@ -69,7 +69,7 @@ class BlockWriter(ABC):
         """Return the number to be shown with the formula at an offset; empty for none."""
 
     @abstractmethod
-    def own_block(self, block: OwnBlock) -> str:
+    def own_block(self, block: SpecialBlock) -> str:
         """Write one of the course's own blocks, without its last line end; may be empty."""
 
     def inlines(self, inlines: Iterable[model.Inline]) -> str:

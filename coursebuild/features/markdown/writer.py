@@ -18,7 +18,7 @@ from markupsafe import Markup
 from coursebuild.core import model
 from coursebuild.core.pages.blocks import output_receipt, script_receipt
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.html_context import OwnBlock
+from coursebuild.core.pages.html_context import SpecialBlock
 from coursebuild.core.pages.marks import block_quote, code_span, escape_marks, fence, link
 from coursebuild.core.registry import kind_of_block
 from coursebuild.features.markdown.blocks import BlockWriter
@@ -58,7 +58,7 @@ class DocumentWriter(BlockWriter):
         equation = self.page.equations.get(start)
         return equation.number if equation is not None and equation.has_margin_number else ""
 
-    def own_block(self, block: OwnBlock) -> str:
+    def own_block(self, block: SpecialBlock) -> str:
         """Write one of the course's own blocks."""
         match block:
             case model.Callout():

@@ -126,7 +126,7 @@ def _imported_early(site: SiteContext, scripts: list[str], files: Mapping[str, b
 
 def _setup_code(template: str, files: Mapping[str, bytes], missing: list[str]) -> str:
     """Return the cell that writes the files and defines the magic."""
-    packed = base64.b64encode(zips.pack(files)).decode() if files else ""
+    packed = base64.b64encode(zips.pack_files(files)).decode() if files else ""
     lines = "\n".join(packed[start : start + 100] for start in range(0, len(packed), 100))
     code = template.replace("ELSEWHERE = ()", f"ELSEWHERE = {tuple(missing)!r}")
     return code.replace('FILES = ""', f'FILES = """\n{lines}\n"""' if packed else 'FILES = ""')

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.quantities import (
-    joined,
-    quantities,
+    join_units,
+    split_quantities,
     text_html,
     unit_length,
 )
@@ -46,7 +46,7 @@ def test_the_direction_of_a_language_is_that_of_its_script(way: str) -> None:
     ],
 )
 def test_numbers_keep_their_units(text: str, found: str) -> None:
-    assert joined(text) == found
+    assert join_units(text) == found
 
 
 @pytest.mark.parametrize(
@@ -61,20 +61,20 @@ def test_numbers_keep_their_units(text: str, found: str) -> None:
     ],
 )
 def test_quantities_in_text_from_the_right(text: str, kept: list[str]) -> None:
-    pieces = list(quantities(text))
+    pieces = list(split_quantities(text))
     assert [piece for piece, is_kept in pieces if is_kept] == kept
     assert "".join(piece for piece, _ in pieces) == text
 
 
 @given(st.text(alphabet="0123456789.,-+−×^ kgms²/°%بة\u00a0<&"))
 def test_finding_quantities_loses_no_character(text: str) -> None:
-    assert "".join(piece for piece, _ in quantities(text)) == text
-    assert joined(text).replace("\u00a0", " ") == text.replace("\u00a0", " ")
+    assert "".join(piece for piece, _ in split_quantities(text)) == text
+    assert join_units(text).replace("\u00a0", " ") == text.replace("\u00a0", " ")
     assert 0 <= unit_length(text) <= len(text)
 
     for way in ("ltr", "rtl"):
         html = str(text_html(text, way))
-        assert unescape(re.sub("</?bdi[^>]*>", "", html)) == joined(text)
+        assert unescape(re.sub("</?bdi[^>]*>", "", html)) == join_units(text)
 
 
 def test_pages_say_their_direction_and_hold_numbers_and_units_together(make: Make) -> None:

@@ -35,7 +35,7 @@ def test_broken_links_are_told_with_what_is_nearest() -> None:
         '<img src="../assets/sites.css" srcset="x.png 2x">\n<a href="../../up.html">2</a>'
         '<a href="b.html#x">3</a><script src=gone.js></script><a href="http://[">4</a>'
     )
-    found = [(broken.url, broken.reason, broken.near) for broken in check_links(site(page))]
+    found = [(broken.url, broken.reason, broken.suggestion) for broken in check_links(site(page))]
     assert found == [
         ("#conservatoin", "`lessons/a.html` has no anchor `#conservatoin`", "conservation"),
         ("../../up.html", "no file `up.html` in the site", None),

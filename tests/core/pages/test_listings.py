@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model import line_anchor, linked_lines, listing_anchor, output_anchor
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages.links import check_links, has, without_lines
+from coursebuild.core.pages.links import check_links, has_anchor, merge_line_ids
 from coursebuild.core.pages.qr import qr_svg
 from support.rendered_course import Make
 
@@ -119,6 +119,6 @@ def test_of_the_lines_of_a_listing_the_last_is_kept(ids: list[str]) -> None:
     for lines in filter(None, known.values()):
         last[lines[0]] = max(last.get(lines[0], 0), lines[2])
     others = {name for name, lines in known.items() if lines is None}
-    short = without_lines(ids)
+    short = merge_line_ids(ids)
     assert short == others | {f"{stem}.L{line}" for stem, line in last.items()}
-    assert all(has(short, name) for name in ids)
+    assert all(has_anchor(short, name) for name in ids)

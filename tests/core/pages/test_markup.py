@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from markupsafe import Markup
 
 from coursebuild.core.model import Document, NumberBinding, Target, Text
-from coursebuild.core.pages.html_context import OwnBlock
+from coursebuild.core.pages.html_context import SpecialBlock
 from coursebuild.core.pages.markup import render_blocks, render_footnotes, render_inlines
-from coursebuild.core.pages.quantities import in_order, joined, quantities
+from coursebuild.core.pages.quantities import isolate_ltr, join_units, split_quantities
 from coursebuild.core.pages.strings import Strings, parse_strings
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source, Span
@@ -52,7 +52,7 @@ class Page(PlainContext):
     def binding(self, binding: NumberBinding) -> Markup:
         return Markup("<x-number>{}</x-number>").format(binding.text)
 
-    def block(self, block: OwnBlock) -> Markup:
+    def block(self, block: SpecialBlock) -> Markup:
         return Markup("<x-{}>\n").format(type(block).__name__.lower())
 
 
@@ -165,9 +165,11 @@ _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
 @given(st.text(alphabet="aµ 0123.,·kgm²<>&\"'×−%°\n\u00a0", max_size=24) | st.text())
 def test_text_has_its_quantities_kept_and_is_escaped(text: str) -> None:
     inlines = (Text(Span(Source("x.md", ""), 0, 0), text),)
-    known = joined(text).translate(_ESCAPES)
+    known = join_units(text).translate(_ESCAPES)
     assert render_inlines(inlines, Page(direction="ltr")) == known
-    pieces = ((Markup(one.translate(_ESCAPES)), kept) for one, kept in quantities(joined(text)))
-    known = "".join(in_order(html) if kept else html for html, kept in pieces)
+    pieces = (
+        (Markup(one.translate(_ESCAPES)), kept) for one, kept in split_quantities(join_units(text))
+    )
+    known = "".join(isolate_ltr(html) if kept else html for html, kept in pieces)
     assert render_inlines(inlines, Page(direction="rtl")) == known
     assert render_inlines(inlines, Page()) == text.translate(_ESCAPES)

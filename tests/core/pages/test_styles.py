@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.pages.styles import class_name, hoist
+from coursebuild.core.pages.styles import class_name, hoist_styles
 
 PAD = class_name("padding: 0")
 
@@ -27,7 +27,7 @@ PAD = class_name("padding: 0")
     ],
 )
 def test_a_style_becomes_a_class(html: str, expected: str | None) -> None:
-    page, found = hoist(html)
+    page, found = hoist_styles(html)
     assert page == (
         expected or f'<b class="{class_name("background: url(" + chr(34) + "a" + chr(34) + ")")}">'
     )
@@ -47,7 +47,7 @@ def test_a_style_becomes_a_class(html: str, expected: str | None) -> None:
     ],
 )
 def test_what_only_looks_like_a_style_stays(html: str) -> None:
-    assert hoist(html) == (html, frozenset())
+    assert hoist_styles(html) == (html, frozenset())
 
 
 @pytest.mark.parametrize(
@@ -55,10 +55,10 @@ def test_what_only_looks_like_a_style_stays(html: str) -> None:
     ["} body { display: none", "color: red /* ", 'content: "', "a: </style>", "a: \\7d"],
 )
 def test_a_declaration_cannot_reach_out_of_its_rule(declaration: str) -> None:
-    assert hoist(f'<b style="{escape(declaration)}">') == ("<b>", frozenset())
+    assert hoist_styles(f'<b style="{escape(declaration)}">') == ("<b>", frozenset())
 
 
 @given(st.text(alphabet="<>/=\"' abcstyle-!\n"))
 def test_any_text_is_taken_and_the_result_has_nothing_more_to_take(html: str) -> None:
-    page, _ = hoist(html)
-    assert hoist(page)[0] == page
+    page, _ = hoist_styles(html)
+    assert hoist_styles(page)[0] == page

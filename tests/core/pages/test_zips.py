@@ -16,8 +16,7 @@ from coursebuild.core.model import MjcfModel
 from coursebuild.core.model.results import CompileResult, ModelFacts, OutputFile
 from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.zips import Package, Surroundings
-from coursebuild.core.pages.zips import archives as zip_archives
+from coursebuild.core.pages.zips import Package, Surroundings, make_archives
 from coursebuild.core.text.source import Source
 from support.rendered_course import Make
 
@@ -70,7 +69,7 @@ def made(make: Make) -> Any:
 
 def packed(made: Any) -> dict[str, bytes]:
     library = Library.of(made.course, made.results, made.assets)
-    return {archive.path: archive.packed() for archive in zip_archives(library, AROUND)}
+    return {archive.path: archive.pack() for archive in make_archives(library, AROUND)}
 
 
 def archives(made: Any) -> dict[str, zipfile.ZipFile]:

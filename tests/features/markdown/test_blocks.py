@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Callout, Document, PlainCode, Target
-from coursebuild.core.pages.html_context import OwnBlock
+from coursebuild.core.pages.html_context import SpecialBlock
 from coursebuild.core.pages.marks import (
     block_quote,
     code_span,
@@ -48,7 +48,7 @@ class Context(BlockWriter):
     def formula_number(self, start: int) -> str:
         return ""
 
-    def own_block(self, block: OwnBlock) -> str:
+    def own_block(self, block: SpecialBlock) -> str:
         if isinstance(block, Callout):
             title = guard_lines(self.inlines(block.title))
             return block_quote("\n\n".join(filter(None, (title, self.blocks(block.blocks)))))
