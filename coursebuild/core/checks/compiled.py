@@ -86,7 +86,7 @@ def check_compiled(
     """
     blocks = (block for document in course.documents for block in document_blocks(document))
     lesson_models = {
-        n for block in blocks if isinstance(block, FeatureBlock) for n in block.models()
+        name for block in blocks if isinstance(block, FeatureBlock) for name in block.models()
     }
     diagnostics: list[Diagnostic] = []
     included = _included_models(course, models) - lesson_models

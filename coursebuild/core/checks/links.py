@@ -58,7 +58,7 @@ from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Span
 
-_Name: TypeAlias = (
+_NamedTarget: TypeAlias = (
     LessonTarget | LevelTarget | PageTarget | ModelTarget | ExampleTarget | TermTarget
 )
 
@@ -235,7 +235,7 @@ def _link_help(kind: str, id: str) -> str:
     return f"link to `{kind}:{id}`"
 
 
-def _suggest_other_kind(target: _Name, targets: LinkTargets) -> str:
+def _suggest_other_kind(target: _NamedTarget, targets: LinkTargets) -> str:
     """A help text where a lesson is called a level, or a level a lesson; else empty."""
     if isinstance(target, LessonTarget) and target.id in targets.levels:
         kind = "level"
@@ -250,7 +250,7 @@ _LESSON_NAME = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")
 """A file name or an address that begins with the id of a lesson, as in `4.2-inertia.md`."""
 
 
-def _suggest_lesson(target: _Name, targets: LinkTargets) -> str:
+def _suggest_lesson(target: _NamedTarget, targets: LinkTargets) -> str:
     """A help text: the lesson whose file or slug the link names, or those of its level."""
     if not isinstance(target, LessonTarget):
         return ""
@@ -269,7 +269,7 @@ def _suggest_lesson(target: _Name, targets: LinkTargets) -> str:
 
 
 def _look_up(
-    link: Link, target: _Name, targets: LinkTargets
+    link: Link, target: _NamedTarget, targets: LinkTargets
 ) -> tuple[str, str, Collection[str], str]:
     """The rule of a link, the name of its target, all names of this kind, and the message."""
     lacks = (
