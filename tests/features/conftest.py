@@ -47,17 +47,17 @@ def zoo(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     return folder
 
 
-def exported(folder: Folder, kind: str, name: str) -> Package:
-    done = folder.main("export", kind)
-    assert done.status == 0, done.out + done.err
-    return Package(folder, done, entries(folder.root / name))
+def export(folder: Folder, kind: str, name: str) -> Package:
+    result = folder.main("export", kind)
+    assert result.status == 0, result.out + result.err
+    return Package(folder, result, entries(folder.root / name))
 
 
 @pytest.fixture(scope="session")
 def qti(zoo: Folder) -> Package:
-    return exported(zoo, "qti", "quizzes-qti.zip")
+    return export(zoo, "qti", "quizzes-qti.zip")
 
 
 @pytest.fixture(scope="session")
 def scorm(zoo: Folder) -> Package:
-    return exported(zoo, "scorm", "course-scorm.zip")
+    return export(zoo, "scorm", "course-scorm.zip")

@@ -70,8 +70,8 @@ def course(tmp_path: Path, stores: Path) -> Folder:
 
 
 def test_a_fence_of_a_feature_follows_its_code_and_the_map(course: Folder) -> None:
-    done = course.main("build")
-    assert done.status == 0, done.out
+    result = course.main("build")
+    assert result.status == 0, result.out
     assert "<p>LISTEN &lt;NOW&gt;</p>" in course.text(PAGE)
     assert "LISTEN <NOW>" in course.text("public/lessons/1.1-one.md")
     styles = [text for path, text in course.tree("public").items() if path.endswith(".css")]
@@ -101,22 +101,22 @@ BROKEN = {
 
 
 def test_a_feature_that_cannot_be_loaded_is_told_at_its_place_in_the_map(course: Folder) -> None:
-    def told() -> str:
-        done = course.main("check")
-        assert done.status == 1
-        return done.out
+    def check() -> str:
+        result = course.main("check")
+        assert result.status == 1
+        return result.out
 
-    for code, wrong in BROKEN.items():
+    for code, message_end in BROKEN.items():
         course.write("features/shout.py", code)
-        message, place, *_ = told().splitlines()
-        assert message.startswith(f"error[feature-broken]: features/shout.py{wrong}"), message
+        message, place, *_ = check().splitlines()
+        assert message.startswith(f"error[feature-broken]: features/shout.py{message_end}"), message
         assert place == f"  --> {MAP}:2:13"
     (course.root / "features/shout.py").unlink()
-    assert told().startswith("error[feature-broken]: features/shout.py cannot be read: ")
+    assert check().startswith("error[feature-broken]: features/shout.py cannot be read: ")
     text = course.text(MAP)
     for path in ("shout.py", "../shout.py", "features/shout", "features/../a.py"):
         course.write(MAP, text.replace("features/shout.py", path))
-        out = told()
+        out = check()
         assert out.startswith(f"error[field-value]: `features[0]` cannot be `{path}`")
         assert "a Python file in `features/`, as in `features/tabs.py`" in out
 
@@ -125,8 +125,8 @@ def test_the_example_of_the_docs_works(course: Folder) -> None:
     course.write("features/shout.py", EXAMPLES[0])
     task = '\n```task name="A & B"\nDo **this**.\n```\n'
     course.write("content/lessons/1.1-one.md", f"## Hello\n{task}")
-    done = course.main("build")
-    assert done.status == 0, done.out
+    result = course.main("build")
+    assert result.status == 0, result.out
     html = (
         '<div class="task"><p><b>Task 1.</b> A &amp; B</p>\n<p>Do <strong>this</strong>.</p></div>'
     )
@@ -135,23 +135,23 @@ def test_the_example_of_the_docs_works(course: Folder) -> None:
     for _ in range(2):  # the second time from what is kept
         assert "error[task-name]: two tasks are called A & B\n" in course.main("check").out
     course.write("content/lessons/1.1-one.md", "## Hello\n\n```task\n```\n")
-    told = "error[task-name]: this task has no name\n  --> content/lessons/1.1-one.md:3:1\n"
-    assert course.main("check").out.startswith(told)
+    expected = "error[task-name]: this task has no name\n  --> content/lessons/1.1-one.md:3:1\n"
+    assert course.main("check").out.startswith(expected)
 
 
 def test_the_walk_of_the_docs_ends_with_diagrams(course: Folder) -> None:
     """Each step takes the place of what has its name in the feature as it is made."""
     assert course.main("new", "feature", "mermaid").status == 0
-    walked = [node for step in STEPS for node in ast.parse(step).body]
-    names = {defined(node) for node in walked if defined(node)} | {"check"}
-    first, *made = ast.parse(course.text("features/mermaid.py")).body[1:]
-    nodes = [*(node for node in made if defined(node) not in names), *walked]
-    nodes.sort(key=lambda node: defined(node) != "")  # imports stand at the top
+    step_nodes = [node for step in STEPS for node in ast.parse(step).body]
+    names = {defined_name(node) for node in step_nodes if defined_name(node)} | {"check"}
+    first, *template_nodes = ast.parse(course.text("features/mermaid.py")).body[1:]
+    nodes = [*(node for node in template_nodes if defined_name(node) not in names), *step_nodes]
+    nodes.sort(key=lambda node: defined_name(node) != "")  # imports stand at the top
     course.write("features/mermaid.py", ast.unparse(ast.Module([first, *nodes], [])))
     diagram = '```mermaid alt="One & two"\nflowchart LR\n  one --> two\n```\n'
     course.write("content/lessons/1.1-one.md", f"## Hello\n\n{diagram}")
-    done = course.main("build")
-    assert done.status == 0, done.out
+    result = course.main("build")
+    assert result.status == 0, result.out
     assert re.search(r'<img src="data:image/svg[^"]+" alt="One &amp; two">', course.text(PAGE))
     assert "```mermaid\nflowchart LR\n" in course.text(PAGE.replace(".html", ".md"))
     for old, new, rule in ((' alt="One & two"', "", "alt"), ("flowchart", "flow", "syntax")):
@@ -159,7 +159,7 @@ def test_the_walk_of_the_docs_ends_with_diagrams(course: Folder) -> None:
         assert f"error[mermaid-{rule}]: " in course.main("check").out
 
 
-def defined(node: ast.stmt) -> str:
+def defined_name(node: ast.stmt) -> str:
     """The name that a statement defines; empty for imports."""
     target = node.targets[0] if isinstance(node, ast.Assign) else node
     return str(getattr(target, "name", getattr(target, "id", "")))
@@ -178,8 +178,8 @@ def inventory(course: Folder) -> Folder:
 
 
 def test_the_page_of_the_docs_is_a_page_of_the_site(inventory: Folder) -> None:
-    done = inventory.main("build")
-    assert done.status == 0, done.out
+    result = inventory.main("build")
+    assert result.status == 0, result.out
     html = inventory.text("public/inventory/index.html")
     assert '<li><a href="../models/box.html">box</a>, used 0 times</li>' in html
     assert "<title>Inventory · " in html
@@ -191,16 +191,16 @@ def test_the_page_of_the_docs_is_a_page_of_the_site(inventory: Folder) -> None:
 def test_a_page_of_a_feature_follows_the_course(
     inventory: Folder, live: Callable[[Folder], Live]
 ) -> None:
-    shown = live(inventory)
+    preview = live(inventory)
     page = "inventory/index.html"
-    assert b"used 0 times" in (shown.find(page) or b"")
+    assert b"used 0 times" in (preview.find(page) or b"")
     inventory.write("content/lessons/1.1-one.md", "See [it](model:box).\n")
-    shown.save("content/lessons/1.1-one.md")
-    assert b"used 1 times" in (shown.find(page) or b"")
-    site = shown.site()
+    preview.save("content/lessons/1.1-one.md")
+    assert b"used 1 times" in (preview.find(page) or b"")
+    site = preview.site()
     assert inventory.main("build").status == 0
-    built = inventory.tree("public")
-    assert site == {path: built[path] for path in site}
+    files = inventory.tree("public")
+    assert site == {path: files[path] for path in site}
     (inventory.root / "models/box.xml").unlink()
     inventory.write("content/lessons/1.1-one.md", "Text.\n")
     assert inventory.main("build").status == 0
@@ -209,9 +209,9 @@ def test_a_page_of_a_feature_follows_the_course(
 
 def test_a_broken_link_of_a_page_of_a_feature_is_told(inventory: Folder) -> None:
     inventory.replace("features/inventory.py", 'href="{}"', 'href="{}l"')
-    done = inventory.main("build")
-    assert done.status == 1
-    assert "error[link-broken]: `../models/box.htmll` leads nowhere" in done.out
+    result = inventory.main("build")
+    assert result.status == 1
+    assert "error[link-broken]: `../models/box.htmll` leads nowhere" in result.out
 
 
 def test_a_page_that_cannot_be_added_is_told(inventory: Folder) -> None:
@@ -222,8 +222,8 @@ def test_a_page_that_cannot_be_added_is_told(inventory: Folder) -> None:
         ("home", "there is a page `home` already"),
         ("../x", "a page cannot be called `../x`: use small letters, digits and `-`"),
     ):
-        named = code.replace('name="inventory",\n    v', f'name="{name}",\n    v')
-        inventory.write("features/inventory.py", named)
-        done = inventory.main("check")
-        assert done.status == 1
-        assert f"error[feature-broken]: features/inventory.py: {message}" in done.out
+        renamed_code = code.replace('name="inventory",\n    v', f'name="{name}",\n    v')
+        inventory.write("features/inventory.py", renamed_code)
+        result = inventory.main("check")
+        assert result.status == 1
+        assert f"error[feature-broken]: features/inventory.py: {message}" in result.out

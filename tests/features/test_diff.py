@@ -65,8 +65,8 @@ def course(tmp_path: Path, stores: Path) -> Folder:
 
 
 def change(course: Folder) -> None:
-    more = '[[level.lesson]]\nid = "1.2"\nslug = "two"\ntitle = "Two"\nstatus = "draft"\n'
-    course.write("content/course.toml", course.text("content/course.toml") + more)
+    entry = '[[level.lesson]]\nid = "1.2"\nslug = "two"\ntitle = "Two"\nstatus = "draft"\n'
+    course.write("content/course.toml", course.text("content/course.toml") + entry)
     course.write(course.lesson(1), NEW)
     course.write(course.lesson(2), "## Two\n\nText.\n")
     course.write("models/ball.xml", MODEL % "0.2")
@@ -80,10 +80,10 @@ def test_everything_that_a_change_does_is_told(
     base = git(course.root, "rev-parse", "--short=7", "HEAD")
     git(course.root, "checkout", "-q", "-b", "change")
     change(course)
-    done = course.main("diff", "main")
-    assert (done.status, done.err) == (0, "")
-    told = done.out.replace(f"`main` ({base})", "BASE")
-    check_text(HERE / "diff.md", told, rewriting=rewriting)
+    result = course.main("diff", "main")
+    assert (result.status, result.err) == (0, "")
+    report = result.out.replace(f"`main` ({base})", "BASE")
+    check_text(HERE / "diff.md", report, rewriting=rewriting)
     git(course.root, "checkout", "-q", "--detach", "main")  # main goes on, which is no change here
     git(course.root, "stash", "-q", "-u")
     course.write("models/other.xml", MODEL % "0.3")
@@ -91,15 +91,15 @@ def test_everything_that_a_change_does_is_told(
     git(course.root, "branch", "-q", "-f", "main", "HEAD")
     git(course.root, "checkout", "-q", "change")
     git(course.root, "stash", "pop", "-q")
-    assert course.main("diff", "main").out == done.out
-    assert course.main("diff", "../../before").out == told.replace("BASE", "`../../before`")
+    assert course.main("diff", "main").out == result.out
+    assert course.main("diff", "../../before").out == report.replace("BASE", "`../../before`")
     assert not (course.root / "examples").exists(), "nothing was run"
 
 
 def test_nothing_is_told_of_what_stays(course: Folder) -> None:
-    told = course.main("diff", "HEAD").out
-    assert "Lessons and pages: no change.\n" in told
-    assert told.count("\n\nNo change.\n") == 4
+    report = course.main("diff", "HEAD").out
+    assert "Lessons and pages: no change.\n" in report
+    assert report.count("\n\nNo change.\n") == 4
 
 
 def site(course: Folder, name: str, **files: str) -> None:
@@ -109,33 +109,37 @@ def site(course: Folder, name: str, **files: str) -> None:
 
 def test_a_page_weighs_what_it_loads(course: Folder) -> None:
     page = '<!DOCTYPE html><link rel="stylesheet" href="s.css"><img src="p.png" alt=""><a href="x">'
-    same = {"other__html": "<p>" + 900 * "x", "s__css": 500 * "s"}
-    site(course, "public", index__html=page, old__html=1000 * "o", p__png=1000 * "p", **same)
-    site(course, "preview", index__html=page, new__html="<p>", p__png=3000 * "p", **same)
+    shared_files = {"other__html": "<p>" + 900 * "x", "s__css": 500 * "s"}
+    site(
+        course, "public", index__html=page, old__html=1000 * "o", p__png=1000 * "p", **shared_files
+    )
+    site(course, "preview", index__html=page, new__html="<p>", p__png=3000 * "p", **shared_files)
     sites = ("--base-site", "public", "--site", "preview")
-    told = course.main("diff", "HEAD", *sites).out
-    assert told.endswith(
+    report = course.main("diff", "HEAD", *sites).out
+    assert report.endswith(
         "| page | before | now | change |\n| --- | --- | --- | --- |\n"
         "| the whole site | 3.5 kB | 4.5 kB | +28.7% |\n"
         "| index.html | 1.6 kB | 3.6 kB | +126.0% |\n"
         "| old.html | 1.0 kB | 0.0 kB | removed |\n"
         "| new.html | 0.0 kB | 0.0 kB | new |\n"
-    ), told
+    ), report
     (course.root / "public/index.html").unlink()
-    told = course.main("diff", "HEAD", *sites).out
-    assert told.endswith("\nNot compared: there is no site in `public`.\n")
-    done = course.main("diff", "HEAD", "--site", "preview")
-    assert (done.status, "belong together" in done.err) == (2, True)
+    report = course.main("diff", "HEAD", *sites).out
+    assert report.endswith("\nNot compared: there is no site in `public`.\n")
+    result = course.main("diff", "HEAD", "--site", "preview")
+    assert (result.status, "belong together" in result.err) == (2, True)
 
 
 def test_a_base_that_cannot_be_had(course: Folder, tmp_path: Path) -> None:
-    done = course.main("diff", "nowhere")
-    said = "coursebuild: `nowhere` is neither a folder with a course nor a revision of git here\n"
-    assert (done.status, done.out, done.err) == (2, "", said)
+    result = course.main("diff", "nowhere")
+    message = (
+        "coursebuild: `nowhere` is neither a folder with a course nor a revision of git here\n"
+    )
+    assert (result.status, result.out, result.err) == (2, "", message)
     first = git(course.root, "rev-parse", "HEAD")
     (course.root / "content/course.toml").rename(tmp_path / "map")
     commit(course.root)
     (tmp_path / "map").rename(course.root / "content/course.toml")
-    done = course.main("diff", "main")
-    assert (done.status, "the course map" in done.err) == (2, True)
+    result = course.main("diff", "main")
+    assert (result.status, "the course map" in result.err) == (2, True)
     assert course.main("diff", first).status == 0

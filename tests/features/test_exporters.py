@@ -29,9 +29,9 @@ def course(tmp_path: Path, stores: Path) -> Folder:
 
 
 def test_example_of_the_docs_writes_the_lessons_as_a_table(course: Folder) -> None:
-    done = course.main("export", "lessons")
-    assert done.status == 0, done.out + done.err
-    assert "wrote lessons.csv, 0.1 kB" in done.out
+    result = course.main("export", "lessons")
+    assert result.status == 0, result.out + result.err
+    assert "wrote lessons.csv, 0.1 kB" in result.out
     table = 'id,title,scripts\r\n1.1,Lesson one,1\r\n1.2,"Two, ""quoted""",0\r\n'
     assert course.read("lessons.csv") == table.encode()
     course.replace(MAP, "Lesson one", "One")
@@ -85,11 +85,13 @@ FEATURE = Feature(
 """,
     )
     course.write("content/lessons/1.2-two.md", "## Two\n\n```note\nmine\n```\n")
-    done = course.main("export", "bare", "--out", "sub/b.zip")
-    assert done.status == 0 and "wrote 6 files to sub/b.zip" in done.out, done.out + done.err
-    assert done.out.count("warning[bare]") == 2
-    packed = entries(course.root / "sub/b.zip")
-    assert packed["1.2.txt"] == b"mine\n" and b'<h2 id="hello">Hello' in packed["1.1.html"]
+    result = course.main("export", "bare", "--out", "sub/b.zip")
+    assert result.status == 0 and "wrote 6 files to sub/b.zip" in result.out, (
+        result.out + result.err
+    )
+    assert result.out.count("warning[bare]") == 2
+    package = entries(course.root / "sub/b.zip")
+    assert package["1.2.txt"] == b"mine\n" and b'<h2 id="hello">Hello' in package["1.1.html"]
 
 
 def test_export_is_refused_where_it_would_be_in_the_way(course: Folder) -> None:
@@ -105,19 +107,19 @@ def test_export_is_refused_where_it_would_be_in_the_way(course: Folder) -> None:
         ("lessons", ".", "is a folder"),
         ("lessons", "public/q.csv", "lies in a published site, which the next build replaces"),
     ):
-        done = course.main("export", name, "--out", out)
-        assert (done.status, reason in done.err) == (2, True), (name, out, done.err)
+        result = course.main("export", name, "--out", out)
+        assert (result.status, reason in result.err) == (2, True), (name, out, result.err)
     assert course.text("notes.txt") == "mine"
 
 
 def test_unknown_and_broken_exporters_are_told(course: Folder) -> None:
-    done = course.main("export", "docx")
+    result = course.main("export", "docx")
     offers = "epub, lessons, page, qti, scorm"
-    assert done.status == 2
-    assert done.err == f"coursebuild: there is no export `docx`: choose from {offers}\n"
+    assert result.status == 2
+    assert result.err == f"coursebuild: there is no export `docx`: choose from {offers}\n"
     course.replace("features/lessons.py", 'Feature(name="lessons"', 'Feature(name="scorm"')
-    done = course.main("export", "docx")
-    assert "features/lessons.py: two features are called `scorm`" in done.err
+    result = course.main("export", "docx")
+    assert "features/lessons.py: two features are called `scorm`" in result.err
     course.replace("features/lessons.py", 'Feature(name="scorm"', 'Feature(name="own"')
     course.replace("features/lessons.py", 'name="lessons",\n', 'name="scorm",\n')
     assert "there is an export `scorm` already" in course.main("check").out
@@ -126,29 +128,29 @@ def test_unknown_and_broken_exporters_are_told(course: Folder) -> None:
 
 
 def test_nothing_is_written_where_something_is_wrong_or_there_is_nothing(course: Folder) -> None:
-    done = course.main("export", "qti")
-    assert (done.status, done.err.splitlines()[-1]) == (
+    result = course.main("export", "qti")
+    assert (result.status, result.err.splitlines()[-1]) == (
         1, "coursebuild: the course has nothing that `export qti` could write"
     )  # fmt: skip
     assert course.main("export", "lessons").status == 0
-    once = course.read("lessons.csv")
+    first_export = course.read("lessons.csv")
     course.replace(course.lesson(), "hello 3.14159\n", "hello 3.14158\n")
-    done = course.main("export", "lessons")
-    assert done.status == 1 and "nothing was written" in done.out
-    assert course.read("lessons.csv") == once
+    result = course.main("export", "lessons")
+    assert result.status == 1 and "nothing was written" in result.out
+    assert course.read("lessons.csv") == first_export
 
 
 def test_full_disk_leaves_what_was_there(course: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     assert course.main("export", "scorm").status == 0
-    once = course.read("course-scorm.zip")
+    first_export = course.read("course-scorm.zip")
 
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("zipfile.ZipFile.writestr", full)
-    done = course.main("export", "scorm")
-    assert done.status == 1 and "cannot be written: no space left on device" in done.err
-    assert course.read("course-scorm.zip") == once
+    result = course.main("export", "scorm")
+    assert result.status == 1 and "cannot be written: no space left on device" in result.err
+    assert course.read("course-scorm.zip") == first_export
     assert not [name for name in course.entries() if name.startswith(".course-scorm.zip")]
 
 
@@ -161,8 +163,8 @@ def test_same_course_gives_the_same_package(
     kind: str, name: str, request: pytest.FixtureRequest
 ) -> None:
     folder = request.getfixturevalue(kind).folder
-    once = folder.read(name)
+    first_export = folder.read(name)
     for options in ((), ("--no-cache", "--jobs", "1")):
-        done = folder.main("export", kind, *options, "--out", "sub/other.zip")
-        assert done.status == 0, done.out + done.err
-        assert folder.read("sub/other.zip") == once, options
+        result = folder.main("export", kind, *options, "--out", "sub/other.zip")
+        assert result.status == 0, result.out + result.err
+        assert folder.read("sub/other.zip") == first_export, options

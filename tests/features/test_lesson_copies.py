@@ -92,8 +92,8 @@ Back to [it](lesson:0.1#part).
 def site(make: Make, text: str = LESSON, **texts: str) -> dict[str, bytes]:
     runs = {"examples/never.py": ScriptRun("examples/never.py", Outcome.NORUN, 0, "", "", 0.0)}
     texts.setdefault("1.1", OTHER)
-    made: dict[str, bytes] = make(text, runs=runs, **texts).site()
-    return made
+    files: dict[str, bytes] = make(text, runs=runs, **texts).site()
+    return files
 
 
 @pytest.fixture(scope="module")
@@ -103,8 +103,8 @@ def files(make: Make) -> dict[str, bytes]:
 
 def cells(data: bytes) -> list[dict[str, Any]]:
     nbformat.validate(nbformat.reads(data.decode(), as_version=4))
-    found: list[dict[str, Any]] = json.loads(data)["cells"]
-    return found
+    notebook_cells: list[dict[str, Any]] = json.loads(data)["cells"]
+    return notebook_cells
 
 
 def source(cell: dict[str, Any]) -> str:
@@ -122,13 +122,13 @@ def test_a_lesson_as_markdown(files: dict[str, bytes], rewriting: bool) -> None:
 def test_every_page_names_its_markdown(files: dict[str, bytes]) -> None:
     for path, data in files.items():
         if path.endswith(".html"):
-            named = re.findall(
+            addresses = re.findall(
                 r'<link rel="alternate" type="text/markdown" href="([^"]*)">', data.decode()
             )
             folder = path.rpartition("/")[0]
-            twin = f"{folder}/{named[0]}".lstrip("/") if named else ""
-            assert bool(named) is (path.removesuffix(".html") + ".md" in files), path
-            assert not named or twin in files
+            copy = f"{folder}/{addresses[0]}".lstrip("/") if addresses else ""
+            assert bool(addresses) is (path.removesuffix(".html") + ".md" in files), path
+            assert not addresses or copy in files
 
 
 def test_pages_without_a_document_as_markdown(files: dict[str, bytes]) -> None:
@@ -144,8 +144,8 @@ def test_pages_without_a_document_as_markdown(files: dict[str, bytes]) -> None:
 
 
 def test_a_lesson_as_a_notebook(files: dict[str, bytes]) -> None:
-    made = cells(files["lessons/0.1-falling.ipynb"])
-    scripts = {cell["id"]: cell for cell in made if cell["cell_type"] == "code"}
+    notebook_cells = cells(files["lessons/0.1-falling.ipynb"])
+    scripts = {cell["id"]: cell for cell in notebook_cells if cell["cell_type"] == "code"}
     assert list(scripts) == ["setup", "code-a-1", "code-in-callout-1", "code-never-1"]
     assert 'FILES = ""\n' in source(scripts["setup"]), "each script stands in its own cell alone"
     first = scripts["code-a-1"]
@@ -157,7 +157,7 @@ def test_a_lesson_as_a_notebook(files: dict[str, bytes]) -> None:
     assert source(scripts["code-never-1"]).startswith(
         "%%example --requires=torch,mjx --norun examples/never.py\n"
     )
-    texts = "\n".join(source(cell) for cell in made if cell["cell_type"] == "markdown")
+    texts = "\n".join(source(cell) for cell in notebook_cells if cell["cell_type"] == "markdown")
     for piece in (
         "[Lesson 1.1](https://example.org/course/lessons/1.1-spinning.html)",
         "[here](https://example.org/course/lessons/0.1-falling.html#part)",
@@ -170,24 +170,26 @@ def test_a_lesson_as_a_notebook(files: dict[str, bytes]) -> None:
 
 
 def test_a_lesson_without_scripts_needs_no_setup(files: dict[str, bytes]) -> None:
-    made = cells(files["lessons/1.1-spinning.ipynb"])
-    assert {cell["cell_type"] for cell in made} == {"markdown"}
+    notebook_cells = cells(files["lessons/1.1-spinning.ipynb"])
+    assert {cell["cell_type"] for cell in notebook_cells} == {"markdown"}
 
 
 def test_a_model_that_readers_edit_is_shown_as_code(files: dict[str, bytes]) -> None:
     lesson = "lessons/1.1-spinning"
     (text,) = (source(cell) for cell in cells(files[f"{lesson}.ipynb"]) if "mujoco" in source(cell))
-    for shown in (files[f"{lesson}.md"].decode(), text):
-        assert "A simulation of a model of its own.\n\n```xml\n<mujoco/>\n```\n" in shown
+    for copy in (files[f"{lesson}.md"].decode(), text):
+        assert "A simulation of a model of its own.\n\n```xml\n<mujoco/>\n```\n" in copy
     page = files[f"{lesson}.html"].decode()
     still = page[page.index('data-kind="mjcf"') :].partition("</section>")[0]
     assert '<code class="language-xml">' in still
 
 
 def test_ids_of_cells_stay_where_others_are_edited(make: Make, files: dict[str, bytes]) -> None:
-    edited = LESSON.replace("### Never", "## New\n\nText.\n\n### Never").replace("a *number*", "b")
+    new_text = LESSON.replace("### Never", "## New\n\nText.\n\n### Never").replace(
+        "a *number*", "b"
+    )
     before = [cell["id"] for cell in cells(files["lessons/0.1-falling.ipynb"])]
-    after = [cell["id"] for cell in cells(site(make, edited)["lessons/0.1-falling.ipynb"])]
+    after = [cell["id"] for cell in cells(site(make, new_text)["lessons/0.1-falling.ipynb"])]
     assert [id for id in after if id != "text-new-1"] == before
 
 
@@ -202,9 +204,9 @@ def test_numbers_of_formulas_are_written(make: Make) -> None:
         "## Part {#part}\n\n$$\na = b % so\n$$ {#eq:one}\n\nBy $$c$$ {#eq:two} and [](#eq:two), "
         "from [](#eq:one).\n"
     )
-    twin = site(make, text)["lessons/0.1-falling.md"].decode()
-    assert "$$\na = b % so\n\\tag{1}\n$$" in twin
-    assert "[(1)](#eq:one)" in twin
+    copy = site(make, text)["lessons/0.1-falling.md"].decode()
+    assert "$$\na = b % so\n\\tag{1}\n$$" in copy
+    assert "[(1)](#eq:one)" in copy
 
 
 def test_addresses_lead_to_the_markdown_of_their_page() -> None:

@@ -64,8 +64,8 @@ def course(tmp_path_factory: pytest.TempPathFactory, stores: Path, packages: Pat
     """A course that uses them, built."""
     folder = Folder(tmp_path_factory.mktemp("course") / "a course")
     folder.fill([LESSON], stores)
-    done = run(folder, packages, "build")
-    assert done.status == 0, done.out
+    result = run(folder, packages, "build")
+    assert result.status == 0, result.out
     return folder
 
 
@@ -91,14 +91,14 @@ def test_pages_show_tabs_and_diagrams_without_a_script(course: Folder) -> None:
 def test_an_edit_of_an_installed_feature_is_seen(
     tmp_path: Path, stores: Path, packages: Path
 ) -> None:
-    copied = tmp_path / "packages"
-    shutil.copytree(packages, copied)
+    installation = tmp_path / "packages"
+    shutil.copytree(packages, installation)
     folder = Folder(tmp_path / "a course")
     folder.fill([LESSON], stores)
-    assert run(folder, copied, "build").status == 0
-    script = copied / "coursebuild_tabs" / "__init__.py"
+    assert run(folder, installation, "build").status == 0
+    script = installation / "coursebuild_tabs" / "__init__.py"
     script.write_text(script.read_text().replace('class="tab-title"', 'class="tab-title new"'))
-    assert run(folder, copied, "build").status == 0
+    assert run(folder, installation, "build").status == 0
     assert '<p class="tab-title new">' in folder.text(PAGE)
 
 
@@ -111,15 +111,15 @@ def test_example_of_the_docs_adds_a_command(tmp_path: Path, stores: Path) -> Non
         start = page.index(f"`coursebuild_slowest/{name}.py`")
         code = page[start:].split("```python\n")[1].split("```")[0]
         (package / f"{name}.py").write_text(code)
-    described = tmp_path / "coursebuild_slowest-1.dist-info"
-    described.mkdir()
-    (described / "METADATA").write_text("Name: coursebuild-slowest\nVersion: 1\n")
-    points = described / "entry_points.txt"
+    info = tmp_path / "coursebuild_slowest-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Name: coursebuild-slowest\nVersion: 1\n")
+    points = info / "entry_points.txt"
     points.write_text("[coursebuild.features]\nslowest = coursebuild_slowest:FEATURE\n")
     assert "list the scripts that took longest" in run(folder, tmp_path, "--help").out
-    done = run(folder, tmp_path, "slowest", "--count", "1")
-    assert done.status == 0
-    assert re.fullmatch(r" +\d+\.\d\d s  examples/hello\.py\n", done.out)
+    result = run(folder, tmp_path, "slowest", "--count", "1")
+    assert result.status == 0
+    assert re.fullmatch(r" +\d+\.\d\d s  examples/hello\.py\n", result.out)
     code = (package / "__init__.py").read_text()
     (package / "__init__.py").write_text(code.replace('name="slowest"', 'name="check"', 1))
     assert "there is a command `check` already" in run(folder, tmp_path, "--help").err
@@ -139,12 +139,12 @@ MISTAKES = {
 def test_mistakes_have_rules_and_places(tmp_path: Path, stores: Path, packages: Path) -> None:
     folder = Folder(tmp_path / "a course")
     folder.fill([f"## Hello\n\n{fence}" for fence in MISTAKES], stores)
-    done = run(folder, packages, "check")
-    assert done.status == 1
-    told = re.findall(r"(error\[.*)\n  --> (.*?):", done.out)
-    assert [path for _, path in told] == [folder.lesson(n) for n in range(1, len(MISTAKES) + 1)]
-    wanted = [*MISTAKES.values()]
-    assert [one for one, (said, _) in zip(wanted, told, strict=True) if one not in said] == []
+    result = run(folder, packages, "check")
+    assert result.status == 1
+    errors = re.findall(r"(error\[.*)\n  --> (.*?):", result.out)
+    assert [path for _, path in errors] == [folder.lesson(n) for n in range(1, len(MISTAKES) + 1)]
+    expected = MISTAKES.values()
+    assert [m for m, (error, _) in zip(expected, errors, strict=True) if m not in error] == []
 
 
 @pytest.mark.browser
@@ -160,10 +160,10 @@ def test_keys_and_links_choose_tabs(browsers: Mapping[str, Browser], course: Fol
         expect(page.get_by_role("tabpanel")).to_have_count(1)
         assert violations(page, "main") == []
         tabs.first.focus()
-        for key, chosen in (("ArrowLeft", 2), ("ArrowRight", 0), ("ArrowRight", 1), ("End", 2)):
+        for key, index in (("ArrowLeft", 2), ("ArrowRight", 0), ("ArrowRight", 1), ("End", 2)):
             page.keyboard.press(key)
-            expect(tabs.nth(chosen)).to_have_attribute("aria-selected", "true")
-            expect(tabs.nth(chosen)).to_be_focused()
+            expect(tabs.nth(index)).to_have_attribute("aria-selected", "true")
+            expect(tabs.nth(index)).to_be_focused()
         expect(page.get_by_text("Nothing else.")).to_be_visible()
         expect(page.get_by_text("The energy is")).to_be_hidden()
         inside = page.get_by_role("heading", name="Inside")

@@ -36,8 +36,11 @@ def test_a_course_is_built_without_a_feature(feature: str, tmp_path: Path, store
     def run(*arguments: str) -> CommandResult:
         return course.run(*arguments, env={"PYTHONPATH": str(installed)})
 
-    done = run("build")
-    assert (done.status, done.out.splitlines()[-1].partition(": ")[2]) == (0, "everything holds")
+    result = run("build")
+    assert (result.status, result.out.splitlines()[-1].partition(": ")[2]) == (
+        0,
+        "everything holds",
+    )
     site = course.tree("public")
     pages = {path: data.lower() for path, data in site.items() if path.endswith(".html")}
     assert b"<h2" in pages["lessons/1.1-one.html"]
@@ -50,17 +53,17 @@ def test_a_course_is_built_without_a_feature(feature: str, tmp_path: Path, store
             assert (copies, offers) == ([], [])
         case "search":
             assert not [path for path in site if "search" in path]
-            sought = b"search/index.html", b"data-search"
-            assert not [p for p, data in pages.items() if any(mark in data for mark in sought)]
+            marks = b"search/index.html", b"data-search"
+            assert not [p for p, data in pages.items() if any(mark in data for mark in marks)]
         case "quiz":
-            said = {
+            messages = {
                 ("export", "qti"): "`export qti` needs quiz: install coursebuild with its quizzes",
                 ("schema", "quiz"): "there is no schema 'quiz': choose from course, lab, model",
             }
-            for arguments, reason in said.items():
+            for arguments, reason in messages.items():
                 assert run(*arguments) == CommandResult(2, "", f"coursebuild: {reason}\n")
             course.write(course.lesson(1), GOOD + QUIZ)
-            done = run("check")
-            assert done.status == 1
-            assert "nothing that is installed reads a block of kind `quiz`" in done.out
-            assert "help: install coursebuild with its quizzes" in done.out
+            result = run("check")
+            assert result.status == 1
+            assert "nothing that is installed reads a block of kind `quiz`" in result.out
+            assert "help: install coursebuild with its quizzes" in result.out

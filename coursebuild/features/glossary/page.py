@@ -30,7 +30,7 @@ class TermEntry(Struct, frozen=True):
     term: DefinedTerm
     place: OwnerLink
     """The lesson or page that defines it."""
-    used: OwnerLinks
+    uses: OwnerLinks
     """The other lessons and pages that link to it, in the order of the course."""
 
 

@@ -70,7 +70,8 @@ class SymbolView(Struct, frozen=True):
     first: OwnerLink
     section: str
     """The heading above its first use; empty before the first heading."""
-    others: OwnerLinks
+    later_uses: OwnerLinks
+    """The lessons that use it after the first one."""
 
 
 def symbols_values(library: Library) -> dict[str, object]:

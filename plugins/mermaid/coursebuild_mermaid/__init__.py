@@ -1,4 +1,4 @@
-"""Mermaid diagrams, drawn when the course is built: no script, no network, no second look.
+"""Mermaid diagrams, drawn when the course is built, so that pages need no script and no network.
 
 A `mermaid` fence holds a diagram in Mermaid's language; `alt="…"` says what it shows.
 """
@@ -25,52 +25,53 @@ SIZE = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
 
 
 class Diagram(FeatureBlock, frozen=True):
-    """A diagram, as it was written and as it is drawn."""
+    """A diagram: its text and its drawing."""
 
     text: str
     alt: str
-    """What it shows, for who cannot see it."""
+    """A description for readers who cannot see it."""
     svg: str
 
 
 def parse(fence: Fence, texts: TextParser) -> Parsed[Diagram | None]:
-    """The diagram of a fence."""
+    """Read the diagram of a fence."""
     keys = fence.keys(values=("alt",))
-    wrong = list(keys.diagnostics)
+    diagnostics = list(keys.diagnostics)
     alt = keys.value.value("alt") or ""
     if not alt.strip():
         help = 'write `mermaid alt="…"`, for readers who cannot see it'
-        wrong.append(
+        diagnostics.append(
             diagnose("mermaid-alt", fence.head, "this diagram is not described", help=help)
         )
     try:
         svg = mmdr.render(fence.body.text).svg()
     except ValueError as error:
-        wrong.append(diagnose("mermaid-syntax", fence.body_span.first_line(), f"Mermaid: {error}"))
-        return Parsed(None, tuple(wrong))
+        place = fence.body_span.first_line()
+        diagnostics.append(diagnose("mermaid-syntax", place, f"Mermaid: {error}"))
+        return Parsed(None, tuple(diagnostics))
     text = fence.body.text.rstrip("\n")
-    return Parsed(Diagram(fence.span, text, alt, svg), tuple(wrong))
+    return Parsed(Diagram(fence.span, text, alt, svg), tuple(diagnostics))
 
 
 def draw(page: PageContext, block: Diagram) -> Markup:
-    """The diagram in a page: a picture, in which no script of it could run, and its text."""
+    """Draw the diagram as a picture, in which no script can run, with its text."""
     data = base64.b64encode(block.svg.encode()).decode()
     size = SIZE.search(block.svg)
     width, height = (f"{float(number):.0f}" for number in size.groups()) if size else ("", "")
     picture = Markup('<img src="data:image/svg+xml;base64,{}" alt="{}" width="{}" height="{}">')
-    folded = Markup("<details><summary>{}</summary>\n{}</details>")
-    text = folded.format(page.renderer.words("mermaid.text"), page.code("", block.text))
+    details = Markup("<details><summary>{}</summary>\n{}</details>")
+    text = details.format(page.renderer.words("mermaid.text"), page.code("", block.text))
     image = picture.format(data, block.alt, width, height)
     return Markup('<figure class="mermaid">{}\n{}</figure>').format(image, text)
 
 
 def markdown(writer: MarkdownWriter, block: Diagram) -> str:
-    """The text itself, which many readers of Markdown draw."""
+    """Return the text itself, which many readers of Markdown draw."""
     return code_block("mermaid", block.text)
 
 
 def index(reader: IndexReader, block: Diagram) -> None:
-    """What it shows can be found."""
+    """Let the search find its description."""
     reader.add("text", block.alt)
 
 

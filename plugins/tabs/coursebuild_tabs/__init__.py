@@ -1,7 +1,7 @@
-"""Tabs: versions of a text, of which a reader looks at one at a time.
+"""Tabs: versions of a text, of which a reader sees one at a time.
 
-A `tabs` fence holds Markdown, cut by lines `=== Title`. Without a script all versions stand below
-each other under their titles; the script makes tabs of them.
+A `tabs` fence holds Markdown, split by lines `=== Title`. Without a script all versions are shown
+one below the other with their titles; the script turns them into tabs.
 """
 
 from __future__ import annotations
@@ -33,53 +33,54 @@ class Tab(Struct, frozen=True):
 
 
 class Tabs(FeatureBlock, frozen=True):
-    """All versions, the one that is shown first at the front."""
+    """All versions; the first one is shown first."""
 
     tabs: tuple[Tab, ...]
 
     def child_blocks(self) -> tuple[Block, ...]:
-        """The texts of all tabs."""
+        """Return the blocks of all tabs."""
         return tuple(block for tab in self.tabs for block in tab.blocks)
 
 
 def parse(fence: Fence, texts: TextParser) -> Parsed[Tabs | None]:
-    """The tabs of a fence."""
+    """Read the tabs of a fence."""
     text = fence.body.text
     titles = list(TITLE.finditer(text))
-    wrong: list[Diagnostic] = []
+    diagnostics: list[Diagnostic] = []
     if text[: titles[0].start() if titles else None].strip():
         message, help = "this text stands in no tab", "begin with a line `=== Title`"
-        wrong.append(_wrong(fence.body.span().first_line(), message, help))
+        diagnostics.append(_diagnose(fence.body.span().first_line(), message, help))
     if len(titles) < 2:
         message = "there is only one tab" if titles else "there are no tabs"
-        wrong.append(_wrong(fence.head, message, "begin each of two or more with `=== Title`"))
+        help = "begin each of two or more with `=== Title`"
+        diagnostics.append(_diagnose(fence.head, message, help))
     tabs: list[Tab] = []
     for title, following in zip(titles, [*titles[1:], None], strict=True):
         end = following.start() if following else len(text)
-        parsed = texts.blocks(fence.body.slice(title.end(), end))
-        tabs.append(Tab(title["title"], parsed.value))
-        wrong += parsed.diagnostics
-    return Parsed(Tabs(fence.span, tuple(tabs)), tuple(wrong))
+        body = texts.blocks(fence.body.slice(title.end(), end))
+        tabs.append(Tab(title["title"], body.value))
+        diagnostics += body.diagnostics
+    return Parsed(Tabs(fence.span, tuple(tabs)), tuple(diagnostics))
 
 
-def _wrong(place: Span, message: str, help: str) -> Diagnostic:
+def _diagnose(place: Span, message: str, help: str) -> Diagnostic:
     return diagnose("tabs", place, message, help=help)
 
 
 def draw(page: PageContext, block: Tabs) -> Markup:
-    """The tabs in a page."""
+    """Draw the tabs on a page."""
     part = Markup('<section><p class="tab-title">{}</p>\n{}</section>\n')
     parts = (part.format(tab.title, page.blocks(tab.blocks)) for tab in block.tabs)
     return Markup('<div class="tabs" data-tabs>\n{}</div>').format(Markup().join(parts))
 
 
 def markdown(writer: MarkdownWriter, block: Tabs) -> str:
-    """The versions below each other."""
+    """Write the versions one below the other."""
     return "\n\n".join(f"**{tab.title}**\n\n{writer.blocks(tab.blocks)}" for tab in block.tabs)
 
 
 def index(reader: IndexReader, block: Tabs) -> None:
-    """All versions can be found."""
+    """Let the search find all versions."""
     for tab in block.tabs:
         reader.add("text", tab.title)
         reader.blocks(tab.blocks)

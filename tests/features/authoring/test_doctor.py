@@ -15,9 +15,9 @@ pytestmark = [pytest.mark.site, pytest.mark.engine]
 def test_doctor_says_what_works_and_how_to_mend_what_does_not(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     folder.tmp.mkdir()
-    done = folder.run("doctor", env={"MUJOCO_GL": "disabled"})
-    assert (done.status, done.err) == (0, "")
-    said = re.sub(r"\d+(\.\d+)*", "#", done.out)
+    result = folder.run("doctor", env={"MUJOCO_GL": "disabled"})
+    assert (result.status, result.err) == (0, "")
+    report = re.sub(r"\d+(\.\d+)*", "#", result.out)
     for line in (
         "ok       Python # at ",
         "ok       MuJoCo #\n",
@@ -26,10 +26,10 @@ def test_doctor_says_what_works_and_how_to_mend_what_does_not(tmp_path: Path) ->
         "GiB free on the disk\n",
         "-        no offscreen rendering: ",
     ):
-        assert line in said, line
+        assert line in report, line
     cure = r"\n         help: (set the environment variable MUJOCO_GL=|install a driver)"
-    assert re.search(cure, done.out)
-    assert f"ok       {folder.root} can be written\n" in done.out
+    assert re.search(cure, result.out)
+    assert f"ok       {folder.root} can be written\n" in result.out
     assert not [path for path in folder.root.iterdir() if path != folder.tmp]
 
 
@@ -37,11 +37,11 @@ def test_doctor_fails_where_a_course_cannot_be_built(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     folder.tmp.mkdir()
     folder.write("broken/mujoco/__init__.py", "raise ImportError('no library')\n")
-    done = folder.run("doctor", env={"PYTHONPATH": f"{folder.root}/broken:{ROOT}"})
-    assert (done.status, done.err) == (1, "")
-    assert re.search(r"^broken   MuJoCo [\d.]+: ImportError: no library$", done.out, re.MULTILINE)
+    result = folder.run("doctor", env={"PYTHONPATH": f"{folder.root}/broken:{ROOT}"})
+    assert (result.status, result.err) == (1, "")
+    assert re.search(r"^broken   MuJoCo [\d.]+: ImportError: no library$", result.out, re.MULTILINE)
     assert (
-        "\n         help: install coursebuild again, into an environment of its own\n" in done.out
+        "\n         help: install coursebuild again, into an environment of its own\n" in result.out
     )
-    done = folder.main("doctor", "-C", "no/such")
-    assert (done.status, done.err) == (2, "coursebuild: there is no folder no/such\n")
+    result = folder.main("doctor", "-C", "no/such")
+    assert (result.status, result.err) == (2, "coursebuild: there is no folder no/such\n")

@@ -57,9 +57,9 @@ TIDY = {
 }
 
 
-@pytest.mark.parametrize(("text", "wanted"), TIDY.values(), ids=TIDY)
-def test_text_is_tidied_and_its_lines_kept(text: str, wanted: str) -> None:
-    assert tidied(text) == wanted
+@pytest.mark.parametrize(("text", "expected"), TIDY.values(), ids=TIDY)
+def test_text_is_tidied_and_its_lines_kept(text: str, expected: str) -> None:
+    assert tidy(text) == expected
 
 
 WRAPPED = {
@@ -86,16 +86,16 @@ WRAPPED = {
 }
 
 
-@pytest.mark.parametrize(("text", "wanted"), WRAPPED.values(), ids=WRAPPED)
-def test_paragraphs_are_wrapped_at_a_width(text: str, wanted: str) -> None:
-    assert tidied(text) == f"{text}\n"
-    assert tidied(text, width=18) == f"{wanted}\n"
+@pytest.mark.parametrize(("text", "expected"), WRAPPED.values(), ids=WRAPPED)
+def test_paragraphs_are_wrapped_at_a_width(text: str, expected: str) -> None:
+    assert tidy(text) == f"{text}\n"
+    assert tidy(text, width=18) == f"{expected}\n"
 
 
-def tidied(text: str, width: int = 0) -> str:
-    done = format_text(text, width)
-    assert not done.diagnostics
-    return done.value
+def tidy(text: str, width: int = 0) -> str:
+    result = format_text(text, width)
+    assert not result.diagnostics
+    return result.value
 
 
 @settings(max_examples=150)
@@ -116,8 +116,8 @@ def test_lines_of_the_course_stay() -> None:
     for path in DOCUMENTS:
         text, lesson = path.read_text(), path.parent.name == "lessons"
         lines = format_text(text, 0, lesson).value.splitlines()
-        changed = {*lines} - {*text.splitlines()}
-        assert all(line.lstrip("> ").startswith("|") for line in changed), path
+        new_lines = {*lines} - {*text.splitlines()}
+        assert all(line.lstrip("> ").startswith("|") for line in new_lines), path
 
 
 def test_command_formats_the_course_by_the_width_of_its_map(
@@ -127,8 +127,8 @@ def test_command_formats_the_course_by_the_width_of_its_map(
     course.write(MAP, course.text(MAP) + "\n[format]\nwidth = 10\n")
     path, before = course.lesson(1), course.tree()
     assert course.main("fmt", "--check") == CommandResult(1, f"would format {path}\n", "")
-    shown = course.main("fmt", "1.1", "--diff")
-    assert (shown.status, "\n+one two\n+three four" in shown.out) == (1, True)
+    preview = course.main("fmt", "1.1", "--diff")
+    assert (preview.status, "\n+one two\n+three four" in preview.out) == (1, True)
     assert course.tree() == before
     assert course.main("fmt") == CommandResult(0, f"changed {path}\n", "")
     assert course.text(path) == "## A\n\none two\nthree four\n"
@@ -138,13 +138,13 @@ def test_command_formats_the_course_by_the_width_of_its_map(
 def test_command_leaves_what_it_cannot_read(make: Make) -> None:
     course = make('## A\n\n```quiz\n{ "id": "x"\n```\n', b"## B\ncaf\xe9\n", "## C\ntext\n")
     before = course.tree()
-    done = course.main("fmt")
-    assert (done.status, done.out) == (1, f"changed {course.lesson(3)}\n")
-    assert done.err.splitlines() == [
+    result = course.main("fmt")
+    assert (result.status, result.out) == (1, f"changed {course.lesson(3)}\n")
+    assert result.err.splitlines() == [
         f"coursebuild: {course.lesson(1)} has mistakes, and is left as it is",
         f"  help: mend this first: {course.lesson(1)}:4:1: `{{` is never closed",
         f"coursebuild: {course.lesson(2)} has mistakes, and is left as it is",
         f"  help: mend this first: {course.lesson(2)} is not UTF-8",
     ]
-    changed = {path for path, data in course.tree().items() if before[path] != data}
-    assert changed == {course.lesson(3)}
+    changed_paths = {path for path, data in course.tree().items() if before[path] != data}
+    assert changed_paths == {course.lesson(3)}

@@ -13,7 +13,7 @@ from support.scratch_course import Folder
 
 pytestmark = pytest.mark.site
 
-SAID = """\
+REPORT = """\
 wrote 11 files to {0}
 
   coursebuild -C {1} serve    look at the course, and write
@@ -25,21 +25,21 @@ wrote 11 files to {0}
 def test_new_course_passes_check_and_build_as_it_is(tmp_path: Path, stores: Path) -> None:
     outside = Folder(tmp_path)
     name = "a cöurse's"
-    done = outside.main("init", name)
-    assert (done.status, done.err) == (0, "")
-    assert done.out == SAID.format(name, """'a cöurse'"'"'s'""")
+    result = outside.main("init", name)
+    assert (result.status, result.err) == (0, "")
+    assert result.out == REPORT.format(name, """'a cöurse'"'"'s'""")
     folder = Folder(tmp_path / name)
-    made = folder.tree()
+    files = folder.tree()
     for store in stores.iterdir():
         (folder.root / ".coursebuild" / store.name).symlink_to(store)
-    done = folder.main("check", "--no-cache")
-    assert (done.status, done.out.splitlines()[-1]) == (
+    result = folder.main("check", "--no-cache")
+    assert (result.status, result.out.splitlines()[-1]) == (
         0,
         "1 lesson, 1 script run, 1 lab tried: everything holds",
     )
-    assert done.out.startswith("ok "), "not even a warning"
+    assert result.out.startswith("ok "), "not even a warning"
     assert folder.main("build").status == 0
-    assert {path: data for path, data in folder.tree().items() if path in made} == made
+    assert {path: data for path, data in folder.tree().items() if path in files} == files
     page = folder.text("public/lessons/1.1-pendulum.html")
     for part in ("data-lab", "data-quiz", "swing", "2.0125 s"):
         assert part in page, part
@@ -47,11 +47,11 @@ def test_new_course_passes_check_and_build_as_it_is(tmp_path: Path, stores: Path
 
 def test_new_course_has_what_git_and_an_editor_need(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
-    done = folder.main("init")
-    assert (done.status, "coursebuild serve " in done.out) == (0, True)
-    made = folder.tree()
+    result = folder.main("init")
+    assert (result.status, "coursebuild serve " in result.out) == (0, True)
+    files = folder.tree()
     assert {"public/", "examples/", ".coursebuild/"} <= {*folder.text(".gitignore").split()}
-    for path, data in made.items():
+    for path, data in files.items():
         if path.endswith(".json"):
             assert json.loads(data), path
         if path.endswith(".toml"):
@@ -67,8 +67,8 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     (tmp_path / "linked").mkdir()
     (tmp_path / "linked/.gitignore").symlink_to("nowhere")
     before = folder.tree()
-    done = folder.main("init", "own")
-    assert (done.status, done.out, done.err) == (
+    result = folder.main("init", "own")
+    assert (result.status, result.out, result.err) == (
         2,
         "",
         "coursebuild: own has .gitignore, models/pendulum.xml already, so nothing was written\n"
@@ -77,14 +77,14 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     assert folder.main("init", "linked").status == 2
     assert folder.tree() == before
     folder.write("file", "text")
-    done = folder.main("init", "file")
-    assert (done.status, done.err) == (1, "coursebuild: file cannot be made: file exists\n")
+    result = folder.main("init", "file")
+    assert (result.status, result.err) == (1, "coursebuild: file cannot be made: file exists\n")
     folder.write("half/models", "a file")
-    done = folder.main("init", "half")
-    assert (done.status, "models/pendulum.xml cannot be written: " in done.err) == (1, True)
+    result = folder.main("init", "half")
+    assert (result.status, "models/pendulum.xml cannot be written: " in result.err) == (1, True)
     assert folder.tree("half") == {"models": b"a file"}
-    done = folder.main("init", os.fsdecode(b"caf\xe9"))
-    assert (done.status, "the path of the course is not UTF-8: " in done.err) == (2, True)
+    result = folder.main("init", os.fsdecode(b"caf\xe9"))
+    assert (result.status, "the path of the course is not UTF-8: " in result.err) == (2, True)
     (tmp_path / "kept").mkdir()
     folder.write("kept/README.md", "# Mine\n")
     assert folder.main("-C", "kept", "init").status == 0

@@ -68,11 +68,11 @@ def test_new_lesson_is_checked_and_built_as_it_is(make: Make) -> None:
         (("1.3", "力学", "--slug", "lixue"), "content/lessons/1.3-lixue.md"),
         (("1.2.1", "A\tB\x7f"), "content/lessons/1.2.1-a-b.md"),
     ):
-        done = folder.main("new", "lesson", *arguments)
-        assert done == CommandResult(0, f"changed {MAP}\nwrote {path}\n", "")
+        result = folder.main("new", "lesson", *arguments)
+        assert result == CommandResult(0, f"changed {MAP}\nwrote {path}\n", "")
         assert (folder.root / path).is_file()
-    done = folder.main("check")
-    assert (done.status, done.out.count("warning")) == (0, 0), done.out
+    result = folder.main("check")
+    assert (result.status, result.out.count("warning")) == (0, 0), result.out
     ids = [line[6:-1] for line in folder.text(MAP).splitlines() if line.startswith("id = ")]
     assert ids[1:] == ["1.1", "1.2", "1.2.1", "1.3", "1.10"]
 
@@ -101,13 +101,13 @@ def test_what_cannot_be_added_changes_nothing(make: Make) -> None:
     folder.write("models/there.xml", "<mujoco/>")
     before = folder.tree()
     for arguments, message in REFUSED:
-        done = folder.main("new", *arguments.split(" "))
-        assert (done.status, done.out) == (2, ""), arguments
-        assert message in done.err, arguments
+        result = folder.main("new", *arguments.split(" "))
+        assert (result.status, result.out) == (2, ""), arguments
+        assert message in result.err, arguments
     assert folder.main("new", "lesson", "1.3", " ").status == 2
     (folder.root / MAP).chmod(0o444)
-    done = folder.main("new", "lesson", "1.3", "T")
-    assert (done.status, f"{MAP} is read-only" in done.err) == (1, True)
+    result = folder.main("new", "lesson", "1.3", "T")
+    assert (result.status, f"{MAP} is read-only" in result.err) == (1, True)
     assert folder.tree() == before
     (folder.root / MAP).chmod(0o644)
     for text, message in (
@@ -118,38 +118,42 @@ def test_what_cannot_be_added_changes_nothing(make: Make) -> None:
         ),
     ):
         folder.write(MAP, text)
-        done = folder.main("new", "lesson", "1.3", "T")
-        assert (done.status, message in done.err, folder.text(MAP)) == (2, True, text)
+        result = folder.main("new", "lesson", "1.3", "T")
+        assert (result.status, message in result.err, folder.text(MAP)) == (2, True, text)
 
 
 def test_new_model_compiles(make: Make) -> None:
     folder = make(FIRST + "\nThe [model](model:parts/falling-ball).\n")
-    done = folder.main("new", "model", "parts/falling-ball")
-    assert done == CommandResult(0, "wrote models/parts/falling-ball.xml\n", "")
+    result = folder.main("new", "model", "parts/falling-ball")
+    assert result == CommandResult(0, "wrote models/parts/falling-ball.xml\n", "")
     assert folder.main("check").status == 0
 
 
 def test_new_template_is_the_one_of_the_tool_and_known_for_it(make: Make) -> None:
     folder = make(FIRST)
-    done = folder.main("new", "template", "blocks/code.html")
-    assert done == CommandResult(0, "wrote theme/templates/blocks/code.html\n", "")
+    result = folder.main("new", "template", "blocks/code.html")
+    assert result == CommandResult(0, "wrote theme/templates/blocks/code.html\n", "")
     first, _, rest = folder.text("theme/templates/blocks/code.html").partition("\n")
     assert rest == (ROOT / "templates/blocks/code.html").read_text(encoding="utf-8")
     assert folder.main("new", "template", "blocks/code.html").status == 2
     assert folder.main("new", "template", "blocks/code.html", "--print").out == f"{first}\n{rest}"
-    done = folder.main("check")
-    assert (done.status, "warning" in done.out) == (0, False), done.out
+    result = folder.main("check")
+    assert (result.status, "warning" in result.out) == (0, False), result.out
 
 
 def test_tests_of_new_features_pass_as_made(make: Make) -> None:
     folder = make(FIRST)
     for name, script in (("advice", ()), ("hint", ("--script",))):
-        done = folder.main("new", "feature", name, *script)
-        assert done.out == f"changed {MAP}\nwrote features/{name}.py\nwrote tests/test_{name}.py\n"
+        result = folder.main("new", "feature", name, *script)
+        assert (
+            result.out == f"changed {MAP}\nwrote features/{name}.py\nwrote tests/test_{name}.py\n"
+        )
         assert ("PagePart" in folder.text(f"features/{name}.py")) == bool(script)
     assert 'features = ["features/advice.py", "features/hint.py"]\n' in folder.text(MAP)
     assert folder.main("check").status == 0
     tests = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    ran = subprocess.run(tests, cwd=folder.root, env=environment, capture_output=True, text=True)
-    assert "6 passed" in ran.stdout, ran.stdout
+    process = subprocess.run(
+        tests, cwd=folder.root, env=environment, capture_output=True, text=True
+    )
+    assert "6 passed" in process.stdout, process.stdout

@@ -47,24 +47,24 @@ def test_every_link_mention_and_prerequisite_follows(course: Folder) -> None:
     before = course.main("check")
     assert before.status == 0, before.out
     toml, lesson = course.text(MAP), course.text(course.lesson(3))
-    done = course.main("rename", "1.2", "1.7")
-    assert done == CommandResult(
+    result = course.main("rename", "1.2", "1.7")
+    assert result == CommandResult(
         0,
         f"changed {MAP}\nchanged {course.lesson(3)}\n"
         "wrote content/lessons/1.7-two.md\nremoved content/lessons/1.2-two.md\n",
         "",
     )
-    changed = course.text(course.lesson(3))
-    assert changed.count("1.7") == 15
-    for kept in ("Lesson 1.20 is another, 1.2 a number", '"1.2")', '"1.2-check"', '"answer": 1.2'):
-        assert kept in changed
-    assert changed.count("1.2") == 5
-    assert changed.replace("1.7", "1.2") == lesson
+    new_lesson = course.text(course.lesson(3))
+    assert new_lesson.count("1.7") == 15
+    for text in ("Lesson 1.20 is another, 1.2 a number", '"1.2")', '"1.2-check"', '"answer": 1.2'):
+        assert text in new_lesson
+    assert new_lesson.count("1.2") == 5
+    assert new_lesson.replace("1.7", "1.2") == lesson
     assert course.text("content/lessons/1.7-two.md") == SECOND
-    told = course.text(MAP)
-    assert 'prerequisites = ["1.1", "1.7"]  # both' in told
-    assert 'path = "content/lessons/1.7-two.md"' in told
-    ids = [line[6:-1] for line in told.splitlines() if line.startswith("id = ")]
+    new_map = course.text(MAP)
+    assert 'prerequisites = ["1.1", "1.7"]  # both' in new_map
+    assert 'path = "content/lessons/1.7-two.md"' in new_map
+    ids = [line[6:-1] for line in new_map.splitlines() if line.startswith("id = ")]
     assert ids == ["1", "1.1", "1.3", "1.7", "1.20"], "moved by its id"
     after = course.main("check")
     assert (after.status, "0 scripts run, 2 cached" in after.out) == (0, True)
@@ -87,13 +87,13 @@ def test_lesson_moves_to_another_level_with_its_comments_and_line_ends(course: F
     assert text.count("\n") == text.count("\r\n")
     assert text.replace("\r\n", "\n").endswith(f'[[level]]\nid = "A"\ntitle = "More"\n{entry}')
     assert course.read("content/lessons/A.1-two.md") == SECOND.replace("\n", "\r\n").encode()
-    done = course.main("check")
-    assert "link-" not in done.out, "`Lesson A.1` is no mention, and no link is lost"
+    result = course.main("check")
+    assert "link-" not in result.out, "`Lesson A.1` is no mention, and no link is lost"
 
 
 def test_planned_lesson_and_one_out_of_order_stay_where_they_are(course: Folder) -> None:
-    done = course.main("rename", "1.20", "1.30")
-    assert (done.status, done.out) == (0, f"changed {MAP}\nchanged {course.lesson(3)}\n")
+    result = course.main("rename", "1.20", "1.30")
+    assert (result.status, result.out) == (0, f"changed {MAP}\nchanged {course.lesson(3)}\n")
     toml = course.text(MAP)
     assert toml.index('"1.3"') < toml.index('"1.30"')
     course.write(MAP, toml.replace('"1.1"\nslug', '"1.9"\nslug').replace('["1.1", ', "["))
@@ -129,13 +129,13 @@ def test_doubtful_places_are_listed_and_nothing_is_changed(make: Make) -> None:
         old = before.get(path, b"")
         folder.write(path, old + b"\n" + text.encode())
         now = folder.tree()
-        done = folder.main("rename", "1.2", "1.7")
-        assert (done.status, done.out) == (1, ""), text
-        first, place, *_, help = done.err.splitlines()
+        result = folder.main("rename", "1.2", "1.7")
+        assert (result.status, result.out) == (1, ""), text
+        first, place, *_, help = result.err.splitlines()
         assert first in (
             "coursebuild: 1 place may mean lesson 1.2:",
             "coursebuild: 2 places may mean lesson 1.2:",
-        ), done.err
+        ), result.err
         assert place.startswith(f"  {path}:"), text
         assert help == (
             "  help: edit them first, or leave them as they are with --leave; nothing was changed"
@@ -165,12 +165,12 @@ def test_what_cannot_be_renamed_changes_nothing(course: Folder) -> None:
     course.write("content/lessons/1.8-two.md", "## There\n")
     before = course.tree()
     for arguments, message in REFUSED:
-        done = course.main("rename", *arguments.split())
-        assert (done.status, done.out) == (2, ""), arguments
-        assert message in done.err, arguments
+        result = course.main("rename", *arguments.split())
+        assert (result.status, result.out) == (2, ""), arguments
+        assert message in result.err, arguments
     (course.root / course.lesson(3)).chmod(0o444)
-    done = course.main("rename", "1.2", "1.7")
-    assert (done.status, f"{course.lesson(3)} is read-only" in done.err) == (1, True)
+    result = course.main("rename", "1.2", "1.7")
+    assert (result.status, f"{course.lesson(3)} is read-only" in result.err) == (1, True)
     assert course.tree() == before
 
 
@@ -185,8 +185,8 @@ def test_of_two_at_once_one_is_done(course: Folder) -> None:
         return course.run("rename", "1.2", new)
 
     with ThreadPoolExecutor(2) as pool:
-        done = list(pool.map(rename, ("1.7", "1.8")))
+        results = list(pool.map(rename, ("1.7", "1.8")))
     names = sorted(path.name for path in (course.root / "content/lessons").glob("*-two.md"))
     assert names in (["1.7-two.md"], ["1.8-two.md"])
     assert course.main("check").status == 0
-    assert sorted(one.status for one in done)[0] == 0
+    assert sorted(result.status for result in results)[0] == 0

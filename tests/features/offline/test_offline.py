@@ -22,13 +22,13 @@ SHELL = frozenset({"index.html", "offline/index.html", "assets/site.0123abcd.css
 
 @pytest.fixture(scope="module")
 def site(make: Make) -> dict[str, bytes]:
-    found: dict[str, bytes] = make("## One\n\nText.\n").site()
-    return found
+    files: dict[str, bytes] = make("## One\n\nText.\n").site()
+    return files
 
 
-def listed(*files: FileFacts) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(listing(SHELL, files))
-    return found
+def read_listing(*files: FileFacts) -> dict[str, Any]:
+    groups: dict[str, Any] = json.loads(listing(SHELL, files))
+    return groups
 
 
 def digest(name: str) -> str:
@@ -54,36 +54,37 @@ GROUPS = {
 def test_each_file_is_in_the_group_of_those_who_need_it() -> None:
     for group, paths in GROUPS.items():
         for path in paths.split():
-            found = listed(file(path))
-            groups = {name for name in ("shell", "text", "rest") if found[name]["files"]}
+            data = read_listing(file(path))
+            groups = {name for name in ("shell", "text", "rest") if data[name]["files"]}
             assert groups == ({group} if group else set()), path
             if group:
-                assert found[group]["bytes"] == 100
-                wanted = "" if "#" in path else digest(path)[:12]
-                assert list(found[group]["files"].values()) == [wanted], path
+                assert data[group]["bytes"] == 100
+                expected = "" if "#" in path else digest(path)[:12]
+                assert list(data[group]["files"].values()) == [expected], path
 
 
 def test_a_page_of_more_than_a_mebibyte_is_for_those_who_ask_for_everything() -> None:
     large = 1 << 20, (1 << 20) + 1
-    found = listed(*(file(f"{size}.html", size) for size in large), file("assets/a.#.js", 1 << 21))
-    assert [*found["rest"]["files"]] == [f"{large[1]}.html"]
-    assert len(found["text"]["files"]) == 2, "what scripts of every page need is kept with them"
+    pages = (file(f"{size}.html", size) for size in large)
+    groups = read_listing(*pages, file("assets/a.#.js", 1 << 21))
+    assert [*groups["rest"]["files"]] == [f"{large[1]}.html"]
+    assert len(groups["text"]["files"]) == 2, "what scripts of every page need is kept with them"
 
 
 def test_a_name_with_a_hash_of_something_else_needs_one() -> None:
-    found = listed(FileFacts("assets/a.0123abcd.js", digest("a"), 1))
-    assert found["text"]["files"] == {"assets/a.0123abcd.js": digest("a")[:12]}
+    groups = read_listing(FileFacts("assets/a.0123abcd.js", digest("a"), 1))
+    assert groups["text"]["files"] == {"assets/a.0123abcd.js": digest("a")[:12]}
 
 
 def test_an_edit_changes_its_line_and_no_other(site: dict[str, bytes], make: Make) -> None:
     def lines(files: dict[str, bytes]) -> set[str]:
         return set(files["files.json"].decode().splitlines())
 
-    edited = make("## One\n\nTxet.\n").site()
-    gone, new = lines(site) - lines(edited), lines(edited) - lines(site)
-    named = {line.split('"')[1] for line in new if line.startswith('"')}
-    assert "lessons/0.1-falling.html" in named
-    assert not {name for name in named if name.endswith((".css", ".woff2"))}
+    new_site = make("## One\n\nTxet.\n").site()
+    gone, new = lines(site) - lines(new_site), lines(new_site) - lines(site)
+    paths = {line.split('"')[1] for line in new if line.startswith('"')}
+    assert "lessons/0.1-falling.html" in paths
+    assert not {path for path in paths if path.endswith((".css", ".woff2"))}
     assert len(gone) == len(new)
 
 
@@ -94,8 +95,8 @@ def test_the_list_of_a_site_is_what_is_there(site: dict[str, bytes]) -> None:
     }
     assert files.keys() <= site.keys()
     for path, digits in files.items():
-        found = hashlib.sha256(site[path]).hexdigest()
-        assert found.startswith(digits or path.split(".")[-2])
+        digest = hashlib.sha256(site[path]).hexdigest()
+        assert digest.startswith(digits or path.split(".")[-2])
     shell = data["shell"]["files"]
     for page in ("index.html", "offline/index.html"):
         text = site[page].decode()
@@ -109,7 +110,7 @@ def test_the_list_is_json_with_a_line_for_each_file(names: list[str]) -> None:
     files = [FileFacts(f"assets/{name}.js", "0" * 64, size) for size, name in enumerate(names)]
     text = listing(SHELL, files).decode("utf-8", "surrogatepass")
     assert f"{json.dumps(json.loads(text), ensure_ascii=False, indent=0)}\n" == text
-    assert [*json.loads(text)["text"]["files"]] == [one.path for one in files]
+    assert [*json.loads(text)["text"]["files"]] == [file.path for file in files]
 
 
 def test_the_manifest_names_what_is_there(site: dict[str, bytes]) -> None:
