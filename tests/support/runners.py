@@ -64,13 +64,13 @@ def processor_time(pid: int) -> int:
 
 
 def wait_for(path: Path) -> int:
-    """The process whose number a script writes into a file."""
+    """Wait for a script to write a process's number into a file, and return the number."""
     wait_for_file(path, 1)
     return int(path.read_text())
 
 
 def wait_until_ended(pid: int) -> bool:
-    """That a process ends."""
+    """Wait until a process has ended."""
     wait_until(lambda: not is_alive(pid), f"the end of process {pid}")
     return True
 
@@ -78,7 +78,7 @@ def wait_until_ended(pid: int) -> bool:
 def run_hanging(
     server: ScriptServer, root: Path, *codes: str, is_done: Callable[[str], object] = bool
 ) -> list[ScriptRun]:
-    """What scripts that do not end do, given a limit that lets each say something before."""
+    """Run scripts that do not end, with a limit that lets each print enough before."""
     paths = [f"examples/hanging{number}.py" for number in range(len(codes))]
     for path, code in zip(paths, codes, strict=True):
         (root / path).write_text(code)

@@ -1,4 +1,4 @@
-"""Small lessons, how outputs recorded in them are compared, and how they are brought up to date."""
+"""Small lessons with recorded outputs, to compare and to update."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def make_run(
 
 
 def describe(diagnostic: Diagnostic) -> str:
-    """All that a diagnostic says, with its places."""
+    """The whole text of a diagnostic, with its places."""
 
     def place(span: Span | None) -> str:
         return "" if span is None else f" at {span.line}:{span.column} `{span.first_line().text}`"

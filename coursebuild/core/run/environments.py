@@ -143,14 +143,7 @@ def _create_environment(prefix: Path, engine: str) -> None:
         if configured.is_file():
             shutil.copyfile(configured, new / "pip.conf")
         python = str(new / "bin" / "python")
-        pip = [sys.executable, "-m", "pip", "--python", python, *_INSTALL]
-        requirements, installed = {f"{_ENGINE}=={engine}"}, set[str]()
-        while requirements:
-            status, output = _run([*pip, *sorted(requirements)])
-            if status:
-                raise _pip_error(engine, output)
-            installed |= requirements
-            requirements = _mujoco_requirements(_packages(new)) - installed
+        _install_engine(python, _packages(new), engine)
         lines = (f"import site; site.addsitedir({folder!r})\n" for folder in site_folders())
         (_packages(new) / "packages_of_here.pth").write_text("".join(lines))
         status, output = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
@@ -160,6 +153,18 @@ def _create_environment(prefix: Path, engine: str) -> None:
         new.rename(prefix)
     finally:
         shutil.rmtree(new, ignore_errors=True)
+
+
+def _install_engine(python: str, packages: Path, engine: str) -> None:
+    """Install MuJoCo, and the packages of its own that it requires, and theirs in turn."""
+    pip = [sys.executable, "-m", "pip", "--python", python, *_INSTALL]
+    requirements, installed = {f"{_ENGINE}=={engine}"}, set[str]()
+    while requirements:
+        status, output = _run([*pip, *sorted(requirements)])
+        if status:
+            raise _pip_error(engine, output)
+        installed |= requirements
+        requirements = _mujoco_requirements(packages) - installed
 
 
 def _mujoco_requirements(packages: Path) -> set[str]:

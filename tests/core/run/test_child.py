@@ -1,4 +1,4 @@
-"""A child that answers lines: it is interrupted, says too much, and leaves nothing behind."""
+"""A child that answers lines can be interrupted, may print much, and leaves nothing behind."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_an_interrupt_from_another_thread(tmp_path: Path, temporary: Path) -> No
     assert list(temporary.iterdir()) == []
 
 
-def test_half_an_answer_is_waited_for_no_longer_than_a_whole_one(tmp_path: Path) -> None:
+def test_half_an_answer_has_the_same_time_limit(tmp_path: Path) -> None:
     with make(tmp_path, 0.1) as child:
         assert (
             child.ask({"do": "sys.stdout.write('{'); sys.stdout.flush(); signal.pause()"}) is None
@@ -86,7 +86,7 @@ def test_half_an_answer_is_waited_for_no_longer_than_a_whole_one(tmp_path: Path)
 
 
 def test_it_ends_with_its_parent(tmp_path: Path) -> None:
-    """However that ends: the input closes."""
+    """However the parent ends, the child's input closes."""
     make(tmp_path)
     code = (
         "from coursebuild.core.run.child import JsonChild\n"

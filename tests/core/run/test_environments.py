@@ -1,4 +1,4 @@
-"""Which versions and distributions `check --against` takes."""
+"""The versions that `check --against` accepts."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from coursebuild.core.run.versions import engine_version
 @pytest.mark.parametrize(
     "text", ["", "abc", "3..1", "v3.1", "3.1 ", "==3.1", "3.1; x", "-e", "٣.١"]
 )
-def test_what_is_no_version(text: str) -> None:
+def test_texts_that_are_no_version(text: str) -> None:
     with pytest.raises(UsageError) as error:
         check_other_version(text)
     assert str(error.value) == f"--against: {text!r} is no version of MuJoCo, such as 3.13.0"
 
 
-def test_the_version_of_here_is_no_other_however_it_is_written() -> None:
+def test_the_installed_version_is_refused_however_it_is_written() -> None:
     installed = engine_version()
     for text in (installed, f"{installed}.0"):
         with pytest.raises(UsageError) as error:

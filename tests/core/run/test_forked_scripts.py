@@ -33,15 +33,15 @@ VisibleResult = tuple[str, str, int]
 
 @functools.cache
 def library() -> dict[str, str]:
-    """What lets a bare Python import `mjcourse`, where it is not installed."""
+    """The variable that lets a bare Python import `mjcourse`, if that is not installed."""
     command = [sys.executable, "-P", "-c", "import mjcourse"]
     lacks = subprocess.run(command, capture_output=True, cwd="/").returncode
     return {"PYTHONPATH": library_folder()} if lacks else {}
 
 
 def run_alone(root: Path, path: str) -> VisibleResult:
-    """What Python itself makes of a script."""
-    # As short as the runner's own: the path of a socket in it must not have many characters.
+    """The result of a script that Python itself runs."""
+    # As short as the runner's own, because the path of a socket has few characters.
     with tempfile.TemporaryDirectory(prefix="bare-", dir="/tmp") as temporary:
         process = subprocess.run(
             [sys.executable, path, *ARGUMENTS],
@@ -59,7 +59,7 @@ def run_alone(root: Path, path: str) -> VisibleResult:
 
 
 def without_addresses(text: str) -> str:
-    """Without what differs between any two runs."""
+    """The text without what differs between any two runs."""
     return re.sub(r"0x[0-9a-f]{6,}", "0x…", re.sub(r"\b\d{15}\b", "…", text))
 
 
@@ -69,7 +69,7 @@ def visible_result(run: ScriptRun) -> VisibleResult:
 
 
 def differences(server: ScriptServer, root: Path, scripts: Mapping[str, str]) -> list[str]:
-    """The scripts that are not to a server what they are to Python, by name."""
+    """How the results of scripts run by a server differ from Python's own, each with its name."""
     paths = [f"examples/script{number}.py" for number in range(len(scripts))]
     for path, code in zip(paths, scripts.values(), strict=True):
         encoding = "latin-1" if "latin-1" in code else "utf-8"
@@ -117,7 +117,7 @@ def interpreter(tmp_path_factory: pytest.TempPathFactory) -> Interpreter:
     return Interpreter("", python, str(prefix), base, version, "none", (str(packages),))
 
 
-def test_package_that_is_not_installed_is_told_by_the_script(
+def test_script_reports_a_package_that_is_not_installed(
     interpreter: Interpreter, root: Path
 ) -> None:
     code = "try: import numpy\nexcept ModuleNotFoundError as error: print(error)\n"
@@ -127,7 +127,7 @@ def test_package_that_is_not_installed_is_told_by_the_script(
     assert run.stdout == "No module named 'numpy'\n"
 
 
-def test_package_that_cannot_be_imported_before_scripts_fails_in_them(
+def test_package_that_cannot_be_preloaded_fails_in_scripts(
     interpreter: Interpreter, root: Path
 ) -> None:
     module = Path(*interpreter.packages, "numpy.py")

@@ -1,4 +1,4 @@
-"""Initial states, and nothing else, are moved a little, and in the same way wherever they occur."""
+"""Initial states, and nothing else, are moved a little, and equal ones equally."""
 
 from __future__ import annotations
 
@@ -74,13 +74,13 @@ def read_values(run_perturbed: Run) -> ReadValues:
 
 
 def is_moved(values: Sequence[float], *by: float) -> bool:
-    """Whether these are as far from what was set as initial states are moved."""
+    """Whether values differ from what was set by as much as initial states are moved."""
     pairs = zip(values, by, strict=True)
     return all(abs(abs(value / base - 1.0) - SIZE) < SIZE / 100 for value, base in pairs)
 
 
 @both_ways
-def test_an_ordinary_run_is_as_ever(read_values: ReadValues) -> None:
+def test_an_unperturbed_run_is_unchanged(read_values: ReadValues) -> None:
     text = PULL + STEP * 20 + STATE
     assert read_values(text, 0) == read_values(text, 0)
     assert read_values(text, 0) != read_values(text, 1)
@@ -232,7 +232,7 @@ mujoco.mj_step2(other, second)
     assert is_moved(values["q"], 0.5, 0.25, 1.0)
 
 
-def test_the_model_the_time_and_what_drives_stay(read_values: ReadValues) -> None:
+def test_model_time_and_forces_stay(read_values: ReadValues) -> None:
     text = PULL + "data.time = 3.0\ndata.qfrc_applied[0] = 5.0\ndata.xfrc_applied[1, 0] = 2.0\n"
     text += FORWARD + "".join(
         f"tell({name!r}, {name})\n"
@@ -256,7 +256,7 @@ tell("end", end[:, -1, 1:3])
     assert is_moved(values["end"], *values["given"])
 
 
-# --- what is told of them
+# --- what is noted
 
 
 def trace(script_run: ScriptRun) -> Trace:
@@ -264,7 +264,7 @@ def trace(script_run: ScriptRun) -> Trace:
     return script_run.trace
 
 
-def test_what_became_of_the_states_is_noted(run_perturbed: Run) -> None:
+def test_final_states_are_noted(run_perturbed: Run) -> None:
     state_trace = trace(run_perturbed(PULL + STEP))
     assert state_trace.is_perturbed
     number, length, position, velocity, *end = state_trace.states[0].split()

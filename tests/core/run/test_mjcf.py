@@ -112,7 +112,7 @@ def test_everything_that_a_model_or_a_text_pulls_in(root: Path) -> None:
 
 
 def test_what_is_pulled_in_from_elsewhere_or_by_a_link(root: Path, tmp_path: Path) -> None:
-    """From beside `models/`, by an absolute path, from outside; a link by its own name."""
+    """From next to `models/`, by an absolute path, from outside; a link has its own name."""
     part = "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
     (root / "beside").mkdir()
     for path in (root / "beside/part.xml", tmp_path / "far.xml", tmp_path / "above.xml"):
@@ -181,7 +181,7 @@ MISTAKES = (
         '<mujoco><keyframe><key qpos="1 2"/></keyframe></mujoco>',
         "None: keyframe '': invalid qpos size, expected 0, got 2",
     ),
-    # In files that are included or attached; the last line is that of what pulls them in.
+    # In files that are included or attached: the line of the element that does so.
     (INCLUDE.format("zero"), "None: "),
     (INCLUDE.format("letter"), "None: "),
     (INCLUDE.format("broken"), "2: "),
@@ -191,7 +191,7 @@ MISTAKES = (
 )
 
 
-def test_mistakes_are_told_in_one_line_with_that_of_the_text(root: Path) -> None:
+def test_messages_have_one_line_and_the_line_of_the_text(root: Path) -> None:
     for name, text in INNER.items():
         (root / f"models/{name}.xml").write_text(text)
     results = texts(root, [xml for xml, _ in MISTAKES])
@@ -219,7 +219,7 @@ def test_a_model_without_end_or_of_any_size_is_ended(root: Path) -> None:
         "</worldbody></mujoco>"
     )
     large = '<mujoco><size memory="90000G"/></mujoco>'
-    for limit in (0.5, 8.0, 120.0):  # what comes to an end may take its time
+    for limit in (0.5, 8.0, 120.0):  # slow machines need a longer limit
         results = texts(root, [endless, large, "<mujoco/>"], timeout=limit)
         assert results[0].error == f"MuJoCo's compiler took longer than {limit:g} s"
         if results[2].error == "":

@@ -1,4 +1,4 @@
-"""Compiled models that are remembered: MuJoCo starts if and only if something changed."""
+"""Compiled models are remembered: MuJoCo starts if and only if something changed."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class Course:
     def __init__(self, root: Path) -> None:
         self.root = root
         self.compiled_names: list[str] = []
-        """What MuJoCo was asked to compile since it was last looked at."""
+        """What MuJoCo was asked to compile since the last `take_compiled`."""
 
     def compile(self, *extra_texts: str, fresh: bool = False) -> dict[str, CompileResult]:
-        """The results by the name of a model, or by a text."""
+        """The results, by the name of the model or by the text."""
         models = {path.stem: path.read_text() for path in sorted(self.root.glob("models/*.xml"))}
         texts = [(f"models/{name}.xml", text) for name, text in models.items()]
         texts += [(mjcf.TEXT_PATH, text) for text in extra_texts]
@@ -78,7 +78,7 @@ def test_nothing_is_compiled_twice(course: Course) -> None:
     assert course.take_compiled() == []
 
 
-def test_what_is_made_of_a_file_is_compiled_again(course: Course) -> None:
+def test_models_are_compiled_again_when_a_file_of_theirs_changes(course: Course) -> None:
     course.compile()
     for file, again in (
         ("models/assets/m.obj", ["main"]),

@@ -48,9 +48,9 @@ class Case(NamedTuple):
     files: dict[str, bytes]
     script: str = "show(load('models/m.xml'))"
     spare: str = ""
-    """The one that is not looked for."""
+    """The file that MuJoCo does not look for."""
     missing: str = ""
-    """What is looked for besides, and is not there."""
+    """A further file that it looks for in vain."""
 
 
 SHOW = """

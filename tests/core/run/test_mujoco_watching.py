@@ -1,4 +1,4 @@
-"""No simulation of a script is lost unnoticed, and the script notices nothing of that."""
+"""Every lost simulation of a script is noticed, without any effect on the script."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def test_each_warning_and_each_lost_state_has_its_name(find_divergences: FindDiv
         assert find_divergences(HEAD + harmless) == ()
 
 
-def test_of_several_models_the_one_whose_clock_it_is(find_divergences: FindDivergences) -> None:
+def test_a_warning_names_the_model_whose_clock_it_shows(find_divergences: FindDivergences) -> None:
     other_model = "model = mujoco.MjModel.from_xml_string(XML.replace('spinner', 'other'))\n"
     twice = HEAD + "first = data\nmujoco.mj_step(model, first)\n" + other_model
     [divergence] = find_divergences(twice + "data = mujoco.MjData(model)\n" + FAST + STEP)
@@ -148,7 +148,7 @@ def test_a_loop_that_diverges_often_does_not_fill_the_notes(
     assert len(find_divergences(HEAD + loop)) == 16
 
 
-def test_a_handler_that_nobody_knows_of_leaves_the_counter(
+def test_with_another_handler_the_counter_is_noticed(
     find_divergences: FindDivergences,
 ) -> None:
     silent = """\
@@ -229,7 +229,7 @@ PLAIN = (
 
 
 def plain(text: str) -> str:
-    """Without addresses, and without the list of native modules that a crash ends with."""
+    """The text without addresses, and without the list of native modules after a crash."""
     return re.sub("0x[0-9a-f]+", "0x", re.sub("Extension modules: .*", "", text))
 
 
@@ -249,7 +249,7 @@ def test_watched_script_does_what_it_does_alone(run: Run, root: Path) -> None:
         (root / "MUJOCO_LOG.TXT").unlink(missing_ok=True)
 
 
-def test_the_log_of_a_process_that_nobody_watches_goes_unless_it_was_there(
+def test_the_log_of_an_unwatched_process_is_removed_unless_it_was_there(
     run: Run, root: Path
 ) -> None:
     text = HEAD + FAST + STEP
@@ -261,7 +261,7 @@ def test_the_log_of_a_process_that_nobody_watches_goes_unless_it_was_there(
     assert (root / "MUJOCO_LOG.TXT").read_text() == "mine\n"
 
 
-def test_data_that_is_let_go_is_given_back(run: Run) -> None:
+def test_unused_data_is_freed(run: Run) -> None:
     text = HEAD + (
         "import weakref\nalive = weakref.WeakSet()\n"
         "for _ in range(500):\n    one = mujoco.MjData(model)\n    alive.add(one)\n"

@@ -63,7 +63,7 @@ def test_a_module_that_no_distribution_names_is_known_by_its_files(
     (site / "folder/data.bin").write_bytes(b"1")
     first = ask(tmp_path, site)
     before = first.version("loose"), first.version("folder")
-    library = first.version("mjcourse")  # whose version says nothing while somebody works on it
+    library = first.version("mjcourse")  # ours; its version does not change while it is developed
     assert all(version.startswith("files ") for version in (*before, library))
     (site / "folder/__pycache__").mkdir()
     (site / "folder/__pycache__/x.pyc").write_bytes(b"1")

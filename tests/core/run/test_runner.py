@@ -1,4 +1,4 @@
-"""Running scripts, well-behaved and not: what is known of each, and what it finds around it."""
+"""Scripts, well-behaved and not: their results, and the environment that they find."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ print(json.dumps([dict(os.environ), sys.argv, time.tzname[0], hash("a"), sys.war
 try: open("/dev/tty")
 except OSError: print("no terminal")
 """
-"""What else it finds is held against what a bare Python finds: see `test_forked_scripts`."""
+"""`test_forked_scripts` compares the rest with what a bare Python finds."""
 OUTER = {
     "PYTHONPATH": "/outer",
     "PYTHONSTARTUP": "/outer",
@@ -163,7 +163,7 @@ OUTER = {
 
 
 @both_ways
-def test_script_finds_the_course_and_nothing_of_who_runs_it(
+def test_script_finds_the_course_and_nothing_of_the_user(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, value in OUTER.items():
@@ -211,7 +211,7 @@ def test_mjcourse_and_siblings_can_be_imported(run: Run, root: Path) -> None:
     assert not (root / "examples/__pycache__").exists()
 
 
-def test_temporary_folder_goes_whatever_is_done_to_it(run: Run, root: Path) -> None:
+def test_temporary_folder_is_removed_whatever_a_script_does_to_it(run: Run, root: Path) -> None:
     locked_folder = "at = tempfile.mkdtemp()\nopen(at + '/f', 'w').close()\nos.chmod(at, 0)\n"
     removed_folder = (
         "os.mkdir('w'); os.chdir('w'); os.rmdir('../w'); shutil.rmtree(os.environ['TMPDIR'])\n"

@@ -98,7 +98,7 @@ def test_script_that_kills_its_supervisor(root: Path, fork: bool) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT, 0])
 def test_nothing_survives_the_tool(root: Path, number: int) -> None:
-    """Killed by each signal; where scripts are no copies, by SIGKILL."""
+    """Each signal ends the tool; 0 stands for SIGKILL with spawned scripts."""
     fork, number = bool(number), number or signal.SIGKILL
     (root / "examples/x.py").write_text(f"{DAEMON}\n{ME}time.sleep(100)\n")
     command = [sys.executable, "-c", TOOL, root, str(fork)]
@@ -108,7 +108,7 @@ def test_nothing_survives_the_tool(root: Path, number: int) -> None:
         output, _ = tool.communicate()
     assert output == ("interrupted\n" if number is signal.SIGINT else "")
     pids = [script, *daemons(root)]
-    if number is signal.SIGINT:  # it had the time to see to it
+    if number is signal.SIGINT:  # it had time to clean up
         assert not any(is_alive(pid) for pid in pids)
     assert all(wait_until_ended(pid) for pid in pids)
     folder = Path((root / "examples/tmp").read_text()).parent
@@ -116,7 +116,7 @@ def test_nothing_survives_the_tool(root: Path, number: int) -> None:
     wait_until(lambda: not folder.exists(), "the end of the temporary folder")
 
 
-def test_run_that_is_wanted_no_more_is_stopped(root: Path) -> None:
+def test_unwanted_run_is_stopped(root: Path) -> None:
     (root / "examples/x.py").write_text(f"{ME}time.sleep(60)\n")
     (root / "examples/y.py").write_text("print('y')\n")
 
@@ -132,7 +132,7 @@ def test_run_that_is_wanted_no_more_is_stopped(root: Path) -> None:
         assert after.stdout == "y\n"
 
 
-def test_failure_of_who_listens_ends_the_run(server: ScriptServer, root: Path) -> None:
+def test_error_in_a_callback_ends_the_run(server: ScriptServer, root: Path) -> None:
     (root / "examples/x.py").write_text(f"{ME}time.sleep(60)\n")
     (root / "examples/y.py").write_text(
         "import os, time\nwhile not os.path.exists('examples/me'): time.sleep(0.01)\n"
@@ -146,7 +146,7 @@ def test_failure_of_who_listens_ends_the_run(server: ScriptServer, root: Path) -
     assert not is_alive(wait_for(root / "examples/me"))
 
 
-def test_results_come_in_order_and_events_tell(server: ScriptServer, root: Path) -> None:
+def test_results_are_in_order_and_callbacks_are_called(server: ScriptServer, root: Path) -> None:
     """The first script is the last to end: it waits for what the last one writes."""
     for i, code in enumerate(
         (
@@ -168,7 +168,7 @@ def test_results_come_in_order_and_events_tell(server: ScriptServer, root: Path)
     assert sorted(finished_runs, key=lambda r: r.path) == list(runs)
 
 
-def test_so_many_at_a_time_and_no_more(server: ScriptServer, root: Path) -> None:
+def test_no_more_scripts_at_a_time_than_allowed(server: ScriptServer, root: Path) -> None:
     """Each script waits for as many as may run at a time to have begun."""
     (root / "examples/x.py").write_text(
         "import os, sys, time\nopen(f'examples/run{os.getpid()}', 'w').close()\n"

@@ -33,7 +33,7 @@ def attempt(what):
     except BaseException as error:
         print(type(error).__name__, error)
 """
-"""Says what came of an attempt, whatever that is."""
+"""Prints the result of an attempt, or its error."""
 
 
 @pytest.fixture
@@ -103,7 +103,7 @@ ATTEMPTS: dict[str, str | tuple[str, ...]] = {
     "os.kill(TESTS, 9)": "ProcessLookupError",
     "all(int(name) < 9 for name in os.listdir('/proc') if name.isdigit())": "True",
 }
-"""What a script tries, and how what comes of it begins."""
+"""What a script tries, and how the result begins."""
 
 
 def test_attempts_fail_and_change_nothing(
@@ -176,7 +176,7 @@ def test_script_that_kills_all_it_can_ends_alone(confine: Confine, neighbour: in
     assert Path(f"/proc/{neighbour}").exists()
 
 
-def test_speaking_for_another_script(confine: Confine) -> None:
+def test_forging_the_report_of_another_script(confine: Confine) -> None:
     forge = (
         "import glob\n"
         "parent = os.getppid()\n"
@@ -244,14 +244,14 @@ def test_links_that_the_tool_would_follow(confine: Confine, root: Path, home: Pa
 
 
 @pytest.mark.slow
-def test_stopping_who_supervises(confine: Confine) -> None:
+def test_stopping_the_supervisor(confine: Confine) -> None:
     first, second = confine("os.kill(os.getppid(), 19)\n" * 3, "print('as before')")
     assert first.outcome is Outcome.KILLED
     assert second.stdout == "as before\n"
 
 
 class TestResults:
-    """What behaves well does the same as outside."""
+    """Well-behaved scripts do the same as outside."""
 
     CODE = """
 import numpy, mujoco, helper
@@ -292,7 +292,9 @@ print(model.ngeom, helper.VALUE, old, os.getcwd(), os.path.expanduser("~"))
         assert [path.name for path in root.glob("runs/*")] == ["old.csv"]
         assert (root / "runs/old.csv").read_text() == "old"
 
-    def test_what_is_not_shown_is_no_result(self, confine: Confine, home: Path) -> None:
+    def test_trace_of_a_file_that_is_not_shown_is_opaque(
+        self, confine: Confine, home: Path
+    ) -> None:
         (run,) = confine("attempt(lambda: open(os.path.expanduser('~/secret')))")
         assert run.trace is not None
         assert run.trace.opaque == f"its sandbox does not show {home}/secret"

@@ -1,4 +1,4 @@
-"""What scripts find around them, and what of it their results depend on."""
+"""The environment of scripts, and the part of it that results depend on."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from coursebuild.core.run.script_environment import conditions, places, wanted_packages
 
 
-def test_conditions_are_what_decides_a_result_and_not_who_runs_it_where() -> None:
+def test_conditions_do_not_depend_on_the_user() -> None:
     user_environment = {
         "PATH": "/bin",
         "HOME": "/home/me",
@@ -35,7 +35,7 @@ def test_conditions_are_what_decides_a_result_and_not_who_runs_it_where() -> Non
 
 
 def test_places_come_longest_first() -> None:
-    """So that a folder inside of another is found before it."""
+    """A folder inside another must be found before that one."""
     folders = places(Path("/home/me/course"), {"HOME": "/home/me"})
     assert [len(folder) for _, folder in folders] == sorted(
         (len(folder) for _, folder in folders), reverse=True
@@ -46,7 +46,7 @@ def test_places_come_longest_first() -> None:
     assert os.path.isdir(dict(folders)["library"])  # noqa: PTH112
 
 
-def test_packages_are_wanted_that_a_script_or_a_file_beside_it_names(tmp_path: Path) -> None:
+def test_wanted_packages_are_named_in_the_folder_of_a_script(tmp_path: Path) -> None:
     cases = (
         (b"", ()),
         (b"import numpy as np", ("numpy",)),

@@ -82,7 +82,7 @@ def test_files_that_are_read_however_the_script_ends(traced: Traced) -> None:
         assert (trace.folders, trace.outside, trace.opaque) == ((), (), ""), code
 
 
-def test_files_that_are_read_before_the_time_is_over(server: ScriptServer, root: Path) -> None:
+def test_files_that_are_read_before_a_timeout(server: ScriptServer, root: Path) -> None:
     code = "open('data/a.txt')\nprint('opened', flush=True)\nwhile True: pass"
     (result,) = run_hanging(server, root, code)
     assert result.trace is not None and result.trace.files == ("data/a.txt",)
@@ -130,7 +130,7 @@ for i in range(4): os.wait()
     assert set(traced(code).files) == expected
 
 
-def test_thousands_of_files_are_known_and_what_is_too_much_is_said(traced: Traced) -> None:
+def test_thousands_of_files_are_noted_up_to_a_limit(traced: Traced) -> None:
     code = "for i in range({}):\n    try: open(f'data/{{i}}-with-a-long-name')\n"
     code += "    except OSError: pass\n"
     trace = traced(code.format(5_000))
@@ -221,7 +221,7 @@ def test_forked_and_spawned_scripts_have_the_same_trace(
     assert forked_trace == spawned_trace
 
 
-# --- what cannot be known, or is more than looking
+# --- traces that may be incomplete, and effects
 
 OPAQUE: list[tuple[str, str]] = [
     ("open('data/new', 'w')", WRITES),
@@ -264,12 +264,12 @@ OPAQUE: list[tuple[str, str]] = [
 ]
 
 
-def test_why_a_trace_does_not_say_everything(traced: Traced) -> None:
+def test_reasons_why_a_trace_is_opaque(traced: Traced) -> None:
     for code, reason in OPAQUE:
         assert traced(code).opaque == reason, code
 
 
-def test_effects_are_told_once_for_each_line(traced: Traced, root: Path, tmp_path: Path) -> None:
+def test_effects_are_noted_once_for_each_line(traced: Traced, root: Path, tmp_path: Path) -> None:
     (root / "examples/sibling.py").write_text("\ndef write(): open('data/c', 'w')\n")
     trace = traced(
         f"import os, sibling, socket\nopen({str(tmp_path / 'o')!r}, 'w')\n"
@@ -289,6 +289,6 @@ def test_effects_are_told_once_for_each_line(traced: Traced, root: Path, tmp_pat
     ]
 
 
-def test_what_it_wrote_itself_is_no_dependency(traced: Traced) -> None:
+def test_files_that_a_script_wrote_are_no_dependency(traced: Traced) -> None:
     trace = traced("open('data/new', 'w').close()\nopen('data/new')\nopen('data/a.txt')")
     assert trace.files == ("data/a.txt",)

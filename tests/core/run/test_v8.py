@@ -168,7 +168,7 @@ class TestMarkup:
         root = mathml(typeset_one(engine, r"a \not= b \not\in C"))
         assert [mo.text for mo in root.iter("mo")] == ["≠", "∉"]
 
-    def test_over_what_is_low_a_root_stands_as_over_a_capital(self, engine: MathEngine) -> None:
+    def test_a_root_over_low_letters_is_as_high_as_over_capitals(self, engine: MathEngine) -> None:
         for tex in (r"\sqrt u", r"\sqrt{1-x^2}", r"\sqrt[3]{\dot q}"):
             root = mathml(typeset_one(engine, tex))
             assert "0.7em" in [space.get("height") for space in root.iter("mspace")], tex
@@ -227,7 +227,7 @@ MISTAKES = [
 
 
 class TestMistakes:
-    def test_each_is_said_at_its_place(self, engine: MathEngine) -> None:
+    def test_each_mistake_has_its_message_and_place(self, engine: MathEngine) -> None:
         formulas = [Formula(tex.replace('\\"', '"'), False) for tex, *_ in MISTAKES]
         errors = engine.typeset(formulas)
         assert errors == [MathError(message, position) for _, message, position in MISTAKES]
@@ -318,20 +318,20 @@ class TestIsolate:
         with pytest.raises(TypeError, match="number returned no string"):
             isolate.call("number", "", 120.0)
 
-    def test_what_is_thrown_is_told(self, isolate: Isolate) -> None:
+    def test_thrown_errors_are_reported(self, isolate: Isolate) -> None:
         with pytest.raises(ScriptError, match="Error: no such thing\n"):
             isolate.call("fail", "no such thing", 120.0)
         with pytest.raises(ScriptError, match="SyntaxError"):
             Isolate("(").close()
 
-    def test_what_never_ends_is_ended_and_the_next_is_not(self, isolate: Isolate) -> None:
+    def test_an_endless_script_is_ended_and_the_next_is_not(self, isolate: Isolate) -> None:
         for _ in range(3):
             with pytest.raises(LimitError, match=r"^ran for more than 0\.1 s$"):
                 isolate.call("spin", "", 0.1)
             assert isolate.call("same", "next", 120.0) == "next"
 
     def test_a_late_result_is_never_taken_for_the_next(self, isolate: Isolate) -> None:
-        """Nor does what ends at its limit take the next along."""
+        """Nor does a script that is ended at its limit end the next one."""
         in_time = 0
         for n in range(300):
             text = str((0, 2_000, 100_000)[n % 3] + n)
@@ -343,7 +343,7 @@ class TestIsolate:
             in_time += 1
         assert in_time >= 75
 
-    def test_what_takes_all_memory_is_ended(self) -> None:
+    def test_a_script_that_takes_all_memory_is_ended(self) -> None:
         small = Isolate(SCRIPT, memory=32 << 20)
         with pytest.raises(LimitError, match=r"^took more than 32 MiB$"):
             small.call("eat", "", 600.0)
@@ -359,7 +359,7 @@ class TestIsolate:
         with pytest.raises(StoppedError):
             isolate.call("same", "x", 600.0)
 
-    def test_whoever_calls_may_run_an_event_loop(self, isolate: Isolate) -> None:
+    def test_the_caller_may_run_an_event_loop(self, isolate: Isolate) -> None:
         async def work() -> str:
             return isolate.call("same", "here", 120.0)
 

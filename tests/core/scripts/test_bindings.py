@@ -101,7 +101,7 @@ def test_a_printed_value_rounded_to_the_digits_shown(binding: str) -> None:
     assert find_mistake(f"`{binding}`{{out}}") is None
 
 
-def test_text_beside_the_number_chooses() -> None:
+def test_text_next_to_the_number_narrows_the_choice() -> None:
     printed = "E 6.0 J\nP 6.04 W\nv=6.1 m/s\n"
     assert find_mistake("`6.0`{out}", printed) is None
     assert find_mistake("`6.0 J`{out}", printed) is None
@@ -183,7 +183,7 @@ def test_where_recorded_text_drifted_the_run_counts_too() -> None:
     )
 
 
-def test_what_an_ellipsis_leaves_out_was_printed_too() -> None:
+def test_bindings_may_show_what_an_ellipsis_leaves_out() -> None:
     text = (
         script() + output("start\n...\nend 1.5\n", "ellipsis") + "\n`1.5`{out} `8`{out} `9`{out}\n"
     )

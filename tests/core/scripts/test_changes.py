@@ -1,4 +1,4 @@
-"""Where a drift is, what class it has, and how it is shown."""
+"""The place, the class and the text of each change."""
 
 from __future__ import annotations
 

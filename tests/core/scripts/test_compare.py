@@ -1,4 +1,4 @@
-"""When a printed output is the recorded one: modes, ellipsis, filters."""
+"""When a printed output matches the recorded one: modes, ellipsis, filters."""
 
 from __future__ import annotations
 
@@ -222,7 +222,7 @@ def test_places_behind_filters_are_true() -> None:
     assert change.span.column == len("at 0x22 F ") + 1
 
 
-def test_a_change_inside_what_a_filter_wrote_is_all_that_it_replaced() -> None:
+def test_a_change_inside_a_replacement_covers_all_that_it_replaced() -> None:
     shorter = Filter(r"(\d\.\d)\d+", r"\1")
     result = verdict("E 6.6411 J", "E 6.7022 J", EXACT, (shorter,))
     assert [change_values(c) for c in result.changes] == [("rounding", "6.6411", "6.7022")]

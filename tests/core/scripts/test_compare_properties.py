@@ -1,4 +1,4 @@
-"""What holds of the comparison for all outputs."""
+"""Properties of the comparison that hold for all outputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recorded output beside a run, line by line, as a page shows it."""
+"""The line-by-line difference between a recorded output and a run, as a page shows it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from support.sample_lessons import DIGITS_ELLIPSIS, EXACT, recording, table
 
 
 def rows(recorded: str, printed: str) -> list[str]:
-    """Each row as text; what changed in it stands in brackets."""
+    """Each row as text; what changed is in brackets."""
     block = recording(recorded)
     verdict = compare(block, DIGITS_ELLIPSIS, (), printed)
     return [
@@ -38,7 +38,7 @@ def test_rows(recorded: str, printed: str, expected: list[str]) -> None:
     assert rows(recorded, printed) == expected
 
 
-def test_of_a_table_the_cells_that_changed() -> None:
+def test_rows_of_a_table_are_the_cells_that_changed() -> None:
     block = table("| n | x |\n| --- | --- |\n| 1 | 2.5 |")
     verdict = compare(block, EXACT, (), "1 3.5\n")
     cell_rows = [(row.mark, row.pieces[0].text) for row in diff_rows(verdict, (), "1 3.5\n")]
@@ -53,7 +53,7 @@ LINES = st.lists(LINE, min_size=1, max_size=6)
 @settings(max_examples=50)
 @given(LINES, LINES)
 def test_the_rows_are_both_texts(recorded: list[str], printed: list[str]) -> None:
-    """Without those that came they are what was recorded, without those that went what ran."""
+    """Without added rows they are the recorded text; without removed rows, the printed one."""
     recorded_text, printed_text = "\n".join(recorded).rstrip("\n"), "\n".join(printed).rstrip("\n")
     if (
         not recorded_text

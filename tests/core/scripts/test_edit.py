@@ -98,7 +98,7 @@ def test_a_recording_that_matches_one_run_only_is_unstable() -> None:
     assert "note: and 1 more line\n" in text
 
 
-def test_stable_is_what_the_comparison_takes() -> None:
+def test_outputs_that_match_by_the_comparison_are_stable() -> None:
     new = update(recording("x 9.99"), "x 1.500", DIGITS, repeated="x 1.5004")
     assert new.body_span.text == "x 1.500\n"
     assert "output-unstable" in refusal_text("x 9.99", "x 1.500", DIGITS, repeated="x 1.501")

@@ -1,4 +1,4 @@
-"""Whatever was recorded and printed: after an update all is well, or it was refused."""
+"""Whatever was recorded and printed: after an update the recording matches, or it is refused."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def assume_writable(recorded: str, printed: str) -> None:
     PREFIXES,
     EOLS,
 )
-def test_after_an_update_all_is_well(
+def test_after_an_update_the_recording_matches(
     recorded: str,
     printed: str,
     comparison: Comparison,

@@ -53,7 +53,7 @@ def test_an_exception_group_ends_with_its_last_exception() -> None:
     ]
 
 
-def test_an_exit_without_a_word_is_told_by_its_status_alone() -> None:
+def test_an_exit_without_output_shows_its_status_alone() -> None:
     assert describe_failure("").split("\n")[1:] == [
         "script-failed at 3:1 ````python file=examples/a.py timeout=2.5`",
         "  `examples/a.py` exited with status 1",

@@ -1,4 +1,4 @@
-"""Drawings as they are recorded, and how one differs from another."""
+"""Figures as they are recorded, and how two of them differ."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_data_differ_by_cells() -> None:
     assert wordings == DIFFERENT_TABLES
 
 
-def test_what_cannot_be_shown_is_told() -> None:
+def test_reasons_why_a_figure_cannot_be_shown() -> None:
     bomb = b'<!DOCTYPE svg [<!ENTITY a "aaaa">]><svg xmlns="http://www.w3.org/2000/svg">&a;</svg>'
     wordings = [
         prepare_figure("x.svg", data)

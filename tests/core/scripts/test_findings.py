@@ -26,7 +26,7 @@ print(7)
 """
 
 
-def test_where_only_some_scripts_ran_the_others_are_known() -> None:
+def test_tracebacks_lead_into_scripts_that_did_not_run() -> None:
     stderr = (
         'Traceback (most recent call last):\n  File "/x/examples/a.py", line 1, in <module>\n'
         '  File "/x/examples/b.py", line 2, in <module>\nZeroDivisionError: division by zero\n'

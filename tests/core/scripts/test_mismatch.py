@@ -27,9 +27,9 @@ def check(evidence: BindingEvidence, text: str, *runs: ScriptRun) -> tuple[Diagn
 
 
 def mismatch_after(binding: str, before: str, now: str, fence: str = "text") -> Diagnostic:
-    """What is wrong with a binding when another output is recorded than the one by which it held.
+    """The diagnostic of a binding after a new output is recorded.
 
-    In between the old one stands beside the new run, as it does before it is accepted.
+    Before that, the old recording is compared with the new run, as before an update is accepted.
     """
     prose, evidence = f"`{binding}`{{out}}", BindingEvidence()
     assert check(evidence, lesson(prose, before, fence), make_run(before)) == ()
@@ -37,12 +37,12 @@ def mismatch_after(binding: str, before: str, now: str, fence: str = "text") -> 
     (diagnostic,) = check(evidence, lesson(prose, now, fence), make_run(now))
     proposals = [edit.text for edit in diagnostic.edits]
     assert proposals == ([diagnostic.help[7:-1]] if diagnostic.help.startswith("write `") else [])
-    for text in proposals:  # what is offered holds
+    for text in proposals:  # the proposal holds
         assert check(evidence, lesson(f"`{text}`{{out}}", now, fence), make_run(now)) == ()
     return diagnostic
 
 
-def test_what_is_said() -> None:
+def test_wording_of_a_mismatch() -> None:
     diagnostic = mismatch_after("2.006 s", PENDULUM, "period   2.950 s\nhalf     1.975 s\n")
     assert (
         describe(diagnostic)
@@ -144,7 +144,7 @@ def test_which_line_is_the_same(before: str, now: str, successor: str | None) ->
         assert diagnostic.help == f"write `{successor}`"
 
 
-def test_what_an_ellipsis_leaves_out_has_its_place_too() -> None:
+def test_lines_left_out_by_an_ellipsis_are_evidence_too() -> None:
     evidence, prose = BindingEvidence(), "`7.5`{out}"
     recorded = "start\n...\nend 1.5\n"
     text = lesson(prose, recorded, "text ellipsis")
@@ -153,7 +153,7 @@ def test_what_an_ellipsis_leaves_out_has_its_place_too() -> None:
     assert (diagnostic.label, diagnostic.help) == ("9.52 is printed where 7.52 was", "write `9.5`")
 
 
-def test_with_another_number_of_outputs_nobody_knows_which_is_which() -> None:
+def test_with_another_number_of_outputs_the_evidence_does_not_count() -> None:
     evidence, now = BindingEvidence(), "period 2.950 s\nhalf 1.975 s\n"
     assert check(evidence, lesson("`2.006`{out}", PENDULUM), make_run(PENDULUM)) == ()
     two_outputs = lesson("\nOutput:\n\n```text\n" + now + "```\n`2.006`{out}", now)
@@ -180,7 +180,7 @@ def test_with_another_number_of_outputs_nobody_knows_which_is_which() -> None:
         ("5.1", "nan inf 9.0", "9.0", ""),
     ],
 )
-def test_where_nothing_is_known_of_before(
+def test_without_evidence_the_nearest_number_is_named(
     binding: str, printed: str, nearest: str, better: str
 ) -> None:
     text = lesson(f"`{binding}`{{out}}", printed + "\n")

@@ -139,8 +139,8 @@ REPEATED = ["1-", "00:", "1", "1.1111", "1+", "a", "1 ", "1e", "1f", "-", "1/", 
 
 
 @pytest.mark.site
-def test_whatever_is_repeated_is_scanned_in_time_that_grows_in_proportion() -> None:
-    """What one expression does shows in no count of calls."""
+def test_scanning_repeated_text_takes_linear_time() -> None:
+    """Measured by time: the work of one expression shows in no count of calls."""
 
     def growth(piece: str) -> float:
         return processor_time_growth(lambda size: scan(piece * (size // len(piece)) + "x"), 2048)

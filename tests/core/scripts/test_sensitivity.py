@@ -1,4 +1,4 @@
-"""Which printed digits hold, given what was printed with initial states moved."""
+"""Which printed digits repeat, given what was printed with initial states moved."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_what_a_filter_takes_out_does_not_count() -> None:
     assert digits(result) == []
 
 
-def test_values_that_a_tolerance_took_are_held_against_those_of_the_run() -> None:
+def test_values_within_a_tolerance_are_compared_with_those_of_the_run() -> None:
     comparison = tolerance("1e-3")
     result = measure("x 1.2345", "x 1.2347", comparison=comparison, base="x 1.2347")
     assert digits(result) == [], "moving has changed nothing"
@@ -143,7 +143,7 @@ def test_digits_that_repeat_and_digits_that_are_converged(
     assert warnings(result) == warnings(measure(text.format(recorded), text.format(moved_output)))
 
 
-def test_why_nothing_is_known_of_half_the_timestep() -> None:
+def test_reasons_why_convergence_is_not_measured() -> None:
     sample_course, block = course(document("", "content/lessons/1.1-a.md")), recording("x 1.25")
     for halved_run, reason in (
         (None, "it was not run with half the timestep"),
@@ -211,7 +211,9 @@ def test_states_that_are_lost_end_infinitely_far_apart() -> None:
         (run("x 1"), replace(run("x 1"), outcome=Outcome.FAILED, status=1), Standing.FAILED),
     ],
 )
-def test_why_nothing_can_be_said(base: ScriptRun, moved_run: ScriptRun, standing: Standing) -> None:
+def test_reasons_why_sensitivity_is_not_measured(
+    base: ScriptRun, moved_run: ScriptRun, standing: Standing
+) -> None:
     sample_course = course(document("", "content/lessons/1.1-a.md"))
     block = recording("x 1")
     result = sensitivity(sample_course, "examples/a.py", "1.1", [block], base, [moved_run] * 4)
@@ -233,7 +235,7 @@ def test_why_nothing_can_be_said(base: ScriptRun, moved_run: ScriptRun, standing
         (tolerance("0", "1e-12"), "3e-13", "-2e-13", False),
     ],
 )
-def test_only_what_would_be_drift_is_warned_of(
+def test_warnings_only_where_the_change_would_be_drift(
     comparison: Comparison, recorded: str, moved_output: str, compared: bool
 ) -> None:
     result = measure(recorded, moved_output, comparison=comparison)
@@ -241,7 +243,7 @@ def test_only_what_would_be_drift_is_warned_of(
     assert len(warnings(result)) == int(compared)
 
 
-def test_a_number_that_came_no_further_than_it_was_moved_is_no_noise() -> None:
+def test_a_number_that_moves_no_further_than_the_states_is_no_noise() -> None:
     assert warnings(measure("3.000000000000", "3.000000000003")) == []
     assert warnings(measure("3.000000000000", "3.000000000300")) != []
     assert warnings(measure("2.9999999999999654", "2.9999999999970046")) != []

@@ -72,7 +72,7 @@ def test_the_number_that_drifted_is_named() -> None:
     assert change.span.source.line_text(change.span.line).startswith("| `Euler` | **+6.702")
 
 
-def test_of_several_numbers_the_nearest_is_meant() -> None:
+def test_the_nearest_of_several_numbers_is_compared() -> None:
     (change,) = verdict("| Euler | | 6.8e-04 |").changes
     assert (change.recorded, change.printed) == ("6.8e-04", "6.9e-04")
     (change,) = verdict("| Euler | 7.0 | |", comparison=EXACT).changes
