@@ -48,6 +48,7 @@ from coursebuild.numerics.reports.bench import (
     FLOORS,
     MeasuredSetting,
     OrderRow,
+    RowVerdict,
     ScenarioReport,
     StableRow,
     WorkPrecisionRow,
@@ -69,7 +70,7 @@ class Basis(Struct, frozen=True, eq=False):
     """The scene's own setting."""
     cones: Mapping[str, Cone]
     energy: float | None
-    """What changes of energy are large against, J; `None` where energy is not conserved."""
+    """The scale for changes of energy, J; `None` where energy is not conserved."""
     momentum_conserved: bool
     late_energy: float | None
     """Mean kinetic energy after the horizon, J; `None` where it is the end."""
@@ -100,17 +101,8 @@ def measure_scenario(
     Raises:
         SceneError: the scenario does not fit the model, or diverges at every timestep.
     """
-    tell(f"{scene.name}: a first run")
-    pilot = run_pilot(model, scene)
-    tell(f"{scene.name}: the reference")
-    cones = find_references(model, pilot, quick=quick)
-    baseline = own_setting(model, pilot)
-    reference = cones[baseline.cone].reference
-    conserved, late_energy = (
-        find_conserved(model, pilot, reference),
-        mean_late_energy(model, pilot, reference),
-    )
-    basis = Basis(model, pilot, baseline, cones, *conserved, late_energy)
+    basis = _prepare(model, scene, quick, tell)
+    pilot = basis.pilot
     measurements = []
     for setting in settings(model, pilot, quick=quick):
         tell(f"{scene.name}: {setting_text(setting)}")
@@ -125,6 +117,29 @@ def measure_scenario(
     judgement = verdict(rows, [noticeable for _, noticeable in measurements])
     if not any(row.own and row.status == "ok" for row in rows):  # nothing to compare costs with
         rows = tuple(replace(row, cost=None) for row in rows)
+    return _report(basis, rows, largest, judgement)
+
+
+def _prepare(model: Any, scene: Scene, quick: bool, tell: Callable[[str], None]) -> Basis:
+    """Make the first run and the references."""
+    tell(f"{scene.name}: a first run")
+    pilot = run_pilot(model, scene)
+    tell(f"{scene.name}: the reference")
+    cones = find_references(model, pilot, quick=quick)
+    baseline = own_setting(model, pilot)
+    reference = cones[baseline.cone].reference
+    conserved = find_conserved(model, pilot, reference)
+    late_energy = mean_late_energy(model, pilot, reference)
+    return Basis(model, pilot, baseline, cones, *conserved, late_energy)
+
+
+def _report(
+    basis: Basis,
+    rows: tuple[WorkPrecisionRow, ...],
+    largest: tuple[StableRow, ...],
+    judgement: RowVerdict,
+) -> ScenarioReport:
+    pilot, reference, scene = basis.pilot, basis.reference, basis.pilot.scene
     return ScenarioReport(
         name=scene.name,
         title=scene.title,
@@ -141,7 +156,7 @@ def measure_scenario(
         horizons=None if pilot.lyapunov is None else pilot.horizons,
         smooth=pilot.smooth,
         notes=_notes(basis, largest),
-        figure=quantity_name(model, scene),
+        figure=quantity_name(basis.model, scene),
         rows=rows,
         orders=_fit_orders(basis, rows) if pilot.smooth else (),
         stable=largest,
@@ -150,7 +165,7 @@ def measure_scenario(
 
 
 def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
-    """What to know when reading the figures."""
+    """Remarks for reading the figures."""
     model, pilot, reference = basis.model, basis.pilot, basis.reference
     notes = [reference.note]
     if pilot.jumps:

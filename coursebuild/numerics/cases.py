@@ -1,4 +1,4 @@
-"""What is measured on a hard case: errors and orders, largest stable timesteps, known quantities.
+"""Measure a hard case: errors and orders, largest stable timesteps, known quantities.
 
 Entry points: `measure_case(problem, machine, clock)`; `measure(problem, integrator, timestep)`, one
 run of it; `floor(problem)`, how well its motion is known; `closed_motion(model, scene, …)`, a

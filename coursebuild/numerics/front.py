@@ -68,7 +68,7 @@ def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:
 
 
 def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
-    """What the measurement says of the scene's own setting.
+    """The verdict on the scene's own setting.
 
     `noticeable`: whether a learner sees the error of a row; `None` where that is not known.
     """

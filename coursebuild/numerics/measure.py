@@ -1,4 +1,4 @@
-"""How far a motion is from its reference, what orders that shows, and what drifts.
+"""The errors of a motion against its reference, the orders that they show, and drifts.
 
 Entry points: `errors`, `largest_errors`, `fit_orders`; `energy_drift`, `momentum_drift`.
 

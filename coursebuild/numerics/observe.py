@@ -83,7 +83,7 @@ _UNITS = {
     "E_POTENTIAL": "J",
     "E_KINETIC": "J",
 }
-"""Of sensors whose unit does not depend on the joint that they are at."""
+"""The units of sensors, except where the unit depends on the joint."""
 
 
 def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
@@ -93,10 +93,10 @@ def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
     data = initial_data(scene.scenario, model)
     values = []
     rows = zip(states.qpos, states.qvel, states.act, strict=True)
-    for look, (qpos, qvel, act) in enumerate(rows):
+    for index, (qpos, qvel, act) in enumerate(rows):
         data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
         if scene.scenario.controls:
-            data.ctrl[:] = scene.scenario.command(look)
+            data.ctrl[:] = scene.scenario.command(index)
         mujoco.mj_forward(model, data)
         match quantity.kind:
             case "body":

@@ -33,13 +33,13 @@ APART = 0.1
 """The distance at which two motions have nothing in common any more: rad, or relative to the
 model's extent."""
 _RESTING = 0.01
-"""What moves slower than this part of the speed of a fall through the model's extent is at rest."""
+"""A body is at rest below this part of the speed of a fall through the model's extent."""
 _SELDOM = 8
 """Steps from one look at how large the state is to the next."""
 
 
 class Pilot(Struct, frozen=True):
-    """What the first run of a scene says."""
+    """The results of a scene's first run."""
 
     scene: Scene
     setup: Setup
@@ -49,7 +49,7 @@ class Pilot(Struct, frozen=True):
     constrained: bool
     """Whether a solver had anything to do."""
     jumps: tuple[str, ...]
-    """What makes accelerations jump, in words; none: the scene is smooth."""
+    """The causes for jumps of accelerations, in words; empty where the scene is smooth."""
     horizons: tuple[float, float]
     """s, multiples of the sample: how long the first and the last twin stay near; the duration for
     one that stays near to the end."""
@@ -110,7 +110,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
 
 
 def position_distance(model: Any, first: Array, second: Array) -> float:
-    """How far two positions (nq,) are from each other, at the joint where they differ most.
+    """The distance of two positions (nq,), at the joint where they differ most.
 
     In rad for hinges and attitudes, relative to the model's extent for slides and free places.
     """
@@ -120,7 +120,7 @@ def position_distance(model: Any, first: Array, second: Array) -> float:
 
 
 def position_distances(model: Any, first: Array, second: Array) -> Array:
-    """The same of two motions (n, nq), at each time: (n,)."""
+    """The distances of two motions (n, nq) at each time: (n,)."""
     pairs = zip(first, second, strict=True)
     return np.array([position_distance(model, a, b) for a, b in pairs])
 
@@ -157,7 +157,7 @@ class _Observer:
             self.full = bool(np.any((act <= self._range[:, 0]) | (act >= self._range[:, 1])))
 
     def jumps(self, model: Any) -> tuple[str, ...]:
-        """What makes accelerations jump."""
+        """The causes for jumps of accelerations, in words."""
         causes = (
             (self.contact, "contact"),
             (self.limit, "a limit that is reached"),

@@ -1,10 +1,11 @@
-"""What a hard case is: a model, what happens in it, and what exactly would happen.
+"""The definition of a hard case: a model, a scenario in it, and the exact motion.
 
 Entry points: `Problem`, `Scenario`, `Reference`, `SecondReference`, `Motion`, `ScalarCheck`,
 `Integrator`; `Setup`, what a run needs beside the model.
 
 A number that a motion depends on is written twice: in the MJCF and the scenario, and in the formula
-or the equations that the first reference goes by. Whoever changes one of them alone is told.
+or the equations of the first reference. If only one of them is changed, the references disagree,
+which is an error.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from coursebuild.core.model.scenarios import is_multiple
 Array: TypeAlias = NDArray[np.float64]
 
 ROOM = 10.0
-"""So many times what is seen in small steps is called impossible: velocities, or the kinetic energy
-that comes on top of all energy."""
+"""A run is lost beyond so many times the values of small steps: of velocity, or of kinetic energy
+on top of the largest energy."""
 
 
 class Integrator(enum.Enum):
@@ -44,16 +45,16 @@ class Integrator(enum.Enum):
 STANDARD: tuple[Integrator, ...] = tuple(
     integrator for integrator in Integrator if integrator is not Integrator.EULER_EXPLICIT
 )
-"""Those with a name of their own in MJCF."""
+"""The integrators with a name of their own in MJCF."""
 
 
 class Scenario(Struct, frozen=True):
-    """What happens: where it begins, how long it takes, what is commanded, when it is looked at."""
+    """The initial state, the duration, the commands, and when the state is sampled."""
 
     duration: float
     """Seconds; a multiple of `sample`."""
     sample: float
-    """Seconds from one look at the state to the next; every timestep divides it."""
+    """Seconds from one sample of the state to the next; every timestep divides it."""
     qpos: tuple[float, ...] = ()
     """Initial positions, as `mjData.qpos`; the model's own where there are none."""
     qvel: tuple[float, ...] = ()
@@ -67,35 +68,35 @@ class Scenario(Struct, frozen=True):
 
     @property
     def times(self) -> Array:
-        """When the state is looked at, (n,) s: `sample`, 2 `sample`, …, `duration`."""
+        """When the state is sampled, (n,) s: `sample`, 2 `sample`, …, `duration`."""
         count = whole_number(self.duration, self.sample, "the duration", "the sampling interval")
         return np.asarray(np.arange(1, count + 1) * (self.duration / count), dtype=np.float64)
 
     def steps(self, timestep: float) -> int:
-        """How many timesteps (s) go from one look to the next.
+        """The number of timesteps (s) from one sample to the next.
 
         Raises:
             ValueError: no whole number.
         """
         return whole_number(self.sample, timestep, "the sampling interval", "the timestep")
 
-    def command(self, look: int) -> tuple[float, ...]:
-        """What is commanded between a look (from 0) and the one before; empty where nothing is.
+    def command(self, index: int) -> tuple[float, ...]:
+        """The command before the sample with this index (from 0); empty without commands.
 
         Raises:
             ValueError: the hold is no multiple of `sample`.
         """
         if not self.controls:
             return ()
-        looks = 1
+        samples = 1
         if self.hold:
-            looks = whole_number(self.hold, self.sample, "the hold", "the sampling interval")
-        return self.controls[min(look // looks, len(self.controls) - 1)]
+            samples = whole_number(self.hold, self.sample, "the hold", "the sampling interval")
+        return self.controls[min(index // samples, len(self.controls) - 1)]
 
     def commands(self, timestep: float) -> Iterator[tuple[float, ...]]:
-        """What is commanded in each step (s), one after the other."""
-        for look in range(len(self.times)):
-            yield from itertools.repeat(self.command(look), self.steps(timestep))
+        """The command of each step, for a timestep (s)."""
+        for index in range(len(self.times)):
+            yield from itertools.repeat(self.command(index), self.steps(timestep))
 
 
 def whole_number(length: float, part: float, length_name: str, part_name: str) -> int:
@@ -134,17 +135,17 @@ class Sizes(Struct, frozen=True):
     """m/s or rad/s."""
 
     def at_least(self, sizes: Sizes) -> Sizes:
-        """Of each part the larger one."""
+        """The larger size of each part."""
         return Sizes(*map(max, astuple(self), astuple(sizes)))
 
     @property
     def place(self) -> float:
-        """Of positions and attitudes together."""
+        """The larger size of positions and attitudes."""
         return max(self.position, self.attitude)
 
     @property
     def largest(self) -> float:
-        """Of all of them."""
+        """The largest size of all parts."""
         return max(self.position, self.attitude, self.velocity)
 
 
@@ -160,7 +161,7 @@ class Solution(Protocol):
 
 
 class Reference(Struct, frozen=True):
-    """What exactly happens."""
+    """The exact motion of a hard case."""
 
     kind: Literal["closed", "ode"]
     """A closed form, or equations of motion that are integrated."""
@@ -170,9 +171,9 @@ class Reference(Struct, frozen=True):
 
 
 class SecondReference(Struct, frozen=True):
-    """The same from the numbers of the model and the scenario, with none of the first one's code.
+    """The same motion from the numbers of the model and the scenario, by independent code.
 
-    How far the two are apart is how well the motion is known.
+    The distance of both references says how well the motion is known.
     """
 
     source: str
@@ -181,7 +182,7 @@ class SecondReference(Struct, frozen=True):
 
 
 class Limit(Struct, frozen=True):
-    """What theory says of the largest stable timestep of an integrator."""
+    """The largest stable timestep of an integrator in theory."""
 
     timestep: float
     """Seconds; infinite where every timestep is stable, 0 where none is."""
@@ -189,35 +190,35 @@ class Limit(Struct, frozen=True):
 
 
 class ScalarCheck(Struct, frozen=True):
-    """A quantity of a hard case that can be measured, and is known where theory says it."""
+    """A quantity of a hard case that can be measured, and compared with theory if theory has it."""
 
     name: str
     unit: str
     exact: float | Callable[[Integrator], float] | None
-    """What it is in theory, perhaps for an integrator; `None` where theory does not say it."""
+    """Its value in theory, perhaps for an integrator; `None` where theory does not give it."""
     measure: Callable[[Integrator], float | Sequence[float]]
-    """Several numbers are those of an ensemble."""
+    """Several numbers are the values of an ensemble."""
     source: str
     integrators: tuple[Integrator, ...] = STANDARD
 
     def expected(self, integrator: Integrator) -> float | None:
-        """What it is in theory for an integrator."""
+        """Its value in theory for an integrator."""
         return self.exact(integrator) if callable(self.exact) else self.exact
 
 
 class Setup(Struct, frozen=True, kw_only=True):
-    """What a run must know beside the model: what happens, and what can be."""
+    """What a run needs beside the model: the scenario, and bounds of the states."""
 
     scenario: Scenario
     position_bound: float = float("inf")
-    """Largest |qpos| that can be, in m or rad; what is beyond grows that should not."""
+    """Largest |qpos| of a run that is not lost, m or rad."""
     velocity_bound: float = float("inf")
-    """Largest |qvel| that can be, in m/s or rad/s."""
+    """Largest |qvel| of a run that is not lost, m/s or rad/s."""
     energy_bound: float = float("inf")
-    """Most potential and kinetic energy together that can be, J, where nothing drives the motion;
-    infinite where something does."""
+    """Most potential and kinetic energy of a run that is not lost, J; infinite where something
+    drives the motion."""
     penetration_bound: float = float("inf")
-    """Deepest contact that is no fault, m."""
+    """Deepest contact of a run that is not lost, m."""
 
 
 class Problem(Setup, frozen=True, kw_only=True):
@@ -234,7 +235,7 @@ class Problem(Setup, frozen=True, kw_only=True):
     second: SecondReference | None = None
     """`None`: MuJoCo's accelerations, integrated."""
     precision: Sizes = Sizes(1e-10, 1e-10, 1e-10)
-    """What the two may differ by, at most: beyond it one of them is wrong."""
+    """The largest allowed difference of both references: beyond it one of them is wrong."""
     timesteps: tuple[float, ...] = ()
     """The ladder of timesteps for work against precision, s, falling."""
     checks: tuple[ScalarCheck, ...] = ()
@@ -243,11 +244,10 @@ class Problem(Setup, frozen=True, kw_only=True):
     search: tuple[float, float] | None = None
     """Timesteps (s) between which the largest stable one is looked for."""
     span: float = 0.0
-    """Simulated time after which what grows must have shown itself, s: the same for all
-    timesteps."""
+    """Simulated time after which an unstable run has grown, s: the same for all timesteps."""
     room: float = ROOM
-    """How many times the largest kinetic energy of its motion energy may rise by, where nothing
-    drives it."""
+    """By how many times the largest kinetic energy of the motion a run's energy may rise, where
+    nothing drives it."""
     smooth: bool = True
     """Whether errors follow a power of the timestep: not with contact, nor where the model's own
     error remains."""
@@ -256,4 +256,4 @@ class Problem(Setup, frozen=True, kw_only=True):
     momentum_conserved: bool = False
     """Whether the angular momentum about the centre of mass does not change."""
     note: str = ""
-    """What to know when reading the figures."""
+    """A remark for reading the figures."""

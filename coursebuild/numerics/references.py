@@ -120,11 +120,8 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         reference = replace(self_reference(model, pilot, quick=quick), note=note)
     if declaration.closed_form:
         problem, motion = closed_motion(model, pilot.scene, declaration, reference.states.times)
-        subject, place = (
-            f"the closed form of `{declaration.closed_form}`",
-            declaration.place("reference"),
-        )
-        source = problem.reference.source
+        subject = f"the closed form of `{declaration.closed_form}`"
+        place, source = declaration.place("reference"), problem.reference.source
         return _with_closed_form(model, reference, motion, source, floor(problem), subject, place)
     exact = None if declaration.reference else pilot.scene.exact
     if exact is None:

@@ -79,7 +79,7 @@ class Scene(Struct, frozen=True):
     bench: BenchTable
     declaration: DeclaredScenario
     exact: ExactMotion | None = None
-    """What the course knows of its motion."""
+    """The course's exact motion, if it gives one."""
 
 
 def scenes(model: Any, declarations: Declarations, *, quick: bool = False) -> tuple[Scene, ...]:

@@ -44,14 +44,14 @@ _REACH = 10.0
 _NEAREST, _FARTHEST = 1e-3, 0.5
 """The relative distances below it between which others are tried."""
 MOST_STEPS = 200_000
-"""Of one run."""
+"""The most steps of one run."""
 _PARTS, _LOOKS = 20, 1000
 """How often a run is looked at: for its growth, and for whether it is lost."""
 _SMALL_STEPS = 100_000
 """Steps of the run that says how much energy there can be, at most."""
 _DENSE, _QUICK = (24, 32, 1e-4), (6, 8, 1e-2)
-"""How many timesteps are tried in a decade and just below the largest stable one, and the relative
-width at which the bisection ends."""
+"""The numbers of timesteps that are tried in a decade and just below the largest stable one, and
+the relative width at which the bisection ends."""
 
 
 class StabilityTrial(Struct, frozen=True):
@@ -168,7 +168,7 @@ def _next_timestep(
 def stable_row(
     integrator: Integrator, trials: Sequence[StabilityTrial], setup: Setup, span: float
 ) -> StableRow:
-    """What a search found for an integrator, over a span (s) of simulated time."""
+    """The row of an integrator from the trials of a search, over a span (s) of simulated time."""
     steps = [trial.timestep for trial in trials]
     stable_steps, largest, lost = steps, None, _first_lost(trials)
     if lost is not None:

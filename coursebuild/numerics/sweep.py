@@ -267,7 +267,7 @@ def _job(scenario: Scenario, model: Any) -> Job:
 def _rollouts(
     scenario: Scenario, model: Any, part: Variation, clock: Clock, *, quick: bool
 ) -> Iterator[SweepRow]:
-    """How much is simulated in a second by so many threads."""
+    """Measure the simulated time per second for numbers of threads."""
     counts = [int(value) for value in part.values if not isinstance(value, str | tuple)]
     batch, step = _COPIES * max(counts, default=1), float(model.opt.timestep)
     steps = min(_MOST_STEPS, scenario.steps(step) * len(scenario.times))

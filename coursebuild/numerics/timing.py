@@ -1,4 +1,4 @@
-"""What scenarios cost, relative to each other, on a machine that does other things too.
+"""The costs of scenarios relative to each other, on a machine that does other things too.
 
 Entry points: `time_jobs(jobs, baseline, clock)`; `costs(model, scene, settings, …)`, of settings of
 a scene; `scenario_job(model, scenes)`, a model's whole scenarios as a job.
@@ -51,7 +51,7 @@ _DRAWS = 200
 
 
 class Timing(Struct, frozen=True):
-    """What a job took."""
+    """The time of a job."""
 
     nanoseconds: Interval
     ratio: Interval
@@ -136,7 +136,7 @@ def costs(
     *,
     quick: bool = False,
 ) -> tuple[Timing, ...]:
-    """What the scenario costs under some settings, relative to number `baseline` of them."""
+    """The costs of a scenario under some settings, relative to number `baseline` of them."""
     variant = with_setting(model, settings[baseline])
     state = full_state(variant, initial_data(scene.scenario, variant))
 

@@ -36,9 +36,9 @@ class Item(Struct, frozen=True, eq=False):
     """One thing that may be needless, and the changes that take it out."""
 
     kind: str
-    """Of the finding, such as `sensor-unread`."""
+    """The kind of the finding, such as `sensor-unread`."""
     name: str
-    """What it is called; the way to its element where it has no name."""
+    """Its name, or the path of its element."""
     element: Element | None
     """The element to point at; `None` for the model as a whole."""
     removals: tuple[Element, ...] = ()

@@ -32,7 +32,7 @@ from coursebuild.numerics.scene import Scene, scenes, thickness
 QUICK = 0.5
 """About how many seconds a scenario takes with `--quick`."""
 TOLERANCE = 1e-8
-"""What counts as equal: relative to a number's size, absolute where that is under 1."""
+"""The difference that counts as none: relative to a number's size, absolute if that is under 1."""
 SHOTS, SHOT = 0.1, 0.05
 """Seconds from one start to the next, and that each lasts."""
 _CONTACTS = 10

@@ -38,7 +38,7 @@ _KEYS = {"key_qpos": "nq", "key_qvel": "nv", "key_act": "na", "key_ctrl": "nu"}
 
 
 class Removal(Struct, frozen=True):
-    """What a change takes out of a compiled model, by number."""
+    """The things that a change removes from a compiled model, by number."""
 
     bodies: frozenset[int] = frozenset()
     """Their descendants go too."""

@@ -64,7 +64,7 @@ _IMPORT = re.compile(r"(?:^|[;:])\s*(?:from\s+([\w.]+)\s+import\b|import\s+([\w.
 _INCLUDE = re.compile(r"<[^>]*\bfile\s*=")
 _POSITIONAL = re.compile(r"\bcase\s+\w+\(\s*\w+\s*[,)]")
 _SCRIPT = re.compile(r"\bfor\s*\(\s*\w+\s+\w+\s+in\b|\.\.\.|\bimport\b|(?<![\w.])\w+\[\s*[^\W\d]")
-"""In JavaScript: what goes through what there is, or makes a name while it runs."""
+"""JavaScript that iterates over members, or computes their names while it runs."""
 _OF_BODIES = ("bodyid", "parentid", "rootid", "weldid", "treeid", "mocapid", "jntid", "dofid")
 _REFERENCES = frozenset(
     name
@@ -77,7 +77,7 @@ _NUMBERS = frozenset(("adr", "id", "num"))
 
 
 class Reader(Struct, frozen=True):
-    """What code asks a model for."""
+    """A file of code, with what it may ask a model for."""
 
     path: str
     names: frozenset[str] = frozenset()

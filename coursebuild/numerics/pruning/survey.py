@@ -81,12 +81,12 @@ Rerun = Callable[[Mapping[str, bytes]], str]
 
 
 class Order(Struct, frozen=True, eq=False):
-    """What is to be surveyed, and how."""
+    """The task of a survey."""
 
     model: str
     """Its name."""
     digest: str
-    """Of all in the course that the report depends on."""
+    """The digest of everything in the course that the report depends on."""
     machine: Machine
     text: ModelText
     scenes: tuple[Scene, ...]

@@ -138,7 +138,7 @@ class PruningTrials:
         return states
 
     def measure_saving(self, trial: PrunedModel, *, timed: bool = True) -> Saving:
-        """What a change saves, in time and bytes."""
+        """Measure the saving of a change, in time and bytes."""
         text = self.count_saved_bytes(trial.edits)
         memory = len(model_bytes(self.text.model)) - len(model_bytes(trial.model))
         timing = self._measure_time(trial) if timed else None
