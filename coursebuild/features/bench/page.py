@@ -54,7 +54,7 @@ class BenchView(Struct, frozen=True):
     scenario: ScenarioView | None = None
     """`None` if nothing was measured."""
     tables: tuple[Grid, ...] = ()
-    folded: Grid | None = None
+    folded_table: Grid | None = None
     """The table of settings, if it is folded below something else."""
     machine: str = ""
 
@@ -131,7 +131,7 @@ def _view(page: PageContext, block: Bench) -> BenchView:
         view,
         scenario=scenario,
         tables=(scenario.settings,) if only_table else tuple(tables),
-        folded=scenario.settings if has_fold else None,
+        folded_table=scenario.settings if has_fold else None,
         machine=machine_text(words, data.machine),
     )
 

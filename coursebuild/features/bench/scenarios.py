@@ -87,10 +87,10 @@ def scenario_view(
         title=report.title or report.name,
         description=tuple(_describe(words, report)),
         verdict=sentence(report.verdict.text),
-        settings=_settings(words, report),
+        settings=_settings_table(words, report),
         notes=tuple(_notes(words, report)),
-        orders=_orders(words, report.orders),
-        stable=_stable(words, report),
+        orders=_orders_table(words, report.orders),
+        stable=_stability_table(words, report),
         report=report,
     )
 
@@ -117,7 +117,7 @@ def _describe(words: Strings, report: ScenarioReport) -> list[str]:
     return sentences
 
 
-def _settings(words: Strings, report: ScenarioReport) -> Grid:
+def _settings_table(words: Strings, report: ScenarioReport) -> Grid:
     rows = report.rows
 
     def error_column(quantity: Quantity) -> tuple[str, list[str]]:
@@ -164,9 +164,11 @@ def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> st
 def _notes(words: Strings, report: ScenarioReport) -> list[str]:
     """Say why runs were lost, and in which MuJoCo changed the model."""
     notes = lost_runs((setting_text(row.setting, report.own_setting), row) for row in report.rows)
-    softened = [setting_text(row.setting, report.own_setting) for row in report.rows if row.refsafe]
-    if softened:
-        notes.append(words("measured.refsafe", settings="; ".join(softened)))
+    softened_settings = [
+        setting_text(row.setting, report.own_setting) for row in report.rows if row.refsafe
+    ]
+    if softened_settings:
+        notes.append(words("measured.refsafe", settings="; ".join(softened_settings)))
     return notes
 
 
@@ -181,7 +183,7 @@ def lost_runs(runs: Iterable[tuple[str, MeasuredRun | SweepRow]]) -> list[str]:
     return [f"{'; '.join(names)}: {'; '.join(reasons)}." for reasons, names in groups]
 
 
-def _orders(words: Strings, orders: tuple[OrderRow, ...]) -> Grid | None:
+def _orders_table(words: Strings, orders: tuple[OrderRow, ...]) -> Grid | None:
     rows = [row for row in orders if row.has_orders]
     if not rows:
         return None
@@ -193,7 +195,7 @@ def _orders(words: Strings, orders: tuple[OrderRow, ...]) -> Grid | None:
     return grid(words("measured.orders"), columns)
 
 
-def _stable(words: Strings, report: ScenarioReport) -> Grid | None:
+def _stability_table(words: Strings, report: ScenarioReport) -> Grid | None:
     rows = report.stable
     if not rows:
         return None

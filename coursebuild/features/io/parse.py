@@ -109,10 +109,10 @@ def _diagnose_missing(
         return diagnose("io-missing", parts[label].span, f"nothing follows `{label}:`")
     notes = []
     for line in (line for part in all_parts for line in part.lines):
-        like = _LIKE_LABEL.match(line.text)
-        if like is not None and nearest(like[1].upper(), LABELS, cutoff=0.75) == label:
-            span = line.span(like.start(1), like.end())
-            notes.append(Note(f"`{like[1]}:` is read as text", span))
+        word = _LIKE_LABEL.match(line.text)
+        if word is not None and nearest(word[1].upper(), LABELS, cutoff=0.75) == label:
+            span = line.span(word.start(1), word.end())
+            notes.append(Note(f"`{word[1]}:` is read as text", span))
     message = f"the io block has no line `{label}:`"
     return diagnose("io-missing", fence.head, message, notes=notes)
 

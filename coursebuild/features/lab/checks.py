@@ -55,8 +55,8 @@ def check_model_names(
 def _check_names(lab: Lab, facts: ModelFacts) -> Iterator[Diagnostic]:
     key = lab.fields.key
     if isinstance(key, int) and not 0 <= key < len(facts.keyframes):
-        have = f"it has {len(facts.keyframes) or 'none'}"
-        message = f"the model has no keyframe {key}: {have}, counted from 0"
+        count = f"it has {len(facts.keyframes) or 'none'}"
+        message = f"the model has no keyframe {key}: {count}, counted from 0"
         yield diagnose("lab-name", lab.place(("key",)), message)
     for field, element, name, names in (
         ("key", "keyframe", key, [name for name in facts.keyframes if name]),

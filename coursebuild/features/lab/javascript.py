@@ -194,19 +194,19 @@ def counting_loop(node: Node) -> CountingLoop:
         raise refusal
     declarators = children(begin)
     start = declarators[0].child_by_field_name("value")
-    name, sign, by = text_of(field(declarators[0], "name")), "", "1"
+    name, sign, amount = text_of(field(declarators[0], "name")), "", "1"
     if step.type == "update_expression":
-        stepped, sign = field(step, "argument"), text_of(field(step, "operator"))
+        counter, sign = field(step, "argument"), text_of(field(step, "operator"))
     elif step.type == "augmented_assignment_expression":
-        stepped, sign = field(step, "left"), text_of(field(step, "operator"))
-        by = text_of(field(step, "right"))
+        counter, sign = field(step, "left"), text_of(field(step, "operator"))
+        amount = text_of(field(step, "right"))
     operator = text_of(field(test, "operator"))
-    counts = sign in ("++", "--", "+=", "-=") and by.isdecimal()
+    counts = sign in ("++", "--", "+=", "-=") and amount.isdecimal()
     if start is None or len(declarators) > 1 or not counts:
         raise refusal
-    if {text_of(stepped), text_of(field(test, "left"))} != {name} or int(by) == 0:
+    if {text_of(counter), text_of(field(test, "left"))} != {name} or int(amount) == 0:
         raise refusal
     if operator not in (("<", "<=") if sign[0] == "+" else (">", ">=")):
         raise refusal
-    count = int(by) if sign[0] == "+" else -int(by)
+    count = int(amount) if sign[0] == "+" else -int(amount)
     return CountingLoop(name, start, field(test, "right"), operator.endswith("="), count)

@@ -29,7 +29,7 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     words, view = writer.words, page_view(writer.page, lab)
     parts = [f"**{words('lab.label')}: {escape_marks(view.title)}**"]
     if view.recorded is not None:
-        parts += _recorded(writer, view.recorded)
+        parts += _write_recording(writer, view.recorded)
     if lab.goal:
         parts.append(f"**{words('lab.goal')}:** {writer.inlines(lab.goal)}")
     parts.append(_describe(writer, view))
@@ -47,7 +47,7 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     return "\n\n".join(filter(None, parts))
 
 
-def _recorded(writer: MarkdownWriter, recorded: RecordedView) -> Iterator[str]:
+def _write_recording(writer: MarkdownWriter, recorded: RecordedView) -> Iterator[str]:
     """Write the picture, and the readouts at the end."""
     yield picture(recorded.alt, writer.locate(recorded.picture))
     if readouts := recorded.record.readouts:

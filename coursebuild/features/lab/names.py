@@ -56,8 +56,8 @@ def _references(code: Excerpt) -> Iterator[NameReference]:
         parts = dotted_names(node) if node.type == "member_expression" else ()
         path = tuple(map(text_of, parts))
         outer = node.parent
-        goes_on = outer is not None and outer.type == "member_expression"
-        if len(path) < 2 or path[0] in (*declared_names, *_OPEN_OBJECTS) or goes_on:
+        is_longer_name = outer is not None and outer.type == "member_expression"
+        if len(path) < 2 or path[0] in (*declared_names, *_OPEN_OBJECTS) or is_longer_name:
             continue
         places = tuple(map(place, parts))
         index = outer.child_by_field_name("index") if outer is not None else None

@@ -112,7 +112,7 @@ def lab_view(
         readouts=tuple(readout.label for readout in fields.readouts),
         plots=tuple(_plot(words, plot) for plot in fields.plots),
         overlays=tuple(words(f"overlay.{name}") for name in fields.toggles),
-        recorded=_recorded(words, place, title, live, engine),
+        recorded=_recorded_view(words, place, title, live, engine),
     )
 
 
@@ -146,7 +146,7 @@ def index_lab(reader: IndexReader, lab: Lab) -> None:
         reader.add("code", lab.xml.text)
 
 
-def _recorded(
+def _recorded_view(
     words: Strings, place: Place, title: str, live: PublishedLab | None, engine: str
 ) -> RecordedView | None:
     """Describe what the trial recorded; `None` if it did not come to its end."""

@@ -160,7 +160,7 @@ class _LabTrial(Struct, frozen=True):
                 diagnostics = self._check_code(mjb)
                 if diagnostics:
                     return self._failed_result(module, start), diagnostics
-                evaluation = evaluate(self._try(module, mjb, key))
+                evaluation = evaluate(self._run_trial(module, mjb, key))
         except NativeError as error:
             diagnostic = diagnose("lab-engine", lab.place(()), f"native MuJoCo {error}")
             return self._failed_result(module, start), [diagnostic]
@@ -232,7 +232,7 @@ class _LabTrial(Struct, frozen=True):
         replies = browser.look_up([name.path for name in names], mjb, self.seconds)
         return list(name_diagnostics(names, replies))
 
-    def _try(self, module: LabModule, mjb: bytes, key: str) -> bytes:
+    def _run_trial(self, module: LabModule, mjb: bytes, key: str) -> bytes:
         """Run the trial, and replace its recorded states by their comparison with a native run."""
         request = {
             "config": trial_data(module),

@@ -79,23 +79,23 @@ _HELP = {
 
 def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report what a lab cannot be published with: failures, other engines, untrue fields."""
-    yield from _failures(lab, trial)
+    yield from _check_failures(lab, trial)
     if trial.version != engine_version():
         message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
         yield diagnose("lab-engine", lab.span.first_line(), message)
-    yield from _shallow(lab, trial)
+    yield from _check_depth_claim(lab, trial)
     if trial.main is not None and trial.main["parity"] is not None:
-        yield from _parity(lab, trial.main["parity"])
+        yield from _check_parity(lab, trial.main["parity"])
 
 
 def remark_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report what is to be said of a lab that can be published."""
-    yield from _deep(lab, trial)
-    yield from _reset(lab, trial)
-    yield from _far(lab, trial)
+    yield from _check_depth(lab, trial)
+    yield from _check_reset(lab, trial)
+    yield from _check_framing(lab, trial)
 
 
-def _failures(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+def _check_failures(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report each failure of a trial at its entry.
 
     MuJoCo warns of the main run again in every attempt; to report it once is enough.
@@ -104,7 +104,7 @@ def _failures(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     of_main_run = {f.kind for f in failures if f.entry == () and f.kind in _OF_MUJOCO}
     for failure in failures:
         if failure.entry == () or failure.kind not in of_main_run:
-            yield _failure(lab, failure)
+            yield _make_diagnostic(lab, failure)
 
 
 def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
@@ -127,15 +127,15 @@ _DEEP, _DIVERGED = "deep", "diverged"
 _OF_MUJOCO = ("warning", _DIVERGED)
 
 
-def _deep(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+def _check_depth(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report bodies that lie deep in each other; only once if the main run has some."""
     if not lab.verify.deep:
         failures = [f for f in trial.failures if f.kind == _DEEP]
         of_main_run = [f for f in failures if f.entry == ()]
-        yield from (_failure(lab, failure) for failure in of_main_run or failures)
+        yield from (_make_diagnostic(lab, failure) for failure in of_main_run or failures)
 
 
-def _shallow(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+def _check_depth_claim(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report a lab that says `deep` without need."""
     if lab.verify.deep and not any(failure.kind == _DEEP for failure in trial.failures):
         message = "the lab says `deep`, and no bodies lay deep in each other"
@@ -143,7 +143,7 @@ def _shallow(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
         yield diagnose("lab-shallow", span, message, help="take `deep` away")
 
 
-def _far(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+def _check_framing(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report a camera of the lab's own that shows what moves too small."""
     main = trial.main
     if main is None or (fill := main["fill"]) is None or (most := main["mostFill"]) is None:
@@ -159,7 +159,7 @@ def _far(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 _SMALL = 0.1
 
 
-def _failure(lab: Lab, failure: TrialFailure) -> Diagnostic:
+def _make_diagnostic(lab: Lab, failure: TrialFailure) -> Diagnostic:
     during = "" if failure.during is None else failure.during.description
     label = f"while trying: {during}" if during not in ("", "start") else ""
     text, help = _explain(lab, failure)
@@ -233,7 +233,7 @@ def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
             return message, ""
 
 
-def _reset(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
+def _check_reset(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report a reset after the main run that did not lead back to the start."""
     difference = trial.main["resetDiffers"] if trial.main is not None else None
     if difference is None:
@@ -252,7 +252,7 @@ def _reset(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     yield diagnose("lab-reset", lab.place(entry), message, help=help)
 
 
-def _parity(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
+def _check_parity(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
     """Report a difference between the engines that is larger than allowed."""
     if parity.is_within_tolerance(lab.verify.rtol):
         return

@@ -18,19 +18,19 @@ DIGITS = 8
 
 def text_key(kind: str, text: str) -> str:
     """Return the key of a text of a kind (`mcq`, `option`), whatever its white space."""
-    folded = unicodedata.normalize("NFC", " ".join(text.split()))
-    data = f"{kind}\n{folded}".encode("utf-8", "surrogatepass")
+    normalized_text = unicodedata.normalize("NFC", " ".join(text.split()))
+    data = f"{kind}\n{normalized_text}".encode("utf-8", "surrogatepass")
     return hashlib.sha256(data).hexdigest()[:DIGITS]
 
 
 def unique_keys(texts: Iterable[tuple[str, str]], used_keys: Iterable[str] = ()) -> Iterator[str]:
     """Yield the keys of texts, given as (kind, text); a key already in use gets a number."""
-    used = set(used_keys)
+    all_keys = set(used_keys)
     for kind, text in texts:
         base = key = text_key(kind, text)
         count = 1
-        while key in used:
+        while key in all_keys:
             count += 1
             key = f"{base}-{count}"
-        used.add(key)
+        all_keys.add(key)
         yield key

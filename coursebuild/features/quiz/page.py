@@ -54,7 +54,7 @@ def quiz(page: PageContext, block: Quiz) -> Markup:
         # A heading of the same id stands for the quiz that it is above.
         anchored=all(heading.anchor != block.id for heading in headings),
         kind_of=_kind,
-        graded_by=functools.partial(_graded_by, page),
+        grading_attributes=functools.partial(_grading_attributes, page),
         output_line=functools.partial(output_line, page),
         letter=letter,
         shuffle=shuffle,
@@ -99,7 +99,7 @@ def _kind(question: AnyQuestion) -> str:
             assert_never(question)
 
 
-def _graded_by(page: PageContext, question: AnyQuestion) -> Iterator[tuple[str, str]]:
+def _grading_attributes(page: PageContext, question: AnyQuestion) -> Iterator[tuple[str, str]]:
     """Yield the data attributes by which the page's script grades an answer."""
     match question:
         case ChoiceQuestion():

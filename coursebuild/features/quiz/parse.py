@@ -82,9 +82,9 @@ def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[Quiz | No
         diagnostics += _check(question_node, decoding)
     for question_node in nodes:
         # If its JSON is wrong, nobody knows what its texts were meant to be.
-        garbled = any(question_node.span.contains(d.span) for d in json.diagnostics)
+        is_garbled = any(question_node.span.contains(d.span) for d in json.diagnostics)
         question = _question(question_node, keys.get(question_node, ""), decoding, prose)
-        if question is not None and not garbled:
+        if question is not None and not is_garbled:
             questions.append(_without_broken_lab(question, diagnostics))
     fields = decoding.value
     id, title = (fields.id, fields.title) if fields is not None else (_id(node, diagnostics), "")
@@ -105,8 +105,8 @@ def _without_broken_lab(question: AnyQuestion, diagnostics: list[Diagnostic]) ->
     """Take away a question's simulation if it has mistakes, so that no trial runs it."""
     if not isinstance(question, ChoiceQuestion) or question.sim is None:
         return question
-    broken = any(question.sim.span.contains(diagnostic.span) for diagnostic in diagnostics)
-    return replace(question, sim=None) if broken else question
+    is_broken = any(question.sim.span.contains(diagnostic.span) for diagnostic in diagnostics)
+    return replace(question, sim=None) if is_broken else question
 
 
 def _keys(nodes: tuple[ObjectNode, ...], decoding: Decoding[QuizFile]) -> dict[ObjectNode, str]:
@@ -114,10 +114,10 @@ def _keys(nodes: tuple[ObjectNode, ...], decoding: Decoding[QuizFile]) -> dict[O
     structs = ((node, decoding.structs.get(node)) for node in nodes)
     questions = [(node, fields) for node, fields in structs if isinstance(fields, AnyFields)]
     ids = {node: fields.id for node, fields in questions if fields.id is not None}
-    nameless = [(node, fields) for node, fields in questions if node not in ids]
-    texts = ((str(fields.__struct_config__.tag), fields.q) for _, fields in nameless)
+    without_id = [(node, fields) for node, fields in questions if node not in ids]
+    texts = ((str(fields.__struct_config__.tag), fields.q) for _, fields in without_id)
     keys = unique_keys(texts, ids.values())
-    return ids | {node: key for (node, _), key in zip(nameless, keys, strict=True)}
+    return ids | {node: key for (node, _), key in zip(without_id, keys, strict=True)}
 
 
 # ---------------------------------------------------------------------------------------- checks

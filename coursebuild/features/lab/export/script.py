@@ -233,7 +233,7 @@ def _number(value: float) -> str:
 
 def _long_text(text: str) -> str:
     """Write a text of several lines as a literal of Python."""
-    odd = any(not c.isprintable() and c != "\n" for c in text)
-    if "\\" in text or '"""' in text or odd or text.endswith('"'):
+    is_unprintable = any(not c.isprintable() and c != "\n" for c in text)
+    if "\\" in text or '"""' in text or is_unprintable or text.endswith('"'):
         return repr(text)
     return f'"""\\\n{text}"""'

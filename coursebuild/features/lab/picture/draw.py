@@ -225,8 +225,8 @@ class _Canvas:
             sight = np.column_stack(
                 (x + 0.5 - width / 2, height / 2 - y - 0.5, np.full(len(x), self.eye.focal))
             )
-            uncovered = 1 - self.colour[y, x, 3:]
-            self.colour[y, x, :3] += uncovered * sky(background, rotate(sight, self.eye.axes.T))
+            clear_share = 1 - self.colour[y, x, 3:]
+            self.colour[y, x, :3] += clear_share * sky(background, rotate(sight, self.eye.axes.T))
             self.colour[y, x, 3] = 1
 
     def _depth(self, solid: Solid) -> float:
@@ -237,8 +237,8 @@ class _Canvas:
         alpha = 1.0 if solid.opaque else solid.rgba[3]
         for y, x in _batches(buffer.solid == i):
             colour = self._shade(buffer, solid, reflection, (y, x))
-            mixed = np.column_stack((np.clip(colour, 0.0, 1.0), np.ones(len(y))))
-            self.colour[y, x] = alpha * mixed + (1 - alpha) * self.colour[y, x]
+            opaque_colour = np.column_stack((np.clip(colour, 0.0, 1.0), np.ones(len(y))))
+            self.colour[y, x] = alpha * opaque_colour + (1 - alpha) * self.colour[y, x]
 
     def _shade(
         self, buffer: GBuffer, solid: Solid, reflection: _Canvas | None, samples: Samples

@@ -140,20 +140,20 @@ def shade(
     metallic = material.metallic
     matte = 1 - (1 - _ROOM) * metallic
     base = colour * matte * texel
-    emitted = colour * (material.emission + (1 - matte) * light.ambient) * texel
+    glow = colour * (material.emission + (1 - matte) * light.ambient) * texel
     exponent = material.shininess
     if material.physical:
-        mirrored = np.full(3, material.specular) * (1 - metallic) + metallic * colour
+        reflected_share = np.full(3, material.specular) * (1 - metallic) + metallic * colour
     else:
-        mirrored = np.full(3, 8 / (exponent + 2) * material.specular * light.gloss)
-    total = emitted + light.ambient * base + np.zeros((len(points), 1))
+        reflected_share = np.full(3, 8 / (exponent + 2) * material.specular * light.gloss)
+    total = glow + light.ambient * base + np.zeros((len(points), 1))
     for lamp in light.point_lights:
         back, strength = _rays(lamp, points)
         facing = np.clip(_dot(normals, back), 0.0, None) * strength
         half = unit(back + toward_eye)
         fresnel = np.exp2((-5.55473 * (vh := np.clip(_dot(toward_eye, half), 0, 1)) - 6.98316) * vh)
         peak = (exponent + 2) / 8 * np.clip(_dot(normals, half), 0.0, 1.0) ** exponent
-        shine = (mirrored * (1 - fresnel[:, None]) + fresnel[:, None]) * peak[:, None]
+        shine = (reflected_share * (1 - fresnel[:, None]) + fresnel[:, None]) * peak[:, None]
         total = total + lamp.colour * facing[:, None] * (base + shine)
     return total
 

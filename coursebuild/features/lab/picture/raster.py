@@ -139,8 +139,8 @@ def _span(places: Array, size: int) -> tuple[NDArray[np.int64], NDArray[np.int64
 
 def rotate(vectors: Array, matrix: Array) -> Array:
     """Multiply vectors by a matrix, without a linear algebra library, whose bits may vary."""
-    rotated: Array = np.einsum("ij,kj->ik", vectors, matrix)
-    return rotated
+    products: Array = np.einsum("ij,kj->ik", vectors, matrix)
+    return products
 
 
 def _cover(px: Array, py: Array, gx: Array, gy: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -103,8 +103,8 @@ def sharpen(corners: Array, normals: Array) -> Array:
     face = unit(_area_normals(corners))[:, None]
     sharp = (face * normals).sum(axis=2, keepdims=True) < _SMOOTH
     has_area = np.any(face != 0, axis=2, keepdims=True)
-    sharpened: Array = np.where(sharp & has_area, face, normals)
-    return sharpened
+    corner_normals: Array = np.where(sharp & has_area, face, normals)
+    return corner_normals
 
 
 def ropes(points: Array, ends: NDArray[np.int64], radius: float) -> Surface:

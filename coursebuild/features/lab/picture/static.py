@@ -76,10 +76,10 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
     height, width = pixels.shape[:2]
     rows = pixels[..., : 3 if opaque else 4].reshape(height, -1)
     # Each row becomes its difference from the row above: PNG's filter 2.
-    filtered = np.diff(rows, axis=0, prepend=np.zeros_like(rows[:1]))
-    filtered = np.column_stack((np.full(height, 2, np.uint8), filtered))
+    differences = np.diff(rows, axis=0, prepend=np.zeros_like(rows[:1]))
+    filtered_rows = np.column_stack((np.full(height, 2, np.uint8), differences))
     header = struct.pack(">IIBBBBB", width, height, 8, 2 if opaque else 6, 0, 0, 0)
-    data = zlib.compress(filtered.tobytes(), 9)
+    data = zlib.compress(filtered_rows.tobytes(), 9)
     file = b"\x89PNG\r\n\x1a\n"
     for chunk in (b"IHDR" + header, b"IDAT" + data, b"IEND"):
         file += struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))

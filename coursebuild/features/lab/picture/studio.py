@@ -61,17 +61,17 @@ class Floor(Struct, frozen=True):
 
     def _shade(self, eye: Eye, bodies: Sequence[Surface], depth: Array) -> Array:
         """Return the part of the light that does not reach each sample."""
-        whole = join_surfaces(bodies)
+        joined_surface = join_surfaces(bodies)
         height = self.height + self._lift
         shade = np.zeros_like(depth)
         for i in range(_POINTS):
             angle, radius = _GOLDEN * i, _WIDTH * np.sqrt((i + 0.5) / _POINTS)
             slope = radius * np.array((np.cos(angle), np.sin(angle))) + _LAMP[:2]
-            elevation = whole.vertices[:, 2:] - height
-            flat = whole.vertices[:, :2] - elevation * slope / _LAMP[2]
+            elevation = joined_surface.vertices[:, 2:] - height
+            flat = joined_surface.vertices[:, :2] - elevation * slope / _LAMP[2]
             vertices = np.column_stack((flat, np.full(len(flat), height)))
             film = GBuffer(eye)
-            shadow = Surface(vertices, whole.normals, whole.faces)
+            shadow = Surface(vertices, joined_surface.normals, joined_surface.faces)
             film.add(0, shadow, np.zeros(3), np.eye(3), front=False)
             shade += (film.solid >= 0) & (film.depth < depth * (1 + _NEAR))
         return shade / _POINTS

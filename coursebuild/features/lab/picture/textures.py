@@ -178,10 +178,10 @@ def _interpolate(level: Array, face: NDArray[np.int64], s: Array, t: Array, cube
         column, row = left.astype(np.int64) + dx, top.astype(np.int64) + dy
         if cube:  # its faces do not repeat
             column, row = np.clip(column, 0, width - 1), np.clip(row, 0, height - 1)
-        colours: Array = level[face, row % height, column % width]
-        return colours
+        texels: Array = level[face, row % height, column % width]
+        return texels
 
     upper = texel(0, 0) * (1 - fx) + texel(1, 0) * fx
     lower = texel(0, 1) * (1 - fx) + texel(1, 1) * fx
-    mixed: Array = upper * (1 - fy) + lower * fy
-    return mixed
+    colours: Array = upper * (1 - fy) + lower * fy
+    return colours

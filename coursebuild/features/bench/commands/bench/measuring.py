@@ -75,7 +75,12 @@ def compile_scene(root: Path, scene: CourseScene, *, quick: bool) -> CompiledSce
 
 
 def run_scenario(
-    compiled: CompiledScene, number: int, *, quick: bool, timed: bool, tell: Callable[[str], None]
+    compiled_scene: CompiledScene,
+    number: int,
+    *,
+    quick: bool,
+    timed: bool,
+    tell: Callable[[str], None],
 ) -> ScenarioReport:
     """Measure a scenario, given by its number.
 
@@ -83,13 +88,13 @@ def run_scenario(
         CannotMeasureError: this is not possible.
     """
     clock = time.thread_time_ns if timed else None
-    with _report_errors(compiled.scene), one_processor():
-        scenario = compiled.scenarios[number]
-        return measure_scenario(compiled.model, scenario, quick=quick, clock=clock, tell=tell)
+    with _report_errors(compiled_scene.scene), one_processor():
+        scenario = compiled_scene.scenarios[number]
+        return measure_scenario(compiled_scene.model, scenario, quick=quick, clock=clock, tell=tell)
 
 
 def run_sweep(
-    compiled: CompiledScene,
+    compiled_scene: CompiledScene,
     sweep: DeclaredSweep,
     *,
     quick: bool,
@@ -103,9 +108,9 @@ def run_sweep(
     """
     tell(sweep.name)
     clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
-    scenarios = (s for s in compiled.scenarios if sweep.scenario in (None, s.name))
-    with _report_errors(compiled.scene):
-        return measure_sweep(compiled.spec, next(scenarios), sweep, clocks, quick=quick)
+    scenarios = (s for s in compiled_scene.scenarios if sweep.scenario in (None, s.name))
+    with _report_errors(compiled_scene.scene):
+        return measure_sweep(compiled_scene.spec, next(scenarios), sweep, clocks, quick=quick)
 
 
 @contextmanager
@@ -169,14 +174,16 @@ def add_card(
     with silent():  # MuJoCo would write its warnings into the working directory
         model = _compile_model(root, scene)
         scenarios = scenes(model, scene.declared)
-        touched = {pair for scenario in scenarios for pair in watch(model, scenario).touching_pairs}
+        touching_pairs = {
+            pair for scenario in scenarios for pair in watch(model, scenario).touching_pairs
+        }
     files = (root / path for path in existing_files(root, source.path, source.text))
     card = SceneCard(
         bodies=int(model.nbody) - 1,
         geoms=int(model.ngeom),
         freedom=int(model.nv),
         possible=len(possible_pairs(model)),
-        touched=len(touched),
+        touched=len(touching_pairs),
         mjcf=len(source.text.encode()) + sum(path.stat().st_size for path in files),
         mjb=int(mujoco.mj_sizeModel(model)),
         browser=_browser_speed(root, scene, scenarios[0].scenario, seconds),

@@ -149,7 +149,7 @@ class SceneRun(MeasuringRun):
     def _report(self, scene: CourseScene, parts: tuple[object, ...]) -> SceneReport:
         # A check compares no times, so it measures none.
         root, timed, name = self.options.root, self.use_store, scene.name
-        compiled = self.measuring.compile_scene(root, scene, quick=self.quick)
+        compiled_scene = self.measuring.compile_scene(root, scene, quick=self.quick)
 
         def tell(text: str) -> None:
             self.progress.doing(name, text)
@@ -165,16 +165,16 @@ class SceneRun(MeasuringRun):
                     "bench-scenarios",
                     (*parts, n),
                     ScenarioReport,
-                    partial(self.measuring.run_scenario, compiled, n, **settings),
+                    partial(self.measuring.run_scenario, compiled_scene, n, **settings),
                 )
-                for n in range(len(compiled.scenarios))
+                for n in range(len(compiled_scene.scenarios))
             ),
             sweeps=tuple(
                 self._load_or_measure_part(
                     "bench-sweeps",
                     (*parts, sweep.name),
                     SweepReport,
-                    partial(self.measuring.run_sweep, compiled, sweep, **settings),
+                    partial(self.measuring.run_sweep, compiled_scene, sweep, **settings),
                 )
                 for sweep in scene.declared.sweeps
             ),

@@ -49,8 +49,8 @@ class DietModel:
         self.scene = scene
         self.path = scene.model.source.path
         self.keeps = {" ".join(keep.finding.split()): keep for keep in scene.declared.keep}
-        self.locked = _locked(root, files, self.path, scene.model.source.text)
-        self.readers = _readers(root, files, course, scene)
+        self.locked = _find_locked_files(root, files, self.path, scene.model.source.text)
+        self.readers = _find_readers(root, files, course, scene)
         self._files: dict[str, bytes | None] = {}
 
     def read(self, path: str) -> bytes | None:
@@ -83,17 +83,17 @@ class DietModel:
         source = self.scene.model.source
         try:
             text = open_model(self.path, self.read, self.compile)
-            declared = self.scene.declared
+            declarations = self.scene.declared
             order = Order(
                 self.scene.name,
                 self.scene.digest,
                 machine,
                 text,
-                pruning_scenes(text.model, declared, quick=quick),
+                pruning_scenes(text.model, declarations, quick=quick),
                 self.readers,
                 self.keeps,
                 self.locked,
-                any(scenario.controls for scenario in declared.scenarios),
+                any(scenario.controls for scenario in declarations.scenarios),
                 time.thread_time_ns,
                 quick,
                 tell,
@@ -143,10 +143,10 @@ class DietModel:
         return scene_digest(self.root, model, self.scene.declared)
 
 
-def _locked(root: Path, files: CourseFiles, path: str, text: str) -> Mapping[str, str]:
+def _find_locked_files(root: Path, files: CourseFiles, path: str, text: str) -> Mapping[str, str]:
     """Map the files of the model that must not be changed to the reason."""
     parts = model_files(root, path, text)
-    locked = {
+    reasons = {
         part: f"{part} is not in models/"
         for part in parts
         if not (part.startswith("models/") and part.endswith(".xml"))
@@ -156,11 +156,11 @@ def _locked(root: Path, files: CourseFiles, path: str, text: str) -> Mapping[str
         user = model.source.path
         if user not in own_files:
             for part in sorted(own_files.intersection(model_files(root, user, model.source.text))):
-                locked.setdefault(part, f"{user} uses {part} too")
-    return locked
+                reasons.setdefault(part, f"{user} uses {part} too")
+    return reasons
 
 
-def _readers(
+def _find_readers(
     root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
 ) -> tuple[Reader, ...]:
     """List everything in the course that may read a model, its observables included."""

@@ -51,9 +51,9 @@ def _model(report: DietReport, style: Style) -> str:
             lines += style.wrap(text, "  ", RED)
     for finding in report.findings:
         lines += ["", *_finding(finding, style)]
-    for stale in report.stale:
-        place = f"{stale.path}:{stale.line}:{stale.column}"
-        text = f"`{stale.finding}` keeps nothing any more: take the entry out ({place})"
+    for entry in report.stale:
+        place = f"{entry.path}:{entry.line}:{entry.column}"
+        text = f"`{entry.finding}` keeps nothing any more: take the entry out ({place})"
         lines += ["", *style.wrap(text, "  ", RED)]
     lines += ["", *_summary(report, style)]
     return "\n".join(lines) + "\n"
