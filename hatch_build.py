@@ -27,7 +27,7 @@ class BrowserHook(BuildHookInterface[Any]):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self._held = contextlib.ExitStack()
+        self._lock = contextlib.ExitStack()
 
     def dependencies(self) -> list[str]:
         """Returns what a build needs besides hatchling: nothing where site/dist is up to date."""
@@ -35,7 +35,7 @@ class BrowserHook(BuildHookInterface[Any]):
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Bundles; for a wheel also names the files to take."""
-        self._held.enter_context(bundle.exclusive())
+        self._lock.enter_context(bundle.exclusive())
         try:
             bundle.bundle()
             files = _assets() | _templates(Path(self.root))
@@ -50,7 +50,7 @@ class BrowserHook(BuildHookInterface[Any]):
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         """Lets the next build go on: the files have been read."""
-        self._held.close()
+        self._lock.close()
 
 
 def _compile(root: Path) -> None:

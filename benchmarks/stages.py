@@ -110,7 +110,7 @@ def measure_typing(root: Path, repeat: int) -> None:
     session = Session(Options(root, 1, quiet=True), site=False)
     rebuild = BackgroundRebuild(session, quiet, Style())
     session.start(quiet)
-    rebuild.once()
+    rebuild.run_once()
     assert session.course is not None
     sources = [
         lesson.document.source for lesson in session.course.lessons if lesson.document is not None

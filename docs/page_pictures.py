@@ -1,13 +1,13 @@
-"""Pictures of every kind of page of a built site, to look at; none is kept in the repository.
+"""Takes pictures of every kind of page of a built site, to look at; none are in the repository.
 
 Entry point: run it as a file, after `make site`: `.venv/bin/python docs/page_pictures.py FOLDER`.
 The packages are those of the tests, the browser is Debian's headless Chromium: `make test`
 installs both.
 
-1. The site is served on this machine. Its kinds of pages are those that its pages say they are of;
-   of each kind the largest page is taken, which has most to it.
+1. The site is served on this machine. The classes of pages say which kinds there are; of each kind
+   the largest page is taken, which has the most parts.
 2. A page is opened at each width, in light and in dark colours, and once as it is printed. Labs and
-   quizzes are brought to life; then the page is saved in pieces that can be looked at.
+   quizzes are started; then the page is saved in pieces of a size to look at.
 
 A picture is `KIND-WIDTH-COLOURS-PIECE.png` (`lesson-0360-dark-02.png`), or `KIND-print-PIECE.png`.
 """
@@ -31,13 +31,13 @@ ROOT = Path(__file__).resolve().parents[1]
 WIDTHS = (360, 800, 1440)
 COLOURS = ("light", "dark")
 PRINTED = 720
-"""CSS pixels of a printed line of A4 with margins, about."""
+"""The width of a printed A4 page without margins, about, in CSS pixels."""
 PIECE = 2400
-"""CSS pixels of a picture's height."""
+"""The height of a picture, in CSS pixels."""
 ARGUMENTS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 _KIND = re.compile(rb'<body class="on-([a-z-]+)"')
 
-SETTLED = """async () => {
+WAIT_UNTIL_READY = """async () => {
   document.documentElement.style.setProperty('--below', 'visible')
   for (let y = 0; y < document.documentElement.scrollHeight; y += innerHeight) {
     scrollTo({ top: y, behavior: 'instant' })
@@ -52,24 +52,24 @@ SETTLED = """async () => {
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):
-    """Serves files without a word."""
+    """Serves files and prints nothing."""
 
     def log_message(self, format: str, *arguments: object) -> None:
-        """Requests are not news."""
+        """Print nothing about requests."""
 
 
 class Server(http.server.ThreadingHTTPServer):
-    """Outlives browsers that hang up."""
+    """A server that goes on when browsers hang up."""
 
     daemon_threads = True
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """A page that is left in the middle of a file is no news."""
+        """Print nothing: a browser may leave a page in the middle of a file."""
 
 
 @contextmanager
-def served(folder: Path) -> Iterator[str]:
-    """The address of a folder on this machine."""
+def serve(folder: Path) -> Iterator[str]:
+    """Serve a folder on this machine; gives its address."""
     handler = functools.partial(Quiet, directory=str(folder))
     with Server(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -77,24 +77,24 @@ def served(folder: Path) -> Iterator[str]:
         server.shutdown()
 
 
-def kinds(site: Path) -> dict[str, str]:
-    """The largest page of each kind, by the kind's name.
+def find_kinds(site: Path) -> dict[str, str]:
+    """Find the largest page of each kind, by the kind's name.
 
     Raises:
         ValueError: there are no pages.
     """
-    found: dict[str, str] = {}
+    pages_by_kind: dict[str, str] = {}
     for page in sorted(site.rglob("*.html"), key=lambda page: (page.stat().st_size, page)):
         match = _KIND.search(page.read_bytes())
         if match is not None:
-            found[match[1].decode()] = page.relative_to(site).as_posix()
-    if not found:
+            pages_by_kind[match[1].decode()] = page.relative_to(site).as_posix()
+    if not pages_by_kind:
         raise ValueError(f"there is no page in {site}: run `make site` first")
-    return dict(sorted(found.items()))
+    return dict(sorted(pages_by_kind.items()))
 
 
 def take(page: Page, folder: Path, name: str) -> int:
-    """Save a page in pieces; gives how many."""
+    """Save a page in pieces; return how many."""
     size = page.evaluate("() => [innerWidth, document.documentElement.scrollHeight]")
     count = 0
     for top in range(0, size[1], PIECE):
@@ -105,8 +105,8 @@ def take(page: Page, folder: Path, name: str) -> int:
     return count
 
 
-def pictures(browser: Browser, site: str, kind: str, path: str, folder: Path) -> int:
-    """Take all pictures of a page; gives how many."""
+def take_all(browser: Browser, site: str, kind: str, path: str, folder: Path) -> int:
+    """Take all pictures of a page; return how many."""
     count = 0
     for width in WIDTHS:
         for colours in COLOURS:
@@ -117,12 +117,12 @@ def pictures(browser: Browser, site: str, kind: str, path: str, folder: Path) ->
             ) as context:
                 page = context.new_page()
                 page.goto(site + path)
-                page.evaluate(SETTLED)
+                page.evaluate(WAIT_UNTIL_READY)
                 count += take(page, folder, f"{kind}-{width:04d}-{colours}")
     with browser.new_context(viewport={"width": PRINTED, "height": 1000}) as context:
         page = context.new_page()
         page.goto(site + path)
-        page.evaluate(SETTLED)
+        page.evaluate(WAIT_UNTIL_READY)
         page.emulate_media(media="print")
         page.evaluate("dispatchEvent(new Event('beforeprint'))")
         count += take(page, folder, f"{kind}-print")
@@ -141,17 +141,17 @@ def main() -> int:
         print("there is no chromium-headless-shell on PATH", file=sys.stderr)
         return 1
     try:
-        chosen = kinds(arguments.site.resolve())
+        pages_by_kind = find_kinds(arguments.site.resolve())
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1
     arguments.folder.mkdir(parents=True, exist_ok=True)
-    with served(arguments.site.resolve()) as site, sync_playwright() as playwright:
+    with serve(arguments.site.resolve()) as site, sync_playwright() as playwright:
         # As root, in a container, Chromium cannot make its sandbox; the pages are our own.
         browser = playwright.chromium.launch(executable_path=chromium, args=[*ARGUMENTS])
-        for kind, path in chosen.items():
+        for kind, path in pages_by_kind.items():
             if arguments.kind is None or kind in arguments.kind:
-                count = pictures(browser, site, kind, path, arguments.folder)
+                count = take_all(browser, site, kind, path, arguments.folder)
                 print(f"{kind}: {count} pictures of {path}")
         browser.close()
     return 0

@@ -5,7 +5,7 @@ packages are those of the tests, the browser is Debian's headless Chromium: `mak
 both.
 
 1. A page of `public/` is opened from the disk, in a window of a fixed size and in light colours.
-2. What the picture is about is scrolled into sight, and the window is saved as a PNG.
+2. The subject of the picture is scrolled into sight, and the window is saved as a PNG.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ class Shot:
     """Path in the site."""
     subject: str
     """CSS selector of what is scrolled to the top of the window."""
-    above: int
-    """Pixels that stay in sight above it."""
+    margin: int
+    """Pixels that stay in sight above the subject."""
     width: int = 1320
-    """Of the window, in CSS pixels."""
+    """The width of the window, in CSS pixels."""
     height: int = 860
 
 
@@ -45,13 +45,13 @@ SHOTS = (
         "lesson.png",
         "lessons/4.2-mass-and-inertia.html",
         'figure[data-script="examples/l4_2_inertia.py"] .output',
-        above=120,
+        margin=120,
     ),
 )
 
 
 def take(browser: Browser, site: Path, shot: Shot, images: Path) -> Path:
-    """Save one picture; gives its path.
+    """Save one picture; return its path.
 
     Raises:
         ValueError: the page is not there, or the picture is too large.
@@ -65,7 +65,7 @@ def take(browser: Browser, site: Path, shot: Shot, images: Path) -> Path:
     page.goto(page_file.as_uri())
     page.evaluate("document.fonts.ready")
     top = page.locator(shot.subject).first.evaluate("e => e.getBoundingClientRect().top")
-    page.evaluate("y => window.scrollTo({top: y, behavior: 'instant'})", top - shot.above)
+    page.evaluate("y => window.scrollTo({top: y, behavior: 'instant'})", top - shot.margin)
     page.wait_for_timeout(300)  # the contents list marks the section in sight
     path = images / shot.name
     page.screenshot(path=path)

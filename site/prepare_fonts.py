@@ -2,7 +2,7 @@
 
     python site/prepare_fonts.py FOLDER [OLD]
 
-`site/bundle.py` calls it with the bundle that it makes, and the one that there was, from which the
+`site/bundle.py` calls it with the bundle that it makes, and with the old one, from which the
 results are taken where nothing has changed. See `coursebuild/core/pages/fonts.py`.
 
 1. The weights that no style sheet asks for are cut away, and so are hints and most names.
@@ -32,8 +32,8 @@ WIDEST = 1.07
 """A radical's advance width in those of the smallest: what is more than 1 stays as a thin space."""
 
 
-def ready(data: bytes, weights: tuple[int, int] | None) -> TTFont:
-    """A font with these weights only, if it has several."""
+def prepare_font(data: bytes, weights: tuple[int, int] | None) -> TTFont:
+    """Prepare a font to be cut: with these weights only, if it has several."""
     options = subset.Options()
     options.hinting = False
     options.notdef_outline = True
@@ -52,7 +52,7 @@ def ready(data: bytes, weights: tuple[int, int] | None) -> TTFont:
 
 
 def narrow_radicals(font: TTFont) -> None:
-    """Press the larger radicals, and the pieces of the largest, together; done twice is done once.
+    """Make the larger radicals, and the pieces of the largest, narrow; idempotent.
 
     MathML Core: the preferred inline size of a stretched operator is that of its widest variant.
     """
@@ -60,14 +60,14 @@ def narrow_radicals(font: TTFont) -> None:
     if smallest is None or "MATH" not in font or "glyf" not in font:
         return
     variants = font["MATH"].table.MathVariants
-    drawn = dict(
+    construction = dict(
         zip(variants.VertGlyphCoverage.glyphs, variants.VertGlyphConstruction, strict=True)
     ).get(smallest)
-    if drawn is None:
+    if construction is None:
         return
-    names = {variant.VariantGlyph for variant in drawn.MathGlyphVariantRecord}
-    if drawn.GlyphAssembly is not None:
-        names |= {part.glyph for part in drawn.GlyphAssembly.PartRecords}
+    names = {variant.VariantGlyph for variant in construction.MathGlyphVariantRecord}
+    if construction.GlyphAssembly is not None:
+        names |= {part.glyph for part in construction.GlyphAssembly.PartRecords}
     advances, glyphs = font["hmtx"], font["glyf"]
     widest = round(WIDEST * advances[smallest][0])
     for name in sorted(names):
@@ -81,7 +81,7 @@ def narrow_radicals(font: TTFont) -> None:
 
 
 def prepare(folder: Path, cuts: Path) -> None:
-    """Put ready fonts in the place of those in a folder, and cut some into another."""
+    """Put prepared fonts in the place of those in a folder, and cut some into another."""
     listing = folder / "fonts.json"
     faces: list[dict[str, Any]] = json.loads(listing.read_bytes())
     for face in faces:
@@ -93,23 +93,23 @@ def prepare(folder: Path, cuts: Path) -> None:
             face["measure"] = font_files.measure_font(whole)
         weights = WEIGHTS.get(face["family"])
         face["weight"] = weights or face["weight"]
-        with ready(data, weights) as font:
+        with prepare_font(data, weights) as font:
             characters = "".join(sorted(map(chr, font.getBestCmap())))
             face["characters"] = fonts.unicode_range(characters)
             font.save(folder / face["file"])
     listing.write_text(json.dumps(faces, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    named: dict[str, str] = {}
-    known = fonts.read_faces(listing.read_bytes())
-    given = [(face, (folder / face.file).read_bytes()) for face in known]
-    for job in fonts.font_jobs(given, "".join(fonts.BASE), ""):
-        named[job.key] = job.face.file.replace(".ttf", ".woff2")
-        (cuts / named[job.key]).write_bytes(fonts.subset_font(job))
-    text = json.dumps(named, indent=1, sort_keys=True)
+    files_by_key: dict[str, str] = {}
+    prepared_faces = fonts.read_faces(listing.read_bytes())
+    faces_with_data = [(face, (folder / face.file).read_bytes()) for face in prepared_faces]
+    for job in fonts.font_jobs(faces_with_data, "".join(fonts.BASE), ""):
+        files_by_key[job.key] = job.face.file.replace(".ttf", ".woff2")
+        (cuts / files_by_key[job.key]).write_bytes(fonts.subset_font(job))
+    text = json.dumps(files_by_key, indent=1, sort_keys=True)
     (cuts / "fonts.json").write_text(f"{text}\n", encoding="utf-8")
 
 
-def made_from(bundle: Path) -> str:
-    """A hash of the fonts and of what cuts them."""
+def hash_sources(bundle: Path) -> str:
+    """A hash of the fonts and of the modules that cut them."""
     digest = hashlib.sha256()
     for path in (
         *map(Path, (__file__, fonts.__file__, font_files.__file__)),
@@ -121,9 +121,9 @@ def made_from(bundle: Path) -> str:
 
 def main(bundle: Path, old: Path | None) -> None:
     """Prepare the fonts of a bundle."""
-    target, stamp = bundle / "prepared", made_from(bundle)
+    target, stamp = bundle / "prepared", hash_sources(bundle)
     target.mkdir()
-    if old is not None and has(old / "prepared" / "fonts.txt", stamp):
+    if old is not None and has_text(old / "prepared" / "fonts.txt", stamp):
         shutil.rmtree(bundle / "fonts")
         shutil.copytree(old / "fonts", bundle / "fonts")
         for path in (old / "prepared").glob("*.woff2"):
@@ -134,8 +134,8 @@ def main(bundle: Path, old: Path | None) -> None:
     (target / "fonts.txt").write_text(stamp, encoding="utf-8")
 
 
-def has(path: Path, text: str) -> bool:
-    """Whether a file has a text."""
+def has_text(path: Path, text: str) -> bool:
+    """Whether a file holds exactly a text."""
     return path.is_file() and path.read_text(encoding="utf-8") == text
 
 

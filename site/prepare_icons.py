@@ -2,12 +2,12 @@
 
     python site/prepare_icons.py FOLDER [OLD]
 
-`site/bundle.py` calls it with the bundle that it makes, and the one that there was, from which the
-pictures are taken where nothing has changed.
+`site/bundle.py` calls it with the bundle that it makes, and with the old one, from which the
+pictures are copied where nothing has changed.
 
 1. The shapes of `templates/icon.svg` are read: rectangles, circles, and paths of straight lines
    with round ends. Anything else is an error, so that no picture lacks a part of the icon.
-2. Each sample takes of a shape's colour what its distance from the shape's edge says.
+2. A pixel takes a share of a shape's colour that depends on its distance from the shape's edge.
 3. A picture is written as PNG. The same icon gives the same bytes.
 
 Only the standard library is used here: the module runs in pip's build environment.
@@ -28,7 +28,7 @@ from xml.etree import ElementTree
 
 ICON = Path(__file__).resolve().parents[1] / "templates" / "icon.svg"
 SIDE = 32.0
-"""Of the icon's own coordinates."""
+"""The icon's side in its own coordinates."""
 
 _SVG = "{http://www.w3.org/2000/svg}"
 _INHERITED = ("fill", "stroke", "stroke-width", "stroke-linecap", "stroke-linejoin")
@@ -43,27 +43,27 @@ class Picture:
     side: int
     """Pixels."""
     full: bool = False
-    """Whether the ground fills the square, as where the system cuts a shape of its own."""
+    """Whether the background fills the square, for systems that cut out a shape of their own."""
     share: float = 1.0
-    """Of the side that the drawing takes: what a system cuts away is ground."""
+    """The share of the side that the drawing takes: systems cut away only background."""
 
 
 PICTURES = (
     Picture("icon-192.png", 192),
     Picture("icon-512.png", 512),
-    # Of a maskable icon a circle of four fifths of the side is never cut away.
+    # Of a maskable icon, a circle of four fifths of the side is never cut away.
     Picture("icon-maskable.png", 512, full=True, share=0.8),
     Picture("icon-touch.png", 180, full=True, share=0.9),
 )
 
 
 class IconError(Exception):
-    """The icon has something that is not drawn here; the message says what."""
+    """The icon has a part that cannot be drawn here; the message says which."""
 
 
 Colour = tuple[int, int, int]
 Distance = Callable[[float, float], float]
-"""Of a point from the edge of a shape, negative inside, in the icon's coordinates."""
+"""The distance of a point from the edge of a shape, negative inside, in the icon's coordinates."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,27 +74,27 @@ class Shape:
     distance: Distance
     box: tuple[float, float, float, float]
     """Left, top, right, bottom."""
-    ground: bool = False
+    is_background: bool = False
 
 
 def shapes(svg: str) -> tuple[Shape, ...]:
     """The shapes of an icon, from the lowest to the highest.
 
     Raises:
-        IconError: there is something else in it.
+        IconError: it has other parts.
     """
     root = ElementTree.fromstring(svg)
     if root.get("viewBox") != f"0 0 {SIDE:g} {SIDE:g}":
         raise IconError(f"the icon's viewBox is {root.get('viewBox')!r}")
-    found = tuple(_shapes(root, {}))
-    if not found or not found[0].ground:
+    drawing = tuple(_shapes(root, {}))
+    if not drawing or not drawing[0].is_background:
         raise IconError("the icon's first shape is no rectangle that fills it")
-    return found
+    return drawing
 
 
-def _shapes(parent: ElementTree.Element, above: dict[str, str]) -> Iterator[Shape]:
+def _shapes(parent: ElementTree.Element, inherited: dict[str, str]) -> Iterator[Shape]:
     for element in parent:
-        style = above | {name: value for name, value in element.items() if name in _INHERITED}
+        style = inherited | {name: value for name, value in element.items() if name in _INHERITED}
         kind = element.tag.removeprefix(_SVG)
         if kind == "g":
             yield from _shapes(element, style)
@@ -144,9 +144,9 @@ def _line(element: ElementTree.Element, style: dict[str, str]) -> Shape:
 
 def _to_segment(px: float, py: float, a: tuple[float, float], b: tuple[float, float]) -> float:
     dx, dy = b[0] - a[0], b[1] - a[1]
-    along = ((px - a[0]) * dx + (py - a[1]) * dy) / (dx * dx + dy * dy)
-    along = min(max(along, 0.0), 1.0)
-    return math.hypot(px - a[0] - along * dx, py - a[1] - along * dy)
+    share = ((px - a[0]) * dx + (py - a[1]) * dy) / (dx * dx + dy * dy)
+    share = min(max(share, 0.0), 1.0)
+    return math.hypot(px - a[0] - share * dx, py - a[1] - share * dy)
 
 
 def _points(path: str) -> list[tuple[float, float]]:
@@ -182,14 +182,14 @@ def _colour(text: str | None) -> Colour:
     return red, green, blue
 
 
-def drawn(icon: tuple[Shape, ...], picture: Picture) -> bytes:
-    """The icon as PNG."""
+def draw(icon: tuple[Shape, ...], picture: Picture) -> bytes:
+    """Draw the icon as PNG."""
     side = picture.side
     scale = side * picture.share / SIDE
     shift = side * (1 - picture.share) / 2
     rows = [bytearray(4 * side) for _ in range(side)]
     for shape in icon:
-        if picture.full and shape.ground:
+        if picture.full and shape.is_background:
             rows = [bytearray((*shape.colour, 255) * side) for _ in range(side)]
         else:
             _paint(rows, shape, scale, shift)
@@ -211,20 +211,20 @@ def _paint(rows: list[bytearray], shape: Shape, scale: float, shift: float) -> N
 
 
 def _blend(row: bytearray, at: int, colour: Colour, cover: float) -> None:
-    below = row[at + 3] / 255 * (1 - cover)
-    whole = cover + below
+    rest = row[at + 3] / 255 * (1 - cover)
+    whole = cover + rest
     for k in range(3):
-        row[at + k] = round((colour[k] * cover + row[at + k] * below) / whole)
+        row[at + k] = round((colour[k] * cover + row[at + k] * rest) / whole)
     row[at + 3] = round(255 * whole)
 
 
 def _png(side: int, rows: list[bytearray]) -> bytes:
-    above = bytearray(4 * side)
+    row_above = bytearray(4 * side)
     lines = bytearray()
-    for row in rows:  # filter 2: what differs from the row above, which in flat colours is little
+    for row in rows:  # filter 2: the difference to the row above, which is small in flat colours
         lines.append(2)
-        lines += bytes((a - b) & 255 for a, b in zip(row, above, strict=True))
-        above = row
+        lines += bytes((a - b) & 255 for a, b in zip(row, row_above, strict=True))
+        row_above = row
     header = struct.pack(">IIBBBBB", side, side, 8, 6, 0, 0, 0)
     chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(lines, 9)), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(
@@ -234,22 +234,22 @@ def _png(side: int, rows: list[bytearray]) -> bytes:
 
 
 def main(bundle: Path, old: Path | None = None) -> None:
-    """Write the pictures into the bundle."""
+    """Write the pictures into a bundle."""
     folder = bundle / "icons"
     folder.mkdir()
     sources = (ICON.read_bytes(), Path(__file__).read_bytes())
-    made_from = hashlib.sha256(b"\0".join(sources)).hexdigest()
-    kept = _kept(old / "icons", made_from) if old is not None else None
-    icon = () if kept is not None else shapes(ICON.read_text(encoding="utf-8"))
+    source_hash = hashlib.sha256(b"\0".join(sources)).hexdigest()
+    pictures_before = _read_pictures(old / "icons", source_hash) if old is not None else None
+    icon = () if pictures_before is not None else shapes(ICON.read_text(encoding="utf-8"))
     for picture in PICTURES:
-        data = drawn(icon, picture) if kept is None else kept[picture.name]
+        data = draw(icon, picture) if pictures_before is None else pictures_before[picture.name]
         (folder / picture.name).write_bytes(data)
-    (folder / "source.json").write_text(f"{json.dumps(made_from)}\n", encoding="utf-8")
+    (folder / "source.json").write_text(f"{json.dumps(source_hash)}\n", encoding="utf-8")
 
 
-def _kept(folder: Path, made_from: str) -> dict[str, bytes] | None:
+def _read_pictures(folder: Path, source_hash: str) -> dict[str, bytes] | None:
     try:
-        if json.loads((folder / "source.json").read_text(encoding="utf-8")) != made_from:
+        if json.loads((folder / "source.json").read_text(encoding="utf-8")) != source_hash:
             return None
         return {picture.name: (folder / picture.name).read_bytes() for picture in PICTURES}
     except (OSError, ValueError):

@@ -1,10 +1,10 @@
-"""Writes the wheel's bill of materials in CycloneDX: what it holds of others, and what it asks for.
+"""Writes the wheel's bill of materials in CycloneDX: the packages in it, and those that it needs.
 
     python site/prepare_sbom.py FILE
 
-`site/bundle.py` calls it with a file beside the licences that it has gathered: of a package without
-one, nothing is in the wheel. Python's packages are not in it; the versions that it was tested with
-are those of requirements.txt.
+`site/bundle.py` calls it with a file beside the licences that it has gathered: nothing of a package
+without a licence file is in the wheel. Python packages are not in the wheel; the bill names the
+versions of requirements.txt, with which it was tested.
 """
 
 import base64
@@ -20,8 +20,8 @@ from urllib.parse import quote
 SITE = Path(__file__).resolve().parent
 
 
-def bundled(licences: Path) -> Iterator[dict[str, Any]]:
-    """The packages of npm's lock of which something is in the wheel."""
+def bundled_packages(licences: Path) -> Iterator[dict[str, Any]]:
+    """The packages of npm's lock that are in the wheel, at least in part."""
     lock = json.loads((SITE / "package-lock.json").read_text("utf-8"))["packages"]
     for path, package in lock.items():
         name = path.removeprefix("node_modules/")
@@ -35,8 +35,8 @@ def bundled(licences: Path) -> Iterator[dict[str, Any]]:
         }
 
 
-def installed_beside() -> Iterator[dict[str, Any]]:
-    """Python's packages, as they are locked."""
+def python_packages() -> Iterator[dict[str, Any]]:
+    """The Python packages, as they are locked."""
     lock = (SITE.parent / "requirements.txt").read_text("utf-8")
     for name, version in re.findall(r"^([\w-]+)==([\w.]+)", lock, re.MULTILINE):
         yield {**_component("pypi", name, version), "isExternal": True}
@@ -48,16 +48,19 @@ def _component(kind: str, name: str, version: str) -> dict[str, Any]:
 
 
 def main(file: Path) -> None:
-    """Write it."""
+    """Write the bill of materials."""
     project = tomllib.loads((SITE.parent / "pyproject.toml").read_text("utf-8"))["project"]
-    about = _component("pypi", project["name"], project["version"])
-    components = [*bundled(file.parent / "licences"), *installed_beside()]
-    needs = {"ref": about["bom-ref"], "dependsOn": [one["bom-ref"] for one in components]}
+    wheel = _component("pypi", project["name"], project["version"])
+    components = [*bundled_packages(file.parent / "licences"), *python_packages()]
+    needs = {
+        "ref": wheel["bom-ref"],
+        "dependsOn": [c["bom-ref"] for c in components],
+    }
     bill = {
         "bomFormat": "CycloneDX",
         "specVersion": "1.7",
         "version": 1,
-        "metadata": {"component": {**about, "licenses": [{"expression": project["license"]}]}},
+        "metadata": {"component": {**wheel, "licenses": [{"expression": project["license"]}]}},
         "components": components,
         "dependencies": [needs],
     }

@@ -2,7 +2,7 @@
 
     python site/prepare_templates.py FOLDER
 
-`site/bundle.py` calls it with the bundle that it makes; `render/templates.py` loads them.
+`site/bundle.py` calls it with the bundle that it makes; `core/pages/templates.py` loads them.
 """
 
 import sys
@@ -14,7 +14,7 @@ from coursebuild.core.pages.templates import compile_templates
 
 
 def main(bundle: Path) -> None:
-    """Write them into the bundle."""
+    """Write the compiled templates into a bundle."""
     compile_templates(template_texts(), bundle / "prepared")
 
 

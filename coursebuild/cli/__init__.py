@@ -3,14 +3,14 @@
 Entry point: `main(arguments)`. Exit status 0: clean; 1: something is wrong in the course; 2: wrong
 usage. Heavy imports happen in the command that needs them.
 
-- `unchanged`: a command with nothing to do, which loads no more than that
-- `running`: memory, and what a command ends with
-- `interrupts`: Ctrl-C and SIGTERM, wherever they come
-- `commands`: which there are; those of every course have a module each (`build`, `check`, …), and
-  features bring further ones
-- `pytest_plugin`: the same as tests of pytest
-- `arguments`: what several commands take
-- `output`: what is written where, and the status that says it too
+- `unchanged`: a command that has nothing to do, for which little is loaded
+- `running`: runs a command, and decides the status that it ends with
+- `interrupts`: Ctrl-C and SIGTERM
+- `commands`: the list of commands; each of the core has a module (`build`, `check`, …), and
+  features have further ones
+- `pytest_plugin`: checks of a course as tests of pytest
+- `arguments`: arguments of several commands
+- `output`: standard output and error, and the exit status
 """
 
 from __future__ import annotations
@@ -20,28 +20,28 @@ import os
 import sys
 
 from coursebuild.cli.output import CLEAN, INTERRUPTED, USAGE, WRONG, say, write
-from coursebuild.cli.unchanged import said_before, split_directory
+from coursebuild.cli.unchanged import previous_output, split_directory
 
 TYPE_CHECKING = False
-"""As type checkers know it: to import `typing` takes a tenth of a run with nothing to do."""
+"""True for type checkers: importing `typing` takes a tenth of a run with nothing to do."""
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command that the arguments name; gives the exit status.
+    """Run the command that the arguments name; return the exit status.
 
-    Without arguments it is the command of this process, which ends with it.
+    Without arguments the command is that of this process, which ends with it.
     """
     _utf8_streams()
     if sys.platform == "win32":
         return say(USAGE, "coursebuild runs on Linux and macOS; on Windows, install it in WSL")
-    given = sys.argv[1:] if arguments is None else list(arguments)
+    all_words = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        directory, words = split_directory(given)
-        said = said_before(directory, words)
-        if said is not None:
-            return _end(write(said, CLEAN), alone=arguments is None)
+        directory, words = split_directory(all_words)
+        output = previous_output(directory, words)
+        if output is not None:
+            return _end(write(output, CLEAN), alone=arguments is None)
         _occupy_streams()
         from coursebuild.cli.running import run
     except KeyboardInterrupt:
@@ -54,16 +54,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _end(status: int, *, alone: bool) -> int:
-    """End this process at once, if it is one command's.
+    """End this process at once if it is one command's.
 
-    Python would give all its memory back, object by object: for a large course that takes seconds,
-    in which Ctrl-C seems to do nothing.
+    Python would free all its memory, object by object: for a large course that takes seconds, in
+    which Ctrl-C seems to do nothing.
     """
     if not alone:
         return status
-    atexit._run_exitfuncs()  # of others: what is left open is closed, as ever
+    atexit._run_exitfuncs()  # registered by libraries
     for stream in (sys.stdout, sys.stderr):
-        if stream is not None:  # there is none where the tool was started without one
+        if stream is not None:  # the tool may have been started without one
             try:
                 stream.flush()
             except (OSError, ValueError):
@@ -72,14 +72,14 @@ def _end(status: int, *, alone: bool) -> int:
 
 
 def _occupy_streams() -> None:
-    """Keep 0, 1 and 2, where they are closed, from the pipes to processes."""
+    """Open the descriptors 0, 1 and 2 if they are closed, so that no pipe gets their numbers."""
     while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(number)
 
 
 def _utf8_streams() -> None:
-    """Reports hold whatever a lesson holds, so they are UTF-8 whatever the locale says."""
+    """Make the streams UTF-8 in any locale, since reports may hold any text of a lesson."""
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:

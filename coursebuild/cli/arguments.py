@@ -1,7 +1,7 @@
-"""What several commands take on the command line.
+"""Arguments of several commands.
 
-Entry points: `options_of`, what arguments say to every command; `add_lessons`, `add_format` and
-others, which declare them.
+Entry points: `options_of`, from arguments to options; `add_lessons`, `add_format` and others, which
+declare arguments.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from coursebuild.pipeline.options import Options, find_course, open_store
 
 
 def options_of(arguments: argparse.Namespace) -> Options:
-    """What the arguments say to every command."""
+    """Make the options of a command from its arguments."""
     jobs = getattr(arguments, "jobs", None) or available_cores()
     root = find_course(arguments.root)
     store = None
@@ -27,22 +27,22 @@ def options_of(arguments: argparse.Namespace) -> Options:
 
 
 def available_cores() -> int:
-    """Cores that this process may use."""
+    """The number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return max(1, len(os.sched_getaffinity(0)))
     return os.cpu_count() or 1
 
 
-# --- what several commands take
+# --- declarations
 
 
 def add_quiet(parser: argparse.ArgumentParser) -> None:
-    """Whether only what is wrong is printed."""
+    """Declare `--quiet`."""
     parser.add_argument("--quiet", "-q", action="store_true", help="print only what is wrong")
 
 
 def add_cache(parser: argparse.ArgumentParser) -> None:
-    """What is done with results that were made before."""
+    """Declare the arguments about stored results."""
     parser.add_argument(
         "--cache",
         metavar="PLACE",
@@ -61,7 +61,7 @@ def add_cache(parser: argparse.ArgumentParser) -> None:
 
 
 def add_running(parser: argparse.ArgumentParser) -> None:
-    """What commands take that run scripts."""
+    """Declare the arguments of commands that run scripts."""
     add_quiet(parser)
     parser.add_argument(
         "--verbose", "-v", action="store_true", help="say of each script why it runs"
@@ -69,7 +69,7 @@ def add_running(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--jobs",
         "-j",
-        type=_jobs,
+        type=_parse_jobs,
         metavar="N",
         help="scripts at a time (default: one per core)",
     )
@@ -77,7 +77,7 @@ def add_running(parser: argparse.ArgumentParser) -> None:
 
 
 def add_sandbox(parser: argparse.ArgumentParser) -> None:
-    """Whether the course is trusted."""
+    """Declare `--sandbox`."""
     parser.add_argument(
         "--sandbox",
         action="store_true",
@@ -85,14 +85,14 @@ def add_sandbox(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _jobs(text: str) -> int:
+def _parse_jobs(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 1024:
         raise argparse.ArgumentTypeError(f"{text!r} is no number of jobs: a whole number from 1")
     return int(text)
 
 
 def add_lessons(parser: argparse.ArgumentParser) -> None:
-    """The lessons and pages that a command is about."""
+    """Declare the names of lessons and pages."""
     parser.add_argument(
         "lessons",
         nargs="*",
@@ -102,14 +102,14 @@ def add_lessons(parser: argparse.ArgumentParser) -> None:
 
 
 def add_long(parser: argparse.ArgumentParser) -> None:
-    """What is done with scripts of which the course keeps a run."""
+    """Declare `--long`."""
     parser.add_argument(
         "--long", action="store_true", help="also run scripts that are recorded once"
     )
 
 
 def add_format(parser: argparse.ArgumentParser, *formats: str) -> None:
-    """The formats of what is printed."""
+    """Declare `--format`."""
     parser.add_argument(
         "--format", choices=formats, default="text", help="how to print it (default: %(default)s)"
     )

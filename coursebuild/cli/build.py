@@ -17,7 +17,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments."""
     add_running(parser)
     add_sandbox(parser)
     parser.add_argument(
@@ -31,5 +31,5 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Publish the site, or say why not."""
     out: str = arguments.out
-    made = ("examples", out)
-    return run_unless_unchanged(arguments, made, lambda options: build(options, Path(out)))
+    outputs = ("examples", out)
+    return run_unless_unchanged(arguments, outputs, lambda options: build(options, Path(out)))

@@ -33,7 +33,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments."""
     add_running(parser)
     add_lessons(parser)
     add_format(parser, "text", "json", "junit", "sarif", "github")
@@ -72,9 +72,9 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Tell what is wrong."""
+    """Print what is wrong."""
     if arguments.against is not None:
-        return _against(arguments)
+        return _compare_with_version(arguments)
 
     def work(options: Options) -> Report:
         return check(
@@ -86,34 +86,34 @@ def run(arguments: argparse.Namespace) -> int:
             truth=arguments.truth,
         )
 
-    # Machines are told how long it took.
-    if arguments.format != "text" or arguments.long or _special(arguments):
+    # Other formats say how long it took, which the report of before would not.
+    if arguments.format != "text" or arguments.long or _special_options(arguments):
         options = options_of(arguments)
         return print_report(work(options), arguments.format, options)
     return run_unless_unchanged(arguments, ("examples",), work)
 
 
-def _special(arguments: argparse.Namespace) -> list[str]:
-    """Those of the options by which it does another work than to verify all, or more."""
+def _special_options(arguments: argparse.Namespace) -> list[str]:
+    """The options given by which it does anything but verify everything, once."""
     names = ("shard", "timings", "write_timings", "sensitivity", "truth")
     return [f"--{name.replace('_', '-')}" for name in names if getattr(arguments, name)]
 
 
-def _against(arguments: argparse.Namespace) -> int:
-    """Tell what the scripts do with another version of MuJoCo; no difference is a mistake."""
-    from coursebuild.pipeline.against import against
-    from coursebuild.report.against import against_json, against_text
+def _compare_with_version(arguments: argparse.Namespace) -> int:
+    """Say what the scripts do with another version of MuJoCo; no difference is a mistake."""
+    from coursebuild.pipeline.against import compare_with_version
+    from coursebuild.report.against import comparison_json, comparison_text
 
-    others = [] if arguments.format in ("text", "json") else [f"--format {arguments.format}"]
-    others += _special(arguments)
-    others += ["--sandbox"] if arguments.sandbox else []
-    if others:
-        raise UsageError(f"--against cannot be combined with {others[0]}")
+    conflicts = [] if arguments.format in ("text", "json") else [f"--format {arguments.format}"]
+    conflicts += _special_options(arguments)
+    conflicts += ["--sandbox"] if arguments.sandbox else []
+    if conflicts:
+        raise UsageError(f"--against cannot be combined with {conflicts[0]}")
     options = options_of(arguments)
     try:
-        report = against(options, tuple(arguments.lessons), arguments.against)
+        report = compare_with_version(options, tuple(arguments.lessons), arguments.against)
     finally:
         options.store.close()
     if arguments.format == "json":
-        return write(against_json(report), CLEAN)
-    return write(against_text(report, style_of(sys.stdout), quiet=options.quiet), CLEAN)
+        return write(comparison_json(report), CLEAN)
+    return write(comparison_text(report, style_of(sys.stdout), quiet=options.quiet), CLEAN)

@@ -1,11 +1,11 @@
-"""Which commands there are, and what the words of a line ask for.
+"""The list of commands, and the choice of one by the words of a command line.
 
-Entry points: `run_command`; `known_commands` and `parser_of`, what can be said.
+Entry points: `run_command`; `known_commands`; `parser_of`, the argument parser of a command.
 
 A command is a name, a summary, and a module with `declare(parser)`, which adds its arguments, and
 `run(arguments)`, which gives the exit status. `EXAMPLES` of the module, if there, end its help.
-Features bring further commands (`core.features.Command`). Only the module of the command that is
-given is imported.
+Features have further commands (`core.features.Command`). Only the module of the command that is
+run is imported.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ anywhere on the line:
 
 
 def run_command(directory: str | None, words: Sequence[str]) -> int:
-    """Do what the words ask for, in a folder; gives the exit status.
+    """Run the command that the words name, in a folder; return the exit status.
 
     Raises:
-        UsageError: they ask for nothing that there is.
+        UsageError: there is no such command or option.
     """
     match words:
         case []:
@@ -74,21 +74,21 @@ def run_command(directory: str | None, words: Sequence[str]) -> int:
 
 
 def known_commands(*, installed: bool = True) -> dict[str, Command]:
-    """By name: those of every course, and those of installed features."""
+    """The commands by name: those of the core, and those of installed features."""
     from coursebuild.core.features import Command
     from coursebuild.core.registry import CORE_COMMANDS, installed_features
 
-    found = [
+    commands = [
         Command(name=name, summary=summary, module=f"coursebuild.cli.{name}")
         for name, summary in CORE_COMMANDS.items()
     ]
-    if installed:  # to find them takes longer than all the rest
-        found += [command for feature in installed_features() for command in feature.commands]
-    return {command.name: command for command in found}
+    if installed:  # finding them takes longer than all the rest
+        commands += [command for feature in installed_features() for command in feature.commands]
+    return {command.name: command for command in commands}
 
 
 def parser_of(command: Command) -> argparse.ArgumentParser:
-    """What can be said to a command."""
+    """Make the argument parser of a command."""
     code = importlib.import_module(command.module)
     parser = _Parser(
         prog=f"coursebuild {command.name}",
@@ -106,18 +106,18 @@ class _Parser(argparse.ArgumentParser):
     """A parser that proposes the option that was meant."""
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong with the line."""
+        """Raise a `UsageError` that says what is wrong with the command line."""
         option = re.match("unrecognized arguments: (--[^ =]+)", message)
         if option is None:
             super().error(message)
         from coursebuild.core.text.diagnostics import nearest
 
-        known = [name[2:] for name in self._option_string_actions if name.startswith("--")]
-        near = nearest(option[1][2:], known)
-        help = f"did you mean `--{near}`?" if near else f"`{self.prog} --help` lists them"
+        options = [name[2:] for name in self._option_string_actions if name.startswith("--")]
+        closest = nearest(option[1][2:], options)
+        help = f"did you mean `--{closest}`?" if closest else f"`{self.prog} --help` lists them"
         raise UsageError(f"there is no option `{option[1]}`", help=help)
 
 
 def _overview() -> str:
-    rows = (f"  {one.name:<13}{one.summary}\n" for one in known_commands().values())
+    rows = (f"  {command.name:<13}{command.summary}\n" for command in known_commands().values())
     return _OVERVIEW.format("".join(rows))

@@ -1,7 +1,7 @@
 """`coursebuild completion`: print the completion script of a shell.
 
-What it prints asks this command in turn, with the words of the line behind `--`, what the last one
-may become. Where nothing is known the shell completes names of files.
+The script calls this command with the words of the line behind `--`, to get the completions of the
+last word. Where there are none the shell completes names of files.
 """
 
 from __future__ import annotations
@@ -50,13 +50,13 @@ complete -c coursebuild -a '(coursebuild completion fish -- \\
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments."""
     parser.add_argument("shell", choices=_SCRIPTS, metavar="SHELL", help=", ".join(_SCRIPTS))
     parser.add_argument("line", nargs="*", metavar="WORD", help="of a line that is to be completed")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the script, or what a word may become."""
+    """Print the script, or the completions of a word."""
     if not arguments.line:
         return write(_SCRIPTS[arguments.shell], CLEAN)
     directory, words = split_directory(arguments.line)
@@ -64,19 +64,19 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _candidates(directory: str | None, words: list[str]) -> list[str]:
-    """What the last word may become, in order."""
+    """The completions of the last word, sorted."""
     *before, last = words or [""]
-    known = known_commands()
+    commands = known_commands()
     if not before or before == ["help"]:
-        found: Iterable[str] = [*known, *([] if before else ["help", "--version", "-C"])]
-    elif before[0] not in known:
-        found = ()
+        candidates: Iterable[str] = [*commands, *([] if before else ["help", "--version", "-C"])]
+    elif before[0] not in commands:
+        candidates = ()
     else:
-        found = _of_command(parser_of(known[before[0]]), before, last, directory)
-    return sorted({word for word in found if word.startswith(last)})
+        candidates = _command_candidates(parser_of(commands[before[0]]), before, last, directory)
+    return sorted({word for word in candidates if word.startswith(last)})
 
 
-def _of_command(
+def _command_candidates(
     parser: argparse.ArgumentParser, before: list[str], last: str, directory: str | None
 ) -> Iterable[str]:
     actions = parser._actions
@@ -89,35 +89,35 @@ def _of_command(
         word
         for action in actions
         if not action.option_strings
-        for word in _values(action, directory)
+        for word in _argument_values(action, directory)
     ]
 
 
-def _values(action: argparse.Action, directory: str | None) -> Iterable[str]:
-    """What a positional argument may be, by what the help calls it."""
+def _argument_values(action: argparse.Action, directory: str | None) -> Iterable[str]:
+    """The values of a positional argument, by its name in the help."""
     if action.choices:
         return action.choices
     root = find_course_root(directory or ".")
     match action.metavar:
         case "LESSON" if root is not None:
-            return _lessons(Path(root))
+            return _read_ids(Path(root))
         case "MODEL" | "SCENE" if root is not None:
             return sorted(path.stem for path in Path(root, "models").glob("*.xml"))
         case "RULE|PATH":
-            return [*RULES, *(_lessons(Path(root)) if root is not None else ())]
+            return [*RULES, *(_read_ids(Path(root)) if root is not None else ())]
         case "SCHEMA":
             return schema_roots()
         case "EXPORT":
-            return [one.name for feature in features() for one in feature.exporters]
+            return [exporter.name for feature in features() for exporter in feature.exporters]
         case _:
             return ()
 
 
-def _lessons(root: Path) -> list[str]:
-    """Ids of the lessons and pages of a map; none where it cannot be read."""
+def _read_ids(root: Path) -> list[str]:
+    """The ids of the lessons and pages of a map; none where it cannot be read."""
     try:
         course = tomllib.loads((root / MAP).read_text("utf-8"))
-        lessons = [one["id"] for level in course["level"] for one in level["lesson"]]
+        lessons = [lesson["id"] for level in course["level"] for lesson in level["lesson"]]
         return [*lessons, *(page["id"] for page in course.get("page", ()))]
     except (OSError, ValueError, KeyError, TypeError):
         return []

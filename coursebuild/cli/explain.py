@@ -11,8 +11,8 @@ from coursebuild.core.files.resources import rules_page
 from coursebuild.core.registry import installed_features
 from coursebuild.core.text.rules import RULES
 from coursebuild.pipeline.explain import explain
-from coursebuild.report.explained import explained_text, rule_text
-from coursebuild.report.values import json_text
+from coursebuild.report.explained import explanation_text, rule_text
+from coursebuild.report.values import json_text, plain
 
 EXAMPLES = """\
 examples:
@@ -23,7 +23,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments."""
     parser.add_argument(
         "name",
         metavar="RULE|PATH",
@@ -33,13 +33,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Tell what is known of a rule or a path."""
-    installed_features()  # which bring rules of their own
+    """Print what is known of a rule or a path."""
+    installed_features()  # they have rules of their own
     rule = RULES.get(arguments.name)
     if rule is not None:
         text = rule_text(rule, rules_page())
         return write(json_text(rule) if arguments.format == "json" else text, CLEAN)
     explanation = explain(options_of(arguments), arguments.name)
     if arguments.format == "json":
-        return write(json_text(explanation), CLEAN)
-    return write(explained_text(explanation, style_of(sys.stdout)), CLEAN)
+        return write(json_text(plain(explanation, runs="own", shown_in="shown")), CLEAN)
+    return write(explanation_text(explanation, style_of(sys.stdout)), CLEAN)

@@ -18,11 +18,11 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments."""
     add_running(parser)
-    known = [exporter for feature in features() for exporter in feature.exporters]
-    offers = ", ".join(f"{one.name} ({one.summary})" for one in known)
-    files = ", ".join(one.file for one in known)
+    exporters = [exporter for feature in features() for exporter in feature.exporters]
+    offers = ", ".join(f"{e.name} ({e.summary})" for e in exporters)
+    files = ", ".join(e.file for e in exporters)
     parser.add_argument(
         "name", metavar="EXPORT", help=f"{offers}, or what a feature of the course itself can write"
     )

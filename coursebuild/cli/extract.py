@@ -15,7 +15,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments."""
     add_quiet(parser)
     parser.add_argument(
         "--adopt",

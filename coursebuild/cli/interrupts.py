@@ -1,19 +1,18 @@
-"""Ctrl-C and SIGTERM as exceptions, which come wherever the command is at the moment.
+"""Ctrl-C and SIGTERM as exceptions, raised wherever the command is at the moment.
 
-Entry point: `heeded`, a context manager.
+Entry point: `signals_as_exceptions`, a context manager.
 
-There are places that such an exception must not come to, or where it is lost:
+There are places where such an exception must not be raised, or where it is lost:
 
-1. A function that msgspec's C code calls, to learn what a type has in it: where that raises, the
-   process ends with a segmentation fault.
-2. An import: of a module in C, such as MuJoCo's, that cannot begin, nothing can be said but that,
-   or it goes on as if nothing had come; and what imports and `logging` do between taking a lock and
-   giving it back.
-3. What Python calls by itself, when an object goes or a process was forked: it drops what is raised
-   there, and goes on.
+1. A function that msgspec's C code calls to inspect a type: if it raises, the process ends with a
+   segmentation fault.
+2. An import: a module in C, such as MuJoCo's, fails to load or ignores the exception; and imports
+   and `logging` hold locks that they would not release.
+3. Functions that Python itself calls, when an object is deleted or a process was forked: Python
+   drops exceptions there, and goes on.
 
-From there the signal comes again a moment later. And a library in C, such as MuJoCo's, may make
-another exception of it, which is made into the one that it was.
+There the signal is sent again a moment later. Also, a library in C, such as MuJoCo's, may turn the
+exception into another; then the original one is raised in its place.
 """
 
 from __future__ import annotations
@@ -29,89 +28,89 @@ from collections.abc import Iterable, Iterator
 from types import FrameType
 from typing import Any
 
-_AGAIN = 0.01
-"""Seconds until a signal comes again."""
+_DELAY = 0.01
+"""Seconds until a signal is sent again."""
 _IMPORT = "<frozen importlib."
-_NOT_IN = "logging/__init__.py"
+_LOGGING = "logging/__init__.py"
 
 
-_own: list[FrameType] = []
-"""The caller of `heeded`; what has called that does not matter."""
-_raised: list[type[KeyboardInterrupt]] = []
-"""What was raised since."""
+_command_frames: list[FrameType] = []
+"""The frame that called `signals_as_exceptions`; its own callers do not matter."""
+_raised_types: list[type[KeyboardInterrupt]] = []
+"""The types of the exceptions raised since."""
 
 
 class Terminated(KeyboardInterrupt):
-    """Somebody asked this process to end: what it has begun is cleaned up, as after Ctrl-C."""
+    """SIGTERM: what the process has begun is cleaned up, as after Ctrl-C."""
 
 
 @contextlib.contextmanager
-def heeded(*, alone: bool = False) -> Iterator[None]:
-    """Raise `Terminated` or `KeyboardInterrupt` where one of the signals comes.
+def signals_as_exceptions(*, alone: bool = False) -> Iterator[None]:
+    """Raise `Terminated` or `KeyboardInterrupt` when one of the signals comes.
 
-    Nothing is changed in another thread than the main one. Ctrl-C stays without effect where it
-    was. `alone`: the process ends with this; a signal that comes so late changes nothing any more.
+    In another thread than the main one, this does nothing. Where Ctrl-C is ignored, it stays so.
+    `alone`: the process ends after this, and then ignores the signals.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    drop = sys.unraisablehook
-    _own.append(sys._getframe(2))  # beyond `contextlib`
+    default_hook = sys.unraisablehook
+    _command_frames.append(sys._getframe(2))  # beyond `contextlib`
 
-    def dropped(unraisable: Any) -> None:
+    def send_dropped_again(unraisable: Any) -> None:
         kind = unraisable.exc_type
         if issubclass(kind, KeyboardInterrupt):
-            _come_again(signal.SIGTERM if kind is Terminated else signal.SIGINT)
+            _send_later(signal.SIGTERM if kind is Terminated else signal.SIGINT)
         else:
-            drop(unraisable)
+            default_hook(unraisable)
 
-    before = {signal.SIGTERM: signal.signal(signal.SIGTERM, _hear)}
+    before = {signal.SIGTERM: signal.signal(signal.SIGTERM, _handle_signal)}
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        before[signal.SIGINT] = signal.signal(signal.SIGINT, _hear)
-    sys.unraisablehook = dropped
+        before[signal.SIGINT] = signal.signal(signal.SIGINT, _handle_signal)
+    sys.unraisablehook = send_dropped_again
     try:
         yield
     except Exception as error:
-        if _raised:
-            raise _raised[-1] from error
+        if _raised_types:
+            raise _raised_types[-1] from error
         raise
     finally:
-        sys.unraisablehook = drop
-        _own.clear()
-        _raised.clear()
+        sys.unraisablehook = default_hook
+        _command_frames.clear()
+        _raised_types.clear()
         if alone:
-            _hear_no_more(before)
+            _ignore_signals(before)
         else:
             for number, handler in before.items():
                 signal.signal(number, handler)
 
 
-def _hear(number: int, frame: FrameType | None) -> None:
-    if _must_wait(frame):
-        _come_again(number)
+def _handle_signal(number: int, frame: FrameType | None) -> None:
+    if _is_unsafe(frame):
+        _send_later(number)
     else:
-        _raised.append(Terminated if number == signal.SIGTERM else KeyboardInterrupt)
-        raise _raised[-1]
+        _raised_types.append(Terminated if number == signal.SIGTERM else KeyboardInterrupt)
+        raise _raised_types[-1]
 
 
-def _hear_no_more(numbers: Iterable[signal.Signals]) -> None:
-    """For the rest of this process, which has a status to end with.
+def _ignore_signals(numbers: Iterable[signal.Signals]) -> None:
+    """Ignore signals for the rest of this process, which ends with the status of its command.
 
-    After a `KeyboardInterrupt` that went through an `exec` of a text Python would kill itself by
-    SIGINT in its place.
+    Otherwise Python would end by SIGINT, after a `KeyboardInterrupt` that has passed through an
+    `exec` of a text.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
-    for number in numbers:  # other threads do not block them
+    for number in numbers:  # the mask is that of this thread only
         signal.signal(number, signal.SIG_IGN)
 
 
-def _must_wait(frame: FrameType | None) -> bool:
-    """Whether an exception must not come here."""
-    if frame is not None and frame.f_code.co_filename.endswith(_NOT_IN):
+def _is_unsafe(frame: FrameType | None) -> bool:
+    """Whether no exception may be raised in this frame."""
+    if frame is not None and frame.f_code.co_filename.endswith(_LOGGING):
         return True
     msgspec = os.path.dirname(getattr(sys.modules.get("msgspec"), "__file__", None) or "?")  # noqa: PTH120
-    began = _own[0] if _own else None
-    while frame is not None and frame is not began:
+    outermost = _command_frames[0] if _command_frames else None
+    while frame is not None and frame is not outermost:
         file = frame.f_code.co_filename
         if file.startswith((_IMPORT, msgspec + os.sep)):
             return True
@@ -119,15 +118,15 @@ def _must_wait(frame: FrameType | None) -> bool:
     return False
 
 
-def _come_again(number: int) -> None:
-    # Without `threading`, of whose locks the main thread may hold one.
+def _send_later(number: int) -> None:
+    # Not by `threading`: the main thread may hold one of its locks.
     _thread.start_new_thread(_send, (number,))
 
 
 def _send(number: int) -> None:
-    time.sleep(_AGAIN)
-    if signal.getsignal(number) is not _hear:  # the command is through
+    time.sleep(_DELAY)
+    if signal.getsignal(number) is not _handle_signal:  # the command has ended
         return
-    main = threading.main_thread().ident
-    assert main is not None
-    signal.pthread_kill(main, number)  # which ends what it waits for
+    main_thread = threading.main_thread().ident
+    assert main_thread is not None
+    signal.pthread_kill(main_thread, number)  # which also interrupts what it waits for

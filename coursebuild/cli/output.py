@@ -1,4 +1,4 @@
-"""What the command line writes, and the exit status that says the same.
+"""What commands write to standard output and error, and their exit status.
 
 Entry points: `write`, `say`, `fail`; `print_report`, `report_text`.
 """
@@ -19,13 +19,13 @@ CLEAN, WRONG, USAGE, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 
 
 def fail(status: int, message: str, help: str = "") -> int:
-    """Say what is wrong on standard error; gives the status."""
+    """Write an error to standard error; return the status."""
     return say(status, f"coursebuild: {message}" + (f"\n  help: {help}" if help else ""))
 
 
 def say(status: int, text: str) -> int:
-    """Write a text to standard error; gives the status."""
-    if sys.stderr is not None:  # print would take standard output in its place
+    """Write a text to standard error; return the status."""
+    if sys.stderr is not None:  # else `print` would write to standard output
         try:
             print(text, file=sys.stderr, flush=True)
         except OSError:  # nobody reads it; the status says it too
@@ -34,37 +34,37 @@ def say(status: int, text: str) -> int:
 
 
 def write(text: str, status: int) -> int:
-    """Write to standard output; gives the status, another one where the text cannot be written."""
+    """Write to standard output; return the status, or another if the text cannot be written."""
     if sys.stdout is None:  # closed by whoever started us
         return status
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
-    except BrokenPipeError:  # the reader has seen enough; what was found is as it was
-        _forget_stdout()
+    except BrokenPipeError:  # the reader has seen enough; the status stays
+        _discard_stdout()
     except OSError as error:
         from coursebuild.core.files.errors import reason
 
-        _forget_stdout()
+        _discard_stdout()
         return fail(WRONG, f"standard output cannot be written: {reason(error)}")
     return status
 
 
-def _forget_stdout() -> None:
-    """Python writes what is left once more when it ends, and would complain."""
+def _discard_stdout() -> None:
+    """Keep Python from trying to write the rest once more at its end, and from complaining."""
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, sys.stdout.fileno())
     os.close(null)
 
 
 def print_report(report: Report, form: str, options: Options) -> int:
-    """Write a report in one of its formats; gives the status that says whether all is well."""
+    """Write a report in one of its formats; return the status of the command."""
     options.store.close()
     return write(report_text(report, form, options), CLEAN if report.ok else WRONG)
 
 
 def report_text(report: Report, form: str, options: Options) -> str:
-    """The report as it is printed: as text only what is wrong, where the user wants no more."""
+    """Return the report as it is printed; as text and if quiet, only what is wrong."""
     from msgspec.structs import replace
 
     from coursebuild.report import render_report
@@ -76,16 +76,16 @@ def report_text(report: Report, form: str, options: Options) -> str:
     return render_report(report, form, style_of(sys.stdout))
 
 
-def look(stream: TextIO | None) -> tuple[bool, int]:
-    """Whether to colour, and how many columns there are.
+def terminal_style(stream: TextIO | None) -> tuple[bool, int]:
+    """Return whether to use colours, and the number of columns.
 
-    Colour on a terminal, unless its user asks for none (https://no-color.org), and wherever the
-    user asks for it (https://force-color.org).
+    Colours are used on a terminal, unless its user asks for none (https://no-color.org), and
+    wherever the user asks for them (https://force-color.org).
     """
-    terminal = stream is not None and stream.isatty()
-    wanted = terminal and os.environ.get("TERM") != "dumb"
-    colour = bool(wanted or os.environ.get("FORCE_COLOR")) and not os.environ.get("NO_COLOR")
-    if not terminal:
+    is_terminal = stream is not None and stream.isatty()
+    is_capable = is_terminal and os.environ.get("TERM") != "dumb"
+    colour = bool(is_capable or os.environ.get("FORCE_COLOR")) and not os.environ.get("NO_COLOR")
+    if not is_terminal:
         return colour, 100
     import shutil
 
@@ -93,7 +93,7 @@ def look(stream: TextIO | None) -> tuple[bool, int]:
 
 
 def style_of(stream: TextIO | None) -> Style:
-    """How text on a stream should look."""
+    """The style of text on a stream."""
     from coursebuild.report import Style
 
-    return Style(*look(stream))
+    return Style(*terminal_style(stream))

@@ -34,7 +34,7 @@ _PLACE = re.compile(r"^ *--> (.*):(\d+):\d+$", re.MULTILINE)
 _HELP = "collect the scripts, labs, quizzes, models and pages of courses as tests"
 
 _Lines = tuple[tuple[int, int], ...]
-"""Stretches of a file, by their first and last line."""
+"""Parts of a file, by their first and last line."""
 
 
 class CourseWarning(UserWarning):
@@ -42,17 +42,17 @@ class CourseWarning(UserWarning):
 
 
 class CourseError(Exception):
-    """What is wrong in a course, as `coursebuild check` prints it."""
+    """Mistakes in a course, as `coursebuild check` prints them."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The option and its place in pytest's configuration."""
+    """Add the option and its entry in pytest's configuration."""
     parser.getgroup("coursebuild").addoption("--coursebuild", action="store_true", help=_HELP)
     parser.addini("coursebuild", _HELP, type="bool", default=False)
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> FileTests | None:
-    """The tests of a file that belongs to a course."""
+    """Collect the tests of a file that belongs to a course."""
     config = parent.config
     if not (config.getoption("coursebuild") or config.getini("coursebuild")):
         return None
@@ -71,78 +71,80 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> FileTests 
 
 
 class CourseTests:
-    """The tests of a course, and what `check` finds once one of them runs."""
+    """The tests of a course, and their results, which `check` finds when the first of them runs."""
 
     def __init__(self, root: Path) -> None:
         from coursebuild.pipeline.load import load
 
-        atexit.register(gc.freeze)  # as Python ends, what was read can crash its collector
+        atexit.register(gc.freeze)  # what was read can crash Python's collector at its end
         course = load(root).value
         self.root = root
-        self.tests: Mapping[str, Mapping[str, _Lines]] = _tests(course)
+        self.tests: Mapping[str, Mapping[str, _Lines]] = _tests_by_file(course)
         """By path and name: where in the file the test's mistakes stand. The first test of a file
         has those that stand in none of the others."""
-        self._found: dict[str, list[tuple[str, str]]] | None = None
+        self._results: dict[str, list[tuple[str, str]]] | None = None
 
-    def found(self, session: pytest.Session, test: str) -> list[tuple[str, str]]:
-        """What is found in a test: tags of JUnit, and texts."""
-        if self._found is None:
-            own = {
+    def results_of(self, session: pytest.Session, test: str) -> list[tuple[str, str]]:
+        """The results of a test: JUnit's tags, with their texts."""
+        if self._results is None:
+            sources = {
                 i.source for i in session.items if isinstance(i, CourseItem) and i.course is self
             }
-            whole = any(_PAGE not in self.tests[source] for source in own)
-            self._found = self._check(() if whole else sorted(own))
-        return self._found[test]
+            checks_everything = any(_PAGE not in self.tests[source] for source in sources)
+            self._results = self._check(() if checks_everything else sorted(sources))
+        return self._results[test]
 
     def _check(self, names: Iterable[str]) -> dict[str, list[tuple[str, str]]]:
         check = ("-m", "coursebuild", "-C", str(self.root), "check", "--format", "junit")
-        done = subprocess.run(
+        result = subprocess.run(
             [sys.executable, *check, *names], capture_output=True, encoding="utf-8"
         )
-        if done.returncode not in (0, 1):
-            raise CourseError(done.stderr)
+        if result.returncode not in (0, 1):
+            raise CourseError(result.stderr)
         owners = {name: path for path, tests in self.tests.items() for name in tests}
-        found: dict[str, list[tuple[str, str]]] = defaultdict(list)
-        for case in ElementTree.fromstring(done.stdout).iter("testcase"):
+        results: dict[str, list[tuple[str, str]]] = defaultdict(list)
+        for case in ElementTree.fromstring(result.stdout).iter("testcase"):
             name = case.get("name", "")
-            for told in case:
-                text = told.text or f"{name}: {told.get('message')}"
-                test = self._test_of(text) if told.text else f"{owners.get(name)}::{name}"
-                found[test].append((told.tag, text))
-        return found
+            for part in case:
+                text = part.text or f"{name}: {part.get('message')}"
+                test = self._find_test(text) if part.text else f"{owners.get(name)}::{name}"
+                results[test].append((part.tag, text))
+        return results
 
-    def _test_of(self, diagnostic: str) -> str:
-        """The test that a diagnostic belongs to."""
+    def _find_test(self, diagnostic: str) -> str:
+        """Find the test that a diagnostic belongs to."""
         place = _PLACE.search(diagnostic)
         if place is None or place[1] not in self.tests:
             return f"{MAP}::{_MAP}"
         tests, line = self.tests[place[1]], int(place[2])
-        inside = (n for n, at in tests.items() if any(a <= line <= b for a, b in at))
-        return f"{place[1]}::{next(inside, next(iter(tests)))}"
+        matching = (n for n, at in tests.items() if any(a <= line <= b for a, b in at))
+        return f"{place[1]}::{next(matching, next(iter(tests)))}"
 
 
 _COURSES = pytest.StashKey[dict[str, CourseTests]]()
 
 
-def _tests(course: Course | None) -> dict[str, Mapping[str, _Lines]]:
-    """The tests of each file; of a course whose map cannot be read, the map alone."""
+def _tests_by_file(course: Course | None) -> dict[str, Mapping[str, _Lines]]:
+    """Return the tests of each file; if the map cannot be read, its test alone."""
     from coursebuild.core.registry import feature_trials
 
-    found: dict[str, Mapping[str, _Lines]] = {MAP: {_MAP: ()}}
+    tests_by_path: dict[str, Mapping[str, _Lines]] = {MAP: {_MAP: ()}}
     if course is None:
-        return found
-    found |= {model.source.path: {_MODEL: ()} for model in course.models}
+        return tests_by_path
+    tests_by_path |= {model.source.path: {_MODEL: ()} for model in course.models}
     trials = {id(trial.block): name for name, (_, trial) in feature_trials(course).items()}
     for document in course.documents:
         tests: dict[str, _Lines] = {_PAGE: ()}
-        for name, lines in _parts(document, trials):
+        for name, lines in _named_parts(document, trials):
             tests[name] = (*tests.get(name, ()), lines)
-        found[document.source.path] = tests
-    return found
+        tests_by_path[document.source.path] = tests
+    return tests_by_path
 
 
-def _parts(document: Document, trials: Mapping[int, str]) -> Iterator[tuple[str, tuple[int, int]]]:
-    """The names and lines of scripts with their outputs, of labs (`trials` has theirs), quizzes."""
+def _named_parts(
+    document: Document, trials: Mapping[int, str]
+) -> Iterator[tuple[str, tuple[int, int]]]:
+    """The names and lines of scripts with their outputs, of quizzes, and of labs (`trials`)."""
     from coursebuild.core.model import FeatureBlock, Recording, Script, document_blocks
 
     for block in document_blocks(document):
@@ -163,7 +165,7 @@ class FileTests(pytest.File):
     """Its path in the course."""
 
     def collect(self) -> Iterator[CourseItem]:
-        """Its tests."""
+        """Collect the file's tests."""
         for name in self.course.tests[self.source]:
             item: CourseItem = CourseItem.from_parent(self, name=name)
             item.course, item.source = self.course, self.source
@@ -171,15 +173,15 @@ class FileTests(pytest.File):
 
 
 class CourseItem(pytest.Item):
-    """One of its tests."""
+    """A test of a file."""
 
     course: CourseTests
     source: str
 
     def runtest(self) -> None:
-        """Tell what is wrong."""
-        found = self.course.found(self.session, f"{self.source}::{self.name}")
-        texts = {tag: [text for kind, text in found if kind == tag] for tag, _ in found}
+        """Fail, warn or skip, as the results say."""
+        parts = self.course.results_of(self.session, f"{self.source}::{self.name}")
+        texts = {tag: [text for kind, text in parts if kind == tag] for tag, _ in parts}
         for text in texts.get("system-out", ()):
             warnings.warn(CourseWarning(text), stacklevel=1)
         if "failure" in texts:
@@ -190,11 +192,11 @@ class CourseItem(pytest.Item):
     def repr_failure(
         self, excinfo: pytest.ExceptionInfo[BaseException], style: object = None
     ) -> str:
-        """The mistakes as `coursebuild check` prints them."""
+        """Return the mistakes as `coursebuild check` prints them."""
         if isinstance(excinfo.value, CourseError):
             return str(excinfo.value)
         return str(super().repr_failure(excinfo))
 
     def reportinfo(self) -> tuple[Path, int, str]:
-        """Where it stands, from line 0, and what its report is headed by."""
+        """Return where the test is, and the heading of its report."""
         return self.path, 0, f"{self.source}: {self.name}"

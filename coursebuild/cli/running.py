@@ -1,4 +1,4 @@
-"""A command's memory, and the status that it ends with, also where a signal ends it.
+"""Runs a command, and returns the status that it ends with, also where a signal ends it.
 
 Entry point: `run`.
 """
@@ -10,7 +10,7 @@ import gc
 import resource
 
 from coursebuild.cli.commands import run_command
-from coursebuild.cli.interrupts import Terminated, heeded
+from coursebuild.cli.interrupts import Terminated, signals_as_exceptions
 from coursebuild.cli.output import INTERRUPTED, TERMINATED, USAGE, WRONG, fail, say
 from coursebuild.core.files.errors import (
     EffectError,
@@ -24,38 +24,38 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-_FILES = 64
-"""Pipes of processes, the store, event loops, what scripts open."""
+_FILES_NEEDED = 64
+"""For pipes of processes, the store, event loops, and what scripts open."""
 
 
 def run(directory: str | None, words: Sequence[str], *, alone: bool) -> int:
-    """Run the command that the words name, in a folder; gives the exit status.
+    """Run the command that the words name, in a folder; return the exit status.
 
-    `alone`: it is the command of this process, which ends with it.
+    `alone`: the command is that of this process, which ends with it.
     """
-    collected = gc.get_threshold()
-    # What a command makes lives until its end, and hardly any of it is in cycles: looking through
-    # it takes time for nothing, most of all when the process ends and gives all of it back.
+    thresholds = gc.get_threshold()
+    # The objects of a command live until its end, and hardly any are in cycles: collecting garbage
+    # takes time for nothing, most of all when the process ends.
     gc.set_threshold(1_000_000 if alone else 200_000, 50, 50)
     if alone:
         atexit.register(gc.freeze)
     try:
-        with heeded(alone=alone):
-            return _run(directory, words)
+        with signals_as_exceptions(alone=alone):
+            return _run_command(directory, words)
     except Terminated:
         return say(TERMINATED, "terminated")
     except KeyboardInterrupt:
         return say(INTERRUPTED, "interrupted")
     finally:
         if not alone:
-            gc.set_threshold(*collected)
+            gc.set_threshold(*thresholds)
 
 
-def _run(directory: str | None, words: Sequence[str]) -> int:
-    files = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
-    if files < _FILES:
-        message = f"only {files} files may be open at a time, and {_FILES} are needed"
-        return fail(WRONG, message, f"`ulimit -n {4 * _FILES}` raises the limit")
+def _run_command(directory: str | None, words: Sequence[str]) -> int:
+    allowed = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    if allowed < _FILES_NEEDED:
+        message = f"only {allowed} files may be open at a time, and {_FILES_NEEDED} are needed"
+        return fail(WRONG, message, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
     try:
         return run_command(directory, words)
     except UsageError as error:

@@ -14,7 +14,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments."""
     parser.add_argument(
         "name", metavar="SCHEMA", help="lab, course, model, or of a feature, as quiz"
     )

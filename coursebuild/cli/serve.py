@@ -19,11 +19,11 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments."""
     add_running(parser)
     parser.add_argument(
         "--port",
-        type=_port,
+        type=_parse_port,
         default=8000,
         help="default: %(default)s; 0: any free one",
     )
@@ -37,7 +37,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--embed",
         action="append",
-        type=_origin,
+        type=_parse_origin,
         default=[],
         metavar="ORIGIN",
         help="let pages of this origin show it in a frame, such as vscode-webview:",
@@ -56,13 +56,13 @@ def run(arguments: argparse.Namespace) -> NoReturn:
     )
 
 
-def _port(text: str) -> int:
+def _parse_port(text: str) -> int:
     if not text.isdecimal() or int(text) > 65535:
         raise argparse.ArgumentTypeError(f"{text!r} is no port: a whole number from 0 to 65535")
     return int(text)
 
 
-def _origin(text: str) -> str:
+def _parse_origin(text: str) -> str:
     if not re.fullmatch(r"[a-z][a-z0-9+.-]*:(//[\w.*\[\]:-]+)?", text):
         raise argparse.ArgumentTypeError(f"{text!r} is no origin, such as https://example.org")
     return text

@@ -1,11 +1,11 @@
-"""A command with nothing to do: known before its arguments are read.
+"""Recognizes a command that has nothing to do, before its arguments are parsed.
 
-Entry points: `said_before`, what it says then; `run_unless_unchanged`, which keeps that;
-`split_directory`, by which both know which course is meant.
+Entry points: `previous_output`, what such a command prints; `run_unless_unchanged`, which stores
+it; `split_directory`, which finds the course's folder among the arguments.
 
-It goes by the arguments as they were given, and by what else decides what is printed. To read
-arguments takes longer than to look at the files of a course; a command that is spelled in another
-way is another command here.
+A command is identified by its arguments as they were given, and by whatever else decides what it
+prints. Parsing arguments takes longer than looking at the files of a course; so a command that is
+spelled in another way counts as another command.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 import os
 import sys
 
-from coursebuild.cli.output import look, print_report, report_text
+from coursebuild.cli.output import print_report, report_text, terminal_style
 from coursebuild.core.engine.up_to_date import Watcher, unchanged
 from coursebuild.core.files.course_root import find_course_root
 
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     from coursebuild.pipeline.options import Options
     from coursebuild.report import Report
 
-_ALL_ANEW = "--no-cache"
+_NO_CACHE = "--no-cache"
 _VARIABLES = ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_KEY", "COURSEBUILD_CACHE_SIZE")
-"""Of the environment: what says the same as arguments."""
+"""Environment variables that replace arguments."""
 
 
-def split_directory(given: Sequence[str]) -> tuple[str | None, list[str]]:
-    """The folder that `-C DIR` names, wherever it stands before `--`, and all other words."""
+def split_directory(all_words: Sequence[str]) -> tuple[str | None, list[str]]:
+    """Return the folder that `-C DIR` names, anywhere before `--`, and all other words."""
     directory, words = None, []
-    rest = iter(given)
+    rest = iter(all_words)
     for word in rest:
         if word == "--":
             words += [word, *rest]
@@ -43,15 +43,15 @@ def split_directory(given: Sequence[str]) -> tuple[str | None, list[str]]:
             directory = word[2:]
         elif (folder := next(rest, None)) is not None:
             directory = folder
-        else:  # told by who reads the words
+        else:  # the parser reports it
             words.append(word)
     return directory, words
 
 
-def said_before(directory: str | None, words: Sequence[str]) -> str | None:
-    """What this command said when all was as it is now; `None` where that is not known."""
-    command = _command_of(words)
-    if command is None or _ALL_ANEW in words:  # of most commands nothing is ever kept
+def previous_output(directory: str | None, words: Sequence[str]) -> str | None:
+    """Return what this command printed when all was as it is now; `None` if that is unknown."""
+    command = _identify_command(words)
+    if command is None or _NO_CACHE in words:  # most commands store nothing
         return None
     try:
         root = find_course_root(".") if directory is None else directory or "."
@@ -62,17 +62,17 @@ def said_before(directory: str | None, words: Sequence[str]) -> str | None:
 
 def run_unless_unchanged(
     arguments: argparse.Namespace,
-    made: tuple[str, ...],
+    outputs: tuple[str, ...],
     work: Callable[[Options], Report],
 ) -> int:
-    """Do the work; where all is well, the same command has nothing to do as long as all stays so.
+    """Do the work; if it succeeds, the same command has nothing to do while nothing changes.
 
-    `made` is what the command leaves behind.
+    `outputs` are the folders that the command writes.
     """
     from coursebuild.cli.arguments import options_of
 
     options = options_of(arguments)
-    command = _command_of(arguments.words)
+    command = _identify_command(arguments.words)
     watcher = None if command is None else Watcher(str(options.root), command)
     report = work(options)
     status = print_report(report, "text", options)
@@ -81,21 +81,21 @@ def run_unless_unchanged(
         from coursebuild.report import unchanged_report
 
         remark = f"nothing has changed since the last {arguments.words[0]}"
-        said = report_text(unchanged_report(report, remark), "text", options)
-        watcher.keep(said, (*report.depends, *package_paths()), made)
+        output = report_text(unchanged_report(report, remark), "text", options)
+        watcher.keep(output, (*report.depends, *package_paths()), outputs)
     return status
 
 
-def _command_of(words: Sequence[str]) -> tuple[str, ...] | None:
-    """The name of a command; `None` where it cannot have one.
+def _identify_command(words: Sequence[str]) -> tuple[str, ...] | None:
+    """The identity of a command; `None` where it cannot have one.
 
-    Which course is meant is no part of it, since what was said is kept there.
+    The course is no part of it, since its folder holds what was printed.
     """
-    own = [word for word in words if word != _ALL_ANEW]
-    around = [*look(sys.stdout), *map(os.environ.get, _VARIABLES)]
-    if any("/" in w or os.sep in w or os.path.exists(w) for w in own):  # noqa: PTH110
+    relevant_words = [word for word in words if word != _NO_CACHE]
+    conditions = [*terminal_style(sys.stdout), *map(os.environ.get, _VARIABLES)]
+    if any("/" in w or os.sep in w or os.path.exists(w) for w in relevant_words):  # noqa: PTH110
         try:
-            around.append(os.getcwd())  # noqa: PTH109  # from where paths are meant
+            conditions.append(os.getcwd())  # noqa: PTH109  # from where paths are meant
         except OSError:
             return None
-    return (*own, *map(repr, around))
+    return (*relevant_words, *map(repr, conditions))

@@ -16,7 +16,7 @@ examples:
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """What can be said."""
+    """Declare the arguments."""
     add_running(parser)
     add_lessons(parser)
     add_long(parser)
@@ -26,7 +26,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Record anew what scripts print."""
+    """Record what scripts print now."""
     options = options_of(arguments)
     report = update(options, tuple(arguments.lessons), dry_run=arguments.dry_run)
     return print_report(report, "text", options)

@@ -1,17 +1,17 @@
-"""The commands: the stages joined.
+"""The commands, which join the stages.
 
-Entry points: `check`, `build`, `update`, `extract`, `explain`, `serve`. Each takes the
-course's root and options, tells a `Progress` what it does, and gives what it found, most of them as
-a `Report`.
+Entry points: `check`, `build`, `update`, `extract`, `explain`, `export`. Each takes the options,
+which name the course's folder, says on a `Progress` what it does, and returns what it found, mostly
+as a `Report`.
 
 1. `options`, `progress`: what every command needs
-2. `check`: the way that `check`, `build` and `export` share, up to the verdict:
+2. `check`: the stages that `check`, `build` and `export` share:
    - `load`: disk → course. Its parser is `documents` (with `reading`, `fingerprints`), which parses
-     only what nobody has parsed
-   - `verify`: course → results. `scripts` runs those of which no result is kept;
-     `trials` tries what features have, as labs; `shards` leaves out the parts of other machines
-   - `judge`: findings → report, and the files for which it holds
+     only texts that were not parsed before
+   - `verify`: course → results. `scripts` runs scripts without a remembered result, `trials` runs
+     features' trials, such as those of labs; `shards` leaves out the work of other machines
+   - `judge`: diagnostics → report, and the files that it depends on
 3. `build`, with `site` (and `pages`, `page_index`): course and results → the files of a site
 
-`coursebuild.preview` does the same in a process that stays, with one page drawn first.
+`coursebuild.preview` does the same in a process that goes on, and draws the open page first.
 """

@@ -1,12 +1,12 @@
 """`coursebuild check --against VERSION`: what the scripts do with another version of MuJoCo.
 
-Entry point: `against(options, names, version)`.
+Entry point: `compare_with_version(options, names, version)`.
 
-1. The scripts run here, or ran.
+1. The scripts run here, unless their results are remembered.
 2. They run in an environment with the other version and otherwise the same packages (see
-   `core.run.environments`). Results are remembered by the versions, like those of here.
+   `core.run.environments`). Their results are remembered, too.
 3. Those that do something else run once more there, and in a fresh environment with the version of
-   here: what this shows is told (see `scripts.against`).
+   here, to find the cause (see `core.scripts.against`).
 4. The models and MJCF blocks are compiled there.
 """
 
@@ -42,13 +42,16 @@ from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import extract_scripts, run
 from coursebuild.pipeline.verify import compile_models
-from coursebuild.report.against import AgainstReport, ModelLine, ScriptAgainst
+from coursebuild.report.against import ComparisonReport, ModelLine, ScriptComparison
 
 
-def against(options: Options, names: tuple[str, ...], version: str) -> AgainstReport:
-    """What the scripts of the lessons that the names mean do with this version of MuJoCo.
+def compare_with_version(
+    options: Options, names: tuple[str, ...], version: str
+) -> ComparisonReport:
+    """Compare what scripts do here with what they do with this version of MuJoCo.
 
-    `latest` is the newest; where that is installed here, nothing is run.
+    The scripts are those of the lessons that the names mean. `latest` is the newest version; where
+    that is installed here, nothing is run.
 
     Raises:
         UsageError: it is no other version, or a name means nothing.
@@ -57,96 +60,104 @@ def against(options: Options, names: tuple[str, ...], version: str) -> AgainstRe
     if version == "latest":
         version = latest_version()
         if version == engine_version():
-            return AgainstReport(version, version, python_version(), (), ())
-    other = check_other_version(version)
+            return ComparisonReport(version, version, python_version(), (), ())
+    version = check_other_version(version)
     progress = Progress(quiet=options.quiet)
     options.store.listen(progress.say)
     with project_lock(options.root, progress.say):
-        loaded = load(options.root)
-        course = loaded.value
+        parsed_course = load(options.root)
+        course = parsed_course.value
         if course is not None and course.python is not None:
             raise UsageError(
                 f"--against: scripts of this course run with {course.python.path}; to try another "
                 "version, install it in a second environment and name that in the map"
             )
         if course is None:
-            wrong = next(d for d in loaded.diagnostics if d.is_error)
+            error = next(d for d in parsed_course.diagnostics if d.is_error)
             raise EffectError(
-                f"the course cannot be read: {wrong.span.path}:{wrong.span.line}: {wrong.message}",
+                f"the course cannot be read: {error.span.path}:{error.span.line}: {error.message}",
                 help="`coursebuild check` tells all that is wrong",
             )
         documents = select(course, names, options.root).documents
-        extracted = extract_scripts(course, options)
-        chosen = tuple(
+        extracted_scripts = extract_scripts(course, options)
+        scripts = tuple(
             e
-            for e in extracted.runnable
+            for e in extracted_scripts.runnable
             if (documents is None or e.document in documents) and not e.script.once
         )
-        work = _Work(course, options, progress, chosen, other)
+        work = _Comparison(course, options, progress, scripts, version)
         blocked = tuple(
-            ScriptAgainst(b.path, "", "uncompared", "the file there is not what its lesson says")
-            for b in extracted.blocked
+            ScriptComparison(b.path, "", "uncompared", "the file there is not what its lesson says")
+            for b in extracted_scripts.blocked
         )
         return work.report(blocked if documents is None else ())
 
 
-class _Work(Struct):
-    """The comparison of some scripts."""
+class _Comparison(Struct):
+    """What some scripts do with another version of MuJoCo."""
 
     course: Course
     options: Options
     progress: Progress
-    chosen: tuple[Extraction, ...]
-    other: str
-    here: dict[str, ScriptRun] = field(default_factory=dict)
+    scripts: tuple[Extraction, ...]
+    version: str
+    """The other version."""
+    runs_here: dict[str, ScriptRun] = field(default_factory=dict)
 
-    def report(self, blocked: tuple[ScriptAgainst, ...]) -> AgainstReport:
-        """Everything that there is to tell."""
-        runs = run(self.chosen, self.options, self.progress)
-        self.here = {one.path: one for one in runs}
-        interpreter = prepare_environment(self.options.root, self.other, self.progress.say)
-        here = run_standings(self.course, self.here, runs)
-        kept = {path: judge_comparability(standing) for path, standing in here.items()}
-        compared = [e for e in self.chosen if kept[e.path] is None]
-        there = self._run(compared, interpreter, f"running scripts with MuJoCo {self.other}")
-        differing = [e for e in compared if not there[e.path].holds]
-        again = self._run(differing, interpreter, "running scripts there again", fresh=True)
-        control, trouble = self._control(differing)
+    def report(self, blocked: tuple[ScriptComparison, ...]) -> ComparisonReport:
+        """Run the scripts with both versions and compare what they do."""
+        runs = run(self.scripts, self.options, self.progress)
+        self.runs_here = {r.path: r for r in runs}
+        interpreter = prepare_environment(self.options.root, self.version, self.progress.say)
+        standings_here = run_standings(self.course, self.runs_here, runs)
+        exclusions = {
+            path: judge_comparability(standing) for path, standing in standings_here.items()
+        }
+        comparable_scripts = [e for e in self.scripts if exclusions[e.path] is None]
+        standings_there = self._run(
+            comparable_scripts, interpreter, f"running scripts with MuJoCo {self.version}"
+        )
+        differing_scripts = [e for e in comparable_scripts if not standings_there[e.path].holds]
+        again = self._run(differing_scripts, interpreter, "running scripts there again", fresh=True)
+        control, trouble = self._run_control(differing_scripts)
         lines = []
-        for extraction in self.chosen:
-            path, reason = extraction.path, kept[extraction.path]
-            if reason is not None:
-                lines.append(ScriptAgainst(path, extraction.owner, reason.status, reason.reason))
-            elif there[path].holds:
-                lines.append(ScriptAgainst(path, extraction.owner, "same"))
-            else:
-                found = judge(there[path], control.get(path), again[path], engine_version())
-                why = found.reason + (f": {trouble}" if trouble and path not in control else "")
-                lines.append(self._line(extraction, there[path], found.status, why))
-        return AgainstReport(
+        for extraction in self.scripts:
+            path, exclusion = extraction.path, exclusions[extraction.path]
+            if exclusion is not None:
+                status, reason = exclusion.status, exclusion.reason
+                lines.append(ScriptComparison(path, extraction.owner, status, reason))
+                continue
+            standing = standings_there[path]
+            if standing.holds:
+                lines.append(ScriptComparison(path, extraction.owner, "same"))
+                continue
+            verdict = judge(standing, control.get(path), again[path], engine_version())
+            reason = verdict.reason + (f": {trouble}" if trouble and path not in control else "")
+            lines.append(self._line(extraction, standing, verdict.status, reason))
+        return ComparisonReport(
             engine_version(),
-            self.other,
+            self.version,
             python_version(),
             (*lines, *blocked),
-            self._models(interpreter),
+            self._compare_models(interpreter),
         )
 
     def _line(
-        self, extraction: Extraction, there: RunStanding, status: str, why: str
-    ) -> ScriptAgainst:
-        everything = extract(self.course).value
-        return ScriptAgainst(
+        self, extraction: Extraction, standing: RunStanding, status: str, reason: str
+    ) -> ScriptComparison:
+        extractions = extract(self.course).value
+        return ScriptComparison(
             extraction.path,
             extraction.owner,
             status,
-            why,
-            there.changes,
-            there.diff,
-            failure_diagnostic(extraction, there.run, everything),
+            reason,
+            standing.changes,
+            standing.diff,
+            failure_diagnostic(extraction, standing.run, extractions),
         )
 
-    def _control(self, scripts: Sequence[Extraction]) -> tuple[dict[str, RunStanding], str]:
-        """What they do in a fresh environment with the version of here; why there is none."""
+    def _run_control(self, scripts: Sequence[Extraction]) -> tuple[dict[str, RunStanding], str]:
+        """How they do in a fresh environment with the version of here, and why there is none."""
         if not scripts:
             return {}, ""
         try:
@@ -169,33 +180,33 @@ class _Work(Struct):
         """How the scripts do there, by path."""
         from coursebuild.core.run.runner import ScriptServer
 
-        there = replace(self.options, interpreter=interpreter)
-        memory = there.memory(fresh=fresh)
+        options_there = replace(self.options, interpreter=interpreter)
+        memory = options_there.memory(fresh=fresh)
         with ScriptServer() as server:
-            served = replace(there, run_all=server.run)
-            runs = run(scripts, served, self.progress, stage, memory)
-        return run_standings(self.course, self.here, runs)
+            server_options = replace(options_there, run_all=server.run)
+            runs = run(scripts, server_options, self.progress, stage, memory)
+        return run_standings(self.course, self.runs_here, runs)
 
-    def _models(self, interpreter: Interpreter) -> tuple[ModelLine, ...]:
-        """Of each model and MJCF block that compiles here, whether it does there."""
+    def _compare_models(self, interpreter: Interpreter) -> tuple[ModelLine, ...]:
+        """Whether the models and MJCF blocks that compile here do so there."""
         from coursebuild.core.run import mjcf
 
         texts = mjcf_texts(self.course)
         if not self.course.models and not texts:
             return ()
-        compiled, _ = compile_models(self.course, self.options, self.progress)
-        here = dict(compiled)
-        models = [model for model in self.course.models if not here[model.name].error]
+        results, _ = compile_models(self.course, self.options, self.progress)
+        results_here = dict(results)
+        models = [model for model in self.course.models if not results_here[model.name].error]
         root = self.options.root
         texts_here = mjcf.compile_all(root, [(mjcf.TEXT_PATH, text.text) for text in texts])
         good = [t for t, result in zip(texts, texts_here, strict=True) if not result.error]
-        compared = [(model.source.path, model.source.text) for model in models]
-        compared += [(mjcf.TEXT_PATH, text.text) for text in good]
-        with self.progress.stage(f"compiling models with MuJoCo {self.other}"):
-            there = mjcf.compile_all(root, compared, python=interpreter.python)
+        texts_to_compile = [(model.source.path, model.source.text) for model in models]
+        texts_to_compile += [(mjcf.TEXT_PATH, text.text) for text in good]
+        with self.progress.stage(f"compiling models with MuJoCo {self.version}"):
+            results_there = mjcf.compile_all(root, texts_to_compile, python=interpreter.python)
         places = [(model.source.path, 1) for model in models]
         places += [(text.block.span.path, text.block.span.line) for text in good]
         return tuple(
             ModelLine(path, line, mjcf.readable_error(result.error))
-            for (path, line), result in zip(places, there, strict=True)
+            for (path, line), result in zip(places, results_there, strict=True)
         )

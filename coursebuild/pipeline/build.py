@@ -1,4 +1,4 @@
-"""`coursebuild build`: verify everything, put the site together, publish it when nothing is wrong.
+"""`coursebuild build`: verify the course, make its site, and publish it when nothing is wrong.
 
 Entry points: `build(options, out)`; `prepare(options, progress)`, what it would publish.
 """
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from coursebuild.numerics.reports import Reports
     from coursebuild.pipeline.site import Site
 
-Make: TypeAlias = "Callable[[Course, Results, Documents, Options, Reports], Site]"
-"""Puts files together from a course in which nothing is wrong."""
+MakeSite: TypeAlias = "Callable[[Course, Results, Documents, Options, Reports], Site]"
+"""Makes the files of a course in which nothing is wrong."""
 
 
 def build(options: Options, out: Path) -> Report:
@@ -48,34 +48,34 @@ def build(options: Options, out: Path) -> Report:
 
 @contextmanager
 def prepare(
-    options: Options, progress: Progress, make: Make | None = None
+    options: Options, progress: Progress, make: MakeSite | None = None
 ) -> Iterator[tuple[Report, Site | None]]:
-    """The verdict on a course, and its site where nothing is wrong.
+    """The report on a course, and its site where nothing is wrong.
 
-    The caller holds the course's lock, and has the files made meanwhile. `make` puts other files
-    together than those of the site.
+    The caller holds the course's lock, and makes the files before the context ends. `make` makes
+    other files than those of the site.
     """
     with Documents(options.store, options.jobs, progress.stage) as documents:
-        checked = read_and_verify(options, progress, documents, static=True)
-        if not checked.is_sound:
-            yield checked.report(), None
+        checked_course = read_and_verify(options, progress, documents, static=True)
+        if not checked_course.is_sound:
+            yield checked_course.report(), None
             return
         from coursebuild.core.pages.templates import TemplateFailure
         from coursebuild.pipeline.site import site_files
 
-        assert checked.course is not None and checked.verified is not None
-        results, reports = checked.verified.results, checked.reports
-        wrong: tuple[Diagnostic, ...] = ()
+        assert checked_course.course is not None and checked_course.verification is not None
+        results, reports = checked_course.verification.results, checked_course.reports
+        diagnostics: tuple[Diagnostic, ...] = ()
         try:
-            site = (make or site_files)(checked.course, results, documents, options, reports)
-            wrong = site.diagnostics
-            if checked.course.theme.templates:  # which may fail in any page
+            site = (make or site_files)(checked_course.course, results, documents, options, reports)
+            diagnostics = site.diagnostics
+            if checked_course.course.theme.templates:  # these may fail on any page
                 for file in site.files:
                     if file.path.endswith(".html"):
                         file.make()
         except TemplateFailure as failure:
             from coursebuild.pipeline.theme import template_diagnostic
 
-            wrong = (template_diagnostic(checked.course, failure),)
-        report = checked.report(wrong)
+            diagnostics = (template_diagnostic(checked_course.course, failure),)
+        report = checked_course.report(diagnostics)
         yield report, site if report.ok else None

@@ -1,6 +1,6 @@
 """`coursebuild check`: verify the course, or some lessons of it; publish nothing.
 
-Entry points: `check(options, names)`; `read_and_verify`, which a build begins with as well.
+Entry points: `check(options, names)`; `read_and_verify`, which `build` and `export` share.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
-from coursebuild.pipeline.verify import Verified, verify
+from coursebuild.pipeline.verify import Verification, verify
 from coursebuild.report import Report
 from coursebuild.report.values import plural
 
@@ -52,62 +52,66 @@ def check(
     progress = Progress(quiet=options.quiet)
     with project_lock(options.root, progress.say):
         with Documents(options.store, options.jobs, progress.stage) as documents:
-            checked = read_and_verify(options, progress, documents, names, shard=shard)
-        course, verified = checked.course, checked.verified
-        if course is None or verified is None:
-            return checked.report()
+            checked_course = read_and_verify(options, progress, documents, names, shard=shard)
+        course, verification = checked_course.course, checked_course.verification
+        if course is None or verification is None:
+            return checked_course.report()
         if timings is not None:
             from coursebuild.pipeline.shards import write_timings
 
-            write_timings(timings, _seconds(verified), _names(course))
-        told = unproven(course) if truth else ()
-        sensitive, found = None, [one for one in told if isinstance(one, Diagnostic)]
+            write_timings(timings, _seconds_by_name(verification), _names(course))
+        claims = unproven(course) if truth else ()
+        diagnostics = [claim for claim in claims if isinstance(claim, Diagnostic)]
+        remarks = [claim for claim in claims if isinstance(claim, str)]
+        sensitivities: tuple[Sensitivity, ...] | None = None
         if sensitivity:
-            sensitive, warnings = _sensitivity(course, options, progress, verified, checked.chosen)
-            found += warnings
-        remarks = [one for one in told if isinstance(one, str)]
+            sensitivities, warnings = _measure_sensitivity(
+                course, options, progress, verification, checked_course.selection
+            )
+            diagnostics += warnings
         if shard is not None:
-            remarks.append(_part(shard, verified))
-        return replace(checked.report(found), remarks=tuple(remarks), sensitivity=sensitive)
+            remarks.append(_describe_part(shard, verification))
+        report = checked_course.report(diagnostics)
+        return replace(report, remarks=tuple(remarks), sensitivity=sensitivities)
 
 
 class CheckedCourse(Struct, frozen=True):
-    """A course, what running it found, and all that is wrong with it."""
+    """A course with the results of running it and everything that is wrong with it."""
 
     began: float
     """When the command began, by `time.monotonic`."""
     diagnostics: tuple[Diagnostic, ...]
-    chosen: Selection
-    """What the command is about."""
+    selection: Selection
+    """The lessons and pages that the command is about."""
     course: Course | None = None
-    """Nothing where the map cannot be read; likewise the others."""
-    verified: Verified | None = None
+    """`None` where the map cannot be read; then so is `verification`."""
+    verification: Verification | None = None
     reports: Reports = Reports()
     """Those that pages may show."""
     interpreter: Interpreter | None = None
-    """Where the scripts ran, if not here."""
+    """The interpreter of the scripts, if it is not ours."""
 
     @property
     def is_sound(self) -> bool:
         """Whether nothing is wrong but what warnings say."""
         return self.course is not None and not any(d.is_error for d in self.diagnostics)
 
-    def report(self, more: Iterable[Diagnostic] = ()) -> Report:
-        """The report; `more` is what else was found."""
-        found = (*self.diagnostics, *more)
-        course, verified, chosen = self.course, self.verified, self.chosen
-        if course is None or verified is None:
-            return judge(None, found, self.began)
+    def report(self, further: Iterable[Diagnostic] = ()) -> Report:
+        """The report; `further` are diagnostics found since."""
+        diagnostics = (*self.diagnostics, *further)
+        course, verification, selection = self.course, self.verification, self.selection
+        if course is None or verification is None:
+            return judge(None, diagnostics, self.began)
         report = judge(
             course,
-            found,
+            diagnostics,
             self.began,
-            scripts=verified.scripts,
-            lessons=len(chosen.lessons),
-            documents=chosen.documents,
-            labs=verified.labs,
+            scripts=verification.scripts,
+            lessons=len(selection.lessons),
+            documents=selection.documents,
+            labs=verification.labs,
         )
-        return replace(report, depends=depends_on(course, verified.results, self.interpreter))
+        return replace(report, depends=depends_on(course, verification.results, self.interpreter))
 
 
 def read_and_verify(
@@ -121,46 +125,61 @@ def read_and_verify(
 ) -> CheckedCourse:
     """What `check`, `build` and `export` do: read a course, check it, run it.
 
-    The caller holds the course's lock. `static`: with what pages are made of.
+    The caller holds the course's lock. `static`: with the static forms of labs, for pages.
     """
     began = time.monotonic()
-    loaded = load(options.root, documents, trusted=options.sandbox is None)
-    course = loaded.value
+    parsed_course = load(options.root, documents, trusted=options.sandbox is None)
+    course = parsed_course.value
     if course is None:
-        return CheckedCourse(began, loaded.diagnostics, Selection((), (), None))
-    chosen = select(course, names, options.root)
+        return CheckedCourse(began, parsed_course.diagnostics, Selection((), (), None))
+    selection = select(course, names, options.root)
     options = options.for_course(course)
-    verified = verify(course, options, progress, chosen.documents, static=static, shard=shard)
+    verification = verify(
+        course, options, progress, selection.documents, static=static, shard=shard
+    )
     reports = shown_reports(options.root, course)
-    found = (*loaded.diagnostics, *verified.diagnostics, *reports.diagnostics)
-    return CheckedCourse(began, found, chosen, course, verified, reports.value, options.interpreter)
+    diagnostics = (*parsed_course.diagnostics, *verification.diagnostics, *reports.diagnostics)
+    return CheckedCourse(
+        began, diagnostics, selection, course, verification, reports.value, options.interpreter
+    )
 
 
-def _sensitivity(
-    course: Course, options: Options, progress: Progress, verified: Verified, chosen: Selection
+def _measure_sensitivity(
+    course: Course,
+    options: Options,
+    progress: Progress,
+    verification: Verification,
+    selection: Selection,
 ) -> tuple[tuple[Sensitivity, ...], list[Diagnostic]]:
-    """Which printed digits hold, and the warnings of those that do not."""
+    """Which printed digits hold, and warnings of those that do not."""
     from coursebuild.core.scripts.sensitivity import noise_warnings
     from coursebuild.pipeline.sensitivity import measure
 
-    by_path = {run.path: run for run in verified.results.runs}
-    ran = [extraction for extraction in extract(course).value if extraction.path in by_path]
-    runs = [by_path[extraction.path] for extraction in ran]
-    own = options.for_course(course)
-    measured = measure(course, own, progress, ran, runs, chosen.documents, halve=True)
-    return measured, [warning for one in measured for warning in noise_warnings(one)]
+    by_path = {run.path: run for run in verification.results.runs}
+    scripts = [extraction for extraction in extract(course).value if extraction.path in by_path]
+    runs = [by_path[extraction.path] for extraction in scripts]
+    options = options.for_course(course)
+    sensitivities = measure(
+        course, options, progress, scripts, runs, selection.documents, halve=True
+    )
+    return sensitivities, [warning for s in sensitivities for warning in noise_warnings(s)]
 
 
-def _part(shard: Shard, verified: Verified) -> str:
-    """What a part of the work was, so that its report is not taken for the whole."""
-    scripts, labs = plural(len(verified.scripts), "script"), plural(len(verified.labs), "lab")
+def _describe_part(shard: Shard, verification: Verification) -> str:
+    """A remark that this was one part of the work, so that nobody takes it for the whole."""
+    scripts, labs = (
+        plural(len(verification.scripts), "script"),
+        plural(len(verification.labs), "lab"),
+    )
     return f"this was part {shard} of the work: {scripts} and {labs}"
 
 
-def _seconds(verified: Verified) -> dict[str, float]:
+def _seconds_by_name(verification: Verification) -> dict[str, float]:
     """How long scripts and labs took, or took when they were last run."""
-    found = {s.path: s.seconds for s in verified.scripts if s.status not in ("skipped", "norun")}
-    return found | {lab.name: lab.seconds for lab in verified.labs if lab.tried}
+    seconds = {
+        s.path: s.seconds for s in verification.scripts if s.status not in ("skipped", "norun")
+    }
+    return seconds | {lab.name: lab.seconds for lab in verification.labs if lab.tried}
 
 
 def _names(course: Course) -> list[str]:

@@ -1,11 +1,12 @@
-"""The documents of a course from what is kept, and by work spread over the cores where it is not.
+"""The documents of a course and their pages, from the store or made by several processes.
 
-Entry point: `Documents`, a context manager and the `Parser` of a course, which gives summaries
-(`document`) and draws pages (`draw`).
+Entry point: `Documents`, a context manager and the `Parser` of a course, which returns summaries
+(`read_document`) and draws pages (`draw`).
 
-1. `ahead` is told which texts there are. The summaries of texts that were read before come from the
-   store; the others are read, in copies of this process where there are many.
-2. `draw` draws pages: each in the copy that has read its document, which has it still.
+1. `prefetch` gets the summaries of texts. Those of texts that were read before come from the store;
+   the other texts are read, by worker processes where there are many.
+2. `draw` draws pages. The worker that has read a document also draws its page, since it still has
+   the whole document.
 """
 
 from __future__ import annotations
@@ -45,21 +46,21 @@ Stage: TypeAlias = Callable[[str], AbstractContextManager[None]]
 Request: TypeAlias = SourceText | PageRequest
 
 
-def _silent(name: str) -> AbstractContextManager[None]:
+def _no_stage(name: str) -> AbstractContextManager[None]:
     return nullcontext()
 
 
 _MAPS, _DECLARATIONS, _CHECKED = "maps", "declarations", "checked"
-"""Kinds of entries in the store; the last says in what nothing was wrong."""
+"""Kinds of entries in the store; the last is for courses in which nothing was wrong."""
 _MANY = 8
-"""Texts or pages for which copies of this process are worth their start."""
+"""Texts or pages for which worker processes are worth their start."""
 
 
 class Documents(Parser):
     """Summaries of the documents of a course, and their pages."""
 
-    def __init__(self, store: Memo, jobs: int, stage: Stage = _silent) -> None:
-        """`jobs` copies of this process at most; `stage` is told when long work begins."""
+    def __init__(self, store: Memo, jobs: int, stage: Stage = _no_stage) -> None:
+        """Use `jobs` worker processes at most; `stage` is called when long work begins."""
         self._store = store
         self._stage = stage
         self._jobs = jobs
@@ -67,7 +68,7 @@ class Documents(Parser):
         self._summaries: dict[str, DocumentSummary] = {}
         self._fingerprints: tuple[Course, str | None, str | None] | None = None
         self._readers: dict[str, int] = {}
-        """Which copy has read a text, by its path."""
+        """The number of the worker that has read a text, by the text's path."""
         self._reader = PageReader(store)
         self._workers: Workers[Request, bytes] | None = None
 
@@ -78,12 +79,12 @@ class Documents(Parser):
         self.close()
 
     def close(self) -> None:
-        """End the copies, and what typesets formulas: a process that ends with it may hang."""
-        self.rest()
+        """End the workers, and what typesets formulas: with it running, a process may hang."""
+        self.stop_workers()
         self._reader.close()
 
-    def rest(self) -> None:
-        """End the copies; what they remember is gone, and the room is free that they took."""
+    def stop_workers(self) -> None:
+        """End the workers, which frees their memory with the documents that they have read."""
         if self._workers is not None:
             self._workers.close()
             self._workers = None
@@ -93,144 +94,152 @@ class Documents(Parser):
 
     @property
     def imports(self) -> dict[str, frozenset[str]]:
-        """The modules that each script imports, by its path, as far as texts were read."""
-        found = (imported for summary in self._summaries.values() for imported in summary.imports)
-        return {path: frozenset(modules) for path, modules in found}
+        """The modules that each script imports, by its path; of the documents read so far."""
+        imports = (pair for summary in self._summaries.values() for pair in summary.imports)
+        return {path: frozenset(modules) for path, modules in imports}
 
     def fingerprint(self, course: Course, *, notes: bool = True) -> str | None:
-        """That of a course whose documents these are; `None` for any other.
+        """The fingerprint of a course whose documents these are; `None` for any other course.
 
-        `notes`: with what features note of its documents, which few pages show.
+        `notes`: of what features note of its documents, too, which few pages show.
         """
         if self._fingerprints is None or self._fingerprints[0] is not course:
             summaries = self._summaries
             bare = course_fingerprint(
                 course, ((s.document, s.fingerprint) for s in summaries.values())
             )
-            own = (summaries[d.source.path].notes_fingerprint for d in course.documents)
-            self._fingerprints = course, bare, None if bare is None else key_of(bare, *own)
+            note_fingerprints = (
+                summaries[d.source.path].notes_fingerprint for d in course.documents
+            )
+            self._fingerprints = (
+                course,
+                bare,
+                None if bare is None else key_of(bare, *note_fingerprints),
+            )
         _, bare, whole = self._fingerprints
         return whole if notes else bare
 
     def check(self, course: Course) -> tuple[Diagnostic, ...]:
-        """What `check_course` finds; nothing where it found nothing in one of this fingerprint."""
+        """What `check_course` finds; a course that was found clean is not checked again."""
         key = step_key("checked course")
         state = (self.fingerprint(course) or "").encode()
         if state and self._store.get(_CHECKED, key, bytes) == state:
             return ()
-        found = super().check(course)
-        if state and not found:
+        diagnostics = super().check(course)
+        if state and not diagnostics:
             self._store.put(_CHECKED, key, state)
-        return found
+        return diagnostics
 
-    def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
-        """Have the summaries of sources, of which it is said which are lessons."""
+    def prefetch(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
+        """Get the summaries of sources, each given with whether it is a lesson."""
         texts = [SourceText.of(source, callouts, lesson=lesson) for source, lesson in sources]
-        missing = [text for text in texts if not self._has(text)]
+        missing = [text for text in texts if not self._has_summary(text)]
         if len(missing) >= _MANY:
             prepare_to_read(missing[0])
-        answers = self._work("reading lessons and pages", iter(missing))
+        answers = self._answer_requests("reading lessons and pages", iter(missing))
         for text, (data, reader) in zip(missing, answers, strict=True):
-            self._take(text, decode(data, DocumentSummary, text.source))
+            self._add_summary(text, decode(data, DocumentSummary, text.source))
             if reader is not None:
                 self._readers[text.source.path] = reader
 
-    def _has(self, text: SourceText) -> bool:
-        """Whether the summary of a text is known, or in the store."""
-        known = self._texts.get(text.source.path)
-        if known is not None and known.key == text.key:
+    def _has_summary(self, text: SourceText) -> bool:
+        """Whether there is a summary of a text, in memory or in the store."""
+        text_before = self._texts.get(text.source.path)
+        if text_before is not None and text_before.key == text.key:
             return True
         summary = self._store.get(
             SUMMARIES, text.key, lambda data: decode(data, DocumentSummary, text.source)
         )
         if summary is not None:
-            self._take(text, summary)
+            self._add_summary(text, summary)
         return summary is not None
 
-    def _take(self, text: SourceText, summary: DocumentSummary | None) -> None:
+    def _add_summary(self, text: SourceText, summary: DocumentSummary | None) -> None:
         assert summary is not None, "what was just encoded can be decoded"
         self._texts[text.source.path] = text
-        self._summaries[text.source.path] = summary.noted(partial(self._notes_again, text))
+        self._summaries[text.source.path] = summary.with_notes(partial(self._remake_notes, text))
 
-    def _notes_again(self, text: SourceText) -> Mapping[str, bytes]:
-        """The notes of a text of which the store has damaged ones."""
-        self._store.peek(SUMMARIES, text.key, lambda _: None)  # which tells of it
+    def _remake_notes(self, text: SourceText) -> Mapping[str, bytes]:
+        """Make the notes of a text again, since those in the store are damaged."""
+        self._store.peek(SUMMARIES, text.key, lambda _: None)  # this reports the damaged entry
         summary = decode(self._reader.read(text), DocumentSummary, text.source)
         assert summary is not None, "what was just encoded can be decoded"
         return summary.notes
 
-    def document(
+    def read_document(
         self, source: Source, callouts: frozenset[str], *, lesson: bool
     ) -> Parsed[Document]:
-        """A document without its prose, and what is wrong in it."""
-        known = self._texts.get(source.path)
+        """Return a document without its prose, and what is wrong in it."""
+        text = self._texts.get(source.path)
         if (
-            known is None
-            or known.source is not source
-            or (known.callouts, known.lesson) != (callouts, lesson)
+            text is None
+            or text.source is not source
+            or (text.callouts, text.lesson) != (callouts, lesson)
         ):
-            self.ahead([(source, lesson)], callouts)
+            self.prefetch([(source, lesson)], callouts)
         summary = self._summaries[source.path]
         return Parsed(summary.document, summary.diagnostics)
 
-    def course_map(self, source: Source) -> Parsed[Course | None]:
-        """The course that a map describes, and what is wrong in it."""
-        return self._remembered(_MAPS, Course, source, super().course_map)
+    def read_map(self, source: Source) -> Parsed[Course | None]:
+        """Return the course that a map describes, and what is wrong in it."""
+        return self._get_or_parse(_MAPS, Course, source, super().read_map)
 
-    def declarations(self, source: Source) -> Parsed[Declarations | None]:
-        """What a file beside a model declares, and what is wrong in it."""
-        return self._remembered(_DECLARATIONS, Declarations, source, super().declarations)
+    def read_declarations(self, source: Source) -> Parsed[Declarations | None]:
+        """Return what a file beside a model declares, and what is wrong in it."""
+        return self._get_or_parse(_DECLARATIONS, Declarations, source, super().read_declarations)
 
-    def _remembered(
+    def _get_or_parse(
         self,
         kind: str,
         type: type[Value],
         source: Source,
         parse: Callable[[Source], Parsed[Value | None]],
     ) -> Parsed[Value | None]:
-        """What a text parses to: kept, or parsed now, by what is imported only then."""
+        """Return what is stored for a text; parse it where nothing is."""
         key = step_key(kind, source.path, source.text)
 
         def read(data: bytes) -> Parsed[Value | None] | None:
-            parsed = decode(data, Parsed, source)
-            return parsed if parsed and isinstance(parsed.value, type | None) else None
+            content = decode(data, Parsed, source)
+            return content if content and isinstance(content.value, type | None) else None
 
-        found = self._store.get(kind, key, read)
-        if found is not None:
-            return found
-        parsed = parse(source)
-        self._store.put(kind, key, encode(parsed))
-        return parsed
+        entry = self._store.get(kind, key, read)
+        if entry is not None:
+            return entry
+        result = parse(source)
+        self._store.put(kind, key, encode(result))
+        return result
 
     # --- drawing
 
     def draw(self, pages: Iterator[PageRequest]) -> Iterator[bytes]:
-        """Draw pages, which are in the store then; gives their records, encoded, in order.
+        """Draw pages and store them; return their records, encoded, in order.
 
-        Pages are asked for while others are drawn.
+        Requests are taken from the iterator while pages are drawn.
         """
-        return (data for data, _ in self._work("drawing pages", pages))
+        return (data for data, _ in self._answer_requests("drawing pages", pages))
 
-    def page(self, key: str, request: Callable[[], PageRequest]) -> DrawnPage:
-        """The page of a key, as it is in the store; drawn here and now, where it is not."""
-        kept = self._store.peek(PAGES, key, lambda data: decode(data, DrawnPage))
-        return kept or self._reader.draw(request())
+    def get_or_draw(self, key: str, request: Callable[[], PageRequest]) -> DrawnPage:
+        """Return the page stored under a key; draw it here where there is none."""
+        entry = self._store.peek(PAGES, key, lambda data: decode(data, DrawnPage))
+        return entry or self._reader.draw(request())
 
-    def context(self, path: str, inputs: PageInputs, course: Course) -> PageContext:
-        """The document at a path with all its text, on the page with these inputs."""
-        own = course.theme.template_texts
-        return self._reader.context(self._texts[path], inputs, course.language, own)
+    def page_context(self, path: str, inputs: PageInputs, course: Course) -> PageContext:
+        """What is needed to draw parts of the document at a path, with all its text."""
+        templates = course.theme.template_texts
+        return self._reader.page_context(self._texts[path], inputs, course.language, templates)
 
-    # --- here, or in copies of this process
+    # --- here, or in worker processes
 
-    def _work(self, name: str, requests: Iterator[Request]) -> Iterator[tuple[bytes, int | None]]:
-        """The answers to requests, from copies of this process where there are many requests."""
+    def _answer_requests(
+        self, name: str, requests: Iterator[Request]
+    ) -> Iterator[tuple[bytes, int | None]]:
+        """Answer requests, by workers where there are many; name the worker of each answer."""
         first = tuple(islice(requests, max(_MANY, self._jobs * _MANY // 2)))
         requests = chain(first, requests)
         if self._workers is None and len(first) >= _MANY and self._jobs > 1:
             from coursebuild.core.engine.workers import Workers, can_fork
 
-            # Before the stage begins, which may start a thread that could not come along.
+            # Before the stage begins, which may start a thread: a fork does not copy threads.
             if can_fork():
                 count = min(self._jobs, -(-2 * len(first) // _MANY))
                 self._workers = Workers(self._reader.answer, count)
@@ -240,9 +249,9 @@ class Documents(Parser):
             if self._workers is None:
                 yield from ((self._reader.answer(request), None) for request in requests)
             else:
-                yield from self._workers.map(map(self._to, requests))
+                yield from self._workers.map(map(self._assign, requests))
 
-    def _to(self, request: Request) -> tuple[int | None, Request]:
-        """A request, to the copy that has its document."""
+    def _assign(self, request: Request) -> tuple[int | None, Request]:
+        """A request with the number of the worker that has its document, if any."""
         text = request.text if isinstance(request, PageRequest) else None
         return (None if text is None else self._readers.get(text.source.path)), request

@@ -1,6 +1,6 @@
-"""What can be downloaded beside pages: scripts, models, files of the course, archives of scripts.
+"""The files that can be downloaded: scripts, models, files of the course, archives of scripts.
 
-Entry point: `Downloads.of`. What is in an archive says `core.pages.zips`.
+Entry point: `Downloads.of`. `core.pages.zips` says what is in an archive.
 """
 
 from __future__ import annotations
@@ -32,27 +32,27 @@ _DIGEST = hashlib.sha256().digest_size * 2
 
 
 class Downloads(Struct, frozen=True):
-    """The files, and what of them others are made from."""
+    """The files, and what features make others from."""
 
     files: tuple[SiteFile, ...]
     archives: Mapping[str, zips.Archive]
     """Archives of scripts by site path."""
     imports: Callable[[str], frozenset[str]]
-    """Says what a Python text imports."""
+    """Returns the modules that a Python text imports."""
 
     @classmethod
     def of(
         cls, library: Library, assets: Assets, documents: Documents, root: Path, store: Memo
     ) -> Downloads:
-        """Those of a course whose documents were read."""
-        imports = _imports(library, documents)
-        around = _surroundings(library, root, store, imports)
-        archives = {archive.path: archive for archive in zips.make_archives(library, around)}
-        packed = (
-            CachedFile(one.path, step_key("archive", one.key), one.pack)
-            for one in archives.values()
+        """The downloads of a course whose documents were read."""
+        imports = _make_imports(library, documents)
+        surroundings = _find_surroundings(library, root, store, imports)
+        archives = {archive.path: archive for archive in zips.make_archives(library, surroundings)}
+        archive_files = (
+            CachedFile(archive.path, step_key("archive", archive.key), archive.pack)
+            for archive in archives.values()
         )
-        files = (*_scripts_and_models(library), *_files(library, assets, root), *packed)
+        files = (*_scripts_and_models(library), *_files(library, assets, root), *archive_files)
         return cls(files, archives, imports)
 
 
@@ -64,29 +64,29 @@ def _scripts_and_models(library: Library) -> Iterator[SiteFile]:
 
 
 def _files(library: Library, assets: Assets, root: Path) -> Iterator[SiteFile]:
-    """Files of the course that pages show or link to, and dark siblings of its drawings."""
-    drawn = (figure for d in library.course.documents for figure in recorded_figures(d))
-    dark = frozenset(figure.path for figure in drawn if figure.has_dark)
+    """Files of the course that pages show or link to, and dark versions of its drawings."""
+    figures = (figure for d in library.course.documents for figure in recorded_figures(d))
+    dark = frozenset(figure.path for figure in figures if figure.has_dark)
     for path in library.course.files:
         digest = file_state(f"{root}/{path}")
         read = functools.partial(read_bytes, root, path)
-        if len(digest) != _DIGEST:  # it is gone, or cannot be read, as reading it says
+        if len(digest) != _DIGEST:  # it is gone or cannot be read: `read` raises the right error
             digest = hashlib.sha256(read()).hexdigest()
         yield CachedFile(urls.file_path(path), digest, read)
         if path in dark:
-            made = functools.partial(_dark, assets, read)
-            yield CachedFile(urls.dark_path(path), step_key("dark drawing", digest), made)
+            make = functools.partial(_make_dark_drawing, assets, read)
+            yield CachedFile(urls.dark_path(path), step_key("dark drawing", digest), make)
 
 
-def _dark(assets: Assets, read: Callable[[], bytes]) -> bytes:
-    known = dark_colours(assets.file("css/site.css").decode())
-    return dark_drawing(read().decode(), known).encode()
+def _make_dark_drawing(assets: Assets, read: Callable[[], bytes]) -> bytes:
+    colours = dark_colours(assets.file("css/site.css").decode())
+    return dark_drawing(read().decode(), colours).encode()
 
 
-def _surroundings(
+def _find_surroundings(
     library: Library, root: Path, store: Memo, imports: Callable[[str], frozenset[str]]
 ) -> zips.Surroundings:
-    """What scripts need around them."""
+    """What scripts need to run elsewhere: packages, modules, models' files and a style."""
     if not library.scripts:
         return zips.Surroundings()
     folders = [root / package.path for package in library.course.packages]
@@ -97,22 +97,27 @@ def _surroundings(
         if path.startswith("models/")
     )
     style = tuple(OutputFile(path.name, path.read_bytes()) for path in root.glob("matplotlibrc"))
-    around = zips.Surroundings((), ours, meshes, style, imports)
-    modules = zips.foreign_modules(library.course, around)
+    surroundings = zips.Surroundings((), ours, meshes, style, imports)
+    modules = zips.foreign_modules(library.course, surroundings)
     interpreter = course_environment(root, library.course).value
-    installed = distributions(store, modules, None if interpreter is None else interpreter.packages)
-    packages = tuple(zips.Package(*one) for one in installed)
-    return replace(around, packages=packages)
+    installed_packages = distributions(
+        store, modules, None if interpreter is None else interpreter.packages
+    )
+    packages = tuple(zips.Package(*package) for package in installed_packages)
+    return replace(surroundings, packages=packages)
 
 
-def _imports(library: Library, documents: Documents) -> Callable[[str], frozenset[str]]:
-    """What Python texts import: those of lessons are known."""
-    scripts, known = library.scripts, documents.imports
-    found = {scripts[path][0].code.text: known[path] for path in scripts.keys() & known}
+def _make_imports(library: Library, documents: Documents) -> Callable[[str], frozenset[str]]:
+    """Make the function that returns a text's imports; those of scripts are known already."""
+    scripts, imports_by_path = library.scripts, documents.imports
+    imports_by_text = {
+        scripts[path][0].code.text: imports_by_path[path]
+        for path in scripts.keys() & imports_by_path
+    }
 
     def imports(text: str) -> frozenset[str]:
-        if text not in found:
-            found[text] = find_imports(text)
-        return found[text]
+        if text not in imports_by_text:
+            imports_by_text[text] = find_imports(text)
+        return imports_by_text[text]
 
     return imports

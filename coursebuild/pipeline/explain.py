@@ -41,7 +41,7 @@ from coursebuild.core.text.rules import RULES
 from coursebuild.numerics.reports.records import BENCH
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
-from coursebuild.report.explained import Explained, Explanation, State
+from coursebuild.report.explained import Explanation, RunExplanation, State
 
 
 def explain(options: Options, name: str) -> Explanation:
@@ -50,10 +50,12 @@ def explain(options: Options, name: str) -> Explanation:
     Raises:
         UsageError: the course cannot be read, or nothing in it is called so.
     """
-    return _Explainer(load_course(options.root), options).of(name)
+    return _Explainer(load_course(options.root), options).explain(name)
 
 
 class _Explainer:
+    """Knows a course and its last results."""
+
     def __init__(self, course: Course, options: Options) -> None:
         self.course = course
         self.root = options.root
@@ -68,38 +70,46 @@ class _Explainer:
             extraction.path: (extraction, job)
             for extraction, job in zip(extractions, jobs(extractions), strict=True)
         }
-        tried = feature_trials(course).items()
-        inputs = ((name, kind.inputs(trial), trial) for name, (kind, trial) in tried)
-        self.labs = {name: (known, trial) for name, known, trial in inputs if known is not None}
+        trials = feature_trials(course).items()
+        inputs = ((name, kind.inputs(trial), trial) for name, (kind, trial) in trials)
+        self.labs = {
+            name: (trial_inputs, trial)
+            for name, trial_inputs, trial in inputs
+            if trial_inputs is not None
+        }
 
-    def of(self, name: str) -> Explanation:
+    def explain(self, name: str) -> Explanation:
         path = path_from_root(name, self.root)
         for candidate in (name, path):
-            found = self._named(candidate)
-            if found is not None:
-                return found
-        dependents = self._dependents(path)
-        whole = self._part_of(path)
+            explanation = self._find_by_name(candidate)
+            if explanation is not None:
+                return explanation
+        dependents = self._find_dependents(path)
+        whole = self._models_with(path)
         if not dependents and not whole and not (self.root / path).exists():
-            near = nearest(name, [*self.scripts, *self.labs, *self.documents, *RULES])
-            help = f"did you mean `{near}`?" if near is not None else ""
+            closest = nearest(name, [*self.scripts, *self.labs, *self.documents, *RULES])
+            help = f"did you mean `{closest}`?" if closest is not None else ""
             raise UsageError(f"nothing of this course is called `{name}`", help=help)
-        return self._file(path, "file", dependents)
+        return self._explain_file(path, "file", dependents)
 
-    def _named(self, name: str) -> Explanation | None:
+    def _find_by_name(self, name: str) -> Explanation | None:
         if name in self.scripts:
-            dependents = self._dependents(name)
-            own = self._script(name)
-            return Explanation(name, "script", (own,), dependents, shown=self._shown(name))
+            dependents = self._find_dependents(name)
+            explanation = self._explain_script(name)
+            return Explanation(
+                name, "script", (explanation,), dependents, shown_in=self._documents_using(name)
+            )
         if name in self.labs:
-            return Explanation(name, "lab", (self._lab(name),))
+            return Explanation(name, "lab", (self._explain_lab(name),))
         part = self.documents.get(name)
         if part is not None:
             scripts = [
-                self._script(p) for p, (e, _) in self.scripts.items() if e.document == part.path
+                self._explain_script(p)
+                for p, (e, _) in self.scripts.items()
+                if e.document == part.path
             ]
             labs = [
-                self._lab(name)
+                self._explain_lab(name)
                 for name, (_, trial) in self.labs.items()
                 if trial.block.span.path == part.path
             ]
@@ -108,54 +118,54 @@ class _Explainer:
         for model in self.course.models:
             path = model.source.path
             if name in (model.name, path):
-                return self._file(path, "model", self._dependents(path))
+                return self._explain_file(path, "model", self._find_dependents(path))
         return None
 
-    def _file(
-        self, path: str, kind: Literal["model", "file"], dependents: tuple[Explained, ...]
+    def _explain_file(
+        self, path: str, kind: Literal["model", "file"], dependents: tuple[RunExplanation, ...]
     ) -> Explanation:
         files = self.models.get(path, ())
-        whole, shown = self._part_of(path), self._shown(path)
-        return Explanation(path, kind, (), dependents, files, whole, shown)
+        whole, documents = self._models_with(path), self._documents_using(path)
+        return Explanation(path, kind, (), dependents, files, whole, documents)
 
-    def _part_of(self, path: str) -> tuple[str, ...]:
+    def _models_with(self, path: str) -> tuple[str, ...]:
         return tuple(model for model, files in self.models.items() if path in files)
 
     # --- scripts and labs
 
-    def _script(self, path: str) -> Explained:
+    def _explain_script(self, path: str) -> RunExplanation:
         extraction, job = self.scripts[path]
         if extraction.script.norun:
-            return Explained("script", path, extraction.owner, "norun")
+            return RunExplanation("script", path, extraction.owner, "norun")
         inputs = self.memory.inputs(job, extraction.data)
         record = self.memory.find_record(inputs)
         if record is not None:
-            return _explained("script", path, extraction.owner, record, ())
+            return _describe_run("script", path, extraction.owner, record, ())
         last, reasons = self.memory.last_record(path), self.memory.reasons(inputs)
-        return _explained("script", path, extraction.owner, last, tuple(reasons))
+        return _describe_run("script", path, extraction.owner, last, tuple(reasons))
 
-    def _lab(self, name: str) -> Explained:
+    def _explain_lab(self, name: str) -> RunExplanation:
         inputs, trial = self.labs[name]
         last = self.memory.last_record(inputs.path)
-        holds = last is not None and self._lab_holds(last, inputs)
+        holds = last is not None and self._is_lab_remembered(last, inputs)
         reasons = [] if holds else self.memory.reasons(inputs)
-        return _explained("lab", name, trial.owner, last, tuple(reasons))
+        return _describe_run("lab", name, trial.owner, last, tuple(reasons))
 
-    def _lab_holds(self, last: RunRecord, inputs: Inputs) -> bool:
-        same = not last.reason_forgotten and last.inputs == inputs
-        return same and not list(state_changes(last.dependencies, self.memory.states))
+    def _is_lab_remembered(self, last: RunRecord, inputs: Inputs) -> bool:
+        is_unchanged = not last.reason_forgotten and last.inputs == inputs
+        return is_unchanged and not list(state_changes(last.dependencies, self.memory.states))
 
-    def _dependents(self, path: str) -> tuple[Explained, ...]:
-        """Scripts and labs whose last results depend on a file or on the listing of its folder."""
-        found = []
+    def _find_dependents(self, path: str) -> tuple[RunExplanation, ...]:
+        """Find scripts and labs whose last results depend on a file or on its folder's listing."""
+        dependents = []
         for script in self.scripts:
             if script != path and self._depends(self.memory.last_record(script), path):
-                found.append(self._script(script))
+                dependents.append(self._explain_script(script))
         for name, (inputs, trial) in self.labs.items():
             models = [f"models/{model}.xml" for model in trial.block.models()]
             if path in models or self._depends(self.memory.last_record(inputs.path), path):
-                found.append(self._lab(name))
-        return tuple(found)
+                dependents.append(self._explain_lab(name))
+        return tuple(dependents)
 
     def _depends(self, last: RunRecord | None, path: str) -> bool:
         folder = path.rpartition("/")[0]
@@ -168,7 +178,7 @@ class _Explainer:
 
     # --- pages
 
-    def _shown(self, path: str) -> tuple[str, ...]:
+    def _documents_using(self, path: str) -> tuple[str, ...]:
         return tuple(
             document.source.path
             for document in self.course.documents
@@ -177,19 +187,19 @@ class _Explainer:
 
 
 def _uses(document: Document, path: str) -> Iterator[object]:
-    """What in a document shows a file, links to it, or quotes its output."""
+    """The parts of a document that show a file, link to it, or quote its output."""
     for block in document_blocks(document):
-        if isinstance(block, FeatureBlock) and path in _shown_of(block):
+        if isinstance(block, FeatureBlock) and path in _files_shown_by(block):
             yield block
         for inline in walk_inlines(block_inlines(block)):
             match inline:
                 case Image(url=url) if local_file(url, document.source.path) == path:
                     yield inline
-                case Link(target=UrlTarget(url=url)) if _local(url, document, path):
+                case Link(target=UrlTarget(url=url)) if _leads_to(url, document, path):
                     yield inline
                 case Link(target=ModelTarget(name=name)) if f"models/{name}.xml" == path:
                     yield inline
-                case Link(target=ExampleTarget(path=other)) if other == path:
+                case Link(target=ExampleTarget(path=example)) if example == path:
                     yield inline
                 case NumberBinding(script=script) if script == path:
                     yield inline
@@ -197,30 +207,30 @@ def _uses(document: Document, path: str) -> Iterator[object]:
                     pass
 
 
-def _shown_of(block: FeatureBlock) -> Iterator[str]:
-    """The models that a block shows or is about, and recorded reports on the latter."""
+def _files_shown_by(block: FeatureBlock) -> Iterator[str]:
+    """The files of models that a block shows or is about, and of reports on the latter."""
     for model in (*block.models(), *block.mentioned_models()):
         yield f"models/{model}.xml"
     yield from map(BENCH.path, block.mentioned_models())
 
 
-def _local(url: str, document: Document, path: str) -> bool:
+def _leads_to(url: str, document: Document, path: str) -> bool:
     return "://" not in url and local_file(url, document.source.path) == path
 
 
-def _explained(
+def _describe_run(
     kind: Literal["script", "lab"],
     name: str,
     owner: str,
     record: RunRecord | None,
     reasons: tuple[str, ...],
-) -> Explained:
+) -> RunExplanation:
     state: State = "would run" if reasons else "remembered"
     if record is None:
-        return Explained(kind, name, owner, state, reasons)
+        return RunExplanation(kind, name, owner, state, reasons)
     depends = [describe(dependency) for dependency in record.dependencies]
-    depends += [f"{what}: {value}" for what, value in record.inputs.conditions]
-    return Explained(
+    depends += [f"{subject}: {value}" for subject, value in record.inputs.conditions]
+    return RunExplanation(
         kind,
         name,
         owner,

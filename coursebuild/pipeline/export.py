@@ -1,7 +1,7 @@
 """`coursebuild export`: the course as one file, for other programs and for paper.
 
-Entry point: `export(options, name, out)`. What can be written, and how, features say. The course is
-verified as for a build, and nothing is written where something is wrong.
+Entry point: `export(options, name, out)`. Features have the exporters. The course is verified as
+for a build, and nothing is written where something is wrong.
 """
 
 from __future__ import annotations
@@ -45,49 +45,51 @@ def export(options: Options, name: str, out: Path | None) -> Report:
     Raises:
         UsageError: no feature has an exporter of this name.
     """
-    exporter = _find(options.root, name)
+    exporter = _find_exporter(options.root, name)
     out = out or Path(exporter.file)
     place = options.root / out
     check_target(options.root, place, exporter.mark, archive=exporter.archive)
     progress = Progress(quiet=options.quiet)
-    make = functools.partial(_exported, exporter)
+    make = functools.partial(_make_files, exporter)
     with (
         project_lock(options.root, progress.say),
-        prepare(options, progress, make) as (report, made),
+        prepare(options, progress, make) as (report, exported_site),
     ):
-        if made is None:
+        if exported_site is None:
             return replace(report, remarks=("nothing was written",))
-        if not made.files:
+        if not exported_site.files:
             raise EffectError(f"the course has nothing that `export {name}` could write")
         with progress.stage("packing"):
-            size = write_export(place, made.files, archive=exporter.archive)
-    count = len(made.files)
-    said = f"wrote {f'{count} files to ' if exporter.archive else ''}{out}, {_size(size)}"
-    return replace(report, remarks=(said,), depends=None)
+            size = write_export(place, exported_site.files, archive=exporter.archive)
+    count = len(exported_site.files)
+    remark = f"wrote {f'{count} files to ' if exporter.archive else ''}{out}, {_format_size(size)}"
+    return replace(report, remarks=(remark,), depends=None)
 
 
-def _size(count: int) -> str:
-    """A number of bytes as people say it."""
+def _format_size(count: int) -> str:
+    """Format a number of bytes."""
     return f"{count / 1e6:.1f} MB" if count >= 100_000 else f"{count / 1e3:.1f} kB"
 
 
-def _find(root: Path, name: str) -> Exporter:
-    """The exporter of a name, which a feature of the course itself may have."""
-    found = find_exporter(name)
-    broken: tuple[Diagnostic, ...] = ()
-    if isinstance(found, str):
+def _find_exporter(root: Path, name: str) -> Exporter:
+    """Find an exporter by its name, also among the features of the course itself."""
+    exporter = find_exporter(name)
+    feature_diagnostics: tuple[Diagnostic, ...] = ()
+    if isinstance(exporter, str):
         from coursebuild.core.syntax.coursemap import parse_course_map
 
         for source in read_sources(root, [MAP]).value:
             course = parse_course_map(source).value
-            broken = () if course is None else load_course_features(root, course)
-        found = find_exporter(name)
-    if isinstance(found, str):
-        raise UsageError("; ".join((found, *(diagnostic.message for diagnostic in broken))))
-    return found
+            feature_diagnostics = () if course is None else load_course_features(root, course)
+        exporter = find_exporter(name)
+    if isinstance(exporter, str):
+        raise UsageError(
+            "; ".join((exporter, *(diagnostic.message for diagnostic in feature_diagnostics)))
+        )
+    return exporter
 
 
-def _exported(
+def _make_files(
     exporter: Exporter,
     course: Course,
     results: Results,
@@ -95,7 +97,7 @@ def _exported(
     options: Options,
     reports: Reports,
 ) -> Site:
-    """The files of an export, in the place of those of a site."""
+    """Make the files of an export, in the place of those of a site."""
     assets = Assets(template_texts(), Bundle(), prepared_folder())
     library = Library.of(course, results, assets, reports)
     entries = {
@@ -103,25 +105,25 @@ def _exported(
         for entry in page_list(library)
         if (document := entry.document(library)) is not None
     }
-    found: list[Diagnostic] = []
+    diagnostics: list[Diagnostic] = []
 
     @functools.cache
     def site() -> Mapping[str, SiteFile]:
-        made = SiteMaker(library, assets, documents, options).made()
-        found.extend(made.diagnostics)
-        return {file.path: file for file in made.files}
+        whole_site = SiteMaker(library, assets, documents, options).make_site()
+        diagnostics.extend(whole_site.diagnostics)
+        return {file.path: file for file in whole_site.files}
 
     def page(document: Document) -> PageContext:
         path = document.source.path
-        return documents.context(path, entries[path].inputs(library), course)
+        return documents.page_context(path, entries[path].inputs(library), course)
 
     context = ExportContext(
         library, assets, site, page, functools.partial(read_bytes, options.root)
     )
     files: list[SiteFile] = []
-    for made in exporter.make(context):
-        if isinstance(made, Diagnostic):
-            found.append(made)
+    for file in exporter.make(context):
+        if isinstance(file, Diagnostic):
+            diagnostics.append(file)
         else:
-            files.append(made)
-    return Site(tuple(files), None, tuple(found), ())
+            files.append(file)
+    return Site(tuple(files), None, tuple(diagnostics), ())

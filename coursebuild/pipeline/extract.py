@@ -34,53 +34,55 @@ def extract(options: Options, *, adopt: bool = False) -> Report:
 
 def _extract(options: Options, *, adopt: bool) -> Report:
     began = time.monotonic()
-    loaded = load(options.root)
-    course = loaded.value
+    parsed_course = load(options.root)
+    course = parsed_course.value
     if course is None:
-        return judge(None, loaded.diagnostics, began)
-    extracted = extract_scripts(course, options)
-    remarks = _remarks(extracted)
-    refused: list[Diagnostic] = []
-    if adopt and extracted.blocked:
-        adoptions, refused, read = _adopt(options, extracted)
-        if read:
-            loaded = load(options.root)
-            course = loaded.value or course
-            _write_as_extracted(options, course, read)
-            extracted = extract_scripts(course, options)
-        remarks += [*adoptions, *_remarks(extracted)]
-    found = [*loaded.diagnostics, *extracted.diagnostics, *refused]
-    if not remarks and all(not d.is_error for d in found):
+        return judge(None, parsed_course.diagnostics, began)
+    extracted_scripts = extract_scripts(course, options)
+    remarks = _list_changes(extracted_scripts)
+    refusals: list[Diagnostic] = []
+    if adopt and extracted_scripts.blocked:
+        adoptions, refusals, files_read = _adopt(options, extracted_scripts)
+        if files_read:
+            parsed_course = load(options.root)
+            course = parsed_course.value or course
+            _write_as_extracted(options, course, files_read)
+            extracted_scripts = extract_scripts(course, options)
+        remarks += [*adoptions, *_list_changes(extracted_scripts)]
+    diagnostics = [*parsed_course.diagnostics, *extracted_scripts.diagnostics, *refusals]
+    if not remarks and all(not d.is_error for d in diagnostics):
         remarks.append("every script is extracted already")
-    return judge(course, found, began, remarks=tuple(remarks))
+    return judge(course, diagnostics, began, remarks=tuple(remarks))
 
 
-def _remarks(extracted: ExtractedScripts) -> list[str]:
-    removed = (f"removed {path}, which no lesson has any more" for path in extracted.removed)
-    return [*(f"wrote {path}" for path in extracted.written), *removed]
+def _list_changes(extracted_scripts: ExtractedScripts) -> list[str]:
+    removals = (
+        f"removed {path}, which no lesson has any more" for path in extracted_scripts.removed_paths
+    )
+    return [*(f"wrote {path}" for path in extracted_scripts.written_paths), *removals]
 
 
 def _adopt(
-    options: Options, extracted: ExtractedScripts
+    options: Options, extracted_scripts: ExtractedScripts
 ) -> tuple[list[str], list[Diagnostic], dict[str, bytes]]:
-    """Write the edited files into their lessons' blocks; also gives what was in these files."""
-    by_path = {e.path: e for e in extracted.all}
+    """Write the edited files into their lessons' blocks; also return what these files held."""
+    by_path = {e.path: e for e in extracted_scripts.extractions}
     edits: dict[Source, list[Edit]] = {}
-    refused: list[Diagnostic] = []
-    read: dict[str, bytes] = {}
-    for example in extracted.blocked:
+    refusals: list[Diagnostic] = []
+    files_read: dict[str, bytes] = {}
+    for example in extracted_scripts.blocked:
         extraction = by_path.get(example.path)
         if extraction is None or example.obstacle not in (Obstacle.EDITED, Obstacle.FOREIGN):
             continue
         data = read_bytes(options.root, example.path)
         if example.diverged and block_text(data) != extraction.text:
-            continue  # taking one would lose the other; how to go on is told with it
-        made = adopt_file(extraction.script, data)
-        if isinstance(made, Edit):
-            edits.setdefault(made.span.source, []).append(made)
-            read[example.path] = data
+            continue  # taking one would lose the other; the diagnostic says how to go on
+        adoption = adopt_file(extraction.script, data)
+        if isinstance(adoption, Edit):
+            edits.setdefault(adoption.span.source, []).append(adoption)
+            files_read[example.path] = data
         else:
-            refused.append(made)
+            refusals.append(adoption)
     remarks: list[str] = []
     for source in edits:  # all or none
         check_writable(options.root, source.path)
@@ -89,17 +91,17 @@ def _adopt(
         if new != source.text:
             write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
             remarks.append(changed_text("updated", source, new))
-    return remarks, refused, read
+    return remarks, refusals, files_read
 
 
-def _write_as_extracted(options: Options, course: Course, read: Mapping[str, bytes]) -> None:
+def _write_as_extracted(options: Options, course: Course, files_read: Mapping[str, bytes]) -> None:
     """Make each adopted file what its block extracts to now.
 
-    An editor's line ends or blank lines at the end are nothing that a block holds; without this the
-    file would count as edited for ever.
+    A block holds no line ends of an editor's and no blank lines at the end: without this the file
+    would count as edited for ever.
     """
     for extraction in extract_course(course).value:
-        data = read.get(extraction.path, extraction.data)
+        data = files_read.get(extraction.path, extraction.data)
         if data != extraction.data and block_text(data) == extraction.text:
             write_atomic(
                 options.root, extraction.path, extraction.data, expected=data, durable=False

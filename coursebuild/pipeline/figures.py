@@ -19,7 +19,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.options import Options
 
 
-def figures_of(course: Course, documents: Collection[str] | None) -> list[RecordedFigure]:
+def find_figures(course: Course, documents: Collection[str] | None) -> list[RecordedFigure]:
     """The figures of scripts in these documents, or in all."""
     return [
         figure
@@ -45,24 +45,24 @@ def write_figures(
     *,
     dry_run: bool,
 ) -> tuple[list[str], list[Diagnostic]]:
-    """Record what scripts drew where it is another drawing; a remark for each, and what failed."""
+    """Write the drawings that differ from the recorded ones; a remark for each, and failures."""
     by_path = {run.path: run for run in runs if run.outcome is Outcome.OK}
     remarks: list[str] = []
-    failed: list[Diagnostic] = []
-    for figure in figures_of(course, documents):
+    failures: list[Diagnostic] = []
+    for figure in find_figures(course, documents):
         run = by_path.get(figure.script)
         data = dict(run.figures).get(figure.name) if run is not None else None
-        drawn = prepare_figure(figure.name, data) if data is not None else ""
+        drawing = prepare_figure(figure.name, data) if data is not None else ""
         recorded = read_recorded(options.root, figure.path)
-        if isinstance(drawn, str) or (
-            recorded is not None and not describe_difference(figure.name, recorded, drawn)
+        if isinstance(drawing, str) or (
+            recorded is not None and not describe_difference(figure.name, recorded, drawing)
         ):
             continue
         try:
             if not dry_run:
-                write_atomic(options.root, figure.path, drawn, expected=recorded)
+                write_atomic(options.root, figure.path, drawing, expected=recorded)
         except (EffectError, OSError) as error:
-            failed.append(diagnose("output-not-updatable", figure.span, str(error)))
+            failures.append(diagnose("output-not-updatable", figure.span, str(error)))
         else:
             remarks.append(f"{'would draw' if dry_run else 'drew'} {figure.path}")
-    return remarks, failed
+    return remarks, failures

@@ -1,12 +1,12 @@
-"""What of a document, a course or its results can be seen from elsewhere, without its places.
+"""Fingerprints of what other pages can see of a document, a course or its results.
 
 Entry points: `document_fingerprint` and `notes_fingerprint`, `course_fingerprint`,
-`results_fingerprint`; each is a hash.
+`results_fingerprint`; each returns a hash.
 
-A sentence that is added moves all that follows it, and nothing else in the course: no page but the
-document's own shows where in its file something stands. So a value is hashed with its spans left
-out, and with the text of its excerpts; where the hash is that of before, whatever was made from it
-for other pages is that of before, and where nothing was found wrong nothing is wrong.
+A sentence added to a document moves all that follows it, but other pages do not show where in a
+file something stands. So a value is hashed without its spans, and with the text of its excerpts.
+Where its hash is unchanged, so is whatever other pages made from it, and a course in which nothing
+was wrong is still free of mistakes.
 """
 
 from __future__ import annotations
@@ -32,27 +32,29 @@ from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.values import fingerprint
 from coursebuild.numerics.reports import Reports
 
-_SHOWN: dict[type, Callable[[Any], object]] = {
+_WITHOUT_PLACES: dict[type, Callable[[Any], object]] = {
     Span: lambda span: None,
     Excerpt: lambda excerpt: excerpt.text,
     Source: lambda source: (source.path, source.text),
 }
-"""What can be seen of places from elsewhere."""
+"""What is hashed in the place of values that hold a place in a file."""
 
 
 def document_fingerprint(document: Document) -> str:
-    """That of a document, by its summary; without what features note of it."""
-    raw = tuple(_raw(document))
-    return fingerprint((document.blocks, document.footnotes, document.equations, raw), _SHOWN)
+    """The fingerprint of a document's summary, without what features note of it."""
+    html = tuple(_raw_html(document))
+    return fingerprint(
+        (document.blocks, document.footnotes, document.equations, html), _WITHOUT_PLACES
+    )
 
 
 def notes_fingerprint(notes: Mapping[str, Struct]) -> str:
-    """That of what features note of a document (`Feature.summary`)."""
-    return fingerprint(dict(notes), _SHOWN)
+    """The fingerprint of what features note of a document (`Feature.summary`)."""
+    return fingerprint(dict(notes), _WITHOUT_PLACES)
 
 
-def _raw(document: Document) -> Iterator[str]:
-    """HTML as its author wrote it, in which links are looked for: its span is where the text is."""
+def _raw_html(document: Document) -> Iterator[str]:
+    """The raw HTML of a document, in which links are looked for: only its span has the text."""
     for block in document_blocks(document):
         if isinstance(block, HtmlBlock):
             yield block.span.text
@@ -62,19 +64,19 @@ def _raw(document: Document) -> Iterator[str]:
 
 
 def course_fingerprint(course: Course, documents: Iterable[tuple[Document, str]]) -> str | None:
-    """That of a course, given those of its documents; `None` where one of them is missing."""
-    known = {id(document): found for document, found in documents}
-    if not all(known.get(id(document)) for document in course.documents):
+    """The fingerprint of a course, from its documents'; `None` where one of these is missing."""
+    fingerprints = {id(document): hashed for document, hashed in documents}
+    if not all(fingerprints.get(id(document)) for document in course.documents):
         return None
 
-    def shown(document: Document) -> object:
-        return document.source.path, known[id(document)]
+    def replace_document(document: Document) -> object:
+        return document.source.path, fingerprints[id(document)]
 
-    return fingerprint((tool_digest(), course), {**_SHOWN, Document: shown})
+    return fingerprint((tool_digest(), course), {**_WITHOUT_PLACES, Document: replace_document})
 
 
 def results_fingerprint(results: Results, reports: Reports) -> str:
-    """That of what was found, without how long it took and what nothing is made from."""
+    """The fingerprint of results, without times and without what no page shows."""
     runs = tuple((r.path, r.outcome, r.status, r.stdout, r.missing) for r in results.runs)
     verdicts = tuple(
         (v.recording.span.path, v.recording.script, v.status, v.comparison)
@@ -85,4 +87,4 @@ def results_fingerprint(results: Results, reports: Reports) -> str:
         for t in results.trials
     )
     rest = results.formulas, results.models, results.python, results.engine
-    return fingerprint((tool_digest(), runs, verdicts, trials, rest, reports), _SHOWN)
+    return fingerprint((tool_digest(), runs, verdicts, trials, rest, reports), _WITHOUT_PLACES)

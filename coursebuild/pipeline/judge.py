@@ -1,6 +1,6 @@
-"""From findings to a report: silenced warnings are left out, the rest is sorted and counted.
+"""From diagnostics to a report: silenced warnings are left out, the rest is sorted and counted.
 
-Entry points: `judge`; `depends_on`, the files for which the verdict on a course holds.
+Entry points: `judge`; `depends_on`, the files that a report depends on.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.report import Report, ScriptLine, Summary
 
 _NOT_RUN = ("skipped", "norun")
-_OF_RUNS = (
+_RULES_OF_RUNS = (
     "script-failed",
     "script-timeout",
     "script-killed",
@@ -30,7 +30,7 @@ _OF_RUNS = (
     "script-writes",
     "script-connects",
 )
-"""Only scripts that were to be run have these; they may point at a line of another lesson."""
+"""Rules broken only by scripts that were to run; the line may be in another lesson."""
 
 
 def judge(
@@ -44,37 +44,37 @@ def judge(
     documents: Collection[str] | None = None,
     remarks: tuple[str, ...] = (),
 ) -> Report:
-    """The report of a command that began at this moment of `time.monotonic`.
+    """Make the report of a command that began at this moment of `time.monotonic`.
 
-    `lessons`: how many it is about; all that are written where nothing is said. `documents` limits
-    it to mistakes in these files and in the map, and of the scripts that ran.
+    `lessons`: how many it is about, by default all that are written. `documents` limits it to
+    mistakes in these files, in the map, and of the scripts that ran.
     """
     if lessons is None:
-        everything = () if course is None else course.lessons
-        lessons = sum(lesson.document is not None for lesson in everything)
-    found = sort_diagnostics(diagnostics)
+        entries = () if course is None else course.lessons
+        lessons = sum(lesson.document is not None for lesson in entries)
+    relevant = sort_diagnostics(diagnostics)
     if documents is not None and course is not None:
-        wanted = {*documents, course.map.path}
-        found = tuple(d for d in found if d.span.path in wanted or d.rule in _OF_RUNS)
+        paths = {*documents, course.map.path}
+        relevant = tuple(d for d in relevant if d.span.path in paths or d.rule in _RULES_OF_RUNS)
     silences = course.silences if course is not None else ()
-    kept = tuple(d for d in found if not _silenced(d, silences))
-    errors = sum(d.is_error for d in kept)
+    reported = tuple(d for d in relevant if not _is_silenced(d, silences))
+    errors = sum(d.is_error for d in reported)
     summary = Summary(
         lessons=lessons,
         scripts=len(scripts),
         ran=sum(line.status not in _NOT_RUN for line in scripts),
         skipped=sum(line.status == "skipped" for line in scripts),
         errors=errors,
-        warnings=len(kept) - errors,
-        silenced=len(found) - len(kept),
+        warnings=len(reported) - errors,
+        silenced=len(relevant) - len(reported),
         seconds=0.0 if began is None else time.monotonic() - began,
         cached=sum(line.cached for line in scripts),
     )
-    return Report(kept, tuple(scripts), summary, remarks, labs)
+    return Report(reported, tuple(scripts), summary, remarks, labs)
 
 
-def _silenced(diagnostic: Diagnostic, silences: Sequence[Silence]) -> bool:
-    """Errors cannot be silenced."""
+def _is_silenced(diagnostic: Diagnostic, silences: Sequence[Silence]) -> bool:
+    """Whether the map silences a diagnostic; errors cannot be silenced."""
     return not diagnostic.is_error and any(
         silence.rule == diagnostic.rule
         and (silence.path is None or fnmatchcase(diagnostic.span.path, silence.path))
@@ -85,9 +85,9 @@ def _silenced(diagnostic: Diagnostic, silences: Sequence[Silence]) -> bool:
 def depends_on(
     course: Course, results: Results, interpreter: Interpreter | None
 ) -> tuple[str, ...] | None:
-    """The files beside those in the course's own folders on which the verdict depends.
+    """The files outside the course's own folders that the report depends on.
 
-    `None` where nobody can know them all, as where a script starts other programs.
+    `None` where they cannot all be known, as where a script starts other programs.
     """
     packages = {package.path for package in course.packages}  # archives hold all of them
     if "." in packages:
@@ -97,12 +97,12 @@ def depends_on(
         files |= {interpreter.python, f"{interpreter.prefix}/pyvenv.cfg", *interpreter.packages}
     for run in results.runs:
         if run.outcome in (Outcome.NORUN, Outcome.SKIPPED):
-            continue  # what is installed is looked at in any case
+            continue  # installed packages are compared in any case
         if run.trace is None or run.trace.opaque or "." in run.trace.folders:
             return None
         files |= {*run.trace.files, *run.trace.folders, *run.trace.outside}
         files |= {file for name in run.trace.sought for file in sought_files(name)}
-    for _, compiled in results.models:
-        if compiled.facts is not None:
-            files |= {*compiled.facts.includes}
+    for _, result in results.models:
+        if result.facts is not None:
+            files |= {*result.facts.includes}
     return tuple(sorted(files))

@@ -1,11 +1,11 @@
 """Disk → Course: read the map, the lessons, the pages and the models, and parse them.
 
 Entry points: `load(root)`; `load_course(root)`, for commands that need a course. A `Parser` parses
-the texts; `documents.Documents` is one that gives what was parsed before.
+the texts; `documents.Documents` is one that keeps what it parsed.
 
 1. Read everything (`core.files.read`), parse `content/course.toml`. Where the map is broken the
-   lessons are parsed all the same, so that all mistakes are told in one run.
-2. Parse what `models/NAME.toml` declare of the models beside them.
+   lessons are parsed all the same, so that one run reports all mistakes.
+2. Parse the declarations of models, `models/NAME.toml`.
 3. Attach its document to each lesson and page; compare what the map names with what is there.
 4. Check the course as a whole.
 """
@@ -42,37 +42,37 @@ from coursebuild.core.text.source import Source
 
 MAP = "content/course.toml"
 MAP_TEXT = 1_000_000
-"""Characters of the course map, which says how long all other texts may be."""
+"""Characters that the course map may have; the map itself says how long other texts may be."""
 
 
 class Parser:
-    """Parses texts and checks courses, each time anew."""
+    """Parses texts and checks courses; keeps nothing."""
 
-    def ahead(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
-        """Hear which texts will be parsed, and which of them are lessons."""
+    def prefetch(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
+        """Prepare for texts that will be parsed soon, each given with whether it is a lesson."""
 
-    def document(
+    def read_document(
         self, source: Source, callouts: frozenset[str], *, lesson: bool
     ) -> Parsed[Document]:
-        """The document that a text holds, and what is wrong in it."""
+        """Return the document that a text holds, and what is wrong in it."""
         from coursebuild.core.syntax.document import parse_document
 
         return parse_document(source, callouts, lesson=lesson)
 
-    def course_map(self, source: Source) -> Parsed[Course | None]:
-        """The course that a map describes, and what is wrong in it."""
+    def read_map(self, source: Source) -> Parsed[Course | None]:
+        """Return the course that a map describes, and what is wrong in it."""
         from coursebuild.core.syntax.coursemap import parse_course_map
 
         return parse_course_map(source)
 
-    def declarations(self, source: Source) -> Parsed[Declarations | None]:
-        """What a file beside a model declares, and what is wrong in it."""
+    def read_declarations(self, source: Source) -> Parsed[Declarations | None]:
+        """Return what a file beside a model declares, and what is wrong in it."""
         from coursebuild.core.syntax.scenarios import parse_declarations
 
         return parse_declarations(source)
 
     def check(self, course: Course) -> tuple[Diagnostic, ...]:
-        """What is wrong with a course as a whole."""
+        """Return what is wrong with a course as a whole."""
         from coursebuild.core.checks.course import check_course
 
         return check_course(course)
@@ -93,8 +93,8 @@ def load(
         EffectError: the course brings code that would run here, and is not `trusted`.
     """
     loader = _Loader(root, Parser() if parser is None else parser, open_texts, trusted=trusted)
-    course = loader.course()
-    return Parsed(course, tuple(loader.found))
+    course = loader.load()
+    return Parsed(course, tuple(loader.diagnostics))
 
 
 def load_course(root: Path) -> Course:
@@ -110,7 +110,7 @@ def load_course(root: Path) -> Course:
 
 
 class _Loader:
-    """The state of one loading: what was read, and what was found wrong."""
+    """The state of one loading."""
 
     def __init__(
         self, root: Path, parser: Parser, open_texts: Mapping[str, str], *, trusted: bool
@@ -121,99 +121,99 @@ class _Loader:
         self.trusted = trusted
         self.parser = parser
         self.files = read.value
-        self.found = list(read.diagnostics)
+        self.diagnostics = list(read.diagnostics)
         self.sources: Mapping[str, Source] = {}
         self.callouts = frozenset(kind.name for kind in CALLOUTS)
-        self.unnamed: dict[str, Source] = {}
-        """Lesson files that the map does not name, by path; one that was surely meant is taken out.
-        """
+        self.unlisted_lessons: dict[str, Source] = {}
+        """Lesson files that the map does not name, by path; without one that is probably meant by
+        an entry without a file."""
 
-    def course(self) -> Course | None:
-        """The whole course, or `None` where there is no usable map."""
-        course = self._map()
+    def load(self) -> Course | None:
+        """Return the whole course, or `None` where there is no usable map."""
+        course = self._parse_map()
         limit = (Limits() if course is None else course.limits).text
-        lessons = self._within(limit, self.files.lessons)
-        texts = self._within(limit, self.files.pages)
-        short = self._within(limit, (model.source for model in self.files.models))
+        lessons = self._drop_long(limit, self.files.lessons)
+        texts = self._drop_long(limit, self.files.pages)
+        short = self._drop_long(limit, (model.source for model in self.files.models))
         self.files = replace(
             self.files,
             lessons=lessons,
             pages=texts,
             models=tuple(model for model in self.files.models if model.source in short),
-            declarations=self._within(limit, self.files.declarations),
+            declarations=self._drop_long(limit, self.files.declarations),
         )
-        declared = self._declared()
+        declarations = self._parse_declarations()
         self.sources = {source.path: source for source in (*lessons, *texts)}
         if course is None:
             if self.files.map is not None:
-                self._announce(self.files.lessons, ())
+                self._prefetch(self.files.lessons, ())
                 for source in self.files.lessons:
-                    self._document(source, lesson=True)
+                    self._parse_document(source, lesson=True)
             return None
         self.callouts = frozenset(kind.name for kind in course.callouts)
-        self.unnamed = self._unnamed(course)
+        self.unlisted_lessons = self._lessons_not_in(course)
         planned = {x.path for x in course.lessons if x.status == "planned"}
-        named = {page.path for page in course.pages}
-        self._announce(
+        page_paths = {page.path for page in course.pages}
+        self._prefetch(
             [source for source in self.files.lessons if source.path not in planned],
-            [source for source in self.files.pages if source.path in named],
+            [source for source in self.files.pages if source.path in page_paths],
         )
-        levels = tuple(self._level(level) for level in course.levels)
-        self._unlisted()
-        pages = self._pages(course.pages, course.limits.text)
-        theme = self._theme(course.theme)
-        self._unlisted_pages(course)
+        levels = tuple(self._attach_level(level) for level in course.levels)
+        self._report_unlisted_lessons()
+        pages = self._attach_pages(course.pages, course.limits.text)
+        theme = self._load_theme(course.theme)
+        self._report_unlisted_pages(course)
         course = replace(
             course,
             levels=levels,
             pages=pages,
             models=self.files.models,
-            files=self._others(course),
-            declarations=declared,
+            files=self._files_to_show(course),
+            declarations=declarations,
             theme=theme,
         )
-        self.found += self.parser.check(course)
+        self.diagnostics += self.parser.check(course)
         environment = course_environment(self.root, course)
-        self.found += environment.diagnostics
+        self.diagnostics += environment.diagnostics
         if course.python is None or environment.value is not None:
-            self.found += _check_engine(course, environment.value)
-        self.found += check_source_parts(course, self._text)
+            self.diagnostics += _check_engine(course, environment.value)
+        self.diagnostics += check_source_parts(course, self._read_text)
         for package in course.packages:
             if not (self.root / package.path).is_dir():
                 message = f"there is no folder `{package.path}`"
-                self.found.append(diagnose("field-value", package.span, message))
+                self.diagnostics.append(diagnose("field-value", package.span, message))
         return course
 
-    def _within(self, limit: int, sources: Iterable[Source]) -> tuple[Source, ...]:
-        """Those that are not too long; the others count as such that cannot be read."""
-        found = []
+    def _drop_long(self, limit: int, sources: Iterable[Source]) -> tuple[Source, ...]:
+        """Return the sources that are not too long; the others count as unreadable."""
+        short = []
         for source in sources:
             if len(source.text) <= limit:
-                found.append(source)
+                short.append(source)
                 continue
             message = f"{source.path} has {len(source.text):_} characters, and may have {limit:_}"
             help = "make more courses of it"
             if source.path != MAP:
                 shorter = "make more lessons of it" if source.path.endswith(".md") else "shorten it"
                 help = f"{shorter}, or set `text` in `[limits]` of the map"
-            self.found.append(
+            self.diagnostics.append(
                 diagnose("text-long", source.span(limit, limit + 1), message, help=help)
             )
             unreadable = (*self.files.unreadable, source.path)
             self.files = replace(self.files, unreadable=unreadable)
-        return tuple(found)
+        return tuple(short)
 
-    def _theme(self, theme: Theme) -> Theme:
-        """The theme with its files; most courses have none."""
+    def _load_theme(self, theme: Theme) -> Theme:
+        """Return the theme with its files."""
         if theme == Theme() and not (self.root / TEMPLATES).is_dir():
             return theme
         from coursebuild.pipeline.theme import load_theme
 
-        loaded = load_theme(self.root, theme)
-        self.found += loaded.diagnostics
-        return loaded.value
+        parsed_theme = load_theme(self.root, theme)
+        self.diagnostics += parsed_theme.diagnostics
+        return parsed_theme.value
 
-    def _text(self, path: str) -> str | None:
+    def _read_text(self, path: str) -> str | None:
         """The text of a file of the project; `None` where there is none."""
         file = (self.root / path).resolve()
         if not file.is_file() or not file.is_relative_to(self.root.resolve()):
@@ -223,46 +223,48 @@ class _Loader:
         except (OSError, UnicodeDecodeError):
             return None
 
-    def _map(self) -> Course | None:
-        if self.files.map is None or not self._within(MAP_TEXT, [self.files.map]):
+    def _parse_map(self) -> Course | None:
+        if self.files.map is None or not self._drop_long(MAP_TEXT, [self.files.map]):
             return None
-        parsed = self.parser.course_map(self.files.map)
-        self.found += parsed.diagnostics
-        if parsed.value is not None:
+        parsed_map = self.parser.read_map(self.files.map)
+        self.diagnostics += parsed_map.diagnostics
+        if parsed_map.value is not None:
             if not self.trusted:
-                _refuse_code(self.root, parsed.value)
-            self.found += load_course_features(self.root, parsed.value)
-        return parsed.value
+                _refuse_code(self.root, parsed_map.value)
+            self.diagnostics += load_course_features(self.root, parsed_map.value)
+        return parsed_map.value
 
-    def _declared(self) -> tuple[Declarations, ...]:
-        """What stands beside the models; a file without a model is a mistake."""
-        models = {model.name for model in self.files.models}
-        found: list[Declarations] = []
+    def _parse_declarations(self) -> tuple[Declarations, ...]:
+        """Parse the files beside the models; such a file without its model is a mistake."""
+        names = {model.name for model in self.files.models}
+        declarations: list[Declarations] = []
         for source in self.files.declarations:
-            parsed = self.parser.declarations(source)
-            self.found += parsed.diagnostics
-            model = source.path.removesuffix(".toml") + ".xml"
-            if model.removeprefix("models/").removesuffix(".xml") not in models:
-                if model not in self.files.unreadable:
-                    paths = [one.source.path for one in self.files.models]
-                    self.found.append(diagnose_orphan_scenarios(source, paths))
-            elif parsed.value is not None:
-                found.append(parsed.value)
-        return tuple(found)
+            parsed_file = self.parser.read_declarations(source)
+            self.diagnostics += parsed_file.diagnostics
+            model_path = source.path.removesuffix(".toml") + ".xml"
+            if model_path.removeprefix("models/").removesuffix(".xml") not in names:
+                if model_path not in self.files.unreadable:
+                    paths = [model.source.path for model in self.files.models]
+                    self.diagnostics.append(diagnose_orphan_scenarios(source, paths))
+            elif parsed_file.value is not None:
+                declarations.append(parsed_file.value)
+        return tuple(declarations)
 
-    def _announce(self, lessons: Sequence[Source], pages: Sequence[Source]) -> None:
+    def _prefetch(self, lessons: Sequence[Source], pages: Sequence[Source]) -> None:
         sources = [*((s, True) for s in lessons), *((s, False) for s in pages)]
-        self.parser.ahead(sources, self.callouts)
+        self.parser.prefetch(sources, self.callouts)
 
-    def _document(self, source: Source, *, lesson: bool) -> Document:
-        parsed = self.parser.document(source, self.callouts, lesson=lesson)
-        self.found += parsed.diagnostics
-        return parsed.value
+    def _parse_document(self, source: Source, *, lesson: bool) -> Document:
+        parsed_document = self.parser.read_document(source, self.callouts, lesson=lesson)
+        self.diagnostics += parsed_document.diagnostics
+        return parsed_document.value
 
-    def _level(self, level: Level) -> Level:
-        return replace(level, lessons=tuple(self._lesson(lesson) for lesson in level.lessons))
+    def _attach_level(self, level: Level) -> Level:
+        return replace(
+            level, lessons=tuple(self._attach_lesson(lesson) for lesson in level.lessons)
+        )
 
-    def _lesson(self, lesson: Lesson) -> Lesson:
+    def _attach_lesson(self, lesson: Lesson) -> Lesson:
         source = self.sources.get(lesson.path)
         if lesson.status == "planned":
             if source is not None:
@@ -271,77 +273,81 @@ class _Loader:
                 self._report("lesson-planned-file", lesson, message, help)
             return lesson
         if source is not None:
-            return replace(lesson, document=self._document(source, lesson=True))
+            return replace(lesson, document=self._parse_document(source, lesson=True))
         if lesson.path not in self.files.unreadable:
-            near = nearest(lesson.path, self.unnamed)
+            closest = nearest(lesson.path, self.unlisted_lessons)
             help = 'write it, or say `status = "planned"`'
-            if near is not None:
-                help = f"is it `{near}`, which the map does not name?"
-                self._document(self.unnamed.pop(near), lesson=True)
+            if closest is not None:
+                help = f"is it `{closest}`, which the map does not name?"
+                self._parse_document(self.unlisted_lessons.pop(closest), lesson=True)
             self._report("lesson-missing", lesson, f"there is no file {lesson.path}", help)
         return lesson
 
     def _report(self, rule: str, entry: Owner, message: str, help: str) -> None:
-        self.found.append(diagnose(rule, entry.span.first_line(), message, help=help))
+        self.diagnostics.append(diagnose(rule, entry.span.first_line(), message, help=help))
 
-    def _unnamed(self, course: Course) -> dict[str, Source]:
-        named = {lesson.path for lesson in course.lessons}
-        return {s.path: s for s in self.files.lessons if s.path not in named}
+    def _lessons_not_in(self, course: Course) -> dict[str, Source]:
+        paths = {lesson.path for lesson in course.lessons}
+        return {s.path: s for s in self.files.lessons if s.path not in paths}
 
-    def _unlisted(self) -> None:
-        for source in self.unnamed.values():
+    def _report_unlisted_lessons(self) -> None:
+        for source in self.unlisted_lessons.values():
             help = f"add a [[level.lesson]] to {MAP}, or move the file away"
             if source.path.count("/") > 2:
                 help = "lessons lie in content/lessons itself: move it there, or out of content/"
             message = f"the course map does not name {source.path}"
-            self.found.append(diagnose("lesson-unlisted", source.span(0, 0), message, help=help))
-            self._document(source, lesson=True)
+            self.diagnostics.append(
+                diagnose("lesson-unlisted", source.span(0, 0), message, help=help)
+            )
+            self._parse_document(source, lesson=True)
 
-    def _unlisted_pages(self, course: Course) -> None:
-        named = {page.path for page in course.pages}
+    def _report_unlisted_pages(self, course: Course) -> None:
+        paths = {page.path for page in course.pages}
         for source in self.files.pages:
-            if source.path not in named:
+            if source.path not in paths:
                 message = f"the course map does not name {source.path}"
                 help = f"add a [[page]] to {MAP}, or move the file away"
-                found = diagnose("page-unlisted", source.span(0, 0), message, help=help)
-                self.found.append(found)
+                diagnostic = diagnose("page-unlisted", source.span(0, 0), message, help=help)
+                self.diagnostics.append(diagnostic)
 
-    def _pages(self, pages: tuple[Page, ...], limit: int) -> tuple[Page, ...]:
-        # Such as lie elsewhere were not read with the course.
+    def _attach_pages(self, pages: tuple[Page, ...], limit: int) -> tuple[Page, ...]:
+        # Pages may lie outside the folders that are read with the course.
         paths = (page.path for page in pages)
-        away = [path for path in paths if path not in self.files.unreadable]
-        away = [p for p in away if p not in self.sources and (self.root / p).exists()]
-        read = read_sources(self.root, away, self.open_texts)
-        self.found += read.diagnostics
-        sources = self._within(limit, read.value)
+        unread = [path for path in paths if path not in self.files.unreadable]
+        unread = [p for p in unread if p not in self.sources and (self.root / p).exists()]
+        read = read_sources(self.root, unread, self.open_texts)
+        self.diagnostics += read.diagnostics
+        sources = self._drop_long(limit, read.value)
         if sources:
-            self._announce((), sources)
-        others = {source.path: source for source in sources}
-        return tuple(self._page(page, others) for page in pages)
+            self._prefetch((), sources)
+        elsewhere = {source.path: source for source in sources}
+        return tuple(self._attach_page(page, elsewhere) for page in pages)
 
-    def _page(self, page: Page, others: Mapping[str, Source]) -> Page:
-        source = self.sources.get(page.path) or others.get(page.path)
+    def _attach_page(self, page: Page, elsewhere: Mapping[str, Source]) -> Page:
+        source = self.sources.get(page.path) or elsewhere.get(page.path)
         if source is not None:
-            return replace(page, document=self._document(source, lesson=False))
+            return replace(page, document=self._parse_document(source, lesson=False))
         if page.path not in self.files.unreadable and not (self.root / page.path).exists():
             message = f"there is no file {page.path}"
             help = "write it, or take the page out of the map"
             self._report("page-missing", page, message, help)
         return page
 
-    def _others(self, course: Course) -> tuple[str, ...]:
+    def _files_to_show(self, course: Course) -> tuple[str, ...]:
         """The files that a page may show or link to: all but the map, the lessons and the pages."""
         models = (f"models/{model.name}.xml" for model in self.files.models)
-        taken = {MAP, *self.sources, *(page.path for page in course.pages), *models}
-        return tuple(path for path in self.files.files if path not in taken)
+        excluded = {MAP, *self.sources, *(page.path for page in course.pages), *models}
+        return tuple(path for path in self.files.files if path not in excluded)
 
 
 def _refuse_code(root: Path, course: Course) -> None:
-    own = [named.path for named in course.features]
-    own += [TEMPLATES] if (root / TEMPLATES).exists() else []
-    if own:
+    """Refuse a course whose own features or templates would run as part of the tool."""
+    paths = [feature.path for feature in course.features]
+    paths += [TEMPLATES] if (root / TEMPLATES).exists() else []
+    if paths:
         raise EffectError(
-            f"`--sandbox` is around scripts alone, and `{own[0]}` is code that the tool would run",
+            f"`--sandbox` is around scripts alone, and `{paths[0]}` is code that the tool would "
+            "run",
             help="look at what it does, and run the command without `--sandbox`",
         )
 
@@ -350,8 +356,8 @@ def _check_engine(course: Course, interpreter: Interpreter | None) -> list[Diagn
     installed = engine_version() if interpreter is None else interpreter.engine
     if course.engine in (None, installed):
         return []
-    where = "" if course.python is None else f" for `{course.python.path}`"
+    purpose = "" if course.python is None else f" for `{course.python.path}`"
     message = f"the course is written for MuJoCo {course.engine}, and {installed} is installed"
-    message += where
+    message += purpose
     help = "install that version, or bring the outputs up to date and change `engine`"
     return [diagnose("engine-version", course.engine_span, message, help=help)]

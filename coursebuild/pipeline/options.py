@@ -1,4 +1,4 @@
-"""What every command needs to know, and the wrong usage that is no mistake of the course.
+"""What every command needs to know: where the course is, its store, the lessons named.
 
 Entry points: `Options`, `find_course(directory)`, `open_store`, `select`.
 """
@@ -35,40 +35,40 @@ class Options(Struct, frozen=True):
     root: Path
     """Absolute, links resolved."""
     jobs: int
-    """Scripts at a time."""
+    """How many scripts run at a time."""
     quiet: bool
     cache: Memo | None = None
-    """What was made before; what is kept in the course's folder where nothing is said."""
+    """Results made before; by default those in the course's folder."""
     long: bool = False
-    """Whether scripts run of which the course keeps a run."""
+    """Whether scripts run that have a recorded run in the course."""
     verbose: bool = False
-    """Whether it is said of each script why it runs."""
+    """Whether to say of each script why it runs."""
     run_all: RunAll | None = None
-    """What runs scripts, where a `ScriptServer` stays warm from run to run."""
+    """Runs scripts, where a `ScriptServer` stays warm from run to run."""
     interpreter: Interpreter | None = None
-    """Where scripts run, where that is not here; see `for_course`."""
+    """The interpreter of scripts, if it is another than ours; see `for_course`."""
     sandbox: Sandbox | None = None
-    """What is around each script; then no other code of the course runs."""
+    """The sandbox of each script; with one, no other code of the course runs."""
 
     @property
     def store(self) -> Memo:
-        """Where results are kept."""
+        """The store of results."""
         return Memo(self.root) if self.cache is None else self.cache
 
     def for_course(self, course: Course) -> Options:
-        """With the environment that the map names for scripts, as far as they can run there."""
+        """The same options, with the environment that the map names for scripts, if it works."""
         return replace(self, interpreter=course_environment(self.root, course).value)
 
     def memory(self, *, fresh: bool = False) -> Memory:
-        """What is remembered of scripts; `fresh`: all are to run again."""
+        """The remembered results of scripts; `fresh`: all scripts are to run again."""
         return Memory(self.root, self.store, fresh=fresh, interpreter=self.interpreter)
 
 
 def find_course(directory: str | None) -> Path:
-    """The course's folder: the one named, or the nearest above that holds `content/course.toml`.
+    """Find the course's folder: the one named, or the nearest above with `content/course.toml`.
 
-    A named folder without a map is taken all the same: that the map is missing is then a mistake of
-    the course. What a killed command left half changed there is undone.
+    A named folder without a map is taken all the same: the missing map is then a mistake of the
+    course. What a killed command left half changed is undone.
     """
     try:
         start = Path.cwd()
@@ -88,45 +88,47 @@ def check_path(root: Path) -> None:
     try:
         str(root).encode()
     except UnicodeEncodeError:
-        shown = os.fsencode(root).decode("utf-8", "backslashreplace")
-        raise UsageError(f"the path of the course is not UTF-8: {shown}") from None
+        path_text = os.fsencode(root).decode("utf-8", "backslashreplace")
+        raise UsageError(f"the path of the course is not UTF-8: {path_text}") from None
 
 
-def open_store(root: Path, where: str | None, size: str | None, *, fresh: bool = False) -> Memo:
-    """The results made before: here, and at a shared place.
+def open_store(root: Path, location: str | None, size: str | None, *, fresh: bool = False) -> Memo:
+    """Open the store of results: here, and at a shared place.
 
-    What the command line does not say (`None`), the environment may: `COURSEBUILD_CACHE` a place,
-    `COURSEBUILD_CACHE_SIZE` what the store here may take. `COURSEBUILD_CACHE_KEY` is what entries
-    at the shared place are signed with: a secret, which no command line shows.
+    What the command line does not set (`None`), the environment may: `COURSEBUILD_CACHE` the place,
+    `COURSEBUILD_CACHE_SIZE` the size of the store here. `COURSEBUILD_CACHE_KEY` signs the entries
+    at the shared place: a secret, which must not stand on a command line.
 
     Raises:
-        UsageError: one of them cannot be.
+        UsageError: the place or the size is not valid.
     """
-    said = "--cache-size"
+    option = "--cache-size"
     if size is None:
-        said, size = "COURSEBUILD_CACHE_SIZE", os.environ.get("COURSEBUILD_CACHE_SIZE") or None
-    limit = SIZE if size is None else _size(said, size)
-    if where is None:
-        where = os.environ.get("COURSEBUILD_CACHE") or None
-    elif not where:
+        option, size = "COURSEBUILD_CACHE_SIZE", os.environ.get("COURSEBUILD_CACHE_SIZE") or None
+    limit = SIZE if size is None else _parse_size(option, size)
+    if location is None:
+        location = os.environ.get("COURSEBUILD_CACHE") or None
+    elif not location:
         raise UsageError("--cache names no place")
     shared = None
-    if where is not None:
+    if location is not None:
         from coursebuild.core.engine.shared_cache import shared_cache
 
         try:
             key = os.environ.get("COURSEBUILD_CACHE_KEY", "").encode("utf-8", "surrogateescape")
-            shared = shared_cache(where, key)
+            shared = shared_cache(location, key)
         except EffectError as error:
             raise UsageError(error.message, help=error.help) from None
     return Memo(root, shared=shared, size=limit, fresh=fresh)
 
 
-def _size(said: str, text: str) -> int:
-    """Bytes."""
+def _parse_size(option: str, text: str) -> int:
+    """Return a size in bytes."""
     match = re.fullmatch(r"([0-9]{1,15})([KMGT]?)", text, re.IGNORECASE)
     if match is None:
-        raise UsageError(f"{said}: {text!r} is no size: a whole number, perhaps with K, M, G or T")
+        raise UsageError(
+            f"{option}: {text!r} is no size: a whole number, perhaps with K, M, G or T"
+        )
     return int(match[1]) << (10 * " KMGT".index(match[2].upper() or " "))
 
 
@@ -140,37 +142,38 @@ class Selection(Struct, frozen=True):
 
 
 def select(course: Course, names: tuple[str, ...], root: Path) -> Selection:
-    """What the names mean: lessons by id, slug, `id-slug` or file, pages by id or file.
+    """Find the lessons named by id, slug, `id-slug` or file, and the pages named by id or file.
 
-    Everything where there are none. A file may be given from the course's folder or from the
-    working directory.
+    Without names, all of them. A file may be given from the course's folder or from the working
+    directory.
 
-    Raises `UsageError` for a name that means nothing, or a lesson that is not written yet.
+    Raises:
+        UsageError: a name means nothing, or a lesson that is not written yet.
     """
     if not names:
-        written = tuple(lesson for lesson in course.lessons if lesson.document is not None)
-        return Selection(written, course.pages, None)
-    chosen = [_named(course, name, root) for name in names]
-    lessons = tuple(lesson for lesson in course.lessons if lesson in chosen)
-    pages = tuple(page for page in course.pages if page in chosen)
+        written_lessons = tuple(lesson for lesson in course.lessons if lesson.document is not None)
+        return Selection(written_lessons, course.pages, None)
+    owners = [_find_owner(course, name, root) for name in names]
+    lessons = tuple(lesson for lesson in course.lessons if lesson in owners)
+    pages = tuple(page for page in course.pages if page in owners)
     paths = {lesson.path for lesson in lessons} | {page.path for page in pages}
     return Selection(lessons, pages, frozenset(paths))
 
 
 def documents_by_name(course: Course) -> dict[str, Owner]:
     """Lessons by id, slug, `id-slug` and file, pages by id and file."""
-    found: dict[str, Owner] = {}
+    owners: dict[str, Owner] = {}
     for page in course.pages:
-        found |= {page.id: page, page.path: page}
+        owners |= {page.id: page, page.path: page}
     for lesson in course.lessons:
         file = f"{lesson.id}-{lesson.slug}"
         for alias in (lesson.slug, file, f"{file}.md", lesson.path, lesson.id):
-            found[alias] = lesson
-    return found
+            owners[alias] = lesson
+    return owners
 
 
 def path_from_root(name: str, root: Path) -> str:
-    """A path as the course names it: given from its folder, or from the working directory."""
+    """The path in the course of a file named from its folder or from the working directory."""
     for start in (root, Path.cwd()):
         path = Path(os.path.normpath(start / name))
         if path.exists() and path.is_relative_to(root):
@@ -178,15 +181,15 @@ def path_from_root(name: str, root: Path) -> str:
     return name
 
 
-def _named(course: Course, name: str, root: Path) -> Owner:
+def _find_owner(course: Course, name: str, root: Path) -> Owner:
     by_name = documents_by_name(course)
-    found = by_name.get(name) or by_name.get(path_from_root(name, root))
-    if found is None:
-        near = nearest(name, [alias for alias in by_name if ("/" in alias) == ("/" in name)])
-        written = [lesson.id for lesson in course.lessons if lesson.status != "planned"]
-        known = did_you_mean("", [*written, *(page.id for page in course.pages)])
-        help = f"did you mean `{near}`?" if near is not None else known
+    owner = by_name.get(name) or by_name.get(path_from_root(name, root))
+    if owner is None:
+        closest = nearest(name, [alias for alias in by_name if ("/" in alias) == ("/" in name)])
+        lesson_ids = [lesson.id for lesson in course.lessons if lesson.status != "planned"]
+        alternatives = did_you_mean("", [*lesson_ids, *(page.id for page in course.pages)])
+        help = f"did you mean `{closest}`?" if closest is not None else alternatives
         raise UsageError(f"no lesson or page is called `{name}`", help=help)
-    if isinstance(found, Lesson) and found.status == "planned":
-        raise UsageError(f"lesson {found.id} is planned, so there is nothing in it yet")
-    return found
+    if isinstance(owner, Lesson) and owner.status == "planned":
+        raise UsageError(f"lesson {owner.id} is planned, so there is nothing in it yet")
+    return owner

@@ -1,10 +1,10 @@
-"""What is known of the pages of the last build, so that those that stay need not be read.
+"""Records of the pages of the last build, so that unchanged pages need not be loaded.
 
 Entry point: `PageIndex`, of `SitePage`s.
 
-A page is the one of before where its key is, a hash of its inputs, of its document's text and of
-the tool. Inputs are made of the course as it looks to others, of what running it found, and of the
-page's own document: where this origin is that of before the key is known without making them.
+A page is unchanged where its key is: a hash of its inputs, of its document's text and of the tool.
+Inputs are made from the course as other pages see it, the results of running it, and the page's own
+document. Where a hash of these, its `origin`, is unchanged, so is its key, and no inputs are made.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ _KIND = "index"
 
 
 class SitePage(Struct, frozen=True, array_like=True):
-    """A page that was drawn, now or before: what the rest of the site must know of it."""
+    """What the rest of the site must know of a page that was drawn, now or before."""
 
     entry: PageEntry
     key: str
     origin: str
-    """A hash of all that its inputs are made of, and of its text; empty where that is not known."""
+    """A hash of all that its inputs are made from, and of its text; empty where that is unknown."""
     indexed: bool
     """Whether search engines should list it."""
     notes: tuple[tuple[str, NotedPage], ...]
-    """Of features, by name."""
+    """What features have noted of it, by their names."""
     ids: tuple[str, ...]
     """Its anchors."""
     text: str
@@ -42,16 +42,19 @@ class SitePage(Struct, frozen=True, array_like=True):
     mathematics: str
     declarations: tuple[str, ...]
     links: tuple[Reference, ...]
-    """Where it leads on other pages."""
+    """Its links to other pages and files."""
     sound: bool
-    """Whether it has the anchors that it leads to itself."""
+    """Whether its links to itself have their anchors."""
 
     @classmethod
     def of(cls, entry: PageEntry, key: str, origin: str, record: PageRecord) -> SitePage:
-        """A page whose record is there."""
+        """The page of a record."""
         head = record.head
-        away = [(path, anchor) for path, anchor in record.references if path != entry.path]
-        own = {anchor for path, anchor in record.references if path == entry.path} - {"", "top"}
+        references = [(path, anchor) for path, anchor in record.references if path != entry.path]
+        anchors_here = {anchor for path, anchor in record.references if path == entry.path} - {
+            "",
+            "top",
+        }
         ids = frozenset(record.ids)
         return cls(
             entry,
@@ -66,8 +69,8 @@ class SitePage(Struct, frozen=True, array_like=True):
             record.text,
             record.mathematics,
             record.declarations,
-            tuple((path, "" if anchor == "top" else anchor) for path, anchor in away),
-            all(has_anchor(ids, anchor) for anchor in own),
+            tuple((path, "" if anchor == "top" else anchor) for path, anchor in references),
+            all(has_anchor(ids, anchor) for anchor in anchors_here),
         )
 
 
@@ -77,23 +80,23 @@ class PageIndex:
     def __init__(self, store: Memo) -> None:
         self._store = store
         self._name = step_key("index of pages")
-        self._kept = store.get_value(_KIND, self._name, tuple[SitePage, ...]) or ()
-        self._pages = {page.entry.path: page for page in self._kept}
+        self._stored_pages = store.get_value(_KIND, self._name, tuple[SitePage, ...]) or ()
+        self._pages = {page.entry.path: page for page in self._stored_pages}
 
     def key(self, path: str, origin: str) -> str | None:
-        """The key of the page at a site path, where it is known without its inputs."""
+        """The key of the page at a site path, if its origin is that of the last build."""
         page = self._pages.get(path)
         return page.key if page is not None and origin and page.origin == origin else None
 
     def page(self, entry: PageEntry, key: str, origin: str) -> SitePage | None:
-        """What is known of the page that has this key, with its origin now."""
+        """The page of an entry, if it has this key; with its origin now."""
         page = self._pages.get(entry.path)
         if page is None or page.key != key or page.entry != entry:
             return None
         return page if page.origin == origin else replace(page, origin=origin)
 
     def save(self, pages: Iterable[SitePage]) -> None:
-        """Keep what is known of all pages of this build for the next one."""
-        now = tuple(pages)
-        if now != self._kept:
-            self._store.put_value(_KIND, self._name, now)
+        """Store the pages of this build for the next one."""
+        all_pages = tuple(pages)
+        if all_pages != self._stored_pages:
+            self._store.put_value(_KIND, self._name, all_pages)

@@ -1,15 +1,15 @@
-"""The pages of a site, drawn where something that they show has changed.
+"""The pages of a site. Only those that show something that has changed are drawn.
 
 Entry point: `Pages`.
 
 1. Every page has inputs, all that it shows of the course, and a key: a hash of its inputs, of its
-   document's text, and of the tool. Where nothing has changed of what inputs are made of, the key
-   is known without.
-2. Of the pages of the last build it is known what the site must know (`page_index`). What was drawn
-   earlier comes from the store; a page that is not there is drawn.
-3. From the records of pages it is known whether all links lead somewhere, and which characters and
-   styles the pages use.
-4. A body is fetched, and framed, when its file is written: a course may have any number of pages.
+   document's text, and of the tool. Where nothing has changed of what the inputs are made of, the
+   key is that of the last build, and the inputs are not made.
+2. `page_index` has records of the pages of the last build. Records of pages that were drawn earlier
+   come from the store; a page that is not there is drawn.
+3. The records say whether all links lead somewhere, and which characters and styles pages use.
+4. A page's body is loaded, and put into its frame, when its file is written: not all bodies of a
+   large course may fit into memory.
 """
 
 from __future__ import annotations
@@ -47,18 +47,18 @@ class Pages:
         entries: Iterable[PageEntry] | None = None,
         last_good: Mapping[str, str] | None = None,
     ) -> None:
-        """`entries` are those to draw, all where nothing is said.
+        """Draw the pages of these entries, or all pages.
 
-        `last_good`: keys, by site path, of pages that stay as they were.
+        `last_good`: the keys, by site path, of pages that stay as they were.
         """
         self._library = library
         self._documents = documents
         self._store = store
         self._last_good = last_good or {}
         self._latest: tuple[str, DrawnPage] | None = None
-        """The page that was asked for last: several files are made of it."""
+        """The page that was loaded last: several files are made of it."""
         index = PageIndex(store)
-        self._pages = self._made(page_list(library) if entries is None else entries, index)
+        self._pages = self._draw_changed(page_list(library) if entries is None else entries, index)
         if entries is None:
             index.save(self._pages.values())
 
@@ -82,36 +82,36 @@ class Pages:
         """Site paths of the pages that search engines should list."""
         return (path for path, page in self._pages.items() if page.indexed)
 
-    def noted(self, feature: str) -> tuple[NotedPage, ...]:
+    def noted_pages(self, feature: str) -> tuple[NotedPage, ...]:
         """The pages of which a feature has noted something, in order."""
         pages = self._pages.values()
-        return tuple(one for page in pages for name, one in page.notes if name == feature)
+        return tuple(note for page in pages for name, note in page.notes if name == feature)
 
     def note(self, feature: str, path: str) -> bytes:
         """What a feature has noted of one of these pages."""
-        return self._drawn(path).notes[feature]
+        return self._load(path).notes[feature]
 
     def are_sound(self, files: set[str]) -> bool:
         """Whether all links of the pages lead to pages, or to files among these."""
         ids = {path: page.ids for path, page in self._pages.items()}
 
-        def leads(path: str, anchor: str) -> bool:
+        def exists(path: str, anchor: str) -> bool:
             return anchor == "" or has_anchor(ids[path], anchor) if path in ids else path in files
 
         pages = self._pages.values()
         links = set[Reference]().union(*(page.links for page in pages))
-        return all(page.sound for page in pages) and all(leads(*link) for link in links)
+        return all(page.sound for page in pages) and all(exists(*link) for link in links)
 
     def files(self, names: Names) -> Iterator[CachedFile]:
         """The pages in their frames."""
         key = self._frame_key(names)
         frame = PageFrame(self._library, names)
         for path, page in self._pages.items():
-            make = functools.partial(self._framed, path, frame)
+            make = functools.partial(self._make_file, path, frame)
             yield CachedFile(path, key_of(page.key, key), make)
 
-    def _framed(self, path: str, frame: PageFrame) -> bytes:
-        return framed(self._drawn(path), frame)
+    def _make_file(self, path: str, frame: PageFrame) -> bytes:
+        return frame_page(self._load(path), frame)
 
     def _frame_key(self, names: Names) -> str:
         """The key of all that a frame shows besides its page."""
@@ -135,75 +135,75 @@ class Pages:
     # --- keys
 
     def _origins(self) -> Callable[[PageEntry, str], str]:
-        """Gives a hash of all that a page is made of, by the key of its text; empty without one."""
+        """Return a function that hashes all that a page is made of: see `SitePage.origin`."""
         library = self._library
         results = results_fingerprint(library.results, library.reports)
-        bare, noted = (
+        bare, with_notes = (
             self._documents.fingerprint(library.course, notes=notes) for notes in (False, True)
         )
 
         def origin(entry: PageEntry, text_key: str) -> str:
-            course = noted if entry.may_show_notes(library) else bare
+            course = with_notes if entry.may_show_notes(library) else bare
             return "" if course is None else key_of(course, results, text_key)
 
         return origin
 
     # --- drawing
 
-    def _made(self, entries: Iterable[PageEntry], index: PageIndex) -> dict[str, SitePage]:
-        """The pages by site path, in order; they are drawn where they are not kept."""
-        found: dict[str, SitePage | None] = {}
-        asked: deque[tuple[PageEntry, str, str]] = deque()
+    def _draw_changed(self, entries: Iterable[PageEntry], index: PageIndex) -> dict[str, SitePage]:
+        """Return the pages by site path, in order; draw those that are not stored."""
+        pages: dict[str, SitePage | None] = {}
+        pending: deque[tuple[PageEntry, str, str]] = deque()
         origin_of = self._origins()
 
         def missing() -> Iterator[PageRequest]:  # inputs are made while pages are drawn
             for entry in entries:
                 path, text = entry.path, text_of(entry, self._library)
                 origin = origin_of(entry, "" if text is None else text.key)
-                stays = path in self._last_good
-                key = self._last_good[path] if stays else index.key(path, origin)
+                stays_as_it_was = path in self._last_good
+                key = self._last_good[path] if stays_as_it_was else index.key(path, origin)
                 request = None
                 if key is None:
                     request = page_request(entry, self._library, text)
                     key = request.key
-                page = index.page(entry, key, origin) or self._kept(entry, key, origin)
+                page = index.page(entry, key, origin) or self._find_drawn(entry, key, origin)
                 if page is not None:
-                    found[path] = page
-                elif not stays:  # else what it was is gone
-                    found[path] = None
-                    asked.append((entry, key, origin))
+                    pages[path] = page
+                elif not stays_as_it_was:  # if it should, it is no longer in the store
+                    pages[path] = None
+                    pending.append((entry, key, origin))
                     yield request or page_request(entry, self._library, text)
 
-        drawn: list[str] = []
+        drawn_paths: list[str] = []
         for data in self._documents.draw(missing()):
-            entry, key, origin = asked.popleft()
+            entry, key, origin = pending.popleft()
             record = decode(data, PageRecord)
             assert record is not None
-            found[entry.path] = SitePage.of(entry, key, origin, record)
-            drawn.append(entry.path)
-        self.drawn = tuple(drawn)
+            pages[entry.path] = SitePage.of(entry, key, origin, record)
+            drawn_paths.append(entry.path)
+        self.drawn_paths = tuple(drawn_paths)
         """Site paths of the pages that were drawn just now."""
-        return {path: page for path, page in found.items() if page is not None}
+        return {path: page for path, page in pages.items() if page is not None}
 
-    def _kept(self, entry: PageEntry, key: str, origin: str) -> SitePage | None:
-        """A page that was drawn before the last build."""
-        kept = self._store.get(PAGES, key, lambda data: decode(data, DrawnPage))
-        return None if kept is None else SitePage.of(entry, key, origin, kept.record)
+    def _find_drawn(self, entry: PageEntry, key: str, origin: str) -> SitePage | None:
+        """Find a page that was drawn before the last build."""
+        page = self._store.get(PAGES, key, lambda data: decode(data, DrawnPage))
+        return None if page is None else SitePage.of(entry, key, origin, page.record)
 
-    def _drawn(self, path: str) -> DrawnPage:
-        """What was drawn of a page."""
+    def _load(self, path: str) -> DrawnPage:
+        """Return a page of the site, from the store."""
         if self._latest is None or self._latest[0] != path:
             page = self._pages[path]
 
             def make() -> PageRequest:
                 return page_request(page.entry, self._library, text_of(page.entry, self._library))
 
-            self._latest = path, self._documents.page(page.key, make)
+            self._latest = path, self._documents.get_or_draw(page.key, make)
         return self._latest[1]
 
 
-def framed(page: DrawnPage, frame: PageFrame) -> bytes:
-    """A page as it is published."""
+def frame_page(page: DrawnPage, frame: PageFrame) -> bytes:
+    """Put a page into its frame, as it is published."""
     record = page.record
     return frame.render(record.head, record.parts, page.body.decode()).encode()
 
@@ -220,10 +220,10 @@ def text_of(entry: PageEntry, library: Library) -> SourceText | None:
 
 
 def page_request(entry: PageEntry, library: Library, text: SourceText | None) -> PageRequest:
-    """A page with all that it shows, and its text; its key is a hash of both."""
+    """Make the request to draw a page; its key is a hash of all that it shows and of its text."""
     course = library.course
     inputs = encode(entry.inputs(library))
     text_key = "" if text is None else text.key
-    own = course.theme.template_texts
-    key = step_key("page", course.language, course.base_url, own, inputs, text_key)
-    return PageRequest(inputs, text, course.language, course.base_url, own, key)
+    templates = course.theme.template_texts
+    key = step_key("page", course.language, course.base_url, templates, inputs, text_key)
+    return PageRequest(inputs, text, course.language, course.base_url, templates, key)

@@ -1,12 +1,12 @@
-"""What long work says while it runs: a live line on a terminal, plain lines elsewhere.
+"""Messages about long work while it runs: a live line on a terminal, plain lines elsewhere.
 
 Entry point: `Progress(stream, quiet=…)`. Everything goes to standard error, so that standard output
-holds only results. What a script's verdict is belongs to the results, and is not said here.
+holds only results. Verdicts on scripts belong to the results, and are not printed here.
 
-1. On a terminal one line says what runs and for how long; it is renewed while the work goes on, and
-   gone when it is done.
-2. Elsewhere a line says what begins, and one for each script what it did and how long it took, so
-   that a log shows where the time goes and what hangs.
+1. On a terminal one line says what runs and for how long. It is updated while the work goes on, and
+   erased at its end.
+2. Elsewhere a line says what begins, and one line for each script how it ended and how long it
+   took, so that a log shows where the time goes and what hangs.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from coursebuild.report.terminal import clipped
+from coursebuild.report.terminal import clip
 
-_RENEWED = 0.1
-"""Seconds from one live line to the next."""
+_INTERVAL = 0.1
+"""Seconds between updates of the live line."""
 _ERASE = "\r\x1b[K"
 
 
@@ -34,28 +34,28 @@ class Progress:
 
     def __init__(self, stream: TextIO | None = None, *, quiet: bool = False) -> None:
         self.stream = sys.stderr if stream is None else stream
-        # There is no standard error where the tool was started without one.
+        # The tool may have been started without a standard error.
         self.quiet = quiet or self.stream is None
         self.live = not self.quiet and self.stream.isatty() and os.environ.get("TERM") != "dumb"
         self._lock = threading.Lock()
-        self._running: dict[str, float] = {}
-        self._doing: dict[str, str] = {}
+        self._running_since: dict[str, float] = {}
+        self._activities: dict[str, str] = {}
         self._stage = ""
-        self._told = ""
+        self._last_line = ""
         self._since = 0.0
-        self._done = 0
+        self._ended_count = 0
         self._total = 0
         self._stop = threading.Event()
 
     @contextmanager
     def stage(self, name: str, total: int = 0) -> Iterator[None]:
-        """A stage of the work, with so many scripts to run."""
-        self._stage, self._done, self._total, self._since = name, 0, total, time.monotonic()
+        """Show a stage of the work, in which `total` scripts run."""
+        self._stage, self._ended_count, self._total, self._since = name, 0, total, time.monotonic()
         if not self.live:
-            told = f"{name} ({total})" if total else name
-            if told != self._told:  # it goes on with the next part of the same work
-                self.say(told)
-            self._told = told
+            line = f"{name} ({total})" if total else name
+            if line != self._last_line:  # else it is the next part of the same work
+                self.say(line)
+            self._last_line = line
             yield
             return
         self._stop.clear()
@@ -68,36 +68,36 @@ class Progress:
             ticker.join()
             with self._lock:
                 self._write(_ERASE)
-                self._running.clear()
+                self._running_since.clear()
 
-    def started(self, name: str) -> None:
-        """A script began."""
+    def start(self, name: str) -> None:
+        """Show that a script runs."""
         with self._lock:
-            self._running[name] = time.monotonic()
+            self._running_since[name] = time.monotonic()
             if not self.live:
                 self._write(f"  {name}\n")
 
-    def doing(self, name: str, what: str) -> None:
-        """What something that runs is at; only a terminal is told."""
+    def describe(self, name: str, activity: str) -> None:
+        """Show what something that runs is doing; only on a terminal."""
         with self._lock:
-            self._doing[name] = what
+            self._activities[name] = activity
 
-    def known(self) -> None:
-        """Something need not run: what it gives is kept."""
+    def skip(self) -> None:
+        """Count something that need not run, since its result is stored."""
         with self._lock:
-            self._done += 1
+            self._ended_count += 1
 
-    def finished(self, name: str, verdict: str, seconds: float) -> None:
-        """A script ended; the verdict is one word, such as `ok` or `timeout`."""
+    def finish(self, name: str, verdict: str, seconds: float) -> None:
+        """Show that a script ended; the verdict is one word, such as `ok` or `timeout`."""
         with self._lock:
-            self._running.pop(name, None)
-            self._doing.pop(name, None)
-            self._done += 1
+            self._running_since.pop(name, None)
+            self._activities.pop(name, None)
+            self._ended_count += 1
             if not self.live:
                 self._write(f"  {name}: {verdict} after {seconds:.2f} s\n")
 
     def say(self, text: str) -> None:
-        """A line for the reader, unless quiet."""
+        """Print a line, unless quiet."""
         with self._lock:
             self._write(f"{_ERASE if self.live else ''}{text}\n")
 
@@ -105,17 +105,17 @@ class Progress:
         while True:
             with self._lock:
                 room = _columns(self.stream) - 1
-                self._write(_ERASE + clipped(self._line(time.monotonic()), room))
-            if self._stop.wait(_RENEWED):
+                self._write(_ERASE + clip(self._line(time.monotonic()), room))
+            if self._stop.wait(_INTERVAL):
                 return
 
     def _line(self, now: float) -> str:
         if not self._total:
             return f"{self._stage}  {now - self._since:.0f} s"
-        doing = {name: f" ({what})" for name, what in self._doing.items()}
-        running = self._running.items()
-        names = [f"{name}{doing.get(name, '')} {now - since:.0f} s" for name, since in running]
-        return f"{self._stage} {self._done}/{self._total}  {', '.join(names)}"
+        activities = {name: f" ({activity})" for name, activity in self._activities.items()}
+        running = self._running_since.items()
+        names = [f"{name}{activities.get(name, '')} {now - since:.0f} s" for name, since in running]
+        return f"{self._stage} {self._ended_count}/{self._total}  {', '.join(names)}"
 
     def _write(self, text: str) -> None:
         if self.quiet:
@@ -128,7 +128,7 @@ class Progress:
 
 
 def _columns(stream: TextIO) -> int:
-    """The width of a terminal; 80 where it does not know its own."""
+    """The width of a terminal; 80 where it is not known."""
     try:
         return os.get_terminal_size(stream.fileno()).columns or 80
     except (OSError, ValueError):

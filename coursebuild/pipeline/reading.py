@@ -1,11 +1,11 @@
-"""Texts read and pages drawn, one at a time, here or in a copy of this process.
+"""Reads texts and draws pages, one at a time, in this process or in a worker.
 
-Entry point: `PageReader`: `read` takes a `SourceText` and gives its `DocumentSummary`, `draw` takes
-a `PageRequest` and gives a `DrawnPage`. Both keep what they make.
+Entry point: `PageReader`: `read` takes a `SourceText` and returns its `DocumentSummary`, `draw`
+takes a `PageRequest` and returns a `DrawnPage`. Both store what they make.
 
-A document and its formulas stay for the drawing. Those that an earlier build has read, or another
-process, are parsed again, and their MathML comes from the store. What draws is imported when there
-is something to draw.
+Documents that were read stay in memory, with their formulas, until their pages are drawn. A
+document that an earlier build or another process has read is parsed again; its MathML comes from
+the store. The modules that draw are imported when there is something to draw.
 """
 
 from __future__ import annotations
@@ -48,17 +48,17 @@ if TYPE_CHECKING:
     from coursebuild.core.run.v8 import MathEngine
 
 SUMMARIES, PAGES = "summaries", "pages"
-"""Kinds of entries in the store. They stay on this machine, where they are made soon enough."""
+"""Kinds of entries in the store. They are not shared with other machines: making them is quick."""
 _MATHML = "mathml"
-"""Likewise. One has the formulas of a text: one for each formula would take as long to write as to
-make."""
+"""Likewise. An entry has all formulas of a text: writing one for each formula would take as long as
+making them."""
 ROOM = 1_500_000
-"""Characters of documents that wait to be drawn as they are, some twenty bytes each. Further ones
-wait packed, in one byte each: to unpack one takes less time than to parse it again."""
+"""Characters of documents that wait unpacked to be drawn, at some twenty bytes a character. Further
+ones wait packed, at one byte a character: unpacking takes less time than parsing again."""
 
 
 class SourceText(Struct, frozen=True):
-    """A text that holds a document."""
+    """The text of a document, and how it is parsed."""
 
     source: Source
     callouts: frozenset[str]
@@ -68,78 +68,78 @@ class SourceText(Struct, frozen=True):
 
     @classmethod
     def of(cls, source: Source, callouts: frozenset[str], *, lesson: bool) -> SourceText:
-        """With its key."""
+        """A text with its key."""
         key = step_key("summary", lesson, callouts, source.path, source.digest)
         return cls(source, callouts, lesson, key)
 
 
 class DocumentSummary(Struct, frozen=True):
-    """A parsed text: what others than its own page look at, and what is wrong in it."""
+    """What is known of a document beyond its own page, and what is wrong in it."""
 
     document: Document
     """Without its prose; see `model.summary`. What features note of it is in `notes`."""
     diagnostics: tuple[Diagnostic, ...]
-    """Those of formulas among them."""
+    """With those of its formulas."""
     imports: tuple[tuple[str, tuple[str, ...]], ...]
     """Paths of scripts, each with the modules that it imports."""
     fingerprint: str
-    """Of what others than its own page can see of it; see `pipeline.fingerprints`."""
+    """A hash of what other pages can see of it; see `pipeline.fingerprints`."""
     notes: dict[str, bytes]
-    """What features note of it (`Feature.summary`), by their names: each as `encode` gives it."""
+    """What features note of it (`Feature.summary`), by their names; encoded."""
     notes_fingerprint: str
 
-    def noted(self, again: Callable[[], Mapping[str, bytes]]) -> DocumentSummary:
-        """With a document that has its notes; `again` makes them, where some cannot be decoded."""
-        notes = _Notes(self.notes, self.document.source, again)
+    def with_notes(self, remake: Callable[[], Mapping[str, bytes]]) -> DocumentSummary:
+        """The same with the notes in its document; `remake` makes damaged notes again."""
+        notes = _Notes(self.notes, self.document.source, remake)
         return replace(self, document=replace(self.document, summaries=notes))
 
 
 class _Notes(Mapping[str, Struct]):
-    """What features note of a document, decoded when it is asked for: after an edit few are."""
+    """What features note of a document, decoded on demand: after an edit few notes are needed."""
 
     def __init__(
         self,
-        packed: Mapping[str, bytes],
+        encoded_notes: Mapping[str, bytes],
         source: Source,
-        again: Callable[[], Mapping[str, bytes]],
+        remake: Callable[[], Mapping[str, bytes]],
     ) -> None:
-        self._packed = packed
+        self._encoded_notes = encoded_notes
         self._source = source
-        self._again = again
+        self._remake = remake
 
     def __getitem__(self, feature: str) -> Struct:
-        found = decode(self._packed[feature], Struct, self._source)
-        if found is None:
-            self._packed = self._again()
-            found = decode(self._packed[feature], Struct, self._source)
-        assert found is not None, "what was just encoded can be decoded"
-        return found
+        note = decode(self._encoded_notes[feature], Struct, self._source)
+        if note is None:
+            self._encoded_notes = self._remake()
+            note = decode(self._encoded_notes[feature], Struct, self._source)
+        assert note is not None, "what was just encoded can be decoded"
+        return note
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._packed)
+        return iter(self._encoded_notes)
 
     def __len__(self) -> int:
-        return len(self._packed)
+        return len(self._encoded_notes)
 
 
 class PageRequest(Struct, frozen=True):
     """A page to be drawn."""
 
-    packed: bytes
-    """Its inputs, as its key is made from them."""
+    encoded_inputs: bytes
+    """Its key is made from them."""
     text: SourceText | None
-    """That of its document, if it has one."""
+    """The text of its document, if it has one."""
     language: str
     """Of the interface."""
     base_url: str
     templates: Texts
-    """Those of the course's own."""
+    """The course's own templates."""
     key: str
-    """Under which it is kept."""
+    """The key under which it is stored."""
 
 
 class DrawnPage(Struct, frozen=True):
-    """A page as it is kept."""
+    """A page as it is stored."""
 
     record: PageRecord
     """What the site must know of it."""
@@ -149,7 +149,9 @@ class DrawnPage(Struct, frozen=True):
     """UTF-8."""
 
 
-class _Whole(Struct, frozen=True):
+class _TypesetDocument(Struct, frozen=True):
+    """A document with all its text, and with its formulas as MathML."""
+
     document: Document
     diagnostics: tuple[Diagnostic, ...]
     formulas: dict[Formula, str | MathError]
@@ -166,23 +168,23 @@ _HEAVY = (
 
 
 def prepare_to_read(sample: SourceText) -> None:
-    """Import and make what reading and drawing need, so that copies of this process share it."""
+    """Import and make what reading and drawing need, so that worker processes share it."""
     for name in _HEAVY:
         importlib.import_module(name)
     from coursebuild.core.pages.highlight import highlight_lines
     from coursebuild.core.syntax.document import parse_document
 
-    # Much is made only when it is needed for the first time.
-    read = parse_document(sample.source, sample.callouts, lesson=sample.lesson).value
+    # Several modules prepare things at their first use.
+    document = parse_document(sample.source, sample.callouts, lesson=sample.lesson).value
     highlight_lines("python", "x")
-    if document_formulas(read):
+    if document_formulas(document):
         from coursebuild.core.run.v8 import start
 
         start()
 
 
 def kept_formulas(store: Memo, path: str) -> dict[Formula, str]:
-    """MathML of the formulas that the text at a path had when it was last read."""
+    """The MathML of the formulas that the text at a path had when it was last read."""
     key = _formulas_key(path)
     return store.get(_MATHML, key, lambda data: decode(data, dict[Formula, str])) or {}
 
@@ -198,20 +200,20 @@ class PageReader:
         self._store = store
         self._lock = threading.RLock()
         self._engine: MathEngine | None = None
-        self._waiting: dict[str, tuple[str, _Whole | bytes]] = {}
-        """Documents that were read and not drawn yet, by path, each with the key of its text;
-        packed, where there was no room."""
+        self._undrawn_documents: dict[str, tuple[str, _TypesetDocument | bytes]] = {}
+        """Documents that were read and not drawn yet, by path, each with the key of its text; those
+        for which there was no room are packed."""
         self._room = ROOM
         self._renderers: dict[tuple[str, Texts], Renderer] = {}
 
     def close(self) -> None:
-        """End the engine that typesets formulas, until it is needed again."""
+        """End the engine that typesets formulas; it starts again when it is needed."""
         if self._engine is not None:
             self._engine.close()
             self._engine = None
 
     def answer(self, request: SourceText | PageRequest) -> bytes:
-        """The summary of a text, or the record of a page, encoded."""
+        """Return the summary of a text, or the record of a page, encoded."""
         if isinstance(request, SourceText):
             return self.read(request)
         return encode(self.draw(request).record)
@@ -219,72 +221,79 @@ class PageReader:
     # --- reading
 
     def read(self, text: SourceText) -> bytes:
-        """The summary of a text, encoded."""
+        """Return the summary of a text, encoded."""
         with self._lock:
-            whole = self._whole(text)
-            found = check_formulas(whole.document, whole.formulas)
+            whole = self._parse_and_typeset(text)
+            formula_diagnostics = check_formulas(whole.document, whole.formulas)
             mathml = known_mathml(whole.formulas)
-            known = summarize(whole.document, mathml)
+            notes = summarize(whole.document, mathml)
             equations = equations_of(whole.document, mathml)
-            bare = without_prose(whole.document)
-            bare = replace(bare, equations=equations, summaries={})
-            wrong = (*whole.diagnostics, *found, *known.diagnostics)
+            summary_document = without_prose(whole.document)
+            summary_document = replace(summary_document, equations=equations, summaries={})
+            diagnostics = (*whole.diagnostics, *formula_diagnostics, *notes.diagnostics)
             scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
             imports = tuple((s.path, tuple(sorted(find_imports(s.code.text)))) for s in scripts)
             summary = DocumentSummary(
-                bare,
-                wrong,
+                summary_document,
+                diagnostics,
                 imports,
-                document_fingerprint(bare),
-                {feature: encode(note) for feature, note in known.value.items()},
-                notes_fingerprint(known.value),
+                document_fingerprint(summary_document),
+                {feature: encode(note) for feature, note in notes.value.items()},
+                notes_fingerprint(notes.value),
             )
             data = encode(summary)
-            if not found:  # that a formula took too long may not happen again
+            if not formula_diagnostics:  # a formula that took too long may not do so again
                 self._store.put(SUMMARIES, text.key, data)
-            self._keep(text, whole)
+            self._keep_until_drawn(text, whole)
             return data
 
-    def _keep(self, text: SourceText, whole: _Whole) -> None:
-        """Keep a document until it is drawn."""
+    def _keep_until_drawn(self, text: SourceText, whole: _TypesetDocument) -> None:
+        """Keep a document in memory until its page is drawn."""
         size = len(text.source.text)
         if size <= self._room:
-            self._waiting[text.source.path] = text.key, whole
+            self._undrawn_documents[text.source.path] = text.key, whole
             self._room -= size
         else:
             with contextlib.suppress(TypeError):  # a feature's block holds something else
-                self._waiting[text.source.path] = text.key, zlib.compress(encode(whole), 1)
+                self._undrawn_documents[text.source.path] = (
+                    text.key,
+                    zlib.compress(encode(whole), 1),
+                )
 
-    def _whole(self, text: SourceText) -> _Whole:
-        """A document with its formulas."""
-        key, known = self._waiting.pop(text.source.path, ("", None))
-        if isinstance(known, _Whole):
-            self._room += len(known.document.source.text)
-        elif known is not None and key == text.key:
-            known = decode(zlib.decompress(known), _Whole, text.source)
-        if isinstance(known, _Whole) and key == text.key:
-            return known
+    def _parse_and_typeset(self, text: SourceText) -> _TypesetDocument:
+        """Return a document with its formulas, parsed now or when it was last read."""
+        key, whole = self._undrawn_documents.pop(text.source.path, ("", None))
+        if isinstance(whole, _TypesetDocument):
+            self._room += len(whole.document.source.text)
+        elif whole is not None and key == text.key:
+            whole = decode(zlib.decompress(whole), _TypesetDocument, text.source)
+        if isinstance(whole, _TypesetDocument) and key == text.key:
+            return whole
         from coursebuild.core.syntax.document import parse_document
 
-        parsed = parse_document(text.source, text.callouts, lesson=text.lesson)
-        formulas = document_formulas(parsed.value)
-        return _Whole(parsed.value, parsed.diagnostics, self._typeset(text.source.path, formulas))
+        parsed_text = parse_document(text.source, text.callouts, lesson=text.lesson)
+        formulas = document_formulas(parsed_text.value)
+        return _TypesetDocument(
+            parsed_text.value, parsed_text.diagnostics, self._typeset(text.source.path, formulas)
+        )
 
     def _typeset(self, path: str, formulas: Sequence[Formula]) -> dict[Formula, str | MathError]:
-        """MathML; that of formulas which the text at this path had before is in the store."""
+        """Return the MathML of formulas; what the text at this path had before is in the store."""
         if not formulas:
             return {}
-        known = kept_formulas(self._store, path)
-        new = [formula for formula in formulas if formula not in known]
+        mathml_before = kept_formulas(self._store, path)
+        new = [formula for formula in formulas if formula not in mathml_before]
         if not new:
-            return {formula: known[formula] for formula in formulas}
-        made = {**known, **dict(zip(new, self._started().typeset(new), strict=True))}
-        found = {formula: made[formula] for formula in formulas}
-        lasting = {formula: one for formula, one in found.items() if isinstance(one, str)}
-        self._store.put(_MATHML, _formulas_key(path), encode(lasting))
-        return found
+            return {formula: mathml_before[formula] for formula in formulas}
+        mathml = {**mathml_before, **dict(zip(new, self._start_engine().typeset(new), strict=True))}
+        mathml_of_text = {formula: mathml[formula] for formula in formulas}
+        without_errors = {
+            formula: html for formula, html in mathml_of_text.items() if isinstance(html, str)
+        }
+        self._store.put(_MATHML, _formulas_key(path), encode(without_errors))
+        return mathml_of_text
 
-    def _started(self) -> MathEngine:
+    def _start_engine(self) -> MathEngine:
         from coursebuild.core.run.v8 import MathEngine
 
         if self._engine is None:
@@ -294,44 +303,46 @@ class PageReader:
     # --- drawing
 
     def draw(self, request: PageRequest) -> DrawnPage:
-        """A page, its body, and what is noted of it."""
+        """Draw a page and store it."""
         from coursebuild.core.pages.added_files import page_notes
         from coursebuild.core.pages.draw import draw
 
-        inputs = decode(request.packed, PageInputs)
+        inputs = decode(request.encoded_inputs, PageInputs)
         assert inputs is not None, "what was just encoded can be decoded"
         with self._lock:
-            whole = None if request.text is None else self._whole(request.text)
+            whole = None if request.text is None else self._parse_and_typeset(request.text)
             document = None if whole is None else whole.document
             renderer = self._renderer_for(request.language, request.templates, whole)
             head, html, context = draw(inputs, document, renderer)
-            found, body = record(head, html, request.base_url)
+            page_record, body = record(head, html, request.base_url)
             notes = page_notes(inputs, context, body)
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
-            found = replace(found, notes=tuple(digests))
-            page = DrawnPage(found, notes, body.encode())
+            page_record = replace(page_record, notes=tuple(digests))
+            page = DrawnPage(page_record, notes, body.encode())
             self._store.put(PAGES, request.key, encode(page))
             return page
 
-    def context(
+    def page_context(
         self, text: SourceText, inputs: PageInputs, language: str, templates: Texts
     ) -> PageContext:
-        """A document with all its text, on its page."""
+        """Return what is needed to draw parts of a document, with all its text."""
         from coursebuild.core.pages.context import PageContext
 
         assert inputs.document_inputs is not None, "a page with a document shows it"
-        whole = self._whole(text)
+        whole = self._parse_and_typeset(text)
         renderer = self._renderer_for(language, templates, whole)
         return PageContext(
             renderer, inputs.document_inputs, Place(inputs.head.path), whole.document
         )
 
-    def _renderer_for(self, language: str, own: Texts, whole: _Whole | None) -> Renderer:
-        """Words and templates, with the formulas of a document."""
-        if (language, own) not in self._renderers:
+    def _renderer_for(
+        self, language: str, templates: Texts, whole: _TypesetDocument | None
+    ) -> Renderer:
+        """Return a renderer with words, templates, and the formulas of a document."""
+        if (language, templates) not in self._renderers:
             texts = template_texts()
-            templates = templates_of(texts, prepared_folder(), own)
+            compiled_templates = templates_of(texts, prepared_folder(), templates)
             strings = strings_for(texts, language)
-            self._renderers = {(language, own): Renderer(strings, templates)}
-        renderer = self._renderers[language, own]
+            self._renderers = {(language, templates): Renderer(strings, compiled_templates)}
+        renderer = self._renderers[language, templates]
         return renderer if whole is None else replace(renderer, formulas=whole.formulas)

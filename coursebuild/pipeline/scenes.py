@@ -1,14 +1,13 @@
-"""The models of a course that can be measured, with what is declared for them.
+"""The models of a course that can be measured, with their declarations.
 
 Entry points: `find_scenes(root, names)`, `scene_digest`.
 
-1. A scene is a file of `models/` that others do not include. One that is named is a scene in any
-   case.
-2. What does not compile, and what is declared wrongly, is a diagnostic; the other scenes are
+1. A scene is a file of `models/` that no other file includes, or one that was named.
+2. A model that does not compile or has wrong declarations is a diagnostic; the other scenes are
    measured all the same.
-3. Figures depend on the model with all files that it pulls in, on its scenarios, and on the file
-   with its exact motion: the digest is theirs. It does not depend on the machine, nor on what else
-   the file beside the model says.
+3. Measurements depend on the model with all files that it includes, on its scenarios, and on the
+   file with its exact motion. The digest is of these, but not of the machine or of the other
+   declarations.
 """
 
 from __future__ import annotations
@@ -47,20 +46,20 @@ class CourseScene(Struct, frozen=True):
     """A model that can be measured."""
 
     model: MjcfModel
-    declared: Declarations
-    """What the file beside it says."""
+    declarations: Declarations
+    """What the file beside the model declares."""
     facts: ModelFacts
     digest: str
-    """Of all that its figures depend on in the course."""
+    """A hash of all that its measurements depend on in the course."""
 
     @property
     def name(self) -> str:
-        """Its file below `models/`, without suffix."""
+        """The model's file below `models/`, without suffix."""
         return self.model.name
 
 
 def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Parsed[tuple[CourseScene, ...]]:
-    """The scenes that the names mean, by name; all where there are none.
+    """Find the scenes with these names, or all scenes; sorted by name.
 
     A name is that of a file below `models/`, with or without its suffix and folder.
 
@@ -70,27 +69,30 @@ def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Parsed[tuple[CourseS
     """
     read = read_course(root)
     models = {model.name: model for model in read.value.models}
-    chosen = _named(names, models) if names else _whole(root, list(models.values()))
-    declared, found = _declared(read.value, chosen, every=not names)
-    found += [d for d in read.diagnostics if d.span.path.startswith("models/")]
+    selection = (
+        _find_models(names, models) if names else _find_main_models(root, list(models.values()))
+    )
+    declarations, diagnostics = _read_declarations(read.value, selection, all_models=not names)
+    diagnostics += [d for d in read.diagnostics if d.span.path.startswith("models/")]
     scenes: list[CourseScene] = []
-    results = compile_all(root, [(model.source.path, model.source.text) for model in chosen])
-    for model, result in zip(chosen, results, strict=True):
+    results = compile_all(root, [(model.source.path, model.source.text) for model in selection])
+    for model, result in zip(selection, results, strict=True):
         if result.facts is None:
-            found.append(diagnose_model(model, result, readable_error))
+            diagnostics.append(diagnose_model(model, result, readable_error))
             continue
-        says = declared.get(model.name, Declarations(model.name, model.source))
-        if says is None:
-            continue  # what is beside it cannot be read, and was told
-        wrong = list(check_scenarios(says, result.facts))
-        found += wrong
-        if not wrong:
-            scenes.append(CourseScene(model, says, result.facts, scene_digest(root, model, says)))
-    return Parsed(tuple(scenes), sort_diagnostics(found))
+        model_declarations = declarations.get(model.name, Declarations(model.name, model.source))
+        if model_declarations is None:
+            continue  # its file cannot be read, which has its diagnostic already
+        mistakes = list(check_scenarios(model_declarations, result.facts))
+        diagnostics += mistakes
+        if not mistakes:
+            digest = scene_digest(root, model, model_declarations)
+            scenes.append(CourseScene(model, model_declarations, result.facts, digest))
+    return Parsed(tuple(scenes), sort_diagnostics(diagnostics))
 
 
-def scene_digest(root: Path, model: MjcfModel, declared: Declarations) -> str:
-    """Of a model with the files that it pulls in, and of its scenarios."""
+def scene_digest(root: Path, model: MjcfModel, declarations: Declarations) -> str:
+    """A hash of a model with the files that it includes, and of its scenarios."""
     digest = hashlib.sha256()
 
     def add(*parts: bytes) -> None:
@@ -101,17 +103,17 @@ def scene_digest(root: Path, model: MjcfModel, declared: Declarations) -> str:
     for path in model_files(root, model.source.path, model.source.text):
         file = root / path
         if file.is_file():
-            # A file elsewhere has another path on another machine.
-            shown = path if not path.startswith("/") else f"/{file.name}"
-            add(shown.encode("utf-8", "surrogateescape"), _content(file))
+            # A file outside the course has another path on another machine.
+            path_text = path if not path.startswith("/") else f"/{file.name}"
+            add(path_text.encode("utf-8", "surrogateescape"), _hash_file(file))
     exact = root / exact_file(model.name)
     if exact.is_file():
-        add(exact.name.encode("utf-8", "surrogateescape"), _content(exact))
-    add(_said(declared).encode("utf-8", "surrogatepass"))
+        add(exact.name.encode("utf-8", "surrogateescape"), _hash_file(exact))
+    add(_canonical_text(declarations).encode("utf-8", "surrogatepass"))
     return digest.hexdigest()
 
 
-def _content(file: Path) -> bytes:
+def _hash_file(file: Path) -> bytes:
     try:
         with file.open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").digest()
@@ -119,68 +121,68 @@ def _content(file: Path) -> bytes:
         return b"unreadable"
 
 
-def _said(declared: Declarations) -> str:
-    """All that is declared and changes a figure, wherever it stands in the file.
+def _canonical_text(declarations: Declarations) -> str:
+    """A text of all declarations that change a measurement, in whatever order the file has them.
 
-    Recorded reports hold the digest of this text: said otherwise, none of them would fit any more.
+    Recorded reports hold its digest: with another text for the same, none of them would fit.
     """
-    bench = declared.bench
+    bench = declarations.bench
     parts = [f"Visible(share={bench.visible}, angle={bench.visible_angle})"]
-    for one in declared.scenarios:
-        said = (
-            *(one.name, one.title or "", one.keyframe, one.qpos, one.qvel, one.duration),
-            *(one.sample, one.controls, one.hold, one.observable),
-            *(None if one.closed_form else one.reference, one.closed_form),
-            *(one.conserved, one.timesteps),
+    for s in declarations.scenarios:
+        fields = (
+            *(s.name, s.title or "", s.keyframe, s.qpos, s.qvel, s.duration),
+            *(s.sample, s.controls, s.hold, s.observable),
+            *(None if s.closed_form else s.reference, s.closed_form),
+            *(s.conserved, s.timesteps),
         )
-        parts.append(repr(said))
-    for sweep in declared.sweeps:
-        vary = [(one.parameter, one.values, one.relative) for one in sweep.variations]
+        parts.append(repr(fields))
+    for sweep in declarations.sweeps:
+        vary = [(v.parameter, v.values, v.relative) for v in sweep.variations]
         parts.append(repr((sweep.name, sweep.title or "", sweep.scenario or "", vary, sweep.show)))
     return f"[{', '.join(parts)}]"
 
 
-# --- which
+# --- selection
 
 
-def _named(names: Sequence[str], models: dict[str, MjcfModel]) -> list[MjcfModel]:
-    wanted: set[str] = set()
+def _find_models(names: Sequence[str], models: dict[str, MjcfModel]) -> list[MjcfModel]:
+    chosen_names: set[str] = set()
     for name in names:
         bare = name.removeprefix("./").removeprefix("models/")
-        found = next((n for n in (name, bare, bare.removesuffix(".xml")) if n in models), None)
-        if found is None:
-            near = nearest(bare.removesuffix(".xml"), models)
-            help = f"did you mean `{near}`?" if near is not None else did_you_mean("", models)
+        known_name = next((n for n in (name, bare, bare.removesuffix(".xml")) if n in models), None)
+        if known_name is None:
+            closest = nearest(bare.removesuffix(".xml"), models)
+            help = f"did you mean `{closest}`?" if closest is not None else did_you_mean("", models)
             raise UsageError(f"no model is called `{name}`", help=help)
-        wanted.add(found)
-    return [models[name] for name in sorted(wanted)]
+        chosen_names.add(known_name)
+    return [models[name] for name in sorted(chosen_names)]
 
 
-def _whole(root: Path, models: Sequence[MjcfModel]) -> list[MjcfModel]:
-    """Those that are no parts of others."""
+def _find_main_models(root: Path, models: Sequence[MjcfModel]) -> list[MjcfModel]:
+    """Find the models that are not part of others."""
     parts = {
         path for model in models for path in model_files(root, model.source.path, model.source.text)
     }
     return [m for m in models if m.source.path not in parts and not _PART.match(m.source.text)]
 
 
-# --- what is wrong
+# --- declarations
 
 
-def _declared(
-    files: CourseFiles, chosen: Sequence[MjcfModel], *, every: bool
+def _read_declarations(
+    files: CourseFiles, models: Sequence[MjcfModel], *, all_models: bool
 ) -> tuple[dict[str, Declarations | None], list[Diagnostic]]:
-    """What is declared for the chosen models; `None` for what cannot be understood."""
-    wanted = {model.name for model in chosen}
-    declared: dict[str, Declarations | None] = {}
-    found: list[Diagnostic] = []
+    """Read the declarations of the chosen models; `None` for a file that cannot be understood."""
+    names = {model.name for model in models}
+    declarations: dict[str, Declarations | None] = {}
+    diagnostics: list[Diagnostic] = []
     paths = {model.source.path for model in files.models}
     for source in files.declarations:
         name = source.path.removeprefix("models/").removesuffix(".toml")
-        if name in wanted:
-            parsed = parse_declarations(source)
-            declared[name] = parsed.value
-            found += parsed.diagnostics
-        elif every and f"models/{name}.xml" not in {*paths, *files.unreadable}:
-            found.append(diagnose_orphan_scenarios(source, paths))
-    return declared, found
+        if name in names:
+            parsed_file = parse_declarations(source)
+            declarations[name] = parsed_file.value
+            diagnostics += parsed_file.diagnostics
+        elif all_models and f"models/{name}.xml" not in {*paths, *files.unreadable}:
+            diagnostics.append(diagnose_orphan_scenarios(source, paths))
+    return declarations, diagnostics

@@ -1,9 +1,9 @@
-"""The scripts of a course: written to `examples/`, remembered or run.
+"""Writes the scripts of a course to `examples/`, and runs those that must run.
 
 Entry points: `extract_scripts`, `run`, `recorded_outputs`, `script_lines`.
 
-One that was edited in `examples/` by hand is reported and not run. Of the others those run, the
-longest first, of which no result is remembered that still holds.
+A script that was edited by hand in `examples/` is reported and not run. Of the others, those run
+that have no remembered result which still holds, the longest first.
 """
 
 from __future__ import annotations
@@ -29,46 +29,55 @@ from coursebuild.report import ScriptLine
 
 
 class ExtractedScripts(Struct, frozen=True):
-    """The scripts as they are in `examples/` now."""
+    """What writing the scripts to `examples/` gave."""
 
-    all: tuple[Extraction, ...]
+    extractions: tuple[Extraction, ...]
     runnable: tuple[Extraction, ...]
-    """Those whose file is what the lesson says; none where their interpreter is missing."""
+    """Those whose files are as their lessons say; none where their interpreter is missing."""
     diagnostics: tuple[Diagnostic, ...]
-    written: tuple[str, ...]
-    removed: tuple[str, ...]
+    written_paths: tuple[str, ...]
+    removed_paths: tuple[str, ...]
     blocked: tuple[Blocked, ...]
 
 
 def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
-    """Bring `examples/` up to date, as far as nobody's edits are lost."""
-    parsed = extract(course)
+    """Bring `examples/` up to date, without overwriting anybody's edits."""
+    extraction_result = extract(course)
     folders = {document.source.path.rpartition("/")[0] for document in course.documents}
     remove_leftovers(options.root / folder for folder in folders)
     try:
-        report = write_examples(options.root, {e.path: e.data for e in parsed.value})
+        report = write_examples(options.root, {e.path: e.data for e in extraction_result.value})
     except OutsideProjectError as error:
-        place = parsed.value[0].script.path_span if parsed.value else course.map.span(0, 0)
+        place = (
+            extraction_result.value[0].script.path_span
+            if extraction_result.value
+            else course.map.span(0, 0)
+        )
         diagnostic = diagnose(
             "script-path", place, error.message, help="make it a folder of the course"
         )
-        return ExtractedScripts(parsed.value, (), (*parsed.diagnostics, diagnostic), (), (), ())
-    by_path = {e.path: e for e in parsed.value}
-    blocked = {example.path for example in report.blocked}
-    found = [*parsed.diagnostics, *(_left(b, by_path.get(b.path), course) for b in report.blocked)]
+        return ExtractedScripts(
+            extraction_result.value, (), (*extraction_result.diagnostics, diagnostic), (), (), ()
+        )
+    by_path = {e.path: e for e in extraction_result.value}
+    blocked_paths = {example.path for example in report.blocked}
+    diagnostics = [
+        *extraction_result.diagnostics,
+        *(_diagnose_blocked(b, by_path.get(b.path), course) for b in report.blocked),
+    ]
     can_run = course.python is None or options.interpreter is not None
-    runnable = tuple(e for e in parsed.value if can_run and e.path not in blocked)
+    runnable = tuple(e for e in extraction_result.value if can_run and e.path not in blocked_paths)
     return ExtractedScripts(
-        parsed.value,
+        extraction_result.value,
         runnable,
-        tuple(found),
+        tuple(diagnostics),
         report.written,
         report.removed,
         report.blocked,
     )
 
 
-_LEFT = {
+_OBSTACLES = {
     Obstacle.EDITED: "{path} was edited by hand since it was extracted, so it is left as it is",
     Obstacle.FOREIGN: "{path} does not hold this block, and was not extracted",
     Obstacle.ORPHAN: "{path} was edited by hand, and no lesson has this script any more",
@@ -77,64 +86,69 @@ _LEFT = {
 }
 
 
-def _left(blocked: Blocked, extraction: Extraction | None, course: Course) -> Diagnostic:
+def _diagnose_blocked(
+    blocked_file: Blocked, extraction: Extraction | None, course: Course
+) -> Diagnostic:
     """Why a file in `examples/` was left alone, and how to go on."""
-    message = _LEFT[blocked.obstacle].format(path=blocked.path)
+    message = _OBSTACLES[blocked_file.obstacle].format(path=blocked_file.path)
     if extraction is None:
         help = "move the file away, or bring it back into a lesson"
         return diagnose("example-edited", course.map.span(0, 0), message, help=help)
-    if blocked.obstacle in (Obstacle.LINK, Obstacle.FOLDER):
+    if blocked_file.obstacle in (Obstacle.LINK, Obstacle.FOLDER):
         help = "move what is there away, or extract the script to another path"
         return diagnose("script-path", extraction.script.path_span, message, help=help)
     help = (
         "`coursebuild extract --adopt` brings what the file holds into the lesson; "
         "to drop it instead, delete the file"
     )
-    if blocked.diverged:
+    if blocked_file.diverged:
         help = (
             "the block was changed as well: bring what is to stay of the file into it by hand, "
             "then delete the file"
         )
-    notes = [Note("from the block to the file:\n" + blocked.diff.rstrip())] if blocked.diff else []
+    notes = (
+        [Note("from the block to the file:\n" + blocked_file.diff.rstrip())]
+        if blocked_file.diff
+        else []
+    )
     return diagnose("example-edited", extraction.script.path_span, message, help=help, notes=notes)
 
 
 def run(
-    chosen: Iterable[Extraction],
+    scripts: Iterable[Extraction],
     options: Options,
     progress: Progress,
     stage: str = "running scripts",
     memory: Memory | None = None,
     perturbation: int = 0,
-    known: Mapping[str, ScriptRun] | None = None,
+    known_runs: Mapping[str, ScriptRun] | None = None,
 ) -> tuple[ScriptRun, ...]:
-    """The results of the chosen scripts: remembered ones, and those of the others run now.
+    """Return the results of scripts: remembered ones, and those of the others, which run now.
 
-    What begins and ends is told. `memory` is what is remembered, where it is not that of the
-    options. `perturbation`: with initial states moved, in the direction that has this number.
-    `known`: results, by path, that hold.
+    `memory` replaces that of the options. `perturbation`: with initial states moved, in the
+    direction of this number. `known_runs`: results, by path, that are known to hold.
     """
-    chosen = tuple(chosen)
+    extractions = tuple(scripts)
     memory = options.memory() if memory is None else memory
-    todo = jobs(chosen, perturbation)
-    norun = (script.path for script in chosen if script.script.norun)
-    done = {path: ScriptRun(path, Outcome.NORUN, 0, "", "", 0.0) for path in norun}
-    done |= {**(known or {}), **recorded_runs(chosen, options)}
+    all_jobs = jobs(extractions, perturbation)
+    norun = (script.path for script in extractions if script.script.norun)
+    runs = {path: ScriptRun(path, Outcome.NORUN, 0, "", "", 0.0) for path in norun}
+    runs |= {**(known_runs or {}), **recorded_runs(extractions, options)}
     inputs = {
         job.path: memory.inputs(job, extraction.data)
-        for job, extraction in zip(todo, chosen, strict=True)
-        if job.path not in done
+        for job, extraction in zip(all_jobs, extractions, strict=True)
+        if job.path not in runs
     }
     if inputs:
-        done |= memory.recall(tuple(inputs.values()))
-    left = [job for job in todo if job.path not in done]
-    for finished in _run(left, inputs, options, progress, stage, memory):
-        done[finished.path] = finished
-    return tuple(done[job.path] for job in todo)
+        runs |= memory.recall(tuple(inputs.values()))
+    jobs_to_run = [job for job in all_jobs if job.path not in runs]
+    for script_run in _run(jobs_to_run, inputs, options, progress, stage, memory):
+        runs[script_run.path] = script_run
+    return tuple(runs[job.path] for job in all_jobs)
 
 
 def _run(
-    todo: Sequence[ScriptJob],
+    jobs_to_run: Sequence[ScriptJob],
     inputs: Mapping[str, Inputs],
     options: Options,
     progress: Progress,
@@ -142,30 +156,30 @@ def _run(
     memory: Memory,
 ) -> tuple[ScriptRun, ...]:
     """Run scripts, the longest first, and remember what they did."""
-    if not todo:
+    if not jobs_to_run:
         return ()
     from coursebuild.core.run.runner import ScriptServer
 
-    lasted = (memory.last_record(job.path) for job in todo)
-    seconds = {last.inputs.path: last.stored_run.seconds for last in lasted if last is not None}
+    last_runs = (memory.last_record(job.path) for job in jobs_to_run)
+    seconds = {last.inputs.path: last.stored_run.seconds for last in last_runs if last is not None}
 
     def on_start(path: str) -> None:
         memory.note_start(path)
-        progress.started(path)
+        progress.start(path)
 
-    def on_finish(done: ScriptRun) -> None:
-        memory.keep(inputs[done.path], done)
-        progress.finished(done.path, done.outcome.value, done.seconds)
+    def on_finish(script_run: ScriptRun) -> None:
+        memory.keep(inputs[script_run.path], script_run)
+        progress.finish(script_run.path, script_run.outcome.value, script_run.seconds)
 
     if options.verbose:
-        for job in todo:
+        for job in jobs_to_run:
             progress.say(f"{job.path}: {'; '.join(memory.reasons(inputs[job.path]))}")
     memory.begin()
-    with ScriptServer(sandbox=options.sandbox) as server, progress.stage(stage, len(todo)):
+    with ScriptServer(sandbox=options.sandbox) as server, progress.stage(stage, len(jobs_to_run)):
         run_all = options.run_all or server.run
         return run_all(
             options.root,
-            longest_first(todo, seconds),
+            longest_first(jobs_to_run, seconds),
             parallel=options.jobs,
             on_start=on_start,
             on_finish=on_finish,
@@ -174,7 +188,7 @@ def _run(
 
 
 def recorded_outputs(course: Course, documents: Collection[str] | None = None) -> list[Recording]:
-    """The outputs of scripts in these documents, or in all, that can be compared."""
+    """Find the recorded outputs in these documents, or in all, that can be compared."""
     return [
         block
         for document in course.documents
@@ -185,17 +199,24 @@ def recorded_outputs(course: Course, documents: Collection[str] | None = None) -
 
 
 def script_lines(
-    chosen: Sequence[Extraction], runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]
+    extractions: Sequence[Extraction], runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]
 ) -> tuple[ScriptLine, ...]:
-    """How each script did, as a report lists it."""
-    drifted = {v.recording.script for v in verdicts if v.status == "drift"}
+    """Make the lines of a report about scripts."""
+    drifted_paths = {v.recording.script for v in verdicts if v.status == "drift"}
     lines = []
-    for extraction, done in zip(chosen, runs, strict=True):
-        drift = done.outcome is Outcome.OK and done.path in drifted
-        status = "drift" if drift else done.outcome.value
-        if done.outcome is Outcome.OK and is_lost(extraction, done):
+    for extraction, script_run in zip(extractions, runs, strict=True):
+        drift = script_run.outcome is Outcome.OK and script_run.path in drifted_paths
+        status = "drift" if drift else script_run.outcome.value
+        if script_run.outcome is Outcome.OK and is_lost(extraction, script_run):
             status = "diverged"
         lines.append(
-            ScriptLine(done.path, extraction.owner, status, done.seconds, done.cached, done.missing)
+            ScriptLine(
+                script_run.path,
+                extraction.owner,
+                status,
+                script_run.seconds,
+                script_run.cached,
+                script_run.missing,
+            )
         )
     return tuple(lines)

@@ -1,11 +1,10 @@
-"""`check --sensitivity`, and what `update` asks of what it records: which digits hold.
+"""Which printed digits repeat when initial states move: for `check --sensitivity` and `update`.
 
 Entry point: `measure(course, options, progress, scripts, runs, documents)`.
 
-Of scripts that use MuJoCo and whose output is recorded and as recorded, four runs are made with
-their initial states moved (`core.run.initial_state_perturbation`), each with three times the time
-limit. `check` has them run a fifth time, with their steps halved (`core.run.half_steps`). All runs
-are remembered like others.
+Scripts that use MuJoCo and print what is recorded run four times with their initial states moved
+(`core.run.initial_state_perturbation`), each with three times the time limit. `check` runs them a
+fifth time, with halved timesteps (`core.run.half_steps`). All runs are remembered like others.
 """
 
 from __future__ import annotations
@@ -37,10 +36,10 @@ def measure(
     *,
     halve: bool = False,
 ) -> tuple[Sensitivity, ...]:
-    """How sensitive the recorded outputs of these scripts are; of those that were run.
+    """Measure how sensitive the recorded outputs of those scripts are that were run.
 
-    `runs` are theirs, in the same order; `documents` the paths of those whose recorded outputs
-    count, all of them without it. `halve`: run them with half the timestep too.
+    `runs` are the scripts' runs, in the same order. `documents`: only recorded outputs in documents
+    with these paths count. `halve`: run the scripts with half the timestep, too.
     """
     recordings: dict[str, list[Recording]] = {}
     for recording in recorded_outputs(course, documents):
@@ -51,13 +50,13 @@ def measure(
         for script, base in zip(scripts, runs, strict=True)
         if base.outcome not in _NOT_RUN
     ]
-    todo = [
+    moved_scripts = [
         script
         for script, base in pairs
         if is_worth_moving(course, recordings.get(script.path, ()), base)
     ]
     numbers = (*range(1, RUNS + 1), *((HALVED,) if halve else ()))
-    again = _runs(todo, options, progress, numbers)
+    perturbed_runs = _run_perturbed(moved_scripts, options, progress, numbers)
     return tuple(
         sensitivity(
             course,
@@ -65,26 +64,28 @@ def measure(
             script.owner,
             recordings.get(script.path, ()),
             base,
-            again.get(script.path, ())[:RUNS],
-            next(iter(again.get(script.path, ())[RUNS:]), None),
+            perturbed_runs.get(script.path, ())[:RUNS],
+            next(iter(perturbed_runs.get(script.path, ())[RUNS:]), None),
         )
         for script, base in pairs
     )
 
 
-def _runs(
+def _run_perturbed(
     scripts: Sequence[Extraction], options: Options, progress: Progress, numbers: Sequence[int]
 ) -> dict[str, list[ScriptRun]]:
-    """The runs of each script with moved states or halved steps, by its path."""
-    found: dict[str, list[ScriptRun]] = {script.path: [] for script in scripts}
+    """Run scripts with moved states or halved timesteps; return the runs by path."""
+    runs: dict[str, list[ScriptRun]] = {script.path: [] for script in scripts}
     if not scripts:
-        return found
+        return runs
     memory = options.memory()
     with ScriptServer(sandbox=options.sandbox) as server:
-        served = replace(options, run_all=server.run)
+        server_options = replace(options, run_all=server.run)
         for number in numbers:
             halving = number == HALVED
             stage = "halving timesteps" if halving else f"moving initial states, {number} of {RUNS}"
-            for one in run(scripts, served, progress, stage, memory, perturbation=number):
-                found[one.path].append(one)
-    return found
+            for script_run in run(
+                scripts, server_options, progress, stage, memory, perturbation=number
+            ):
+                runs[script_run.path].append(script_run)
+    return runs

@@ -1,11 +1,10 @@
-"""`check --shard 2/8`: which of the scripts and labs of a course one machine of several takes.
+"""`check --shard 2/8`: divides the scripts and labs of a course among several machines.
 
 Entry points: `Shard`, `read_shard`, `read_timings`, `write_timings`.
 
-Every machine computes the whole split by itself, so it must follow from what all of them have: the
-names of the scripts and labs, and times only from files that are given to all of them. (What each
-has in its own store, or finds in a shared cache at its own moment, differs, and a script could fall
-between two shards.)
+Every machine computes the whole split by itself, so it must follow from what all machines have: the
+names of the scripts and labs, and times from files that are given to all. (Stores and shared caches
+differ from machine to machine: by their times, a script could fall between two shards.)
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.write import write_atomic
 from coursebuild.pipeline.options import UsageError
 
-_MOST = 10_000
+_LARGEST_COUNT = 10_000
 
 
 class Shard(Struct, frozen=True):
@@ -38,29 +37,29 @@ class Shard(Struct, frozen=True):
         return f"{self.index}/{self.count}"
 
     def takes(self, names: Iterable[str]) -> frozenset[str]:
-        """Of all names those that are of this part."""
+        """Return those of the names that belong to this part."""
         parts = split(names, self.count, dict(self.seconds))
         return frozenset(name for name, part in parts.items() if part == self.index)
 
 
 def split(names: Iterable[str], count: int, seconds: Mapping[str, float]) -> dict[str, int]:
-    """The part, from 1, of each name.
+    """Assign each name to a part, from 1.
 
     With times: the longest first, each to the part that has least to do (within 4/3 of the best
-    possible: Graham, SIAM J. Appl. Math. 17, 1969, p. 416). An unknown one counts as the median.
-    Without times all count the same, in the order of their hashes, so that neighbours in a lesson,
-    which are often alike, are spread.
+    possible: Graham, SIAM J. Appl. Math. 17, 1969, p. 416). An unknown time counts as the median.
+    Without times all names count the same, in the order of their hashes: neighbours in a lesson,
+    which are often alike, go to different parts.
     """
-    everything = sorted(set(names), key=_hash)
-    known = sorted(seconds[name] for name in everything if name in seconds)
-    usual = known[len(known) // 2] if known else 1.0
+    sorted_names = sorted(set(names), key=_hash)
+    known_times = sorted(seconds[name] for name in sorted_names if name in seconds)
+    median = known_times[len(known_times) // 2] if known_times else 1.0
     loads = [(0.0, 0, part) for part in range(1, count + 1)]
-    found: dict[str, int] = {}
-    for name in sorted(everything, key=lambda name: -seconds.get(name, usual)):
+    parts: dict[str, int] = {}
+    for name in sorted(sorted_names, key=lambda name: -seconds.get(name, median)):
         load, number, part = heapq.heappop(loads)
-        found[name] = part
-        heapq.heappush(loads, (load + seconds.get(name, usual), number + 1, part))
-    return found
+        parts[name] = part
+        heapq.heappush(loads, (load + seconds.get(name, median), number + 1, part))
+    return parts
 
 
 def _hash(name: str) -> bytes:
@@ -68,10 +67,10 @@ def _hash(name: str) -> bytes:
 
 
 def read_shard(text: str | None, timings: Sequence[str]) -> Shard | None:
-    """What `--shard` and `--timings` say; `None` where nothing is divided.
+    """Parse `--shard` and `--timings`; `None` where the work is not divided.
 
     Raises:
-        UsageError: it cannot be understood, or a file cannot be read.
+        UsageError: they cannot be understood, or a file cannot be read.
     """
     if text is None:
         if timings:
@@ -81,7 +80,7 @@ def read_shard(text: str | None, timings: Sequence[str]) -> Shard | None:
     if match is None:
         raise UsageError(f"--shard: {text!r} is no part of the work; write 2/8 for the second of 8")
     index, count = int(match[1]), int(match[2])
-    if not 1 <= index <= count <= _MOST:
+    if not 1 <= index <= count <= _LARGEST_COUNT:
         raise UsageError(f"--shard: there is no part {index} of {count}")
     seconds: dict[str, float] = {}
     for file in timings:
@@ -91,10 +90,10 @@ def read_shard(text: str | None, timings: Sequence[str]) -> Shard | None:
 
 
 def read_timings(file: str) -> dict[str, float]:
-    """The times in a file that `--write-timings` wrote, s.
+    """Read the times, in seconds, from a file that `--write-timings` wrote.
 
     Raises:
-        UsageError: there are none.
+        UsageError: it has none.
     """
     try:
         value = json.loads(Path(file).read_bytes())
@@ -102,10 +101,10 @@ def read_timings(file: str) -> dict[str, float]:
         raise UsageError(f"--timings: {file} cannot be read: {reason(error)}") from None
     except (ValueError, RecursionError):
         value = None
-    found = value.get("seconds") if isinstance(value, dict) else None
-    if not isinstance(found, dict) or not all(_is_time(time) for time in found.values()):
+    times = value.get("seconds") if isinstance(value, dict) else None
+    if not isinstance(times, dict) or not all(_is_time(time) for time in times.values()):
         raise UsageError(f"--timings: {file} holds no times; `--write-timings` writes such a file")
-    return {name: float(time) for name, time in found.items()}
+    return {name: float(time) for name, time in times.items()}
 
 
 def _is_time(value: object) -> bool:
@@ -113,17 +112,17 @@ def _is_time(value: object) -> bool:
 
 
 def write_timings(file: str, seconds: Mapping[str, float], names: Iterable[str]) -> None:
-    """Write how long things took, sorted; what else the file says of the course's names stays.
+    """Write how long scripts and labs took; other times of the course that are in the file stay.
 
     Raises:
         UsageError: it cannot be written, or something else is in it.
     """
     path = Path(file).absolute()
     before = read_timings(file) if path.exists() else {}
-    known = frozenset(names)
-    merged = {name: time for name, time in before.items() if name in known}
-    merged |= {name: round(time, 3) for name, time in seconds.items()}
-    value = {"seconds": {name: merged[name] for name in sorted(merged)}}
+    course_names = frozenset(names)
+    times = {name: time for name, time in before.items() if name in course_names}
+    times |= {name: round(time, 3) for name, time in seconds.items()}
+    value = {"seconds": {name: times[name] for name in sorted(times)}}
     data = json.dumps(value, indent=2, ensure_ascii=True).encode() + b"\n"
     try:
         expected = path.read_bytes() if path.exists() else None

@@ -1,9 +1,9 @@
-"""The recorded reports of a course that still fit it, and what is wrong with the others.
+"""The recorded reports that pages may show, and warnings about those that no longer fit.
 
-Entry points: `shown_reports(root, course)`; `read_record`, one of them. Nothing is measured here.
+Entry points: `shown_reports(root, course)`; `read_record`, for one. Nothing is measured here.
 
 A report fits if it is of the model as it is now, with its files and scenarios, and of the version
-of MuJoCo that is installed. Any other is left out of the site, and told.
+of MuJoCo that is installed. Any other is left out of the site, with a warning.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _T = TypeVar("_T")
 
 
 def shown_reports(root: Path, course: Course) -> Parsed[Reports]:
-    """What pages may show, and a warning for each report that none does."""
+    """Read the reports that pages may show; a warning for each that they may not."""
     paths = [path for path in course.files if path.startswith(_FOLDER)]
     return _Reader(root, course).read(paths) if paths else Parsed(Reports())
 
@@ -43,10 +43,10 @@ class _Reader:
     def __init__(self, root: Path, course: Course) -> None:
         self._root = root
         self._models = {model.name: model for model in course.models}
-        self._declared = {one.model: one for one in course.declarations}
+        self._declarations = {d.model: d for d in course.declarations}
         self._digests: dict[str, str] = {}
         self._engine = engine_version()
-        self._found: list[Diagnostic] = []
+        self._diagnostics: list[Diagnostic] = []
 
     def read(self, paths: Iterable[str]) -> Parsed[Reports]:
         from coursebuild.numerics.reports.records import BENCH, DIET, STABILITY
@@ -57,31 +57,31 @@ class _Reader:
         for path in paths:
             name = path.removeprefix(_FOLDER)
             if path == STABILITY.path():
-                cases = self._decoded(STABILITY) or ()
+                cases = self._read_record(STABILITY) or ()
                 if not self._is_of_this_engine(
-                    STABILITY, "", {one.machine.engine for one in cases}
+                    STABILITY, "", {case.machine.engine for case in cases}
                 ):
                     cases = ()
             elif name.endswith(BENCH.suffix):
-                scenes |= self._of_model(BENCH, name.removesuffix(BENCH.suffix))
+                scenes |= self._read_for_model(BENCH, name.removesuffix(BENCH.suffix))
             elif name.endswith(DIET.suffix):
-                diets |= self._of_model(DIET, name.removesuffix(DIET.suffix))
-        return Parsed(Reports(scenes, diets, cases), tuple(self._found))
+                diets |= self._read_for_model(DIET, name.removesuffix(DIET.suffix))
+        return Parsed(Reports(scenes, diets, cases), tuple(self._diagnostics))
 
-    def _of_model(self, kind: ReportKind[_Scene], name: str) -> dict[str, _Scene]:
-        """The report on a model by its name, if it fits."""
+    def _read_for_model(self, kind: ReportKind[_Scene], name: str) -> dict[str, _Scene]:
+        """Read the report on a model; return it by the model's name, if it fits."""
         path, model = kind.path(name), self._models.get(name)
         if model is None:
-            near = nearest(name, self._models)
-            help = f"is it of `{near}`?" if near is not None else "remove it"
-            self._tell(path, f"the report {path} belongs to no model", help)
+            closest = nearest(name, self._models)
+            help = f"is it of `{closest}`?" if closest is not None else "remove it"
+            self._warn(path, f"the report {path} belongs to no model", help)
             return {}
-        report = self._decoded(kind, name)
+        report = self._read_record(kind, name)
         if report is None:
             return {}
         if report.digest != self._digest(model):
-            why = f"`{name}`, its files or its scenarios have changed since"
-            self._leave_out(kind, name, why)
+            reason = f"`{name}`, its files or its scenarios have changed since"
+            self._warn_stale(kind, name, reason)
             return {}
         fits = self._is_of_this_engine(kind, name, {report.machine.engine})
         return {name: report} if fits else {}
@@ -90,37 +90,39 @@ class _Reader:
         from coursebuild.pipeline.scenes import scene_digest
 
         if model.name not in self._digests:
-            declared = self._declared.get(model.name, Declarations(model.name, model.source))
-            self._digests[model.name] = scene_digest(self._root, model, declared)
+            declarations = self._declarations.get(
+                model.name, Declarations(model.name, model.source)
+            )
+            self._digests[model.name] = scene_digest(self._root, model, declarations)
         return self._digests[model.name]
 
-    def _decoded(self, kind: ReportKind[_T], model: str = "") -> _T | None:
+    def _read_record(self, kind: ReportKind[_T], model: str = "") -> _T | None:
         from coursebuild.numerics.reports.records import ReportFailure
 
-        found = read_record(self._root, kind, model)
-        if isinstance(found, ReportFailure):
-            self._tell(kind.path(model), found.message, found.help)
+        report = read_record(self._root, kind, model)
+        if isinstance(report, ReportFailure):
+            self._warn(kind.path(model), report.message, report.help)
             return None
-        return found
+        return report
 
     def _is_of_this_engine(self, kind: ReportKind[_T], model: str, engines: set[str]) -> bool:
-        others = sorted(engines - {self._engine})
-        if others:
-            why = f"it is of MuJoCo {', '.join(others)}, and {self._engine} is installed"
-            self._leave_out(kind, model, why)
-        return not others
+        other_engines = sorted(engines - {self._engine})
+        if other_engines:
+            reason = f"it is of MuJoCo {', '.join(other_engines)}, and {self._engine} is installed"
+            self._warn_stale(kind, model, reason)
+        return not other_engines
 
-    def _leave_out(self, kind: ReportKind[_T], model: str, why: str) -> None:
+    def _warn_stale(self, kind: ReportKind[_T], model: str, reason: str) -> None:
         path, help = kind.path(model), f"make it again with `{kind.command(model)}`"
-        self._tell(path, f"the report {path} is not shown: {why}", help)
+        self._warn(path, f"the report {path} is not shown: {reason}", help)
 
-    def _tell(self, path: str, message: str, help: str) -> None:
+    def _warn(self, path: str, message: str, help: str) -> None:
         place = Source(path, "").span(0, 0)
-        self._found.append(diagnose("report-stale", place, message, help=help))
+        self._diagnostics.append(diagnose("report-stale", place, message, help=help))
 
 
 def read_record(root: Path, kind: ReportKind[_T], model: str = "") -> _T | ReportFailure:
-    """The recorded report on a model (or on the hard cases), or why there is none."""
+    """Read the recorded report on a model (or on the hard cases), or why there is none."""
     from coursebuild.numerics.reports.records import RecordError, ReportFailure
 
     path, make = kind.path(model), kind.command(model)
@@ -137,5 +139,5 @@ def read_record(root: Path, kind: ReportKind[_T], model: str = "") -> _T | Repor
 
 @functools.lru_cache(maxsize=32)
 def _decode(kind: ReportKind[_T], data: bytes, model: str) -> _T:
-    """What a preview reads at each save, and few of them change."""
+    """Decode a report; cached, since a preview reads all of them at each save."""
     return kind.decode(data, model)

@@ -2,9 +2,8 @@
 
 Entry point: `site_files(…)`.
 
-A file that is the same as in the site of before need not be made: it has a key, a hash of all that
-its bytes depend on, and `core.engine.publish` makes it only where it was not published under
-this key.
+A file that is the same as in the last site need not be made: it has a key, a hash of all that its
+bytes depend on, and `core.engine.publish` makes it only where it was not published under this key.
 """
 
 from __future__ import annotations
@@ -51,12 +50,12 @@ class Site(Struct, frozen=True):
     files: tuple[SiteFile, ...]
     """Sorted by path."""
     file_list: FileList | None
-    """The list of them all, where there is one."""
+    """The list of all files, if a feature adds one."""
     diagnostics: tuple[Diagnostic, ...]
-    drawn: tuple[str, ...]
-    """The pages that were drawn just now, and not before."""
+    drawn_pages: tuple[str, ...]
+    """Site paths of the pages that were drawn for it, since they had changed."""
     names: Names | None = None
-    """Of what all pages share."""
+    """The names of the files that all pages share."""
     keys: Mapping[str, str] = field(default_factory=dict)
     """The keys of pages, by site path."""
 
@@ -64,10 +63,10 @@ class Site(Struct, frozen=True):
 def site_files(
     course: Course, results: Results, documents: Documents, options: Options, reports: Reports
 ) -> Site:
-    """The site of a course whose documents are summaries; `reports` are those that it shows."""
+    """Make the site of a course whose documents are summaries; its pages show the `reports`."""
     assets = Assets(template_texts(), Bundle(), prepared_folder())
     library = Library.of(course, results, assets, reports)
-    return SiteMaker(library, assets, documents, options).made()
+    return SiteMaker(library, assets, documents, options).make_site()
 
 
 _ANYTHING = PageFacts(
@@ -75,7 +74,7 @@ _ANYTHING = PageFacts(
     frozenset(map(chr, (*range(0x20, 0x3000), *range(0x1D400, 0x1D800)))),
     frozenset(),
 )
-"""What pages may need that nobody has looked at."""
+"""What pages that are not drawn yet may need."""
 
 
 class SiteMaker:
@@ -91,47 +90,52 @@ class SiteMaker:
         self.store = options.store
         self.documents = documents
 
-    def made(
+    def make_site(
         self,
         entries: Iterable[PageEntry] | None = None,
         last_good: Mapping[str, str] | None = None,
         *,
         whole_fonts: bool = False,
     ) -> Site:
-        """The site, or some pages of it with all other files: these are not checked for links.
+        """Make the site, or some of its pages with all other files; then links are not checked.
 
-        For the arguments see `Pages`. `whole_fonts` serve pages that are drawn later.
+        See `Pages` for the arguments. `whole_fonts`: leave fonts whole, for pages drawn later.
         """
         pages = Pages(self.library, self.documents, self.store, entries, last_good)
-        self.documents.rest()
-        names, shared = self._shared(None if whole_fonts else pages.facts)
-        own = self.library.trial_files
+        self.documents.stop_workers()
+        names, shared_files = self._make_shared_files(None if whole_fonts else pages.facts)
+        trial_files = self.library.trial_files
         downloads = Downloads.of(self.library, self.assets, self.documents, self.root, self.store)
-        files: list[SiteFile] = [*shared, *own, *self._copies(own), *downloads.files]
+        files: list[SiteFile] = [
+            *shared_files,
+            *trial_files,
+            *self._copies(trial_files),
+            *downloads.files,
+        ]
         context = functools.partial(self._context, pages, names, downloads)
-        added, file_list = added_files(context)
-        files += [*added, OutputFile(urls.ROBOTS, meta.robots(self.course))]
+        files_added, file_list = added_files(context)
+        files += [*files_added, OutputFile(urls.ROBOTS, meta.robots(self.course))]
         if self.course.base_url:
             files.append(OutputFile(urls.SITEMAP, meta.sitemap(self.course, pages.indexed)))
-        framed = tuple(pages.files(names))
-        found: tuple[Diagnostic, ...] = ()
+        page_files = tuple(pages.files(names))
+        diagnostics: tuple[Diagnostic, ...] = ()
         if entries is None and not pages.are_sound({file.path for file in files}):
-            found = tuple(broken_links([*framed, *files], self.course.base_url))
-        everything = tuple(sorted((*framed, *files), key=lambda file: file.path))
-        return Site(everything, file_list, found, pages.drawn, names, pages.keys)
+            diagnostics = tuple(broken_links([*page_files, *files], self.course.base_url))
+        all_files = tuple(sorted((*page_files, *files), key=lambda file: file.path))
+        return Site(all_files, file_list, diagnostics, pages.drawn_paths, names, pages.keys)
 
     # --- what all pages share
 
-    def _shared(self, facts: PageFacts | None) -> tuple[Names, list[SiteFile]]:
-        """The shared files; with whole fonts where there are no facts."""
-        cut = None if facts is None else functools.partial(_cut_font, self.store)
+    def _make_shared_files(self, facts: PageFacts | None) -> tuple[Names, list[SiteFile]]:
+        """Make the shared files; with whole fonts where there are no facts."""
+        cut_font = None if facts is None else functools.partial(_cut_font, self.store)
         facts = facts or _ANYTHING
         facts = replace(facts, text=facts.text | common_characters(self.library))
-        made, names = common_files(self.assets, cut, facts, self.course.theme)
-        return names, [*made, *self._copies(made)]
+        shared_files, names = common_files(self.assets, cut_font, facts, self.course.theme)
+        return names, [*shared_files, *self._copies(shared_files)]
 
     def _copies(self, files: Iterable[SiteFile]) -> tuple[CachedFile, ...]:
-        """Compressed copies."""
+        """Make compressed copies."""
 
         def keep(key: str, make: Callable[[], bytes]) -> bytes:
             return prepared_file("copies", key) or self.store.get_or_create("compressed", key, make)
@@ -145,12 +149,12 @@ class SiteMaker:
         downloads: Downloads,
         feature: str,
     ) -> SiteContext:
-        """What a feature makes further files from."""
+        """Return what a feature makes its files from."""
         return SiteContext(
             self.library,
             self.assets,
             names,
-            pages.noted(feature),
+            pages.noted_pages(feature),
             functools.partial(pages.note, feature),
             functools.partial(self.store.get_or_create, "parts"),
             downloads.archives,
@@ -159,7 +163,7 @@ class SiteMaker:
 
 
 def _cut_font(store: Memo, job: FontJob) -> bytes:
-    """A cut font: made ahead, or kept, or cut now."""
+    """Return a cut font: delivered with the tool, stored, or cut now."""
 
     def make() -> bytes:
         from coursebuild.core.pages.fonts import subset_font
@@ -170,7 +174,7 @@ def _cut_font(store: Memo, job: FontJob) -> bytes:
 
 
 def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnostic]:
-    """Links of the built pages that lead nowhere; most are found in the sources already."""
+    """Find links of built pages that lead nowhere; most are found in the sources already."""
     from coursebuild.core.pages.links import check_links
 
     pages = {
@@ -178,12 +182,12 @@ def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnosti
         for file in files
         if file.path.endswith(".html")
     }
-    everything = (OutputFile(file.path, pages.get(file.path, b"")) for file in files)
-    for broken in check_links(everything, base_url):
+    listed_files = (OutputFile(file.path, pages.get(file.path, b"")) for file in files)
+    for broken in check_links(listed_files, base_url):
         page = Source(f"public/{broken.page}", pages[broken.page].decode())
-        written = escape(broken.url)
-        at = max(page.text.find(f'"{written}"') + 1, 0)
-        span = page.span(at, at + len(written) if at else 0)
+        url = escape(broken.url)
+        at = max(page.text.find(f'"{url}"') + 1, 0)
+        span = page.span(at, at + len(url) if at else 0)
         help = f"did you mean `{broken.suggestion}`?" if broken.suggestion else ""
         message = f"`{broken.url}` leads nowhere: {broken.reason}"
         yield diagnose("link-broken", span, message, help=help)

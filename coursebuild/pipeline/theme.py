@@ -1,10 +1,10 @@
-"""The files of a course's theme: read, and checked.
+"""Reads and checks the files of a course's theme.
 
 Entry points: `load_theme`; `template_copies`, templates as a course begins with them;
-`template_diagnostic`, what to say of one that fails.
+`template_diagnostic`, for a template that fails.
 
 A copied template names in its first line the text that it was copied from, by some digits of its
-hash. Where the tool has another text by now, the author hears of it.
+hash. Where the tool has another text by now, the author gets a warning.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from coursebuild.core.text.source import Source
 
 _ORIGIN = re.compile(r"\{# Copied from coursebuild (\S+): (\w+)")
 _LOADS = re.compile(r"""@import[^;]*|url\(\s*["']?(?!#|data:|["'\s])[^()]*\)""", re.IGNORECASE)
-"""What in a style sheet asks for another file."""
+"""Parts of a style sheet that load another file."""
 
 
 def load_theme(root: Path, theme: Theme) -> Parsed[Theme]:
-    """The theme with what its files hold, and what is wrong with them."""
-    wrong: list[Diagnostic] = []
+    """Read the files of a theme, and check them."""
+    diagnostics: list[Diagnostic] = []
 
     def read(file: ThemeFile | None) -> ThemeFile | None:
         if file is None:
@@ -44,36 +44,41 @@ def load_theme(root: Path, theme: Theme) -> Parsed[Theme]:
         try:
             return replace(file, data=read_bytes(root, file.path))
         except EffectError as error:
-            wrong.append(diagnose("theme-file", file.span, error.message))
+            diagnostics.append(diagnose("theme-file", file.span, error.message))
             return None
 
-    def all_read(files: tuple[ThemeFile, ...]) -> tuple[ThemeFile, ...]:
-        return tuple(found for file in files if (found := read(file)) is not None)
+    def read_all(files: tuple[ThemeFile, ...]) -> tuple[ThemeFile, ...]:
+        return tuple(mistakes for file in files if (mistakes := read(file)) is not None)
 
     templates = read_folder(root, TEMPLATES.rstrip("/"))
     whole = replace(
         theme,
         **{name: read(getattr(theme, name)) for name in PICTURES},
-        css=all_read(theme.css),
+        css=read_all(theme.css),
         fonts=tuple(
             replace(
                 family,
-                files=all_read(family.files),
+                files=read_all(family.files),
                 licence=read(family.licence) or family.licence,
             )
             for family in theme.fonts
         ),
         templates=templates.value,
     )
-    found = (*wrong, *templates.diagnostics, *_check_files(whole), *_check_templates(whole))
-    return Parsed(whole, found)
+    mistakes = (
+        *diagnostics,
+        *templates.diagnostics,
+        *_check_files(whole),
+        *_check_templates(whole),
+    )
+    return Parsed(whole, mistakes)
 
 
 def _check_files(theme: Theme) -> Iterator[Diagnostic]:
     for file in theme.pictures:
-        drawn = prepare_figure(file.path, file.data)
-        if isinstance(drawn, str):
-            yield diagnose("theme-file", file.span, f"`{file.path}` {drawn}")
+        picture = prepare_figure(file.path, file.data)
+        if isinstance(picture, str):
+            yield diagnose("theme-file", file.span, f"`{file.path}` {picture}")
         elif file in (theme.icon, theme.touch_icon):
             width, height = picture_size(file) or (1, 1)
             if width != height:
@@ -105,7 +110,7 @@ def _digest(text: str) -> str:
 
 
 def template_copies() -> dict[str, str]:
-    """The tool's templates by name, each below a line that says which it is."""
+    """The tool's templates by name, each below a line that says which version it is of."""
     return {
         name: f"{{# Copied from coursebuild {__version__}: {_digest(text)} #}}\n{text}"
         for name, text in _originals().items()
@@ -122,7 +127,7 @@ def _check_templates(theme: Theme) -> Iterator[Diagnostic]:
             continue
         mistake = find_template_error(source.text)
         if mistake is not None:
-            yield _broken(source, *mistake)
+            yield _diagnose_template(source, *mistake)
         first = source.text.partition("\n")[0]
         origin, now = _ORIGIN.match(first), _digest(originals[name])
         if origin is None or origin[2] != now:
@@ -136,13 +141,13 @@ def _check_templates(theme: Theme) -> Iterator[Diagnostic]:
 
 
 def template_diagnostic(course: Course, failure: TemplateFailure) -> Diagnostic:
-    """What to tell of a template that failed while a page was drawn."""
+    """The diagnostic of a template that failed while a page was drawn."""
     sources = {source.path: source for source in course.theme.templates}
-    return _broken(sources[failure.path], failure.line, failure.message)
+    return _diagnose_template(sources[failure.path], failure.line, failure.message)
 
 
-def _broken(source: Source, line: int, message: str) -> Diagnostic:
-    """That a template is wrong at a line."""
+def _diagnose_template(source: Source, line: int, message: str) -> Diagnostic:
+    """The diagnostic of a template that is wrong at a line."""
     start = source.line_starts[min(line, len(source.line_starts)) - 1]
     span = source.span(start, start + len(source.line_text(line).rstrip()))
     return diagnose("template-broken", span, message[:1].lower() + message[1:].rstrip("."))

@@ -1,4 +1,4 @@
-"""What features try of a course, while its scripts run.
+"""Runs features' trials of a course, such as those of labs, while its scripts run.
 
 Entry point: `run_with_trials`.
 """
@@ -23,21 +23,21 @@ def run_with_trials(
     context: TrialContext,
     progress: Progress,
 ) -> tuple[T, TrialOutcome]:
-    """What scripts gave, and what trials gave that went on in a thread meanwhile."""
+    """Run scripts here and trials in a thread meanwhile; return the results of both."""
     groups = groupby(trials, key=itemgetter(0))
     runs = [(kind.start(context), [trial for _, trial in group]) for kind, group in groups]
 
     def try_all() -> TrialOutcome:
-        tried = [run.run(those) for run, those in runs]
-        results = tuple(result for found, _ in tried for result in found)
-        return results, tuple(wrong for _, found in tried for wrong in found)
+        outcomes = [run.run(trials_of_kind) for run, trials_of_kind in runs]
+        results = tuple(result for results, _ in outcomes for result in results)
+        return results, tuple(d for _, diagnostics in outcomes for d in diagnostics)
 
     with ThreadPoolExecutor(1, "trials") as thread:
-        trying = thread.submit(try_all)
+        future = thread.submit(try_all)
         try:
-            ran = scripts()
+            script_runs = scripts()
             with progress.stage("trying labs"):
-                return ran, trying.result()
+                return script_runs, future.result()
         except BaseException:  # Ctrl-C does not wait for a lab
             for run, _ in runs:
                 run.stop()

@@ -3,14 +3,14 @@
 Entry point: `update(options, names, dry_run=…)`.
 
 1. Every chosen script runs twice. What differs between the two runs cannot be recorded. A
-   remembered result counts as the first of them, and where nothing of it is to be recorded as both:
-   what is written has always been printed by two runs, the second of them now.
+   remembered result counts as the first run, and as both where nothing of it is to be recorded:
+   whatever is written was printed by two runs, the second of them now.
 2. The new outputs become edits; each lesson is written whole or not at all, and only if nobody
    changed it meanwhile.
-3. The bound numbers of the lessons as they are now are checked, so that prose which a new output
-   makes false is told, and what is printed now in place of the number that it had.
+3. The bound numbers of the updated lessons are checked: where a new output makes prose false, a
+   diagnostic says what is printed now in place of the number.
 4. Scripts whose output was written run again with their initial states moved a little: digits that
-   change with them are noise, and should not have been printed.
+   change with these are noise, and should not be printed.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.findings import collect_evidence, script_findings
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.pipeline.figures import figures_of, write_figures
+from coursebuild.pipeline.figures import find_figures, write_figures
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.recorded_runs import check_recorded_runs, keep_runs
+from coursebuild.pipeline.recorded_runs import check_recorded_runs, record_runs
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
     extract_scripts,
@@ -50,7 +50,7 @@ from coursebuild.report import Report
 
 
 def update(options: Options, names: tuple[str, ...] = (), *, dry_run: bool = False) -> Report:
-    """Record anew what the chosen lessons' scripts print."""
+    """Record what the scripts of the chosen lessons print now."""
     progress = Progress(quiet=options.quiet)
     with project_lock(options.root, progress.say):
         return _update(options, names, progress, dry_run=dry_run)
@@ -60,163 +60,179 @@ def _update(
     options: Options, names: tuple[str, ...], progress: Progress, *, dry_run: bool
 ) -> Report:
     began = time.monotonic()
-    loaded = load(options.root)
-    course = loaded.value
+    parsed_course = load(options.root)
+    course = parsed_course.value
     if course is None:
-        return judge(None, loaded.diagnostics, began)
+        return judge(None, parsed_course.diagnostics, began)
     options = options.for_course(course)
-    chosen = select(course, names, options.root)
-    extracted = extract_scripts(course, options)
-    scripts = _with_recordings(course, chosen, extracted.runnable)
-    with ScriptServer() as server:  # what scripts import stays imported from one run to the other
-        served = replace(options, run_all=server.run)
-        first = run(scripts, served, progress)
-        again = _again(course, chosen, scripts, first, served, progress)
-    edits, refused = _edits(course, chosen, first, again, _repeated(extracted))
-    for told in loaded.diagnostics:
-        if told.rule == "source-part" and told.span.path in (chosen.documents or [told.span.path]):
-            edits.setdefault(told.span.source, []).extend(told.edits)
-    for path in {d.span.path for d in loaded.diagnostics if d.rule == "file-encoding"}:
+    selection = select(course, names, options.root)
+    extracted_scripts = extract_scripts(course, options)
+    scripts = _recorded_scripts(course, selection, extracted_scripts.runnable)
+    with ScriptServer() as server:  # it keeps what scripts import from one run to the next
+        server_options = replace(options, run_all=server.run)
+        first_runs = run(scripts, server_options, progress)
+        second_runs = _run_again(course, selection, scripts, first_runs, server_options, progress)
+    edits, refusals = _make_edits(
+        course, selection, first_runs, second_runs, _repeated_paths(extracted_scripts)
+    )
+    for diagnostic in parsed_course.diagnostics:
+        if diagnostic.rule == "source-part" and diagnostic.span.path in (
+            selection.documents or [diagnostic.span.path]
+        ):
+            edits.setdefault(diagnostic.span.source, []).extend(diagnostic.edits)
+    for path in {d.span.path for d in parsed_course.diagnostics if d.rule == "file-encoding"}:
         edits = {source: changes for source, changes in edits.items() if source.path != path}
-    remarks, unwritten = _write(options, edits, dry_run=dry_run)
-    drawn, unsaved = write_figures(course, chosen.documents, first, options, dry_run=dry_run)
-    remarks, unwritten = (*remarks, *drawn), [*unwritten, *unsaved]
+    remarks, failures = _write(options, edits, dry_run=dry_run)
+    figure_remarks, figure_failures = write_figures(
+        course, selection.documents, first_runs, options, dry_run=dry_run
+    )
+    remarks, failures = (*remarks, *figure_remarks), [*failures, *figure_failures]
     if options.long and not dry_run:
-        keep_runs(scripts, first, options)
-    now = loaded if dry_run or not remarks else load(options.root)
-    found = [*now.diagnostics, *extracted.diagnostics, *refused, *unwritten]
-    found += check_recorded_runs(scripts, options)
-    found += _afterwards(course, now.value or course, scripts, first, again)
+        record_runs(scripts, first_runs, options)
+    now = parsed_course if dry_run or not remarks else load(options.root)
+    diagnostics = [*now.diagnostics, *extracted_scripts.diagnostics, *refusals, *failures]
+    diagnostics += check_recorded_runs(scripts, options)
+    diagnostics += _diagnose_updated(course, now.value or course, scripts, first_runs, second_runs)
     if edits and not dry_run and now.value is not None:
-        changed = {
+        changed_scripts = {
             r.script
-            for r in recorded_outputs(course, chosen.documents)
+            for r in recorded_outputs(course, selection.documents)
             if _is_touched(r, edits, ())
         }
-        found += _noise(now.value, chosen, changed, first, options, progress)
-    if not remarks and all(not d.is_error for d in found):
+        diagnostics += _find_noise(
+            now.value, selection, changed_scripts, first_runs, options, progress
+        )
+    if not remarks and all(not d.is_error for d in diagnostics):
         remarks = ("every recorded output is up to date",)
     return judge(
         course,
-        found,
+        diagnostics,
         began,
-        scripts=script_lines(scripts, _as_they_ran(first, again), ()),
-        lessons=len(chosen.lessons),
-        documents=chosen.documents,
+        scripts=script_lines(scripts, _as_they_ran(first_runs, second_runs), ()),
+        lessons=len(selection.lessons),
+        documents=selection.documents,
         remarks=remarks,
     )
 
 
-def _again(
+def _run_again(
     course: Course,
-    chosen: Selection,
+    selection: Selection,
     scripts: Sequence[Extraction],
-    first: Sequence[ScriptRun],
+    first_runs: Sequence[ScriptRun],
     options: Options,
     progress: Progress,
 ) -> tuple[ScriptRun, ...]:
-    """The second runs; a remembered first one that is recorded already stands for both."""
-    edits, refused = _edits(course, chosen, first, first, frozenset())
-    wrong = {
+    """Run scripts again; a remembered first run that is recorded already stands for both."""
+    edits, refusals = _make_edits(course, selection, first_runs, first_runs, frozenset())
+    outdated = {
         r.script
-        for r in recorded_outputs(course, chosen.documents)
-        if _is_touched(r, edits, refused)
+        for r in recorded_outputs(course, selection.documents)
+        if _is_touched(r, edits, refusals)
     }
-    left = [
+    scripts_to_run = [
         extraction
-        for extraction, one in zip(scripts, first, strict=True)
-        if (not one.cached or one.path in wrong) and not extraction.script.once
+        for extraction, first_run in zip(scripts, first_runs, strict=True)
+        if (not first_run.cached or first_run.path in outdated) and not extraction.script.once
     ]
     memory = options.memory(fresh=True)
-    second = run(left, options, progress, "running scripts again", memory)
-    ran = {r.path: r for r in second}
-    return tuple(ran.get(one.path, one) for one in first)
+    runs = run(scripts_to_run, options, progress, "running scripts again", memory)
+    runs_by_path = {r.path: r for r in runs}
+    return tuple(runs_by_path.get(first_run.path, first_run) for first_run in first_runs)
 
 
-def _as_they_ran(first: Sequence[ScriptRun], again: Sequence[ScriptRun]) -> list[ScriptRun]:
-    """The runs as they are told of: one that was remembered, and had to run again, did run."""
+def _as_they_ran(
+    first_runs: Sequence[ScriptRun], second_runs: Sequence[ScriptRun]
+) -> list[ScriptRun]:
+    """The runs to report: those that were remembered and had to run again count as run."""
     return [
-        one if two.cached or not one.cached else replace(one, cached=False, seconds=two.seconds)
-        for one, two in zip(first, again, strict=True)
+        first_run
+        if second_run.cached or not first_run.cached
+        else replace(first_run, cached=False, seconds=second_run.seconds)
+        for first_run, second_run in zip(first_runs, second_runs, strict=True)
     ]
 
 
-def _noise(
+def _find_noise(
     now: Course,
-    chosen: Selection,
-    changed: Collection[str | None],
-    first: Sequence[ScriptRun],
+    selection: Selection,
+    changed_scripts: Collection[str | None],
+    first_runs: Sequence[ScriptRun],
     options: Options,
     progress: Progress,
 ) -> list[Diagnostic]:
-    """Warnings of digits that were recorded and are noise, of the scripts whose output changed."""
+    """Find recorded digits that are noise, in the outputs that have changed."""
     from coursebuild.core.scripts.sensitivity import noise_warnings
     from coursebuild.pipeline.sensitivity import measure
 
-    ran = {one.path: one for one in first if one.path in changed}
-    scripts = [extraction for extraction in extract(now).value if extraction.path in ran]
-    runs = [ran[extraction.path] for extraction in scripts]
-    measured = measure(now, options, progress, scripts, runs, chosen.documents)
-    return [warning for one in measured for warning in noise_warnings(one)]
+    runs_by_path = {
+        script_run.path: script_run
+        for script_run in first_runs
+        if script_run.path in changed_scripts
+    }
+    scripts = [extraction for extraction in extract(now).value if extraction.path in runs_by_path]
+    runs = [runs_by_path[extraction.path] for extraction in scripts]
+    sensitivities = measure(now, options, progress, scripts, runs, selection.documents)
+    return [warning for sensitivity in sensitivities for warning in noise_warnings(sensitivity)]
 
 
 def _is_touched(
-    recording: Recording, edits: Mapping[Source, list[Edit]], refused: Sequence[Diagnostic]
+    recording: Recording, edits: Mapping[Source, list[Edit]], refusals: Sequence[Diagnostic]
 ) -> bool:
-    """Whether something is to be written into a recording, or cannot be."""
+    """Whether something is to be written into a recording, or was refused."""
     whole = recording.span
-    written = any(whole.contains(edit.span) for edit in edits.get(whole.source, ()))
-    return written or any(whole.contains(d.span) for d in refused)
+    is_written = any(whole.contains(edit.span) for edit in edits.get(whole.source, ()))
+    return is_written or any(whole.contains(d.span) for d in refusals)
 
 
-def _with_recordings(
-    course: Course, chosen: Selection, runnable: Sequence[Extraction]
+def _recorded_scripts(
+    course: Course, selection: Selection, runnable: Sequence[Extraction]
 ) -> tuple[Extraction, ...]:
-    """The scripts that have an output or a figure to bring up to date."""
-    wanted = {recording.script for recording in recorded_outputs(course, chosen.documents)}
-    wanted |= {figure.script for figure in figures_of(course, chosen.documents)}
-    return tuple(e for e in runnable if e.path in wanted)
+    """Find the scripts that have an output or a figure to bring up to date."""
+    paths = {recording.script for recording in recorded_outputs(course, selection.documents)}
+    paths |= {figure.script for figure in find_figures(course, selection.documents)}
+    return tuple(e for e in runnable if e.path in paths)
 
 
-def _repeated(extracted: ExtractedScripts) -> frozenset[str]:
-    """Paths that several blocks have: whose output stands below them cannot be told."""
-    twice = (d for d in extracted.diagnostics if d.rule == "script-repeated")
-    return frozenset(diagnostic.span.text.strip("\"'") for diagnostic in twice)
+def _repeated_paths(extracted_scripts: ExtractedScripts) -> frozenset[str]:
+    """The paths that several scripts have: nobody knows whose output is recorded."""
+    repetitions = (d for d in extracted_scripts.diagnostics if d.rule == "script-repeated")
+    return frozenset(diagnostic.span.text.strip("\"'") for diagnostic in repetitions)
 
 
-def _edits(
+def _make_edits(
     course: Course,
-    chosen: Selection,
-    first: Sequence[ScriptRun],
-    again: Sequence[ScriptRun],
-    doubtful: frozenset[str],
+    selection: Selection,
+    first_runs: Sequence[ScriptRun],
+    second_runs: Sequence[ScriptRun],
+    doubtful_paths: frozenset[str],
 ) -> tuple[dict[Source, list[Edit]], list[Diagnostic]]:
-    """What to write, by lesson, and what cannot be written."""
+    """Make the edits, by lesson; a diagnostic for each output that cannot be written."""
     good = {
-        one.path: (one.stdout, two.stdout)
-        for one, two in zip(first, again, strict=True)
-        if one.outcome is Outcome.OK and two.outcome is Outcome.OK
+        first_run.path: (first_run.stdout, second_run.stdout)
+        for first_run, second_run in zip(first_runs, second_runs, strict=True)
+        if first_run.outcome is Outcome.OK and second_run.outcome is Outcome.OK
     }
     edits: dict[Source, list[Edit]] = {}
-    refused: list[Diagnostic] = []
-    for recording in recorded_outputs(course, chosen.documents):
-        if recording.script not in good or recording.script in doubtful:
+    refusals: list[Diagnostic] = []
+    for recording in recorded_outputs(course, selection.documents):
+        if recording.script not in good or recording.script in doubtful_paths:
             continue
         comparison = recording.comparison or course.comparison
-        made = update_body(recording, comparison, course.filters, *good[recording.script])
-        if isinstance(made, Edit):
-            edits.setdefault(recording.span.source, []).append(made)
-        elif made is not None:
-            refused.append(made)
-    return edits, refused
+        edit = update_body(recording, comparison, course.filters, *good[recording.script])
+        if isinstance(edit, Edit):
+            edits.setdefault(recording.span.source, []).append(edit)
+        elif edit is not None:
+            refusals.append(edit)
+    return edits, refusals
 
 
 def _write(
     options: Options, edits: Mapping[Source, list[Edit]], *, dry_run: bool
 ) -> tuple[tuple[str, ...], list[Diagnostic]]:
-    """Write the lessons; a remark for each, and what was not written."""
+    """Write the lessons; a remark for each, and a diagnostic for each that was not written."""
     remarks: list[str] = []
-    unwritten: list[Diagnostic] = []
+    failures: list[Diagnostic] = []
     for source, changes in edits.items():
         new = apply_edits(source.text, changes)
         try:
@@ -226,40 +242,42 @@ def _write(
                 write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
         except EffectError as error:
             span = min((edit.span for edit in changes), key=lambda span: span.start)
-            unwritten.append(diagnose("output-not-updatable", span, error.message, help=error.help))
+            failures.append(diagnose("output-not-updatable", span, error.message, help=error.help))
         else:
             remarks.append(changed_text("would update" if dry_run else "updated", source, new))
-    return tuple(remarks), unwritten
+    return tuple(remarks), failures
 
 
-def changed_text(what: str, source: Source, new: str) -> str:
-    """A remark that says which file was changed, and how."""
+def changed_text(verb: str, source: Source, new: str) -> str:
+    """Make a remark that says which file was changed, and how."""
     diff = difflib.unified_diff(
         source.text.splitlines(), new.splitlines(), source.path, source.path, n=1, lineterm=""
     )
-    return "\n".join([f"{what} {source.path}", *diff])
+    return "\n".join([f"{verb} {source.path}", *diff])
 
 
-def _afterwards(
+def _diagnose_updated(
     before: Course,
     now: Course,
     scripts: Sequence[Extraction],
-    first: Sequence[ScriptRun],
-    again: Sequence[ScriptRun],
+    first_runs: Sequence[ScriptRun],
+    second_runs: Sequence[ScriptRun],
 ) -> list[Diagnostic]:
-    """What is wrong with the lessons as they are now."""
+    """Find what is wrong with the scripts of the lessons as they are now."""
     runs = [
-        two if one.outcome is Outcome.OK and two.outcome is not Outcome.OK else one
-        for one, two in zip(first, again, strict=True)
+        second_run
+        if first_run.outcome is Outcome.OK and second_run.outcome is not Outcome.OK
+        else first_run
+        for first_run, second_run in zip(first_runs, second_runs, strict=True)
     ]
-    ran = {extraction.path for extraction in scripts}
+    paths = {extraction.path for extraction in scripts}
 
     def verdicts(course: Course) -> list[Verdict]:
-        return [v for v in compare_all(course, runs) if v.recording.script in ran]
+        return [v for v in compare_all(course, runs) if v.recording.script in paths]
 
-    # What was written above a script moved it, so that its place is another than before.
-    placed = [extraction for extraction in extract(now).value if extraction.path in ran]
-    held = collect_evidence(before, runs, verdicts(before)) if now is not before else None
-    found = script_findings(now, placed, runs, verdicts(now), held)
-    # What update just refused is told by the refusal; a dry run leaves the drift as it is.
-    return [d for d in found if d.rule != "output-drift"]
+    # What was written above a script has moved it.
+    extractions = [extraction for extraction in extract(now).value if extraction.path in paths]
+    evidence = collect_evidence(before, runs, verdicts(before)) if now is not before else None
+    diagnostics = script_findings(now, extractions, runs, verdicts(now), evidence)
+    # A drift that was not updated has its own diagnostic; a dry run leaves all drifts.
+    return [d for d in diagnostics if d.rule != "output-drift"]

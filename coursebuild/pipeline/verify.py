@@ -3,12 +3,12 @@
 Entry point: `verify(course, options, progress, documents)`.
 
 1. Scripts are written to `examples/`, and those of the chosen documents run (`scripts`).
-2. Recorded outputs and bound numbers are held against the runs.
+2. Recorded outputs and bound numbers are compared with the runs.
 3. Models and MJCF blocks are compiled in a child process, which is not started for a course that
    has none.
-4. Labs are tried beside the scripts.
+4. Labs are tried while the scripts run.
 
-Documents may be summaries. Formulas are no part of this: see `pipeline.documents`.
+Documents may be summaries. Formulas are not checked here: see `pipeline.documents`.
 """
 
 from __future__ import annotations
@@ -53,11 +53,11 @@ if TYPE_CHECKING:
 
 
 _QUICK = 20.0
-"""Seconds that a script may take to be run again where its output has drifted."""
+"""Seconds: a faster script runs again where its output has drifted."""
 
 
-class Verified(Struct, frozen=True):
-    """What verification found."""
+class Verification(Struct, frozen=True):
+    """The results of a verification."""
 
     results: Results
     diagnostics: tuple[Diagnostic, ...]
@@ -73,107 +73,121 @@ def verify(
     *,
     static: bool = False,
     shard: Shard | None = None,
-    held: BindingEvidence | None = None,
-    known: Mapping[str, ScriptRun] | None = None,
-) -> Verified:
+    evidence: BindingEvidence | None = None,
+    known_runs: Mapping[str, ScriptRun] | None = None,
+) -> Verification:
     """Verify a course, or only what stands in the documents with these paths.
 
     `static`: with the static forms of labs, which only a build needs. `shard`: only this part of
-    the scripts and labs. `held`: the lines by which bound numbers held before. `known`: what
-    scripts do, by path, that need not be looked at.
+    the scripts and labs. `evidence`: the lines by which bound numbers held before. `known_runs`:
+    runs, by path, that are known to hold.
     """
     options.store.listen(progress.say)
     options = options.for_course(course)
-    extracted = extract_scripts(course, options)
-    chosen, trials = _chosen(course, extracted.runnable, documents, shard)
-    models, compiled = compile_models(course, options, progress)
+    extracted_scripts = extract_scripts(course, options)
+    extractions, trials = _select(course, extracted_scripts.runnable, documents, shard)
+    models, model_diagnostics = compile_models(course, options, progress)
     memory = options.memory()
-    scripts = functools.partial(run, chosen, options, progress, memory=memory, known=known)
-    tried: tuple[TrialResult, ...] = ()
-    found = [*extracted.diagnostics, *compiled]
+    scripts = functools.partial(
+        run, extractions, options, progress, memory=memory, known_runs=known_runs
+    )
+    trial_results: tuple[TrialResult, ...] = ()
+    diagnostics = [*extracted_scripts.diagnostics, *model_diagnostics]
     if trials:
-        beside = Memory(options.root, options.store)  # for another thread
-        context = TrialContext(options.root, course, dict(models), beside, compiled, static)
-        runs, (tried, wrong) = run_with_trials(scripts, trials, context, progress)
-        found += wrong
+        trial_memory = Memory(options.root, options.store)  # another thread uses it
+        context = TrialContext(
+            options.root, course, dict(models), trial_memory, model_diagnostics, static
+        )
+        runs, (trial_results, trial_diagnostics) = run_with_trials(
+            scripts, trials, context, progress
+        )
+        diagnostics += trial_diagnostics
     else:
         runs = scripts()
-    found += check_recorded_runs(chosen, options)
+    diagnostics += check_recorded_runs(extractions, options)
     verdicts = compare_all(course, runs)
-    again = _again(chosen, runs, verdicts, options, progress) if known is None else {}
-    broken = [f"models/{name}.xml" for name, model in models if model.error]
-    everything = extracted.all
-    found += script_findings(course, chosen, runs, verdicts, held, everything, again, broken)
+    second_runs = (
+        _repeat_drifted(extractions, runs, verdicts, options, progress)
+        if known_runs is None
+        else {}
+    )
+    broken_models = [f"models/{name}.xml" for name, model in models if model.error]
+    all_scripts = extracted_scripts.extractions
+    diagnostics += script_findings(
+        course, extractions, runs, verdicts, evidence, all_scripts, second_runs, broken_models
+    )
     if memory.differing_runs:
         from coursebuild.core.scripts.repeat import repeat_findings
 
-        found += repeat_findings(course, chosen, memory.differing_runs)
-    found += check_runs(course, runs)
-    found += _nothing(course, () if shard is not None else runs)
-    found += figure_findings(course, runs, functools.partial(read_recorded, options.root))
+        diagnostics += repeat_findings(course, extractions, memory.differing_runs)
+    diagnostics += check_runs(course, runs)
+    diagnostics += _diagnose_nothing(course, () if shard is not None else runs)
+    diagnostics += figure_findings(course, runs, functools.partial(read_recorded, options.root))
     interpreter = options.interpreter
     python = python_version() if interpreter is None else interpreter.version
     engine = engine_version() if interpreter is None else interpreter.engine
-    results = Results(runs, verdicts, (), models, python, engine, tried)
-    scripts_ran = script_lines(chosen, runs, verdicts)
-    labs = tuple(trial.line for trial in tried)
-    return Verified(results, tuple(found), scripts_ran, labs)
+    results = Results(runs, verdicts, (), models, python, engine, trial_results)
+    lines = script_lines(extractions, runs, verdicts)
+    labs = tuple(trial.line for trial in trial_results)
+    return Verification(results, tuple(diagnostics), lines, labs)
 
 
-def _again(
-    chosen: Sequence[Extraction],
+def _repeat_drifted(
+    extractions: Sequence[Extraction],
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
     options: Options,
     progress: Progress,
 ) -> dict[str, ScriptRun]:
-    """Second runs, by path, of quick scripts whose output has drifted: does it vary by itself?"""
-    drifted = {verdict.recording.script for verdict in verdicts if verdict.status == "drift"}
-    quick = {one.path for one in runs if one.seconds < _QUICK}
-    scripts = [e for e in chosen if e.path in drifted & quick and not e.script.once]
+    """Run quick scripts again whose output has drifted, by path: does it vary by itself?"""
+    drifted_paths = {verdict.recording.script for verdict in verdicts if verdict.status == "drift"}
+    quick = {script_run.path for script_run in runs if script_run.seconds < _QUICK}
+    scripts = [e for e in extractions if e.path in drifted_paths & quick and not e.script.once]
     if not scripts:
         return {}
     memory = options.memory(fresh=True)
-    again = run(scripts, options, progress, "running again what differs", memory)
-    return {one.path: one for one in again}
+    repeated_runs = run(scripts, options, progress, "running again what differs", memory)
+    return {script_run.path: script_run for script_run in repeated_runs}
 
 
-def _nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Diagnostic]:
-    """That there is nothing to publish, or that nothing of it was verified."""
+def _diagnose_nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Diagnostic]:
+    """Diagnose that there is nothing to publish, or that nothing was verified."""
     place = course.map.span(0, 0)
     if all(lesson.status == "planned" for lesson in course.lessons):
         message = "no lesson of the course is written"
         help = "write a file in content/lessons, and give its entry in the map a `status`"
         yield diagnose("no-lessons", place, message, help=help)
-    skipped = [run for run in runs if run.outcome is Outcome.SKIPPED]
-    if skipped and all(run.outcome in (Outcome.SKIPPED, Outcome.NORUN) for run in runs):
-        missing = sorted({name for run in skipped for name in run.missing})
+    skipped_runs = [run for run in runs if run.outcome is Outcome.SKIPPED]
+    if skipped_runs and all(run.outcome in (Outcome.SKIPPED, Outcome.NORUN) for run in runs):
+        missing = sorted({name for run in skipped_runs for name in run.missing})
         message = "no script can run here, so that nothing was verified"
         yield diagnose("no-scripts", place, message, help=f"install {', '.join(missing)}")
 
 
-def _chosen(
+def _select(
     course: Course,
     runnable: Sequence[Extraction],
     documents: Collection[str] | None,
     shard: Shard | None,
 ) -> tuple[Sequence[Extraction], tuple[tuple[Trials, Trial], ...]]:
-    """The scripts to run, and the trials."""
-    chosen, trials = runnable, feature_trials(course)
+    """Select the scripts to run, and the trials."""
+    extractions, trials = runnable, feature_trials(course)
     if documents is not None:
-        quoted = _quoted_scripts(course, documents)
-        chosen = [e for e in chosen if e.document in documents or e.path in quoted]
+        quoted_scripts = _quoted_scripts(course, documents)
+        extractions = [
+            e for e in extractions if e.document in documents or e.path in quoted_scripts
+        ]
         paths = {name: trial.block.span.path for name, (_, trial) in trials.items()}
-        trials = {name: known for name, known in trials.items() if paths[name] in documents}
+        trials = {name: pair for name, pair in trials.items() if paths[name] in documents}
     if shard is not None:
-        only = shard.takes([*(e.path for e in chosen), *trials])
-        chosen = [e for e in chosen if e.path in only]
-        trials = {name: known for name, known in trials.items() if name in only}
-    return chosen, tuple(trials.values())
+        only = shard.takes([*(e.path for e in extractions), *trials])
+        extractions = [e for e in extractions if e.path in only]
+        trials = {name: pair for name, pair in trials.items() if name in only}
+    return extractions, tuple(trials.values())
 
 
 def _quoted_scripts(course: Course, documents: Collection[str]) -> set[str]:
-    """Scripts, of any lesson, whose output the numbers and questions of these documents quote."""
+    """Find the scripts, of any lesson, whose output these documents quote."""
     paths: set[str] = set()
     for document in course.documents:
         if document.source.path in documents:
@@ -190,7 +204,7 @@ def _quoted_scripts(course: Course, documents: Collection[str]) -> set[str]:
 def compile_models(
     course: Course, options: Options, progress: Progress
 ) -> tuple[tuple[tuple[str, CompileResult], ...], tuple[Diagnostic, ...]]:
-    """Compile the models and MJCF blocks of a course; what is wrong with them."""
+    """Compile the models and MJCF blocks of a course; diagnose what is wrong with them."""
     texts = mjcf_texts(course)
     if not course.models and not texts:
         return (), ()
@@ -198,12 +212,12 @@ def compile_models(
     from coursebuild.core.run.model_memory import compile_or_recall
 
     stage = functools.partial(progress.stage, "compiling models")
-    everything = [(model.source.path, model.source.text) for model in course.models]
-    everything += [(mjcf.TEXT_PATH, text.text) for text in texts]
+    texts_to_compile = [(model.source.path, model.source.text) for model in course.models]
+    texts_to_compile += [(mjcf.TEXT_PATH, text.text) for text in texts]
     results = compile_or_recall(
-        options.root, options.store, everything, stage, course.limits.memory
+        options.root, options.store, texts_to_compile, stage, course.limits.memory
     )
     models = tuple(zip((model.name for model in course.models), results, strict=False))
-    made = tuple(zip(texts, results[len(models) :], strict=True))
-    found = check_compiled(course, dict(models), made, mjcf.readable_error)
-    return models, found
+    compiled_blocks = tuple(zip(texts, results[len(models) :], strict=True))
+    diagnostics = check_compiled(course, dict(models), compiled_blocks, mjcf.readable_error)
+    return models, diagnostics

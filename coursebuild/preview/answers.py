@@ -1,6 +1,6 @@
-"""What is served at an address: files of the site, and what the preview adds to pages.
+"""What is served at an address: files of the site, with what the preview adds to pages.
 
-Entry point: `Answers.find`. Files of the site come from a `Session`, which decides what there is.
+Entry point: `Answers.find`. The files of the site come from a `Session`.
 """
 
 from __future__ import annotations
@@ -27,66 +27,66 @@ _TYPES = MimeTypes().types_map[True] | {
     ".webp": "image/webp",
     ".woff2": "font/woff2",
 }
-"""Python's own table, and what it lacks or has otherwise in some version."""
+"""Python's own table, and what it lacks in some version or has otherwise."""
 _WORKER = "/service-worker.js"
-_NOTHING = b"<!DOCTYPE html><html lang=en><title>Preview</title><body><p>%s</p></body></html>"
+_MESSAGE_PAGE = b"<!DOCTYPE html><html lang=en><title>Preview</title><body><p>%s</p></body></html>"
 
 
 class Answers:
-    """See the module."""
+    """Finds what is served at an address."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
         bundled = Bundle()
-        self._own = {
+        self._preview_files = {
             f"{PREFIX}preview.js": page_script(bundled["js/preview.js"]),
             f"{PREFIX}preview.css": bundled["css/preview.css"],
             f"{PREFIX}worker.js": page_script(bundled["js/preview-worker.js"]),
         }
-        self.tool = digest(b"".join(self._own.values()))
+        self.tool = digest(b"".join(self._preview_files.values()))
         """A digest of these files: pages reload when the preview's own scripts have changed."""
 
     def find(self, path: str) -> tuple[HTTPStatus, str, bytes]:
-        """Status, content type and bytes of an address path."""
+        """Return the status, content type and bytes for the path of an address."""
         if path.endswith(_WORKER):
             path = f"{PREFIX}worker.js"
-        if path in self._own:
-            return HTTPStatus.OK, _type_of(path), self._own[path]
-        name, data = self._file(path)
+        if path in self._preview_files:
+            return HTTPStatus.OK, _type_of(path), self._preview_files[path]
+        name, data = self._find_file(path)
         if data is not None:
-            text = _tagged(data, name, digest(data)) if name.endswith(".html") else data
+            text = _add_preview(data, name, digest(data)) if name.endswith(".html") else data
             return HTTPStatus.OK, _type_of(name), text
         if self._session.files.has_page(name):
-            why = b"This page cannot be shown before its mistakes are mended."
-            return HTTPStatus.OK, HTML, _tagged(_NOTHING % why, name, "")
+            message = b"This page cannot be shown before its mistakes are mended."
+            return HTTPStatus.OK, HTML, _add_preview(_MESSAGE_PAGE % message, name, "")
         missing = self._session.find("404.html")
         if missing is None:
-            missing = _NOTHING % b"Nothing is built yet."
-        return HTTPStatus.NOT_FOUND, HTML, _tagged(missing, name, "")
+            missing = _MESSAGE_PAGE % b"Nothing is built yet."
+        return HTTPStatus.NOT_FOUND, HTML, _add_preview(missing, name, "")
 
-    def _file(self, path: str) -> tuple[str, bytes | None]:
-        """The path in the site that an address means, and what is there.
+    def _find_file(self, path: str) -> tuple[str, bytes | None]:
+        """Find the path in the site that an address means, and the file there.
 
-        The page for missing addresses names everything from the root of the host, where the
-        published site may lie in a folder.
+        The page for missing addresses links to everything from the root of the host, but the
+        published site may lie in a folder of it.
         """
         base = self._session.base()
         names = [path.lstrip("/")]
         if path.startswith(base):
             names.append(path.removeprefix(base))
-        found = [
+        site_paths = [
             unquote(name) + ("index.html" if not name or name.endswith("/") else "")
             for name in names
         ]
-        for name in found:
+        for name in site_paths:
             data = self._session.find(name)
             if data is not None:
                 return name, data
-        return found[0], None
+        return site_paths[0], None
 
 
 def digest(data: bytes | None) -> str:
-    """A digest of a page, another after each change; empty where there is no page."""
+    """A digest of a page; empty where there is no page."""
     return "" if data is None else hashlib.sha256(data).hexdigest()[:16]
 
 
@@ -95,12 +95,12 @@ def _type_of(name: str) -> str:
     return f"{kind}; charset=utf-8" if kind.startswith("text/") else kind
 
 
-def _tagged(page: bytes, name: str, state: str) -> bytes:
-    """The page with what the preview adds to it."""
-    about = f'data-page="{escape(name)}" data-state="{state}"'
+def _add_preview(page: bytes, name: str, state: str) -> bytes:
+    """Return a page with the preview's style sheet and script."""
+    attributes = f'data-page="{escape(name)}" data-state="{state}"'
     tags = (
         f'<link rel="stylesheet" href="{PREFIX}preview.css">'
-        f'<script src="{PREFIX}preview.js" {about}></script>'
+        f'<script src="{PREFIX}preview.js" {attributes}></script>'
     ).encode("utf-8", "replace")
     head, end, tail = page.rpartition(b"</body>")
     return head + tags + end + tail if end else page + tags

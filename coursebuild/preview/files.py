@@ -1,13 +1,12 @@
-"""The files of the site of a course as it is now; pages are drawn when they are asked for.
+"""The files of the site of a course as it is now; pages are drawn on demand.
 
 Entry point: `Files`.
 
-1. `make` puts all files together as a build does, of pages and of what they share. Most are made
-   when they are asked for.
-2. A page that shows something else since is drawn when it is asked for. One whose document has a
-   mistake stays as it was.
+1. `make` makes all files of the site as a build does. The contents of most are made on demand.
+2. A page that has changed since is drawn on demand. A page whose document has a mistake stays as
+   it was.
 
-Callers hold the session's lock, but for `make`.
+Callers hold the session's lock, except for `make`.
 """
 
 from __future__ import annotations
@@ -26,13 +25,13 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.pages import framed, page_request, text_of
+from coursebuild.pipeline.pages import frame_page, page_request, text_of
 from coursebuild.pipeline.reading import DrawnPage
 from coursebuild.pipeline.site import Site, SiteMaker
 
-_DRAWN = 64
-"""Pages whose text is kept in memory."""
-_SITES = 3
+_MOST_PAGES = 64
+"""How many pages are kept in memory."""
+_MOST_SITES = 3
 """Sites whose shared files stay available: a browser may still ask for those of an older page."""
 
 
@@ -40,14 +39,14 @@ class ServedPage(Struct, frozen=True):
     """The text of a page, and what it was made from."""
 
     frame: PageFrame
-    """Another one after each change of the course or of what pages share."""
+    """There is a new frame after each change of the course or of what pages share."""
     key: str
     page: DrawnPage
     text: bytes
 
 
 class Files:
-    """See the module."""
+    """The files of the site."""
 
     def __init__(
         self,
@@ -57,7 +56,7 @@ class Files:
         is_sound: Callable[[Document], bool],
     ) -> None:
         """`is_sound` says whether a document can be drawn."""
-        self._options = replace(options, jobs=1)  # no copies are made of a process with threads
+        self._options = replace(options, jobs=1)  # a process with threads is not forked
         self._assets = assets
         self._documents = documents
         self._is_sound = is_sound
@@ -65,26 +64,26 @@ class Files:
         self._entries: dict[str, PageEntry] = {}
         self._pages: dict[str, ServedPage] = {}
         self._last_good: dict[str, str] = {}
-        """Keys of pages as they are in the site that was made last, by site path."""
+        """Keys of the pages of the site that was made last, by site path."""
         self._frame: PageFrame | None = None
         self._sites: list[tuple[Site, Mapping[str, SiteFile]]] = []
         self._trial_files: Mapping[str, OutputFile] = {}
-        """Files of features that pages already show, though no site was made with them yet."""
+        """Features' files that pages may show before a site was made with them."""
 
     def show(self, library: Library) -> None:
         """Draw pages of this course from now on."""
         self._library = library
         self._trial_files = {file.path: file for file in library.trial_files}
         self._entries = {entry.path: entry for entry in page_list(library)}
-        self._pages = {path: one for path, one in self._pages.items() if path in self._entries}
+        self._pages = {p: page for p, page in self._pages.items() if p in self._entries}
         self._last_good = {p: key for p, key in self._last_good.items() if p in self._entries}
         if self._sites:
             self._set_frame()
-        else:  # whatever characters pages will have
-            self.serve(self._maker(library).made((), whole_fonts=True))
+        else:  # fonts with all characters, as pages are not drawn yet
+            self.serve(self._maker(library).make_site((), whole_fonts=True))
 
     def make(self, library: Library, broken: Collection[str], pause: Callable[[], None]) -> Site:
-        """All files of a site.
+        """Make all files of the site.
 
         `broken` are paths of pages whose documents have mistakes. `pause` is called between pages.
         """
@@ -96,15 +95,15 @@ class Files:
                     pause()
                     yield entry
 
-        return self._maker(library).made(entries(), last_good)
+        return self._maker(library).make_site(entries(), last_good)
 
     def _maker(self, library: Library) -> SiteMaker:
         return SiteMaker(library, self._assets, self._documents, self._options)
 
     def serve(self, site: Site) -> None:
-        """Have the files of this site from now on."""
+        """Serve the files of this site from now on."""
         files = {file.path: file for file in site.files}
-        self._sites = [*self._sites[1 - _SITES :], (site, files)]
+        self._sites = [*self._sites[1 - _MOST_SITES :], (site, files)]
         self._last_good |= {p: key for p, key in site.keys.items() if p in self._entries}
         self._set_frame()
 
@@ -113,7 +112,7 @@ class Files:
         assert self._library is not None and names is not None
         self._frame = PageFrame(self._library, names)
 
-    # --- what there is
+    # --- lookup
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -121,14 +120,14 @@ class Files:
         return tuple(self._sites[-1][1]) if self._sites else ()
 
     def has_page(self, path: str) -> bool:
-        """Whether there is a page, or would be but for its mistakes."""
+        """Whether the site has a page here, even one that cannot be drawn for its mistakes."""
         return path in self._entries
 
-    def is_kept(self, path: str) -> bool:
+    def is_outdated(self, path: str) -> bool:
         """Whether a page is older than its document, which has mistakes."""
         document = self.document(path)
-        drawn = path in self._pages or path in self._last_good
-        return document is not None and drawn and not self._is_sound(document)
+        has_text = path in self._pages or path in self._last_good
+        return document is not None and has_text and not self._is_sound(document)
 
     def document(self, path: str) -> Document | None:
         """The document that a page shows, as it was last read."""
@@ -136,41 +135,43 @@ class Files:
         return None if entry is None or self._library is None else entry.document(self._library)
 
     def find(self, path: str) -> bytes | None:
-        """A file of the site, if there is one and it can be had."""
+        """Return a file of the site, if there is one and it can be made."""
         if path in self._entries:
-            return self._page(path)
+            return self._find_page(path)
         if path in self._trial_files:
             return self._trial_files[path].data
         for site, files in reversed(self._sites):
-            # A browser may ask for what an older page shares with others.
+            # Browsers may ask for shared files of an older page.
             newest = site is self._sites[-1][0]
             if path in files and (newest or path.startswith("assets/")):
                 return _data(files[path])
         return None
 
-    def _page(self, path: str) -> bytes | None:
-        """A page as it is now, or as it was when it had no mistake."""
-        library, frame, known = self._library, self._frame, self._pages.pop(path, None)
+    def _find_page(self, path: str) -> bytes | None:
+        """Return a page as it is now, or as it was before its document had a mistake."""
+        library, frame, served_page = self._library, self._frame, self._pages.pop(path, None)
         assert library is not None and frame is not None
-        if known is None or known.frame is not frame:
+        if served_page is None or served_page.frame is not frame:
             document = self.document(path)
             if document is None or self._is_sound(document):
                 entry = self._entries[path]
                 request = page_request(entry, library, text_of(entry, library))
-                if known is None or known.key != request.key:
-                    page = self._documents.page(request.key, lambda: request)
+                if served_page is None or served_page.key != request.key:
+                    page = self._documents.get_or_draw(request.key, lambda: request)
                 else:
-                    page = known.page
-                known = ServedPage(frame, request.key, page, framed(page, frame))
-            elif known is None:
+                    page = served_page.page
+                served_page = ServedPage(frame, request.key, page, frame_page(page, frame))
+            elif served_page is None:
                 files = self._sites[-1][1]
                 return _data(files[path]) if path in files else None
             else:
-                known = replace(known, frame=frame, text=framed(known.page, frame))
-        self._pages[path] = known  # as the one that was asked for last
-        if len(self._pages) > _DRAWN:
+                served_page = replace(
+                    served_page, frame=frame, text=frame_page(served_page.page, frame)
+                )
+        self._pages[path] = served_page  # last in the dictionary, as it was used last
+        if len(self._pages) > _MOST_PAGES:
             del self._pages[next(iter(self._pages))]
-        return known.text
+        return served_page.text
 
 
 def _data(file: SiteFile) -> bytes | None:

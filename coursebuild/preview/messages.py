@@ -1,13 +1,13 @@
-"""What an open page is told beside its text, and what its author may accept there.
+"""Messages for an open page: what is wrong, and what its author may accept there.
 
 Entry points: `page_news(session, path)`, as JSON; `accept(session, path, id)`.
 
-1. Every mistake of the course: first those that keep the page as it was, then others of its
+1. The mistakes of the course: first those that keep the page from being drawn, then others of its
    document. Each says whether the page shows it in its place.
-2. For each script of the page how it did, for each recorded output or figure that differs the two
-   side by side, and for each bound number what would be right.
-3. What is offered has an id made from what the file holds and would hold. It is written only as
-   long as both are still the same: nothing is ever written that was not seen.
+2. For each script of the page its state; for each recorded output or figure that differs, both
+   versions; for each bound number that does not hold, the right one.
+3. An offer's id is made from what the file holds and what it would hold. It is accepted only as
+   long as both are unchanged: nothing is ever written that the author has not seen.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ from coursebuild.report import Report
 from coursebuild.report.text import location
 
 _MOST = 60
-"""Mistakes that a page is told of."""
+"""The most mistakes that are sent to a page."""
 _IN_PLACE = ("output-drift", "binding-mismatch", "figure-drift")
 """Rules whose mistakes a page shows where they are."""
 _IMAGES = {"svg": "image/svg+xml", "png": "image/png"}
 
 
 class Offer(Struct, frozen=True):
-    """What a file of the course would hold instead."""
+    """A proposed change of a file of the course."""
 
     path: str
     old: bytes | None
@@ -55,14 +55,14 @@ class Offer(Struct, frozen=True):
 
     @classmethod
     def of(cls, edit: Edit) -> Offer:
-        """A lesson with an edit."""
+        """The offer of an edit of a lesson."""
         source = edit.span.source
         new = apply_edits(source.text, [edit])
         return cls(source.path, source.text.encode(), new.encode())
 
     @property
     def id(self) -> str:
-        """By which it is accepted."""
+        """The id by which it is accepted."""
         digest = hashlib.sha256(self.path.encode())
         for data in (self.old or b"", self.new):
             digest.update(b"%d:" % len(data) + data)
@@ -70,25 +70,25 @@ class Offer(Struct, frozen=True):
 
 
 def report_now(session: Session) -> Report:
-    """Everything that is wrong, as a report."""
+    """Return everything that is wrong, as a report."""
     return judge(session.course, session.diagnostics())
 
 
 def page_news(session: Session, path: str) -> str:
-    """What the page at a site path is told; of an offer, its id."""
-    with session.changed:
-        news = _news(session, path)
+    """Return the messages for the page at a site path, with offers as their ids."""
+    with session.condition:
+        news = _collect_news(session, path)
         id = attrgetter("id")
         return json.dumps(news, default=id, ensure_ascii=False, separators=(",", ":"))
 
 
 def accept(session: Session, path: str, id: str) -> str:
-    """Write what is offered on a page under this id; gives why not, or nothing.
+    """Write what is offered on a page under this id; return why that failed, or an empty text.
 
-    The lock is held, so that two browsers cannot accept the same at once.
+    The lock is held: two browsers cannot accept the same at once.
     """
-    with session.changed:
-        news = _news(session, path)
+    with session.condition:
+        news = _collect_news(session, path)
         parts = (*news["outputs"], *news["figures"], *news["numbers"])
         offers = (part["offer"] for part in parts if part.get("offer"))
         offer = next((offer for offer in offers if offer.id == id), None)
@@ -101,19 +101,21 @@ def accept(session: Session, path: str, id: str) -> str:
         return ""
 
 
-def _news(session: Session, path: str) -> dict[str, Any]:
+def _collect_news(session: Session, path: str) -> dict[str, Any]:
     document, library = session.files.document(path), session.library
-    report, blocking = report_now(session), session.blocking(path)
-    own = "" if document is None else document.source.path
+    report, blocking = report_now(session), session.blocking_diagnostics(path)
+    document_path = "" if document is None else document.source.path
 
     def rank(d: Diagnostic) -> tuple[bool, ...]:
-        return d not in blocking, not d.is_error, d.span.path != own
+        return d not in blocking, not d.is_error, d.span.path != document_path
 
-    found = sorted(report.diagnostics, key=rank)[:_MOST]
+    diagnostics = sorted(report.diagnostics, key=rank)[:_MOST]
     news: dict[str, Any] = {
-        "problems": [{**_problem(d, own), "blocks": d in blocking} for d in found],
+        "problems": [
+            {**_describe_mistake(d, document_path), "blocks": d in blocking} for d in diagnostics
+        ],
         "more": max(0, len(report.diagnostics) - _MOST),
-        "kept": session.files.is_kept(path),
+        "kept": session.files.is_outdated(path),
         "busy": session.busy,
         "trouble": session.trouble,
         "scripts": [],
@@ -132,8 +134,8 @@ def _news(session: Session, path: str) -> dict[str, Any]:
 # --- mistakes
 
 
-def _problem(diagnostic: Diagnostic, own: str) -> dict[str, Any]:
-    """A mistake on the page of a document with this path."""
+def _describe_mistake(diagnostic: Diagnostic, document_path: str) -> dict[str, Any]:
+    """Describe a mistake for the page of a document with this path."""
     span = diagnostic.span
     line = span.source.line_text(span.line)
     end = len(line) if span.end_line > span.line else span.end_column - 1
@@ -148,7 +150,7 @@ def _problem(diagnostic: Diagnostic, own: str) -> dict[str, Any]:
         "line": line,
         "start": span.column - 1,
         "end": max(end, span.column - 1),
-        "inPlace": span.path == own and diagnostic.rule in _IN_PLACE,
+        "inPlace": span.path == document_path and diagnostic.rule in _IN_PLACE,
     }
 
 
@@ -169,7 +171,7 @@ def _state(run: ScriptRun | None) -> str:
 
 
 def _outputs(session: Session, library: Library, document: Document) -> Iterator[dict[str, Any]]:
-    """The recorded outputs, each with its number among those of its script on the page."""
+    """Describe recorded outputs, each with its number among those of its script on the page."""
     numbers: Counter[str] = Counter()
     for recording in document_blocks(document):
         if not isinstance(recording, Recording) or recording.script is None:
@@ -182,75 +184,77 @@ def _outputs(session: Session, library: Library, document: Document) -> Iterator
         elif verdict is not None:
             output["state"] = verdict.status
             if verdict.status == "drift":
-                output |= _drift(session, library, verdict)
+                output |= _describe_drift(session, library, verdict)
         yield output
 
 
-def _drift(session: Session, library: Library, verdict: Verdict) -> dict[str, Any]:
+def _describe_drift(session: Session, library: Library, verdict: Verdict) -> dict[str, Any]:
     run = library.runs[verdict.recording.script or ""]
     rows = diff_rows(verdict, library.course.filters, run.stdout)
     edit = new_output(session, library, verdict)
     return {
-        "rows": [[row.mark, [[one.text, one.is_changed] for one in row.pieces]] for row in rows],
+        "rows": [
+            [row.mark, [[piece.text, piece.is_changed] for piece in row.pieces]] for row in rows
+        ],
         "offer": Offer.of(edit) if isinstance(edit, Edit) else None,
         "refused": edit.message if isinstance(edit, Diagnostic) else "",
     }
 
 
 def new_output(session: Session, library: Library, verdict: Verdict) -> Edit | Diagnostic | None:
-    """What `coursebuild update` would write; nothing as long as the script was run only once."""
+    """Make the edit that `coursebuild update` would; `None` if the script ran only once so far."""
     run = library.runs[verdict.recording.script or ""]
-    again = session.printed_again(run.path)
-    if again is None:
+    second = session.second_output(run.path)
+    if second is None:
         return None
     filters = library.course.filters
-    return update_body(verdict.recording, verdict.comparison, filters, run.stdout, again)
+    return update_body(verdict.recording, verdict.comparison, filters, run.stdout, second)
 
 
 # --- figures
 
 
 def _figures(session: Session, library: Library, document: Document) -> Iterator[dict[str, Any]]:
-    """The figures of which scripts draw another now; of data there is no image."""
-    wrong = {d.span for d in session.diagnostics() if d.rule == "figure-drift"}
+    """Describe figures that scripts now draw differently; there is no image of data."""
+    drifted_spans = {d.span for d in session.diagnostics() if d.rule == "figure-drift"}
     for figure in recorded_figures(document):
         run = library.runs.get(figure.script)
         data = dict(run.figures).get(figure.name) if run is not None else None
-        drawn = prepare_figure(figure.name, data) if data is not None else ""
-        if figure.span not in wrong or isinstance(drawn, str):
+        drawing = prepare_figure(figure.name, data) if data is not None else ""
+        if figure.span not in drifted_spans or isinstance(drawing, str):
             continue
         old = read_recorded(session.root, figure.path)
         differs = (
             "nothing is recorded yet"
             if old is None
-            else describe_difference(figure.name, old, drawn)
+            else describe_difference(figure.name, old, drawing)
         )
         if differs:
             kind = _IMAGES.get(figure.name.rpartition(".")[2])
-            image = f"data:{kind};base64,{base64.b64encode(drawn).decode()}"
+            image = f"data:{kind};base64,{base64.b64encode(drawing).decode()}"
             yield {
                 "name": figure.name,
                 "differs": differs,
                 "drawn": image if kind else "",
-                "offer": Offer(figure.path, old, drawn),
+                "offer": Offer(figure.path, old, drawing),
             }
 
 
 # --- bound numbers
 
 
-def _numbers(document: Document, found: Iterable[Diagnostic]) -> Iterator[dict[str, Any]]:
-    """The bound numbers that do not hold, each with its number among those of the same text."""
-    wrong = {
+def _numbers(document: Document, diagnostics: Iterable[Diagnostic]) -> Iterator[dict[str, Any]]:
+    """Describe bound numbers that do not hold, each with its number among those of its text."""
+    mismatches = {
         (d.span.start, d.span.end): d
-        for d in found
+        for d in diagnostics
         if d.rule == "binding-mismatch" and d.span.source.text == document.source.text
     }
     numbers: Counter[str] = Counter()
     for binding in document_bindings(document):
         nth = numbers[binding.text]
         numbers[binding.text] += 1
-        mistake = wrong.get((binding.text_span.start, binding.text_span.end))
+        mistake = mismatches.get((binding.text_span.start, binding.text_span.end))
         if mistake is not None:
             edit = next(iter(mistake.edits), None)
             yield {

@@ -1,16 +1,15 @@
-"""The rest of a build, in the background after each save: all that a page need not wait for.
+"""The rest of a build, in the background after each save: whatever a page need not wait for.
 
-Entry point: `BackgroundRebuild.follow()`, which the main thread runs, so that Ctrl-C ends whatever
-is running as it ends any other command.
+Entry point: `BackgroundRebuild.follow()`, which the main thread runs, so that Ctrl-C ends scripts
+as in any other command.
 
 1. When nothing was saved for a moment, everything is read.
 2. Scripts and labs that have no remembered result run, and models are compiled (`verify`). Scripts
-   that print something else than is recorded run once more, so that it is known whether their new
-   output can be offered.
-3. The files of the site are put together: pages that show something else now, fonts, the search.
-4. What is wrong now and was not before is printed, and what is wrong no longer.
+   that do not print what is recorded run once more, to see whether their new output can be offered.
+3. The files of the site are made: changed pages, fonts, the search.
+4. New mistakes are printed, and those that are gone.
 
-A save in between begins this anew. A script that runs is ended only where it is another by now.
+A save in between begins this anew. A running script is stopped only if it was edited.
 """
 
 from __future__ import annotations
@@ -44,9 +43,9 @@ from coursebuild.report.text import location
 QUIET = 0.15
 """Seconds without a save after which the work begins."""
 LONGEST = 2.0
-"""Seconds after which it begins all the same."""
+"""Seconds after which it begins in any case."""
 RETRY = 2.0
-"""Seconds after which what could not be done is tried again, though nothing was saved."""
+"""Seconds after which failed work is tried again, though nothing was saved."""
 
 
 class SupersededError(Exception):
@@ -54,33 +53,33 @@ class SupersededError(Exception):
 
 
 class BackgroundRebuild:
-    """See the module."""
+    """Does the rest of a build after each save; see the module."""
 
     def __init__(self, session: Session, progress: Progress, style: Style) -> None:
         self._session = session
         self._options = session.options
         self._progress = progress
-        # A terminal also shows which scripts run, in a line that is erased when they have ended.
+        # Only a terminal shows which scripts run, in a line that is erased at their end.
         self._stages = progress if progress.live else Progress(quiet=True)
-        self._seen = -1
+        self._edits = -1
         """The session's `edits` when the work began last."""
-        self._held: BindingEvidence = {}
+        self._evidence: BindingEvidence = {}
         """The lines that proved bound numbers, also before an output was accepted."""
         self._server = ScriptServer()
         self._style = style
-        self._told: tuple[Diagnostic, ...] | None = None
-        """The mistakes that were printed last."""
+        self._printed: tuple[Diagnostic, ...] | None = None
+        """The diagnostics that were printed last."""
         self._failure: BaseException | None = None
 
     def close(self) -> None:
-        """End the process of scripts."""
+        """End the process that runs scripts."""
         self._server.close()
 
     def fail(self, error: BaseException) -> None:
-        """End `follow` by an exception of another thread."""
-        with self._session.changed:
+        """Raise an exception of another thread in `follow`."""
+        with self._session.condition:
             self._failure = error
-            self._session.changed.notify_all()
+            self._session.condition.notify_all()
 
     def follow(self) -> NoReturn:
         """Work as long as the process lives."""
@@ -88,21 +87,21 @@ class BackgroundRebuild:
             self._wait()
             try:
                 with project_lock(self._options.root, self._progress.say):
-                    self.once()
+                    self.run_once()
             except (SupersededError, RunStoppedError):
                 continue
             except EffectError as error:
                 text = f"coursebuild: {error.message}" + (f"\n{error.help}" if error.help else "")
                 if text != self._session.trouble:
                     print(text, file=sys.stderr, flush=True)
-                self._done(text)
+                self._finish(text)
 
     def _wait(self) -> None:
-        """Until there is something to do, and nobody is saving."""
+        """Wait until there is something to do and nobody is saving."""
         session = self._session
-        with session.changed:
-            session.changed.wait_for(
-                lambda: session.edits != self._seen or self._failure is not None,
+        with session.condition:
+            session.condition.wait_for(
+                lambda: session.edits != self._edits or self._failure is not None,
                 RETRY if session.trouble else None,
             )
             if self._failure is not None:
@@ -110,62 +109,67 @@ class BackgroundRebuild:
             began = time.monotonic()
             while time.monotonic() < began + LONGEST:
                 edits = session.edits
-                if not session.changed.wait_for(lambda edits=edits: session.edits != edits, QUIET):  # type: ignore[misc]
+
+                def has_save(edits: int = edits) -> bool:
+                    return session.edits != edits
+
+                if not session.condition.wait_for(has_save, QUIET):
                     return
 
-    def once(self) -> None:
+    def run_once(self) -> None:
         """Do everything once.
 
         Raises:
             SupersededError, RunStoppedError: something was saved in the meantime.
         """
         session = self._session
-        self._seen = session.edits
+        self._edits = session.edits
         session.read()
-        with session.changed:
-            self._seen = session.edits
-        course = session.saved_course()
+        with session.condition:
+            self._edits = session.edits
+        course = session.read_saved_course()
         if course is not None:
-            self._busy("running scripts and labs")
+            self._begin_step("running scripts and labs")
             self._verify(course)
-            self._busy("drawing pages")
+            self._begin_step("drawing pages")
             session.make_site(self._pause)
-        self._done()
+        self._finish()
 
-    def _busy(self, what: str) -> None:
+    def _begin_step(self, step: str) -> None:
         self._pause()
-        self._session.busy = what
-        self._session.tell()
+        self._session.busy = step
+        self._session.notify()
 
     def _pause(self) -> None:
-        """Make room for a save, and begin anew after it."""
+        """Let a save go first, and begin anew after it."""
         self._session.calm.wait(LONGEST)
-        if self._session.edits != self._seen:
+        if self._session.edits != self._edits:
             raise SupersededError
 
-    def _done(self, trouble: str = "") -> None:
-        """End the work: print what is wrong, if that is news."""
+    def _finish(self, trouble: str = "") -> None:
+        """End the work; print mistakes that are new."""
         session = self._session
-        with session.changed:
-            if session.edits != self._seen and not trouble:
+        with session.condition:
+            if session.edits != self._edits and not trouble:
                 raise SupersededError
             session.busy = ""
             session.trouble = trouble
-            session.tell()
+            session.notify()
         if not trouble:
-            self._tell_changes(report_now(session))
+            self._print_changes(report_now(session))
 
-    def _tell_changes(self, report: Report) -> None:
+    def _print_changes(self, report: Report) -> None:
         """Print the mistakes that are new, and those that are gone."""
-        now, before = report.diagnostics, self._told
-        self._told = now
-        new, gone = without(now, before or ()), without(before or (), now)
+        now, before = report.diagnostics, self._printed
+        self._printed = now
+        new = subtract_diagnostics(now, before or ())
+        resolved = subtract_diagnostics(before or (), now)
         for diagnostic in new:
             print(diagnostic_text(diagnostic, self._style) + "\n", file=sys.stderr, flush=True)
-        for diagnostic in gone:
+        for diagnostic in resolved:
             self._progress.say(f"gone: {location(diagnostic.span)}: {diagnostic.message}")
         counts = [f"{len(new)} new"] if new else []
-        counts += [f"{len(gone)} gone"] if gone else []
+        counts += [f"{len(resolved)} gone"] if resolved else []
         verdict = summary_line(report).rpartition(": ")[2]
         if now and before is not None:
             verdict = f"{verdict} ({', '.join(counts)})" if counts else f"still {verdict}"
@@ -175,89 +179,92 @@ class BackgroundRebuild:
 
     def _verify(self, course: Course) -> None:
         session = self._session
-        with session.changed:
-            everything, session.all_due = session.all_due, False
-        known = {} if everything else session.known_runs(course)
+        with session.condition:
+            all_due, session.all_due = session.all_due, False
+        known_runs = {} if all_due else session.known_runs(course)
         try:
-            verified = verify(
+            verification = verify(
                 course,
-                replace(self._options, run_all=self._run_all(course)),
+                replace(self._options, run_all=self._make_run_all(course)),
                 self._stages,
                 static=True,
-                held=self._held,
-                known=known,
+                evidence=self._evidence,
+                known_runs=known_runs,
             )
         except BaseException:
-            session.all_due |= everything
+            session.all_due |= all_due
             raise
-        self._options.store.fresh = False  # what was made anew once holds from now on
-        session.take_results(course, verified)
-        self._run_again(course, session.drifted(verified.results.runs))
+        self._options.store.fresh = False  # with `--no-cache`, everything is made anew only once
+        session.take_results(course, verification)
+        self._run_again(course, session.drifted_scripts(verification.results.runs))
 
-    def _run_all(self, course: Course) -> RunAll:
-        """What runs scripts, and shows what each prints as soon as it has ended."""
-        session, serve, keys = self._session, self._run_unless_edited(course), script_keys(course)
+    def _make_run_all(self, course: Course) -> RunAll:
+        """Make a function that runs scripts, and shows what each prints as soon as it ends."""
+        session, keys = self._session, script_keys(course)
+        run_scripts = self._run_unless_edited(course)
 
         def run_all(
             root: Path,
-            todo: Sequence[ScriptJob],
+            jobs: Sequence[ScriptJob],
             *,
             on_start: OnStart,
             on_finish: OnFinish,
-            **where: Any,
+            **keywords: Any,
         ) -> tuple[ScriptRun, ...]:
-            def ended(run: ScriptRun) -> None:
+            def take_run(run: ScriptRun) -> None:
                 on_finish(run)
                 session.take_run(keys[run.path], run)
 
-            there = functools.partial(serve, root, **where)
-            runs = there(todo, on_start=on_start, on_finish=ended)
+            run_here = functools.partial(run_scripts, root, **keywords)
+            runs = run_here(jobs, on_start=on_start, on_finish=take_run)
             # Run again at once: an author who sees a new output can accept it before labs have run.
-            drifted = session.drifted(runs)
-            left = [job for job in todo if job.path in drifted]
-            session.take_second_runs(there(left))
+            drifted_paths = session.drifted_scripts(runs)
+            drifted_jobs = [job for job in jobs if job.path in drifted_paths]
+            session.take_second_runs(run_here(drifted_jobs))
             return runs
 
         return run_all
 
     def _run_unless_edited(self, course: Course) -> RunAll:
-        """What runs scripts until one of those that run is edited: its output is of no use."""
-        session, edits, keys = self._session, self._seen, script_keys(course)
+        """Make a function that runs scripts until one of them is edited while it runs."""
+        session, edits, keys = self._session, self._edits, script_keys(course)
 
-        def unwanted(running: frozenset[str]) -> bool:
+        def is_any_edited(running: frozenset[str]) -> bool:
             nonlocal edits
-            with session.changed:
+            with session.condition:
                 if session.edits == edits or session.course is None:
                     return False
                 edits = session.edits
-                now = script_keys(session.course)
-            return any(now.get(path) != keys[path] for path in running)
+                keys_now = script_keys(session.course)
+            return any(keys_now.get(path) != keys[path] for path in running)
 
-        return functools.partial(self._server.run, is_unwanted=unwanted)
+        return functools.partial(self._server.run, is_unwanted=is_any_edited)
 
-    def _run_again(self, course: Course, drifted: Collection[str]) -> None:
-        """Run those that drifted once more, where what they did was remembered."""
+    def _run_again(self, course: Course, drifted_paths: Collection[str]) -> None:
+        """Run drifted scripts once more whose results were remembered."""
         session, options = self._session, self._options.for_course(course)
-        unsure = {path for path in drifted if session.printed_again(path) is None}
-        scripts = [script for script in extract(course).value if script.path in unsure]
+        paths = {path for path in drifted_paths if session.second_output(path) is None}
+        scripts = [script for script in extract(course).value if script.path in paths]
         if scripts:
-            self._busy("running scripts again")
+            self._begin_step("running scripts again")
             memory = options.memory(fresh=True)
-            served = replace(options, run_all=self._run_unless_edited(course))
-            again = run(scripts, served, self._stages, "running scripts again", memory)
-            session.take_second_runs(again)
+            server_options = replace(options, run_all=self._run_unless_edited(course))
+            runs = run(scripts, server_options, self._stages, "running scripts again", memory)
+            session.take_second_runs(runs)
 
 
-def without(these: Sequence[Diagnostic], others: Sequence[Diagnostic]) -> list[Diagnostic]:
-    """Those that are not among the others; that lines have moved makes no difference."""
+def subtract_diagnostics(
+    diagnostics: Sequence[Diagnostic], known: Sequence[Diagnostic]
+) -> list[Diagnostic]:
+    """Return the diagnostics that are not among the known ones, wherever lines have moved."""
 
     def identity(d: Diagnostic) -> tuple[str, ...]:
         return d.rule, d.span.path, d.message, d.label
 
-    left = Counter(map(identity, others))
-    found = []
-    for diagnostic in these:
-        left[identity(diagnostic)] -= 1
-        if left[identity(diagnostic)] < 0:
-            found.append(diagnostic)
-    return found
+    counts = Counter(map(identity, known))
+    rest = []
+    for diagnostic in diagnostics:
+        counts[identity(diagnostic)] -= 1
+        if counts[identity(diagnostic)] < 0:
+            rest.append(diagnostic)
+    return rest

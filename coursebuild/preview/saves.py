@@ -1,12 +1,12 @@
-"""From events of the file system to saves, and from saves to pages.
+"""Turns events of the file system into saves, and saves into pages.
 
 Entry point: `follow(session, watcher, progress)`, which a thread of its own runs.
 
-1. An editor may save in several steps: empty the file, then fill it; or write a new file, then put
-   it in the place of the old one. They count as one save, which is complete when nothing has
+1. An editor may save in several steps: empty the file, then fill it; or write a new file, then move
+   it to the place of the old one. They count as one save, which is complete when nothing has
    happened for some milliseconds.
-2. Many files at once, as when a branch is switched, are waited for longer.
-3. So is a file that is missing or empty, which it may be only between two steps.
+2. For many files at once, as when a branch is switched, the wait is longer.
+3. So it is for a file that is missing or empty, which may be so only between two steps.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ QUIET_MANY = 0.060
 QUIET_GONE = 0.100
 """The same where a file is not there or empty."""
 LONGEST = 0.250
-"""Seconds after which a save is taken, whatever still happens; with many files, four times that."""
+"""Seconds after which a save is taken in any case; with many files, four times that."""
 
 
 def follow(session: Session, watcher: FolderWatcher, progress: Progress) -> None:
     """Take saves until the watcher is stopped.
 
-    Each is told, with the milliseconds from its first event until it was taken.
+    Each is printed, with the milliseconds from its first event until it was taken.
     """
-    while not watcher.stopped:
+    while not watcher.is_stopped:
         watcher.watch_also(session.files_elsewhere(), session.packages())
         paths = watcher.get(1.0)
         if not paths:
@@ -42,28 +42,30 @@ def follow(session: Session, watcher: FolderWatcher, progress: Progress) -> None
         began = time.monotonic()
         session.calm.clear()
         try:
-            paths = _complete(session.root, watcher, paths)
-            changed = session.edit(paths)
-            if changed is None:  # more than documents changed
-                session.take_others()
+            paths = _wait_until_complete(session.root, watcher, paths)
+            has_changed = session.edit(paths)
+            if has_changed is None:  # more than documents changed
+                session.take_other_saves()
         finally:
             session.calm.set()
-        if changed is not False:
+        if has_changed is not False:
             names = ", ".join(sorted(paths)[:3]) + (" …" if len(paths) > 3 else "")
             progress.say(f"changed: {names} ({1e3 * (time.monotonic() - began):.0f} ms)")
 
 
-def _complete(root: Path, watcher: FolderWatcher, paths: frozenset[str]) -> frozenset[str]:
-    """All paths of a save, once nothing more happens."""
+def _wait_until_complete(
+    root: Path, watcher: FolderWatcher, paths: frozenset[str]
+) -> frozenset[str]:
+    """Wait until a save is complete; return all its paths."""
     began = now = time.monotonic()
     while True:
         many = len(paths) > MOST
         quiet = QUIET_MANY if many else QUIET_GONE if _is_any_empty(root, paths) else QUIET
-        left = began + LONGEST * (4 if many else 1) - now
-        more = watcher.get(min(quiet, left)) if left > 0 else frozenset()
-        if not more:
+        remaining = began + LONGEST * (4 if many else 1) - now
+        later = watcher.get(min(quiet, remaining)) if remaining > 0 else frozenset()
+        if not later:
             return paths
-        paths |= more
+        paths |= later
         now = time.monotonic()
 
 

@@ -2,11 +2,11 @@
 
 Entry point: `serve`.
 
-1. The course is read; its pages are drawn when they are asked for.
+1. The course is read; its pages are drawn on demand.
 2. A thread takes saves (`saves`): the page that was saved is new within milliseconds.
-3. The main thread does the rest behind it (`rebuild`): scripts, labs, fonts, whole checks.
+3. The main thread does the rest in the background (`rebuild`): scripts, labs, fonts, whole checks.
 
-The last good page stays while something is wrong; what is wrong is printed and shown over it.
+While something is wrong, the last good page stays, with the mistakes shown over it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def serve(
 ) -> NoReturn:
     """Serve until interrupted.
 
-    `embed`: origins whose pages may show the preview in a frame. `style`: of what is printed.
+    `embed`: origins whose pages may show the preview in a frame. `style`: how mistakes are printed.
     `browse`: open a browser.
     """
     progress = Progress(quiet=options.quiet)
@@ -47,15 +47,15 @@ def serve(
     try:
         server = PreviewServer(host, port, session, embed)
     except OSError as error:
-        why = error.strerror or error
-        raise UsageError(f"port {port} of {host} cannot be used: {why}") from None
+        reason = error.strerror or error
+        raise UsageError(f"port {port} of {host} cannot be used: {reason}") from None
     watcher = FolderWatcher(options.root)
     rebuild = BackgroundRebuild(session, progress, style)
 
     def take_saves() -> None:
         try:
             follow(session, watcher, progress)
-        except BaseException as error:  # told by the main thread
+        except BaseException as error:  # raised again in the main thread
             rebuild.fail(error)
 
     try:
@@ -74,12 +74,12 @@ def serve(
 
 
 def _announce(links: list[str], *, browse: bool, draw: bool) -> None:
-    """Say where the preview is, which answers there by now; for a phone's camera it is drawn."""
-    first, *others = links
+    """Print the addresses of the preview; draw one that a phone's camera can read."""
+    first, *other_links = links
     print(f"serving {first} (stop with Ctrl-C)", file=sys.stderr, flush=True)
-    for link in others:
+    for link in other_links:
         print(f"     or {link}", file=sys.stderr, flush=True)
     if draw and "?" in links[-1]:
         segno.make(links[-1]).terminal(sys.stderr, compact=True)
-    if browse:  # some wait until their window is there
+    if browse:  # in a thread, since some browsers only return when their window is open
         threading.Thread(target=webbrowser.open, args=(first,), name="open", daemon=True).start()

@@ -1,10 +1,10 @@
-"""Watching the course's files, by `watchfiles`.
+"""Watches the course's files, by `watchfiles`.
 
-Entry point: `FolderWatcher`. Caches and editors' own files do not count.
+Entry point: `FolderWatcher`. Caches and editors' own files are ignored.
 
-The course's folders are watched with everything in them, including folders that are made later,
-and so are those that its scripts import from. Pages may be elsewhere (`docs/guide.md`,
-`README.md`): these files are polled.
+The course's folders, and those that its scripts import from, are watched with everything in them,
+including folders that are made later. Files elsewhere, such as pages in `docs/guide.md` or
+`README.md`, are polled.
 """
 
 from __future__ import annotations
@@ -20,71 +20,73 @@ from coursebuild.core.files.course_root import FOLDERS, is_dropping
 from coursebuild.core.files.errors import EffectError, reason
 
 LOOK = 0.200
-"""Seconds between two looks for new and removed folders, and at files elsewhere."""
+"""Seconds between two looks for new and removed folders, and at polled files."""
 _PROBE = "4913"
-"""A file that vim makes for a moment, to see whether it can."""
+"""A file that vim makes for a moment, to see whether the folder can be written."""
 _STEP = 2
 """Milliseconds between two looks for events: a save is noticed within two of them."""
 
 
 class FolderWatcher:
-    """Tells of saves, also of those while the caller does something else."""
+    """Reports saves, also those that happen while the caller does something else."""
 
     def __init__(self, root: Path) -> None:
         self._root = root
         self._stop = threading.Event()
-        self._watched: tuple[str, ...] = FOLDERS
-        self._others: dict[str, tuple[int, ...]] = {}
-        """Files elsewhere, and their state at the last look."""
+        self._watched_folders: tuple[str, ...] = FOLDERS
+        self._polled_files: dict[str, tuple[int, ...]] = {}
+        """Files elsewhere, with their state at the last look."""
         self._events: queue.SimpleQueue[frozenset[str] | OSError] = queue.SimpleQueue()
-        self._begun = threading.Event()
+        self._ready = threading.Event()
         self._thread = threading.Thread(target=self._run, name="watch", daemon=True)
 
     def start(self) -> None:
-        """Begin to watch; from then on no change is missed."""
+        """Begin to watch; from its return on, no change is missed."""
         self._thread.start()
-        self._begun.wait()
+        self._ready.wait()
 
     @property
-    def stopped(self) -> bool:
-        """Whether it was stopped."""
+    def is_stopped(self) -> bool:
+        """Whether watching has ended."""
         return self._stop.is_set()
 
     def stop(self) -> None:
-        """Watch no longer."""
+        """End watching."""
         self._stop.set()
         self._events.put(frozenset())
         if self._thread.is_alive():
             self._thread.join(1.0)
 
     def watch_also(self, paths: frozenset[str], folders: Iterable[str] = ()) -> None:
-        """Files and folders elsewhere that count as well, by POSIX path below the course's folder.
+        """Set the files and folders elsewhere to watch, by POSIX path from the course's folder.
 
-        The whole of the course's folder cannot: what the tool itself writes lies in it.
+        The course's folder as a whole cannot be watched: the tool itself writes into it.
         """
-        self._watched = (*FOLDERS, *(folder for folder in folders if folder != "."))
-        inside = tuple(f"{folder}/" for folder in self._watched)
-        others = {path for path in paths if not path.startswith(inside)}
-        self._others = {path: self._others.get(path, self._state(path)) for path in others}
+        self._watched_folders = (*FOLDERS, *(folder for folder in folders if folder != "."))
+        inside = tuple(f"{folder}/" for folder in self._watched_folders)
+        files = {path for path in paths if not path.startswith(inside)}
+        self._polled_files = {
+            path: self._polled_files.get(path, self._file_state(path)) for path in files
+        }
 
     def get(self, seconds: float) -> frozenset[str]:
-        """Paths that changed, POSIX and relative to the root; empty where there is nothing new.
+        """Return the paths that changed, POSIX and relative to the root, if there are any.
 
-        Waits for so long.
+        Wait for changes for so many seconds.
 
         Raises:
             EffectError: changes cannot be watched.
         """
         try:
-            found = self._events.get(timeout=max(seconds, 0.0))
+            change = self._events.get(timeout=max(seconds, 0.0))
         except queue.Empty:
             return frozenset()
-        if isinstance(found, OSError):
+        if isinstance(change, OSError):
             raise EffectError(
-                f"changes of files cannot be watched: {reason(found)}",
+                f"changes of files cannot be watched: {reason(change)}",
                 help="the system's limit of watched files may be reached (fs.inotify on Linux)",
             )
-        return found
+        return change
 
     def _run(self) -> None:
         try:
@@ -92,44 +94,44 @@ class FolderWatcher:
         except OSError as error:
             self._events.put(error)
         finally:
-            self._begun.set()
+            self._ready.set()
 
     def _follow(self) -> None:
         before: frozenset[str] | None = None
         while not self._stop.is_set():
             folders = self._folders()
-            # Folders that are new, or were not watched for a moment, are told as changed once they
-            # are watched: files may have been put into them before.
-            news = frozenset() if before is None else before | folders.keys()
-            for changed in self._watch(tuple(self._root / f for f in folders)):
-                self._begun.set()
-                found = changed | news | self._changed_others()
-                if found:
-                    self._events.put(found)
-                news = frozenset()
+            # Folders that are new, or were not watched for a moment, are reported once they are
+            # watched: files may have been put into them before.
+            unseen_folders = frozenset() if before is None else before | folders.keys()
+            for paths in self._watch(tuple(self._root / f for f in folders)):
+                self._ready.set()
+                all_paths = paths | unseen_folders | self._find_changed_files()
+                if all_paths:
+                    self._events.put(all_paths)
+                unseen_folders = frozenset()
                 if self._folders() != folders:
                     break
             before = frozenset(folders)
 
     def _folders(self) -> dict[str, tuple[int, ...]]:
-        """The folders of the course that there are, and which they are: device and inode."""
-        found: dict[str, tuple[int, ...]] = {}
-        for name in self._watched:
+        """The watched folders that exist, with their device and inode."""
+        folders: dict[str, tuple[int, ...]] = {}
+        for name in self._watched_folders:
             with contextlib.suppress(OSError):
                 status = (self._root / name).stat()
                 if stat.S_ISDIR(status.st_mode):
-                    found[name] = (status.st_dev, status.st_ino)
-        return found
+                    folders[name] = (status.st_dev, status.st_ino)
+        return folders
 
-    def _changed_others(self) -> set[str]:
-        """The files elsewhere that are others than at the last look."""
-        others = self._others  # another dictionary where more are watched from now on
-        found = {path for path, before in others.items() if self._state(path) != before}
-        others.update((path, self._state(path)) for path in found)
-        return found
+    def _find_changed_files(self) -> set[str]:
+        """Find the polled files that have changed since the last look."""
+        files = self._polled_files  # `watch_also` replaces the dictionary
+        changed_files = {path for path, before in files.items() if self._file_state(path) != before}
+        files.update((path, self._file_state(path)) for path in changed_files)
+        return changed_files
 
-    def _state(self, path: str) -> tuple[int, ...]:
-        """What is another after a save of a file."""
+    def _file_state(self, path: str) -> tuple[int, ...]:
+        """What differs after a save of a file."""
         try:
             status = (self._root / path).stat()
         except OSError:
@@ -137,7 +139,7 @@ class FolderWatcher:
         return status.st_mtime_ns, status.st_size, status.st_ino, status.st_mode
 
     def _watch(self, folders: tuple[Path, ...]) -> Iterator[frozenset[str]]:
-        """Changes in these folders; an empty set at first, and now and then."""
+        """Yield changes in these folders; an empty set at first, and now and then."""
         if not folders:
             while not self._stop.is_set():
                 yield frozenset()
@@ -157,7 +159,7 @@ class FolderWatcher:
             yield frozenset(Path(path).relative_to(self._root).as_posix() for _, path in batch)
 
     def _is_source(self, path: str) -> bool:
-        """Whether a path is one of the course, and none of an editor's or of Python's."""
+        """Whether a path is a file of the course, and not one of an editor's or of Python's."""
         file = Path(path)
         return file.is_relative_to(self._root) and not any(
             name == _PROBE or is_dropping(name) for name in file.relative_to(self._root).parts

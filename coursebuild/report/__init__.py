@@ -16,7 +16,7 @@ from coursebuild.report.values import unchanged_report as unchanged_report
 
 
 def render_report(report: Report, form: str, style: Style) -> str:
-    """The report as `text`, or in a format of `machine`; it ends in a newline (or is empty)."""
+    """Return the report as `text` or in a format of `machine`; ends in a newline, or is empty."""
     if form == "text":
         return to_text(report, style)
     from coursebuild.report.machine import FORMATS

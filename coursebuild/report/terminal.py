@@ -1,6 +1,6 @@
 """Text on a terminal: colours, paragraphs and tables.
 
-Entry points: `Style`, `visible`, `clipped`; `Column`, `table`.
+Entry points: `Style`, `visible`, `clip`; `Column`, `table`.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ class Style(Struct, frozen=True):
     width: int = 100
 
     def paint(self, text: str, code: str) -> str:
-        """`text` in a colour, where there is colour."""
+        """Return a text in a colour, if colours are used."""
         return f"\x1b[{code}m{text}\x1b[0m" if self.colour and text and code else text
 
     def wrap(self, text: str, indent: str = "", code: str = "") -> list[str]:
-        """A paragraph in a colour, no wider than the terminal where its words allow it."""
+        """Return the lines of a paragraph, no wider than the terminal if its words allow."""
         lines = textwrap.wrap(
             visible(text),
             max(self.width, _NARROWEST),
@@ -42,16 +42,16 @@ class Style(Struct, frozen=True):
 
 
 def visible(text: str) -> str:
-    """Text with control characters shown as symbols, so that it cannot change the terminal."""
-    return "".join(map(_shown, text))
+    """Return a text with symbols for control characters, so that it cannot change the terminal."""
+    return "".join(map(_show_char, text))
 
 
 def visible_lines(text: str) -> str:
-    """The same for a text of several lines."""
+    """Do the same for a text of several lines."""
     return "\n".join(visible(line) for line in text.split("\n"))
 
 
-def _shown(char: str) -> str:
+def _show_char(char: str) -> str:
     code = ord(char)
     if char == "\t":
         return " " * TAB
@@ -64,12 +64,12 @@ def _shown(char: str) -> str:
     return char
 
 
-def clipped(text: str, room: int) -> str:
-    """The beginning of a text that fits into so many cells."""
-    used = 0
+def clip(text: str, room: int) -> str:
+    """Return the beginning of a text that fits into `room` cells."""
+    width = 0
     for index, char in enumerate(text):
-        used += cells(char)
-        if used > room:
+        width += cells(char)
+        if width > room:
             return text[:index]
     return text
 
@@ -80,34 +80,36 @@ class Column(Struct, frozen=True):
     title: str
     cells: tuple[str, ...]
     rank: int = 0
-    """Those of low rank come first where there is no room for all; 0 is always there."""
+    """Where there is no room for all, columns of higher rank are left out; 0 never is."""
     left: bool = False
-    """Words stand at the left, numbers at the right."""
+    """Whether its cells are aligned left, as words are; numbers are aligned right."""
 
 
 def table(columns: Sequence[Column], width: int | None = None) -> list[str]:
-    """The titles and the rows as lines, no wider than `width` where that can be.
+    """Return the titles and the rows as lines, no wider than `width` where that is possible.
 
     Columns without any text are left out.
     """
-    filled = [
+    filled_columns = [
         (column, [column.title, *map(visible, column.cells)])
         for column in columns
         if any(cell.strip() for cell in column.cells)
     ]
-    widths = [max(map(cells, texts)) for _, texts in filled]
-    shown = {n for n, (column, _) in enumerate(filled) if width is None or column.rank == 0}
-    for n in sorted(range(len(filled)), key=lambda n: (filled[n][0].rank, n)):
-        tried = shown | {n}
-        if width is None or sum(widths[m] + len(_GAP) for m in tried) - len(_GAP) <= width:
-            shown = tried
-    padded = [
-        [_padded(text, widths[n], left=filled[n][0].left) for text in filled[n][1]]
-        for n in sorted(shown)
+    widths = [max(map(cells, texts)) for _, texts in filled_columns]
+    visible_columns = {
+        n for n, (column, _) in enumerate(filled_columns) if width is None or column.rank == 0
+    }
+    for n in sorted(range(len(filled_columns)), key=lambda n: (filled_columns[n][0].rank, n)):
+        candidate = visible_columns | {n}
+        if width is None or sum(widths[m] + len(_GAP) for m in candidate) - len(_GAP) <= width:
+            visible_columns = candidate
+    padded_columns = [
+        [_pad(text, widths[n], left=filled_columns[n][0].left) for text in filled_columns[n][1]]
+        for n in sorted(visible_columns)
     ]
-    return [_GAP.join(row).rstrip() for row in zip(*padded, strict=True)]
+    return [_GAP.join(row).rstrip() for row in zip(*padded_columns, strict=True)]
 
 
-def _padded(text: str, width: int, *, left: bool) -> str:
+def _pad(text: str, width: int, *, left: bool) -> str:
     pad = " " * (width - cells(text))
     return text + pad if left else pad + text

@@ -34,7 +34,7 @@ from coursebuild.report.values import Report, ScriptLine, plural, summary_line
 
 
 def to_text(report: Report, style: Style) -> str:
-    """Each diagnostic, the scripts, and a summary line."""
+    """The report as text: each diagnostic, the scripts, and a summary line."""
     parts = [diagnostic_text(d, style) + "\n" for d in report.diagnostics]
     lines = [script_line(line, style) for line in report.scripts]
     lines += [lab_line(line, style) for line in report.labs]
@@ -95,15 +95,15 @@ def diagnostic_text(diagnostic: Diagnostic, style: Style) -> str:
             f"{pad} {bar} {' ' * at}{marks}{label}",
         ]
     for note in diagnostic.notes:
-        where = f"{location(note.span)}: " if note.span is not None else ""
-        lines += _remark("note", where + note.message, pad, style)
+        place = f"{location(note.span)}: " if note.span is not None else ""
+        lines += _remark("note", place + note.message, pad, style)
     if diagnostic.help:
         lines += _remark("help", diagnostic.help, pad, style)
     return "\n".join(lines)
 
 
 def location(span: Span) -> str:
-    """Where a span begins: `content/lessons/4.2-x.md:210:26`."""
+    """The place where a span begins: `content/lessons/4.2-x.md:210:26`."""
     return f"{span.path}:{span.line}:{span.column}"
 
 
@@ -115,7 +115,7 @@ def _remark(kind: str, message: str, pad: str, style: Style) -> list[str]:
 
 
 def _frame(span: Span, room: int) -> tuple[str, int, int]:
-    """The line to show, the cell at which the marks begin, and how many there are."""
+    """Return the line to show, the cell at which the marks begin, and how many there are."""
     line = span.source.line_text(span.line)
     start = span.column - 1
     end = len(line) if span.end_line > span.line else span.end_column - 1
@@ -129,12 +129,12 @@ def _frame(span: Span, room: int) -> tuple[str, int, int]:
 
 
 def _window(line: str, start: int, end: int, room: int) -> tuple[int, int]:
-    """The part of the line to show: all of it where it fits, else a stretch around the marks."""
-    # Any number of characters may have no width.
+    """Return the part of the line to show: all of it if it fits, else a part around the marks."""
+    # Characters may have no width: a long line may fit.
     if len(line) <= 2 * room and cells(line) <= room:
         return 0, len(line)
-    around = line[max(0, start - room) : start + room]
-    room //= 2 if cells(around) > len(around) else 1
+    nearby = line[max(0, start - room) : start + room]
+    room //= 2 if cells(nearby) > len(nearby) else 1
     first = max(0, min(start - room // 4, len(line) - room))
     if end <= room - room // 4:
         first = 0
@@ -143,7 +143,7 @@ def _window(line: str, start: int, end: int, room: int) -> tuple[int, int]:
 
 # --- sensitivity
 
-_WHY = {
+_REASONS = {
     Standing.NO_MUJOCO: "it does not use MuJoCo",
     Standing.NOT_MOVED: "no simulation of it has an initial state to move",
     Standing.UNRECORDED: "nothing that it prints is recorded and compared",
@@ -152,60 +152,62 @@ _WHY = {
 }
 
 
-def sensitivity_text(found: Sequence[Sensitivity], style: Style) -> str:
-    """A line for each script, and one for each number of which not all digits do both."""
+def sensitivity_text(sensitivities: Sequence[Sensitivity], style: Style) -> str:
+    """A line for each script, and one for each number with digits that fail a test."""
     lines = [
         f"digits that repeat when initial states are moved by {PERTURBATION:.0e} (relative), and",
         "digits that are converged: half the timestep does not change them",
     ]
-    for one in found:
-        lines += _sensitivity(one, style)
+    for sensitivity in sensitivities:
+        lines += _sensitivity_lines(sensitivity, style)
     return "".join(line + "\n" for line in lines)
 
 
-def _sensitivity(one: Sensitivity, style: Style) -> list[str]:
-    if one.standing is not Standing.MEASURED:
-        return [f"{style.paint('not asked', FAINT)} {one.path}  {_WHY[one.standing]}"]
-    repeat = one.numbers - sum(doubt.repeat < doubt.digits for doubt in one.doubts)
-    converged = one.numbers - sum(doubt.converged != doubt.digits for doubt in one.doubts)
-    verdict = "chaotic" if one.chaotic else "some" if one.doubts or one.flips else "all"
+def _sensitivity_lines(s: Sensitivity, style: Style) -> list[str]:
+    if s.standing is not Standing.MEASURED:
+        return [f"{style.paint('not asked', FAINT)} {s.path}  {_REASONS[s.standing]}"]
+    repeat = s.numbers - sum(doubt.repeat < doubt.digits for doubt in s.doubts)
+    converged = s.numbers - sum(doubt.converged != doubt.digits for doubt in s.doubts)
+    verdict = "chaotic" if s.chaotic else "some" if s.doubts or s.flips else "all"
     colour = GREEN if verdict == "all" else YELLOW
-    parts = [f"of {plural(one.numbers, 'number')} {repeat} repeat in full"]
-    parts.append(one.unhalved or f"{converged} are converged in full")
-    if one.amplification is not None:
-        parts.append(f"states end {_times(one.amplification)} times as far apart as they began")
-    head = f"{style.paint(f'{verdict:<9}', colour)} {one.path}  {', '.join(parts)}"
-    rows: list[Doubt | Flip] = [*one.doubts, *one.flips]
+    parts = [f"of {plural(s.numbers, 'number')} {repeat} repeat in full"]
+    parts.append(s.unhalved or f"{converged} are converged in full")
+    if s.amplification is not None:
+        parts.append(
+            f"states end {_format_factor(s.amplification)} times as far apart as they began"
+        )
+    head = f"{style.paint(f'{verdict:<9}', colour)} {s.path}  {', '.join(parts)}"
+    rows: list[Doubt | Flip] = [*s.doubts, *s.flips]
     rows.sort(key=lambda row: (row.span.path, row.span.start))
-    return [head, *(f"  {_doubt(row)}" for row in rows)]
+    return [head, *(f"  {_row_text(row)}" for row in rows)]
 
 
-def _times(size: float) -> str:
+def _format_factor(size: float) -> str:
     if not math.isfinite(size):
         return "without bounds, many"
     return f"{size:.0e}" if size >= 1e3 else f"{size:.2g}"
 
 
-def _doubt(row: Doubt | Flip) -> str:
+def _row_text(row: Doubt | Flip) -> str:
     match row:
         case Doubt():
-            what = f"{row.printed}  of {plural(row.digits, 'digit')} {row.repeat} repeat"
-            seen = [] if row.repeat == row.digits else [f"{row.least} to {row.most}"]
+            text = f"{row.printed}  of {plural(row.digits, 'digit')} {row.repeat} repeat"
+            measured_values = [] if row.repeat == row.digits else [f"{row.least} to {row.most}"]
             if row.converged is not None:
-                what += f", {row.converged} are converged"
-                seen.append(f"half the timestep: {row.halved}")
-            what += f", print {row.instead}" if row.instead else ""
-            what += f"  ({'; '.join(seen)})"
-            allowed = row.repeat < row.digits and not row.compared
+                text += f", {row.converged} are converged"
+                measured_values.append(f"half the timestep: {row.halved}")
+            text += f", print {row.instead}" if row.instead else ""
+            text += f"  ({'; '.join(measured_values)})"
+            is_allowed = row.repeat < row.digits and not row.compared
         case Flip():
-            what, allowed = _flip(row), not row.compared
+            text, is_allowed = _flip_text(row), not row.compared
         case _:
             assert_never(row)
-    return f"{location(row.span)}  {what}" + ("  (allowed for)" if allowed else "")
+    return f"{location(row.span)}  {text}" + ("  (allowed for)" if is_allowed else "")
 
 
-def _flip(row: Flip) -> str:
-    printed, other = (" ".join(text.split()) for text in (row.printed, row.other))
-    if not other:
+def _flip_text(row: Flip) -> str:
+    printed, second = (" ".join(text.split()) for text in (row.printed, row.other))
+    if not second:
         return f"`{printed}` is not always printed"
-    return f"`{other}` is printed {f'in place of `{printed}`' if printed else 'here as well'}"
+    return f"`{second}` is printed {f'in place of `{printed}`' if printed else 'here as well'}"

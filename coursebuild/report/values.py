@@ -1,4 +1,4 @@
-"""What a report holds, and values as JSON has them.
+"""What a report holds, and values as JSON.
 
 Entry points: `Report`; `summary_line(report)`, its last line as text; `plain`, `json_text`.
 """
@@ -33,7 +33,7 @@ class ScriptLine(Struct, frozen=True):
     seconds: float
     cached: bool
     missing: tuple[str, ...] = ()
-    """For a skipped one: the modules that are not there."""
+    """The modules that a skipped script lacks."""
 
 
 class Summary(Struct, frozen=True):
@@ -42,40 +42,39 @@ class Summary(Struct, frozen=True):
     lessons: int
     scripts: int
     ran: int
-    """Scripts with a result, of now or of before."""
+    """Scripts with a result, new or remembered."""
     skipped: int
     errors: int
     warnings: int
     silenced: int
     seconds: float
     cached: int = 0
-    """Of `ran`: those whose result is remembered, so that they were not run again."""
+    """Those of `ran` whose result is remembered, so that they were not run again."""
 
 
 class Report(Struct, frozen=True):
-    """Everything that one command found."""
+    """Everything that a command reports."""
 
     diagnostics: tuple[Diagnostic, ...]
     scripts: tuple[ScriptLine, ...]
     summary: Summary
     remarks: tuple[str, ...] = ()
-    """What was done, a line each, such as the files written."""
+    """What was done, such as the files written; a line for each."""
     labs: tuple[TrialLine, ...] = ()
     depends: tuple[str, ...] | None = None
-    """Files that all of this depends on beside those in the course's own folders, absolute or
-    relative to its root; `None` where they are not known."""
-
+    """Files outside the course's own folders that the report depends on, absolute or relative to
+    its root; `None` where they are not known."""
     sensitivity: tuple[Sensitivity, ...] | None = None
-    """Which printed digits hold; `None` where nobody asked."""
+    """Which printed digits hold; `None` where that was not measured."""
 
     @property
     def ok(self) -> bool:
-        """Whether nothing is wrong (warnings do not count)."""
+        """Whether there are no errors."""
         return all(not d.is_error for d in self.diagnostics)
 
 
 def unchanged_report(report: Report, remark: str) -> Report:
-    """The same report, for a later run that found nothing changed and ran nothing."""
+    """Return the same report for a later run that found nothing changed."""
     return replace(
         report,
         scripts=tuple(replace(line, cached=True) for line in report.scripts),
@@ -86,12 +85,12 @@ def unchanged_report(report: Report, remark: str) -> Report:
 
 
 def plural(count: int, noun: str) -> str:
-    """`1 error`, `2 errors`."""
+    """A count with its noun: `1 error`, `2 errors`."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def summary_line(report: Report) -> str:
-    """One line: what was checked and what was found."""
+    """One line that says what was checked and what was found."""
     s = report.summary
     parts = [plural(s.lessons, "lesson"), f"{plural(s.ran - s.cached, 'script')} run"]
     if s.cached:
@@ -100,9 +99,9 @@ def summary_line(report: Report) -> str:
         parts.append(f"{plural(len(report.labs), 'lab')} tried")
     if s.skipped:
         parts.append(f"{s.skipped} skipped")
-    found = [plural(s.errors, "error")] if s.errors else []
-    found += [plural(s.warnings, "warning")] if s.warnings else []
-    verdict = ", ".join(found) if found else "everything holds"
+    counts = [plural(s.errors, "error")] if s.errors else []
+    counts += [plural(s.warnings, "warning")] if s.warnings else []
+    verdict = ", ".join(counts) if counts else "everything holds"
     silenced = f" ({s.silenced} silenced)" if s.silenced else ""
     return f"{', '.join(parts)}: {verdict}{silenced}"
 
@@ -111,15 +110,15 @@ def summary_line(report: Report) -> str:
 
 
 def json_text(value: object) -> str:
-    """A value as JSON, ending in a newline."""
+    """Return a value as JSON, ending in a newline."""
     return json.dumps(plain(value), ensure_ascii=False, indent=2, allow_nan=False) + "\n"
 
 
 def plain(value: object, **names: str) -> Any:
-    """A value as dictionaries, lists, texts and numbers; what is no finite number is `None`.
+    """Convert a value to dictionaries, lists, texts and numbers; infinities and NaN to `None`.
 
-    A struct is an object of its fields, under other names where `names` has some. Its `span` are
-    the path, the line and the columns, as fields of the object itself.
+    A struct becomes an object of its fields, some under other `names`. In the place of its `span`
+    stand the path, the lines and the columns.
     """
     match value:
         case Diagnostic():
@@ -141,9 +140,9 @@ def plain(value: object, **names: str) -> Any:
                 )
             return fields
         case Mapping():
-            return {key: plain(one) for key, one in value.items()}
+            return {key: plain(item) for key, item in value.items()}
         case list() | tuple():
-            return [plain(one) for one in value]
+            return [plain(item) for item in value]
         case Enum():
             return value.value
         case float() if not math.isfinite(value):
@@ -153,7 +152,7 @@ def plain(value: object, **names: str) -> Any:
 
 
 def place_fields(span: Span | None) -> dict[str, Any]:
-    """Where something stands; all `None` where that is not known."""
+    """The path, the lines and the columns of a span; all `None` where it is not known."""
     if span is None:
         return dict.fromkeys(("path", "line", "column", "end_line", "end_column"))
     return {

@@ -40,17 +40,17 @@ def course(tmp_path: Path, stores: Path) -> Folder:
 
 
 def run(course: Folder, *arguments: str) -> tuple[int, str]:
-    """The exit status of pytest, and what it prints."""
+    """Run pytest; return its exit status and what it prints."""
     plugins = ("-p", NAME, "-p", "no:cacheprovider")
-    done = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-m", "pytest", *plugins, *arguments],
         cwd=course.root,
         env=course.environment({"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONWARNINGS": ""}),
         capture_output=True,
         text=True,
     )
-    assert done.stderr == ""
-    return done.returncode, done.stdout
+    assert result.stderr == ""
+    return result.returncode, result.stdout
 
 
 def outcomes(printed: str) -> dict[str, str]:
@@ -76,10 +76,12 @@ def test_a_test_fails_with_the_mistakes_in_its_text(course: Folder) -> None:
     course.write("content/lessons/9.9-stray.md", "## Stray\n")
     status, printed = run(course, "--coursebuild", "-v", "content")
     assert status == 1
-    found = {name.rpartition("::")[2]: said for name, said in outcomes(printed).items()}
-    own = [name for name, said in found.items() if said == "FAILED"]
-    assert own == ["map", "page", "examples/one.py", "examples/broken.py", "1.2-quiz"]
-    assert found["examples/absent.py"] == "SKIPPED"
+    outcome_by_test = {
+        name.rpartition("::")[2]: outcome for name, outcome in outcomes(printed).items()
+    }
+    failed_tests = [name for name, outcome in outcome_by_test.items() if outcome == "FAILED"]
+    assert failed_tests == ["map", "page", "examples/one.py", "examples/broken.py", "1.2-quiz"]
+    assert outcome_by_test["examples/absent.py"] == "SKIPPED"
     sections = dict(
         re.findall(r"^_+ (?:\S+): (\S+) _+\n((?:(?![=_]{9}).*\n)*)", printed, re.MULTILINE)
     )
@@ -121,9 +123,9 @@ def test_nothing_is_collected_unless_it_is_asked_for(course: Folder, tmp_path: P
 def test_pytest_finds_the_plugin_and_the_documentation_shows_what_it_prints() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert project["entry-points"]["pytest11"] == {"coursebuild": NAME}
-    shown = [
+    lines = [
         fence.text
         for fence in fences(DOCS / "how-to/continuous-integration.md")
         if fence.kind == "text"
     ]
-    assert outcomes(shown[-1])["content/lessons/1.1-pendulum.md::1.1-lab-1"] == "PASSED"
+    assert outcomes(lines[-1])["content/lessons/1.1-pendulum.md::1.1-lab-1"] == "PASSED"

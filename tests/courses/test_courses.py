@@ -1,4 +1,4 @@
-"""Course folders and the trees that they must become.
+"""Builds of course folders, compared with the expected files.
 
 A case is a folder `tests/courses/<case>/` with `course/` (a course as an author has it) and
 `expected/`: `files.txt`, the list of everything that a build makes, and the texts worth reading in
@@ -23,7 +23,7 @@ from support.built_sites import BuiltCourses
 HERE = Path(__file__).parent
 CASES = sorted(path.parent.name for path in HERE.glob("*/expected"))
 READ = (".html", ".py", ".xml", ".txt")
-"""What is compared by its text, but for the assets; of a page that is the part in `<main>`."""
+"""Files that are compared by their text, except assets; of pages, only the part in `<main>`."""
 
 
 def test_there_are_cases() -> None:
@@ -36,16 +36,16 @@ def test_course_becomes_what_is_expected(
     case: str, built_courses: BuiltCourses, request: pytest.FixtureRequest
 ) -> None:
     root = built_courses[case].root
-    made = outputs(root)
+    actual = outputs(root)
     assert authored(root) == authored(HERE / case / "course")
     expected = HERE / case / "expected"
     if request.config.getoption("--rewrite-fixtures"):
-        rewrite(expected, made)
-    assert made == read_expected(expected)
+        rewrite(expected, actual)
+    assert actual == read_expected(expected)
 
 
 def authored(root: Path) -> dict[str, bytes]:
-    """Everything of the author's, which a build must leave alone."""
+    """Everything of the author's, which a build must not change."""
     return {
         path.relative_to(root).as_posix(): path.read_bytes()
         for top in ("content", "models")
@@ -55,28 +55,28 @@ def authored(root: Path) -> dict[str, bytes]:
 
 
 def outputs(root: Path) -> dict[str, str]:
-    """What is compared: `files.txt` and the texts, by path."""
+    """The files to compare, by path: `files.txt` and the texts."""
     texts: dict[str, str] = {}
     names: list[str] = []
     for path in sorted(_files(root), key=lambda path: path.relative_to(root).as_posix()):
         name = path.relative_to(root).as_posix()
         if name.startswith((".coursebuild/", "content/", "models/")):
             continue
-        names.append(copied(steady(name)))
+        names.append(mark_copy(replace_varying(name)))
         if name.endswith(".zip"):
             members = zipfile.ZipFile(path).namelist()
             names += {
-                f"{steady(name)}: {re.sub('/mjcourse/.*', '/mjcourse/…', m)}" for m in members
+                f"{replace_varying(name)}: {re.sub('/mjcourse/.*', '/mjcourse/…', m)}" for m in members
             }
         elif name.startswith("public/examples/") or re.fullmatch("public/models/.*xml", name):
             assert path.read_bytes() == (root / name.removeprefix("public/")).read_bytes()
         elif name.endswith(READ) and not name.startswith("public/assets/"):
-            texts[name] = main_part(name, steady(path.read_text("utf-8")))
+            texts[name] = main_part(name, replace_varying(path.read_text("utf-8")))
     return {"files.txt": "".join(f"{name}\n" for name in sorted(names)), **texts}
 
 
-def copied(name: str) -> str:
-    """Compressed copies stand beside the file itself: `index.html`, `index.html + br`."""
+def mark_copy(name: str) -> str:
+    """Put compressed copies on the line of the file itself: `index.html + br`."""
     stem, dot, kind = name.rpartition(".")
     return f"{stem} + {kind}" if dot and kind in ("br", "gz") else name
 
@@ -86,8 +86,8 @@ def _files(root: Path) -> Iterator[Path]:
         yield from (Path(folder, name) for name in names)
 
 
-def steady(text: str) -> str:
-    """Without what changes with a style sheet, the Python version or the machine."""
+def replace_varying(text: str) -> str:
+    """Remove what changes with a style sheet, the Python version or the machine."""
     text = re.sub(r"(assets/[\w./-]+?)\.[0-9a-f]{8}\.", r"\1.HASH.", text)
     text = re.sub(r"; [^;]*native MuJoCo[^<]*", "; PARITY", text)  # differs by processor
     return text.replace(f"Python {platform.python_version()}", "Python PYTHON")
@@ -97,9 +97,9 @@ def main_part(name: str, text: str) -> str:
     """The content of a page, without the head and the frame that all pages share."""
     if not name.endswith(".html"):
         return text
-    found = re.findall(r"<main\b.*</main>", text, re.DOTALL)
-    assert len(found) == 1, f"{name} has {len(found)} main elements"
-    return f"{found[0]}\n"
+    mains = re.findall(r"<main\b.*</main>", text, re.DOTALL)
+    assert len(mains) == 1, f"{name} has {len(mains)} main elements"
+    return f"{mains[0]}\n"
 
 
 def read_expected(expected: Path) -> dict[str, str]:
@@ -110,9 +110,9 @@ def read_expected(expected: Path) -> dict[str, str]:
     }
 
 
-def rewrite(expected: Path, made: dict[str, str]) -> None:
+def rewrite(expected: Path, files: dict[str, str]) -> None:
     shutil.rmtree(expected, ignore_errors=True)
-    for name, text in made.items():
+    for name, text in files.items():
         path = expected / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(text.encode())

@@ -1,8 +1,8 @@
-"""What the pages in docs/ say is tried: examples are built, tables are held to the code.
+"""The pages in docs/ are tested: examples are built, tables are compared with the code.
 
-An example is a fence whose info string says what it is:
+An example is a fence with one of these words in its info string:
 
-- `file=PATH`: a file of the small course that all other examples live in.
+- `file=PATH`: a file of the small course to which all other examples belong.
 - `map`: another map for that course, which must then be clean.
 - `lesson`: a lesson 1.2 for that course. It must be clean, or with `error=RULE` have mistakes of
   this one rule.
@@ -28,14 +28,14 @@ from support.scratch_course import Folder
 
 pytestmark = pytest.mark.engine
 
-GUIDE = [path for path in PAGES if path.stem != "tutorial"]  # which has a course of its own
+GUIDE = [path for path in PAGES if path.stem != "tutorial"]  # this page has a course of its own
 FENCES = [fence for path in GUIDE for fence in fences(path)]
 SPANS = [span for path in PAGES for span in code_spans(path)]
 CODE = [*SPANS, *(fence.text for fence in FENCES)]
 LESSONS = [fence for fence in FENCES if fence.is_("lesson")]
 MAPS = [fence for fence in FENCES if fence.is_("map")]
 MESSAGES = [(a, b) for a, b in pairwise(FENCES) if b.is_("prints")]
-"""Each message on a page, after the example that it stands below."""
+"""Each message on a page, with the example above it."""
 SECOND = "content/lessons/1.2-large-swings.md"
 
 SWING = '''
@@ -50,9 +50,9 @@ def period(length: float) -> float:
 
 @pytest.fixture(scope="session")
 def checked_course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
-    """The course that the reference begins with, and the files that examples show.
+    """The course at the beginning of the reference, with the files that examples show.
 
-    It has been checked, so that in copies of it only what a test changes is run.
+    It was checked, so that in its copies only what a test has changed runs.
     """
     root = tmp_path_factory.mktemp("guide")
     write_files(root, FENCES)
@@ -74,11 +74,11 @@ def course(checked_course: Path, tmp_path: Path) -> Path:
 
 
 def with_second_lesson(course: Path, text: str) -> None:
-    """Puts a lesson into the place of the planned one."""
+    """Write a lesson in the place of the planned one."""
     map_file = course / "content/course.toml"
-    planned, written = 'status = "planned"', 'status = "complete"'
+    planned, complete = 'status = "planned"', 'status = "complete"'
     assert map_file.read_text().count(planned) == 1
-    map_file.write_text(map_file.read_text().replace(planned, written))
+    map_file.write_text(map_file.read_text().replace(planned, complete))
     (course / SECOND).write_text(text, encoding="utf-8")
 
 
@@ -109,10 +109,10 @@ def test_mistake(
 ) -> None:
     with_second_lesson(course, lesson.text)
     assert main(["-C", str(course), "check", "--quiet"]) == 1
-    told = capsys.readouterr().out
-    wanted = message.text.rstrip().splitlines()
-    assert told.splitlines()[: len(wanted)] == wanted
-    assert re.findall(r"^(?:error|warning)\[(.*)\]: ", told, re.MULTILINE) == [
+    output = capsys.readouterr().out
+    expected = message.text.rstrip().splitlines()
+    assert output.splitlines()[: len(expected)] == expected
+    assert re.findall(r"^(?:error|warning)\[(.*)\]: ", output, re.MULTILINE) == [
         lesson.value("error")
     ]
 
@@ -122,7 +122,7 @@ def test_every_mistake_on_the_page_has_its_message() -> None:
 
 
 def test_every_right_example_builds(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Together, as lessons 1.2, 1.3 and so on of one course: not even a warning is given."""
+    """Together, as lessons 1.2, 1.3 and so on of one course, without even a warning."""
     right = [fence for fence in LESSONS if not fence.value("error")]
     entries = []
     for number, fence in enumerate(right, start=2):
@@ -155,17 +155,17 @@ def test_what_is_said_about_drifts(course: Path, capsys: pytest.CaptureFixture[s
     assert (course / SECOND).read_text(encoding="utf-8") == mended
 
 
-# ------------------------------------------------------------------------ nothing is left out
+# ------------------------------------------------------------------------------- completeness
 
 
-def quoted(name: str) -> bool:
-    """Whether a page names something in code: in a fence, or in a span."""
+def is_quoted(name: str) -> bool:
+    """Whether a page has a name in code: in a fence, or in a span."""
     word = re.compile(rf"(?<![\w-]){re.escape(name)}(?![\w-])")
     return any(word.search(code) for code in CODE)
 
 
 def test_every_callout_kind_is_named() -> None:
-    assert [kind.name for kind in CALLOUTS if not quoted(kind.name)] == []
+    assert [kind.name for kind in CALLOUTS if not is_quoted(kind.name)] == []
 
 
 PAGE_OF_KIND = {
@@ -177,22 +177,24 @@ PAGE_OF_KIND = {
 def test_every_key_of_a_fence_is_on_its_page(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The tool itself lists the keys of a kind, when it is given one that is far from all."""
+    """The tool itself lists the keys of a kind if it gets an unknown key that is like none."""
     bodies = {"io": "INPUT: a\nPROCESS: b\nOUTPUT: c", "quiz": "{}", "lab": "{}"}
     parts = (f"```{kind} zzzzzzzz=1\n{bodies.get(kind, '')}\n```\n" for kind in PAGE_OF_KIND)
     with_second_lesson(course, "## A\n\n" + "\n".join(parts))
-    found = check(course, capsys)["diagnostics"]
-    wrong = [d for d in found if d["rule"] == "fence-key-unknown"]
+    diagnostics = check(course, capsys)["diagnostics"]
+    mistakes = [d for d in diagnostics if d["rule"] == "fence-key-unknown"]
     keys: dict[str, set[str]] = {page: set() for page in PAGE_OF_KIND.values()}
-    for page, one in zip(PAGE_OF_KIND.values(), wrong, strict=True):
-        named = set(re.findall(r"`([^`]+)`", one["help"] or ""))
-        assert named or "takes no keys" in one["message"]
-        keys[page] |= named
-    for page, named in keys.items():
+    for page, mistake in zip(PAGE_OF_KIND.values(), mistakes, strict=True):
+        named_keys = set(re.findall(r"`([^`]+)`", mistake["help"] or ""))
+        assert named_keys or "takes no keys" in mistake["message"]
+        keys[page] |= named_keys
+    for page, named_keys in keys.items():
         (path,) = (path for path in GUIDE if path.stem == page and "reference" in path.parts)
         spans = " ".join([*code_spans(path), *(fence.text for fence in fences(path))])
-        assert {key for key in named if not re.search(rf"(?<![\w-]){key}(?![\w-])", spans)} == set()
-        assert keys_in_tables(path) <= named
+        assert {
+            key for key in named_keys if not re.search(rf"(?<![\w-]){key}(?![\w-])", spans)
+        } == set()
+        assert keys_in_tables(path) <= named_keys
 
 
 def keys_in_tables(path: Path) -> set[str]:

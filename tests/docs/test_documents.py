@@ -1,4 +1,4 @@
-"""The README and the pages in docs/: commands exist, the README's course builds, links lead."""
+"""The README and the pages in docs/: commands exist, the README's course builds, links work."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PICTURE_LIMIT = 300_000  # bytes
 
 @pytest.fixture
 def course(tmp_path: Path, stores: Path) -> Folder:
-    """The course of one's own that the README shows."""
+    """The small course that the README shows."""
     folder = Folder(tmp_path / "course")
     write_files(folder.root, FENCES)
     folder.borrow(stores)
@@ -49,8 +49,8 @@ def test_the_course_of_the_readme_is_two_files(course: Folder) -> None:
 @pytest.mark.site
 def test_the_course_of_the_readme_builds_by_its_commands(course: Folder) -> None:
     for command in ("update", "check", "build"):
-        done = course.main(command)
-        assert done.status == 0, done.out + done.err
+        result = course.main(command)
+        assert result.status == 0, result.out + result.err
     assert "every recorded output is up to date" in course.main("update").out
     page = course.text("public/lessons/1.1-free-fall.html")
     assert "after 1.000 s the ball has fallen 4.9148 m" in page
@@ -58,22 +58,22 @@ def test_the_course_of_the_readme_builds_by_its_commands(course: Folder) -> None
 
 @pytest.mark.site
 def test_the_mistake_of_the_readme(course: Folder) -> None:
-    """`drift=` says which digits somebody put in the place of the printed ones."""
+    """`drift=` names the digits that replace the printed ones in the example."""
     (message,) = (fence for fence in FENCES if fence.value("drift"))
     lesson = course.text(LESSON)
     course.replace(LESSON, "4.9148", message.value("drift") or "")
-    done = course.main("check")
-    assert done.status == 1
-    wanted = message.text.rstrip().splitlines()
-    assert done.out.splitlines()[: len(wanted)] == wanted
-    assert "error[binding-mismatch]" not in done.out  # the number printed is the one in the text
+    result = course.main("check")
+    assert result.status == 1
+    expected = message.text.rstrip().splitlines()
+    assert result.out.splitlines()[: len(expected)] == expected
+    assert "error[binding-mismatch]" not in result.out  # the number printed is the one in the text
 
     course.write(LESSON, lesson)
-    course.replace(LESSON, "`4.915`", "`4.815`")  # the last sentence is checked as well
-    done = course.main("check")
-    assert done.status == 1
-    assert "error[binding-mismatch]" in done.out
-    assert "the nearest printed value is 4.9148" in done.out
+    course.replace(LESSON, "`4.915`", "`4.815`")  # the last sentence is checked, too
+    result = course.main("check")
+    assert result.status == 1
+    assert "error[binding-mismatch]" in result.out
+    assert "the nearest printed value is 4.9148" in result.out
 
 
 def shell_lines(path: Path) -> list[str]:
@@ -84,48 +84,54 @@ def shell_lines(path: Path) -> list[str]:
 
 def test_every_make_target_exists() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    said = [line.split()[1] for line in shell_lines(README) if re.match(r"make \w", line)]
-    assert {"site", "test", "serve", "help"} <= set(said)
-    assert [t for t in said if not re.search(rf"^{re.escape(t)}:", makefile, re.MULTILINE)] == []
+    targets = [line.split()[1] for line in shell_lines(README) if re.match(r"make \w", line)]
+    assert {"site", "test", "serve", "help"} <= set(targets)
+    assert [t for t in targets if not re.search(rf"^{re.escape(t)}:", makefile, re.MULTILINE)] == []
 
 
 def test_every_command_exists() -> None:
-    said = set()
+    commands = set()
     for line in (line for path in [README, *PAGES] for line in shell_lines(path)):
         called = re.match(r"coursebuild (?:-C \S+ )?([a-z]+)", line)
         if called is not None:
-            said.add((called[1], *re.findall(r"--[a-z-]+", line)))
-    assert {command for command, *_ in said} >= {"build", "check", "update", "extract", "schema"}
-    for command, *options in sorted(said):
-        done = Folder(ROOT).main(command, "--help")
-        assert done.status == 0
-        assert [option for option in options if option not in done.out] == []
+            commands.add((called[1], *re.findall(r"--[a-z-]+", line)))
+    assert {command for command, *_ in commands} >= {
+        "build",
+        "check",
+        "update",
+        "extract",
+        "schema",
+    }
+    for command, *options in sorted(commands):
+        result = Folder(ROOT).main(command, "--help")
+        assert result.status == 0
+        assert [option for option in options if option not in result.out] == []
 
 
 # -------------------------------------------------------------------------------------- links
 
 
 def test_links_lead_where_the_repository_is_read() -> None:
-    others = [*ROOT.glob("plugins/*/README.md"), ROOT / "benchmarks/README.md"]
+    other_files = [*ROOT.glob("plugins/*/README.md"), ROOT / "benchmarks/README.md"]
     lost = []
-    for path in [README, *DOCS.rglob("*.md"), *others]:
+    for path in [README, *DOCS.rglob("*.md"), *other_files]:
         for url in links(path):
             name, _, anchor = unquote(url).partition("#")
             target = path.parent / name if name else path
             if not re.match(r"https?://", url):
-                there = target.is_file() and (not anchor or anchor in anchors(target))
-                lost += [] if there else [(path.relative_to(ROOT).as_posix(), url)]
+                exists = target.is_file() and (not anchor or anchor in anchors(target))
+                lost += [] if exists else [(path.relative_to(ROOT).as_posix(), url)]
     assert lost == []
 
 
 def test_every_document_is_a_page_without_mistakes() -> None:
-    """As pages, their links, anchors and all else are checked by the tool itself."""
-    loaded = load(ROOT)
-    assert loaded.value is not None
-    pages = {page.path for page in loaded.value.pages}
+    """They are pages of the course: the tool checks their links, anchors and everything else."""
+    parsed_course = load(ROOT)
+    assert parsed_course.value is not None
+    pages = {page.path for page in parsed_course.value.pages}
     documents = {path.relative_to(ROOT).as_posix() for path in DOCS.rglob("*.md")}
     assert documents - pages == set()
-    assert [d for d in loaded.diagnostics if d.span.path in documents] == []
+    assert [d for d in parsed_course.diagnostics if d.span.path in documents] == []
 
 
 def test_the_picture_is_there_and_small() -> None:
@@ -140,10 +146,10 @@ def test_the_picture_is_there_and_small() -> None:
 def test_the_picture_can_be_taken_again(built_courses: BuiltCourses, tmp_path: Path) -> None:
     site = built_courses["real"].root / "public"
     script = [sys.executable, DOCS / "screenshots.py", "--site", site, "--images", tmp_path]
-    done = subprocess.run(script, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    taken = {path.name for path in tmp_path.glob("*.png")}
-    assert taken == {path.name for path in (DOCS / "images").glob("*.png")}
+    result = subprocess.run(script, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    pictures = {path.name for path in tmp_path.glob("*.png")}
+    assert pictures == {path.name for path in (DOCS / "images").glob("*.png")}
 
 
 # ------------------------------------------------------------------------------- architecture
@@ -164,20 +170,22 @@ def test_the_folders_are_those_of_the_architecture() -> None:
         if (path.suffix == ".py" and not path.name.startswith("__"))
         or (path / "__init__.py").is_file()
     }
-    listed: set[str] = set()
-    for where, _, entry_points in rows(DOCS / "explanation/architecture.md"):
-        names = [name.removeprefix("coursebuild/") for name in re.findall(r"`([^`]+)`", where)]
+    listed_modules: set[str] = set()
+    for folder, _, entry_points in rows(DOCS / "explanation/architecture.md"):
+        names = [name.removeprefix("coursebuild/") for name in re.findall(r"`([^`]+)`", folder)]
         for name in names:
             place = package / name if (package / name).exists() else ROOT / name
             assert place.exists(), name
-        listed.update(names)
-        found = {name for part in names if part in parts for name in defined(package / part)}
-        if found:
-            assert set(re.findall(r"`([^`]+)`", entry_points)) <= found, where
-    assert parts <= listed
+        listed_modules.update(names)
+        definitions = {
+            name for part in names if part in parts for name in defined_names(package / part)
+        }
+        if definitions:
+            assert set(re.findall(r"`([^`]+)`", entry_points)) <= definitions, folder
+    assert parts <= listed_modules
 
 
-def defined(place: Path) -> set[str]:
+def defined_names(place: Path) -> set[str]:
     """The names of top-level functions, classes and constants in a module or a package."""
     top = re.compile(r"^(?:def |class |(?=\w+: ))(\w+)", re.MULTILINE)
     paths = [place] if place.is_file() else place.rglob("*.py")

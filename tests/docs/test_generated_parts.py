@@ -1,6 +1,6 @@
-"""Parts of the pages in docs/ that are made from the code are as the code is, and none is missing.
+"""Parts of the pages in docs/ that are generated from the code are up to date and complete.
 
-`pytest tests/docs/test_generated_parts.py --rewrite-fixtures` writes them anew.
+`pytest tests/docs/test_generated_parts.py --rewrite-fixtures` updates them.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from support.generated_parts import headings, regenerate
 from support.markdown_files import PAGES
 
 LONG = 6
-"""Sections from which on a page begins with its contents."""
+"""With so many sections or more, a page begins with its contents."""
 TOLD_OTHERWISE = {"CourseFile", "ModelFile", "Overlays"}
-"""Structures whose fields are the sections of a page, or the values of a field."""
+"""Structs whose fields are the sections of a page, or the values of a field."""
 TEXTS = {path: path.read_text(encoding="utf-8") for path in PAGES}
 
 
 def generated(kind: str) -> set[str]:
-    """What the generated parts of one kind are of."""
+    """The subjects of the generated parts of a kind."""
     part = re.compile(rf"<!-- generated: {kind}(.*) -->")
-    return {found.strip() for text in TEXTS.values() for found in part.findall(text)}
+    return {part_text.strip() for text in TEXTS.values() for part_text in part.findall(text)}
 
 
 def test_generated_parts_are_in_step(request: pytest.FixtureRequest) -> None:
@@ -38,10 +38,10 @@ def test_generated_parts_are_in_step(request: pytest.FixtureRequest) -> None:
 
 
 def test_every_field_has_its_table() -> None:
-    told = {" ".join(words.split()[:2]) for words in generated("fields")}
+    headings = {" ".join(words.split()[:2]) for words in generated("fields")}
     for schema in ("course", "model", "lab", "quiz"):
         names = set(json.loads(json_schema(schema))["$defs"]) - TOLD_OTHERWISE
-        missing = {name for name in names if not {f"{schema} {name}", f"lab {name}"} & told}
+        missing = {name for name in names if not {f"{schema} {name}", f"lab {name}"} & headings}
         assert missing == set(), schema
 
 
@@ -52,8 +52,8 @@ def test_every_command_has_its_section() -> None:
 def test_long_pages_begin_with_their_contents() -> None:
     long = {path for path, text in TEXTS.items() if len(headings(text, 2)) >= LONG}
     contents = re.compile("<!-- generated: (contents|commands) -->")
-    without = {path for path in long if not contents.search(TEXTS[path])}
-    assert without == set()
+    without_contents = {path for path in long if not contents.search(TEXTS[path])}
+    assert without_contents == set()
 
 
 def test_every_page_begins_with_its_title() -> None:

@@ -1,11 +1,11 @@
-"""The tutorial does what it says: its files are written and its commands run, in its order.
+"""The tutorial works: its files are written and its commands run, in its order.
 
-What a fence is for stands behind its kind:
+The info string of a fence says what to do with it:
 
-- `file=PATH`, `append=PATH`: what the author writes; `shows=PATH`: what then stands in the file.
-- `sh`: commands. `mistake=OLD→NEW in=PATH` is an edit with which they fail and that is undone, and
-  `replace=` one that stays; both change the last place. `sh later` is not run here.
-- `prints`: what the command above it says.
+- `file=PATH`, `append=PATH`: what the author writes; `shows=PATH`: what the file holds then.
+- `sh`: commands. `mistake=OLD→NEW in=PATH` is an edit with which they fail, undone afterwards, and
+  `replace=` an edit that stays; both change the last match. `sh later` is not run here.
+- `prints`: the output of the command above.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ pytestmark = pytest.mark.site
 
 
 def test_the_tutorial_leads_to_a_published_course(tmp_path: Path) -> None:
-    folder, done = Folder(tmp_path), CommandResult(0, "", "")
+    folder, result = Folder(tmp_path), CommandResult(0, "", "")
     for fence in fences(DOCS / "tutorial.md"):
         if fence.is_("prints"):
-            assert fence.text in done.out
+            assert fence.text in result.out
         elif fence.kind == "sh" and not fence.is_("later"):
-            folder, done = walked(folder, fence)
+            folder, result = run_fence(folder, fence)
         elif path := fence.value("file"):
             folder.write(path, fence.text)
         elif path := fence.value("append"):
@@ -43,16 +43,16 @@ def test_the_tutorial_leads_to_a_published_course(tmp_path: Path) -> None:
     assert "1.3-check" in page
 
 
-def walked(folder: Folder, fence: Fence) -> tuple[Folder, CommandResult]:
-    """The folder in which the commands end, and what the last of them did."""
+def run_fence(folder: Folder, fence: Fence) -> tuple[Folder, CommandResult]:
+    """Run the commands of a fence; return the folder after them, and the result of the last."""
     path, mistake, edit = fence.value("in"), fence.value("mistake"), fence.value("replace")
     before = folder.text(path) if path else ""
     if path:
         old, _, new = (mistake or edit or "").partition("→")
-        head, found, tail = before.rpartition(old)
-        assert found
+        head, match, tail = before.rpartition(old)
+        assert match
         folder.write(path, head + new + tail)
-    done = CommandResult(0, "", "")
+    result = CommandResult(0, "", "")
     for line in fence.text.splitlines():
         program, *words = shlex.split(line)
         if program == "cd":
@@ -62,20 +62,20 @@ def walked(folder: Folder, fence: Fence) -> tuple[Folder, CommandResult]:
             look_at(folder)
         else:
             assert program == "coursebuild"
-            done = folder.main(*words)
-            assert done.status == (1 if mistake else 0), done.out + done.err
+            result = folder.main(*words)
+            assert result.status == (1 if mistake else 0), result.out + result.err
     if path and mistake:
         folder.write(path, before)
-    return folder, done
+    return folder, result
 
 
 def look_at(folder: Folder) -> None:
-    """The preview shows the course at the address that it prints."""
+    """Assert that the preview shows the course at the address that it prints."""
     server = folder.start("serve", "--port", "0", stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     try:
         assert server.stdout is not None
         lines = iter(server.stdout.readline, b"")
-        address = next(found[0] for line in lines if (found := re.search(rb"http://\S+/", line)))
+        address = next(match[0] for line in lines if (match := re.search(rb"http://\S+/", line)))
         with urlopen(address.decode()) as page:
             assert b"A first course" in page.read()
     finally:

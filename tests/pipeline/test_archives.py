@@ -1,4 +1,4 @@
-"""What a learner downloads runs elsewhere, with the course's own packages."""
+"""Downloaded archives run elsewhere, with the course's own packages."""
 
 from __future__ import annotations
 
@@ -37,16 +37,20 @@ def test_unpacked_archive_runs_with_the_packages_of_the_course(make: Make, tmp_p
     folder.replace("content/course.toml", "[course]\n", '[course]\npackages = ["src", "lib"]\n')
     for path, text in FILES.items():
         folder.write(path, text)
-    built = folder.run("build")
-    assert built.status == 0, built.out
+    build = folder.run("build")
+    assert build.status == 0, build.out
     for name in ("examples.zip", "lessons/1.1-one.zip"):
         with zipfile.ZipFile(folder.root / "public" / name) as archive:
             archive.extractall(tmp_path / name)
-            assert not [one for one in archive.namelist() if "other" in one]
+            assert not [
+                name_in_archive
+                for name_in_archive in archive.namelist()
+                if "other" in name_in_archive
+            ]
         (top,) = (tmp_path / name).iterdir()
         assert (top / "requirements.txt").read_text() == ""
         command = [sys.executable, "-S", "examples/a.py"]
-        done = subprocess.run(command, cwd=top, capture_output=True, text=True, check=False)
-        assert (done.stdout, done.stderr) == ("True swing.\n", "")
+        result = subprocess.run(command, cwd=top, capture_output=True, text=True, check=False)
+        assert (result.stdout, result.stderr) == ("True swing.\n", "")
     folder.write("src/pkg/word.txt", "turn")
     assert "differs from this run" in folder.run("check").out

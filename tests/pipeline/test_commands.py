@@ -35,36 +35,38 @@ ONE_RAN = "ok       examples/one.py  # s\n\n1 lesson, 1 script run: everything h
 def test_status_and_report_tell_whether_the_course_is_right(make: Make) -> None:
     folder = make(GOOD)
     for command in COMMANDS:
-        done = folder.main(command)
-        assert (done.status, done.out.splitlines()[-1].partition(": ")[2]) == (
+        result = folder.main(command)
+        assert (result.status, result.out.splitlines()[-1].partition(": ")[2]) == (
             0,
             "everything holds",
         )
         assert folder.main(command, "--quiet") == CommandResult(0, "", ""), command
     folder.write(folder.lesson(), GOOD + "> [!nosuch]\n> Text.\n")
     for command in COMMANDS:
-        done = folder.main(command)
-        assert (done.status, done.out.partition(": ")[0]) == (1, "error[callout-unknown]"), command
+        result = folder.main(command)
+        assert (result.status, result.out.partition(": ")[0]) == (1, "error[callout-unknown]"), (
+            command
+        )
     (folder.root / MAP).unlink()
     for command in COMMANDS:
-        done = folder.main("-C", str(folder.root), command)
-        assert (done.status, done.out.partition(": ")[0]) == (1, "error[map-missing]"), command
+        result = folder.main("-C", str(folder.root), command)
+        assert (result.status, result.out.partition(": ")[0]) == (1, "error[map-missing]"), command
 
 
 def test_commands_one_after_the_other_leave_a_process_as_it_was(make: Make) -> None:
-    """The collector is set as before, and no file stays open that only garbage holds."""
+    """The garbage collector is set as before, and no file stays open."""
     course = make(GOOD)
     folder = Path("/proc/self/fd") if Path("/proc/self/fd").exists() else Path("/dev/fd")
     threshold, frozen = gc.get_threshold(), gc.get_freeze_count()
     course.main("check")
     gc.collect()
-    opened = len(list(folder.iterdir()))
+    open_files = len(list(folder.iterdir()))
     for _ in range(3):
         course.main("check", "--format", "json")
     gc.collect()
-    assert len(list(folder.iterdir())) == opened
+    assert len(list(folder.iterdir())) == open_files
     assert gc.get_threshold() == threshold
-    assert gc.get_freeze_count() <= frozen  # what was frozen before may have ended
+    assert gc.get_freeze_count() <= frozen  # frozen objects may have been freed
 
 
 WRONG_USAGE = [
@@ -125,42 +127,42 @@ def test_wrong_usage_gives_2_and_touches_nothing(make: Make) -> None:
     folder.write(MAP, f"{folder.text(MAP)}\n{planned}")
     before = folder.tree("content")
     for arguments, says in WRONG_USAGE:
-        done = folder.main(*arguments.split())
-        assert (done.status, done.out) == (2, ""), arguments
-        assert says in done.err, arguments
-        assert "Traceback" not in done.err
+        result = folder.main(*arguments.split())
+        assert (result.status, result.out) == (2, ""), arguments
+        assert says in result.err, arguments
+        assert "Traceback" not in result.err
     assert folder.tree("content") == before
     assert not (folder.root / "public").exists()
 
 
 def test_outside_of_a_course_gives_2(tmp_path: Path) -> None:
-    done = Folder(tmp_path).main("check")
-    assert (done.status, done.out) == (2, "")
-    assert "there is no content/course.toml in this folder or one above it" in done.err
+    result = Folder(tmp_path).main("check")
+    assert (result.status, result.out) == (2, "")
+    assert "there is no content/course.toml in this folder or one above it" in result.err
     assert not any(tmp_path.iterdir())
 
 
 def test_help_version_and_schemas_are_printed_anywhere(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     for arguments in (["--help"], ["-h"], ["help"]):
-        done = folder.main(*arguments)
-        assert (done.status, done.err) == (0, "")
+        result = folder.main(*arguments)
+        assert (result.status, result.err) == (0, "")
         for line in ("  check        verify, publish nothing\n", "  bench        measure speed"):
-            assert line in done.out
-    in_build = ["-C", "build", "bench", "--help"]  # a folder that is called like a command
+            assert line in result.out
+    in_build = ["-C", "build", "bench", "--help"]  # a folder with the name of a command
     assert folder.main(*in_build) == folder.main("help", "bench")
     for name in known_commands():
-        done = folder.main("help", name)
-        assert (done.status, done.err) == (0, ""), name
-        assert done.out.startswith(f"usage: coursebuild {name} "), name
-        assert "\nexamples:\n  " in done.out, name
+        result = folder.main("help", name)
+        assert (result.status, result.err) == (0, ""), name
+        assert result.out.startswith(f"usage: coursebuild {name} "), name
+        assert "\nexamples:\n  " in result.out, name
     for arguments in (["--version"], ["-V"], ["-C", "no/such", "-V"]):
-        done = folder.main(*arguments)
-        assert (done.status, done.out, done.err) == (0, f"coursebuild {__version__}\n", "")
+        result = folder.main(*arguments)
+        assert (result.status, result.out, result.err) == (0, f"coursebuild {__version__}\n", "")
     for name in ("quiz", "lab", "course"):
-        done = Folder(tmp_path).main("schema", name)
-        assert done.status == 0
-        assert json.loads(done.out).keys() & {"$defs", "properties"}, name
+        result = Folder(tmp_path).main("schema", name)
+        assert result.status == 0
+        assert json.loads(result.out).keys() & {"$defs", "properties"}, name
 
 
 # --- where the course is
@@ -170,9 +172,9 @@ def test_on_windows_one_sentence_says_where_it_runs() -> None:
     code = (
         "import sys; sys.platform = 'win32'; from coursebuild.cli import main; sys.exit(main([]))"
     )
-    done = run_code(code)
-    said = "coursebuild runs on Linux and macOS; on Windows, install it in WSL\n"
-    assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
+    result = run_code(code)
+    message = "coursebuild runs on Linux and macOS; on Windows, install it in WSL\n"
+    assert (result.returncode, result.stdout, result.stderr) == (2, "", message)
 
 
 def test_a_course_is_found_from_anywhere(make: Make, tmp_path: Path) -> None:
@@ -184,28 +186,28 @@ def test_a_course_is_found_from_anywhere(make: Make, tmp_path: Path) -> None:
     link = tmp_path / "link"
     link.symlink_to(folder.root)
     relative = os.path.relpath(folder.root, elsewhere)
-    for where in (folder.root, relative, f"{relative}/", f"{folder.root}/content/..", link):
-        assert folder.main("-C", str(where), "check", cwd=elsewhere).status == 0, where
+    for place in (folder.root, relative, f"{relative}/", f"{folder.root}/content/..", link):
+        assert folder.main("-C", str(place), "check", cwd=elsewhere).status == 0, place
     for words in (["check", "-C", relative], ["check", f"-C{relative}", "-q"]):
         assert folder.main(*words, cwd=elsewhere).status == 0, words
     assert folder.main("check", "--", "-C", cwd=folder.root).status == 2  # a lesson of this name
     assert not any(elsewhere.iterdir())
-    where = str(folder.root)
-    assert folder.main("-C", where, "build", "--out", "../a site/öut", cwd=elsewhere).status == 0
+    place = str(folder.root)
+    assert folder.main("-C", place, "build", "--out", "../a site/öut", cwd=elsewhere).status == 0
     assert (tmp_path / "a site/öut/lessons/1.1-one.html").is_file()
-    inner = Folder(folder.root / "inner")  # the nearest one above counts
+    inner = Folder(folder.root / "inner")  # the nearest course above counts
     inner.write(MAP, folder.text(MAP))
     inner.write(inner.lesson(), "## Inner\n\n" + block("inner.py", "print(1)", "1"))
     assert "examples/inner.py" in folder.main("check", cwd=inner.root / "content").out
     odd = Folder(folder.root.with_name("caf\udce9"))
     folder.root.rename(odd.root)
-    done = odd.main("build")
-    assert (done.status, done.out) == (2, "")
-    assert "the path of the course is not UTF-8: " in done.err
-    assert "caf\\xe9" in done.err
+    result = odd.main("build")
+    assert (result.status, result.out) == (2, "")
+    assert "the path of the course is not UTF-8: " in result.err
+    assert "caf\\xe9" in result.err
 
 
-# --- which lessons
+# --- lessons
 
 
 def test_lessons_and_pages_are_named_by_id_slug_or_file(make: Make, tmp_path: Path) -> None:
@@ -223,22 +225,22 @@ def test_lessons_and_pages_are_named_by_id_slug_or_file(make: Make, tmp_path: Pa
         "content/pages/../lessons/1.1-one.md",
         str(folder.root / folder.lesson()),
     ):
-        done = folder.main("check", name)
-        scripts = [line for line in done.out.splitlines() if "examples/" in line]
-        assert (done.status, len(scripts), "examples/one.py" in scripts[0]) == (0, 1, True), name
+        result = folder.main("check", name)
+        scripts = [line for line in result.out.splitlines() if "examples/" in line]
+        assert (result.status, len(scripts), "examples/one.py" in scripts[0]) == (0, 1, True), name
     for name in ("1.2-two.md", "./1.2-two.md"):
-        done = folder.main("check", name, cwd=folder.root / "content/lessons")
-        assert "examples/two.py" in done.out
-    other = tmp_path / "content/lessons/1.2-two.md"
-    other.parent.mkdir(parents=True)
-    other.write_text(SECOND)
-    assert folder.main("check", str(other)).status == 2
-    done = folder.main("check", "three", "1.1", "1.1")  # in the order of the course, each once
-    assert [line.split()[1] for line in done.out.splitlines()[:2]] == [
+        result = folder.main("check", name, cwd=folder.root / "content/lessons")
+        assert "examples/two.py" in result.out
+    lesson = tmp_path / "content/lessons/1.2-two.md"
+    lesson.parent.mkdir(parents=True)
+    lesson.write_text(SECOND)
+    assert folder.main("check", str(lesson)).status == 2
+    result = folder.main("check", "three", "1.1", "1.1")  # in the order of the course, each once
+    assert [line.split()[1] for line in result.out.splitlines()[:2]] == [
         "examples/one.py",
         "examples/hello.py",
     ]
-    assert "\n2 lessons, " in done.out
+    assert "\n2 lessons, " in result.out
     assert "run `coursebuild update about`" in folder.main("check").out
     assert folder.main("check", "content/pages/about.md").status == 1
     assert folder.main("update", "about").status == 0
@@ -249,13 +251,13 @@ def test_a_mistake_elsewhere_does_not_count_but_one_in_the_map(make: Make) -> No
     folder = make(FIRST, SECOND + "[gone](lesson:7.7)\n")
     assert [folder.main("check", *names).status for names in (["1.1"], ["1.2"], [])] == [0, 1, 1]
     folder.replace(MAP, 'title = "Scratch"', 'title = "Scratch"\nsumary = ""')
-    done = folder.main("check", "1.1")
-    assert done.status == 1
-    assert "error[field-unknown]: unknown field `sumary`" in done.out
+    result = folder.main("check", "1.1")
+    assert result.status == 1
+    assert "error[field-unknown]: unknown field `sumary`" in result.out
 
 
 def test_a_lesson_that_quotes_another_is_checked_with_its_script(make: Make) -> None:
-    bound = "## Two\n\n" + block("two.py", "print(2)") + "It is `41`{out=examples/one.py}.\n"
+    lesson = "## Two\n\n" + block("two.py", "print(2)") + "It is `41`{out=examples/one.py}.\n"
     quiz = """## Three
 
 ```quiz
@@ -263,7 +265,7 @@ def test_a_lesson_that_quotes_another_is_checked_with_its_script(make: Make) -> 
 ```
 """
     sibling = "## Four\n\n" + block("four.py", "from one import f\n\nf(0)")
-    folder = make(FIRST, bound, quiz, sibling)
+    folder = make(FIRST, lesson, quiz, sibling)
     for code, rules in (
         ("print(41)\ndef f(x): return 1 / x", ("", "quiz-output", "script-failed")),
         ("print(42)\nprint(1)\ndef f(x): return 1", ("binding-mismatch", "", "")),
@@ -271,11 +273,11 @@ def test_a_lesson_that_quotes_another_is_checked_with_its_script(make: Make) -> 
     ):
         folder.write(folder.lesson(), "## One\n\n" + block("one.py", code))
         for name, rule in zip(("1.2", "1.3", "1.4"), rules, strict=True):
-            done = folder.main("check", name)
+            result = folder.main("check", name)
             if rule:
-                assert (done.status, f"error[{rule}]" in done.out) == (1, True), (code, name)
+                assert (result.status, f"error[{rule}]" in result.out) == (1, True), (code, name)
             else:
-                assert done.status == 0, (code, name)
+                assert result.status == 0, (code, name)
 
 
 # --- nothing to do
@@ -284,20 +286,20 @@ def test_a_lesson_that_quotes_another_is_checked_with_its_script(make: Make) -> 
 def test_a_course_may_have_no_scripts_and_is_told_that_none_can_run(make: Make) -> None:
     folder = make("## Only text\n")
     for command in (["check"], ["check", "--shard", "1/3"], ["build"]):
-        done = folder.main(*command)
-        assert (done.status, "no-scripts" in done.out) == (0, False), command
-    for info, told in (("norun", False), ("requires=no_such_module", True)):
+        result = folder.main(*command)
+        assert (result.status, "no-scripts" in result.out) == (0, False), command
+    for info, is_warned in (("norun", False), ("requires=no_such_module", True)):
         folder.write(folder.lesson(), "## One\n\n" + block("one.py", "print(1)", info=info))
         for command in (["check", "1.1"], ["build"]):
-            done = folder.main(*command)
-            assert (done.status, "warning[no-scripts]" in done.out) == (0, told), command
+            result = folder.main(*command)
+            assert (result.status, "warning[no-scripts]" in result.out) == (0, is_warned), command
 
 
 def test_a_course_without_a_written_lesson_is_a_mistake(make: Make) -> None:
     folder = make()
     for command in ("build", "check"):
-        done = folder.main(command)
-        assert done.status == 1
-        assert "error[no-lessons]: no lesson of the course is written" in done.out
-        assert "no-scripts" not in done.out
+        result = folder.main(command)
+        assert result.status == 1
+        assert "error[no-lessons]: no lesson of the course is written" in result.out
+        assert "no-scripts" not in result.out
     assert not (folder.root / "public").exists()

@@ -1,4 +1,4 @@
-"""What a shell completes: words of the line, of the course at hand, names of files."""
+"""Completions of a shell: commands, options, names in the course, files."""
 
 from __future__ import annotations
 
@@ -21,31 +21,31 @@ def course(make: Make) -> Folder:
     return folder
 
 
-def completed(folder: Folder, *line: str, cwd: Path | None = None) -> list[str]:
-    done = folder.main("completion", "bash", "--", *line, cwd=cwd)
-    assert (done.status, done.err) == (0, "")
-    return done.out.split("\n")[:-1]
+def complete(folder: Folder, *line: str, cwd: Path | None = None) -> list[str]:
+    result = folder.main("completion", "bash", "--", *line, cwd=cwd)
+    assert (result.status, result.err) == (0, "")
+    return result.out.split("\n")[:-1]
 
 
 def test_words_are_completed_by_where_they_stand(course: Folder, tmp_path: Path) -> None:
-    assert completed(course, "c") == ["check", "completion"]
-    assert {"help", "check", "bench", "-C"} < {*completed(course, "")}
-    assert completed(course, "help", "sta") == ["stability"]
-    assert completed(course, "check", "--fo") == ["--format"]
-    assert completed(course, "check", "--format", "j") == ["json", "junit"]
-    assert completed(course, "check", "--out-of", "") == ["1.1", "1.2"]
-    assert completed(course, "check", "--timings", "") == [], "the shell completes a file"
-    assert completed(course, "update", "1.1", "1") == ["1.1", "1.2"]
-    assert completed(course, "bench", "--quick", "") == ["pendulum"]
-    assert completed(course, "explain", "output-d") == ["output-drift"]
-    assert completed(course, "schema", "") == ["course", "lab", "model", "quiz"]
-    assert "epub" in completed(course, "export", "")
-    assert completed(course, "nosuch", "") == []
+    assert complete(course, "c") == ["check", "completion"]
+    assert {"help", "check", "bench", "-C"} < {*complete(course, "")}
+    assert complete(course, "help", "sta") == ["stability"]
+    assert complete(course, "check", "--fo") == ["--format"]
+    assert complete(course, "check", "--format", "j") == ["json", "junit"]
+    assert complete(course, "check", "--out-of", "") == ["1.1", "1.2"]
+    assert complete(course, "check", "--timings", "") == [], "the shell completes a file"
+    assert complete(course, "update", "1.1", "1") == ["1.1", "1.2"]
+    assert complete(course, "bench", "--quick", "") == ["pendulum"]
+    assert complete(course, "explain", "output-d") == ["output-drift"]
+    assert complete(course, "schema", "") == ["course", "lab", "model", "quiz"]
+    assert "epub" in complete(course, "export", "")
+    assert complete(course, "nosuch", "") == []
     elsewhere = ("-C", str(course.root), "check", "1")
-    assert completed(course, *elsewhere, cwd=tmp_path) == ["1.1", "1.2"]
+    assert complete(course, *elsewhere, cwd=tmp_path) == ["1.1", "1.2"]
     for text in ("", "[", "level = 3", "[[level]]\nlesson = 2", "\x00"):
         course.write("content/course.toml", text)
-        assert completed(course, "check", "") == [], text
+        assert complete(course, "check", "") == [], text
 
 
 def test_shells_take_what_is_printed(course: Folder, tmp_path: Path) -> None:
@@ -60,7 +60,7 @@ def test_shells_take_what_is_printed(course: Folder, tmp_path: Path) -> None:
         'COMP_WORDS=(coursebuild check 1.2); COMP_CWORD=2; _coursebuild; echo "${COMPREPLY[@]}"\n'
         'COMP_WORDS=(coursebuild check --tru 1.2); _coursebuild; echo "${COMPREPLY[@]}"\n'
     )
-    done = subprocess.run(
+    result = subprocess.run(
         [bash, "-c", code],
         cwd=course.root,
         env=course.environment(),
@@ -68,6 +68,6 @@ def test_shells_take_what_is_printed(course: Folder, tmp_path: Path) -> None:
         text=True,
         check=True,
     )
-    assert done.stdout == "complete -o default -F _coursebuild coursebuild\n1.2\n--truth\n"
+    assert result.stdout == "complete -o default -F _coursebuild coursebuild\n1.2\n--truth\n"
     for shell, line in (("zsh", "compdef _coursebuild coursebuild"), ("fish", "complete -c ")):
         assert line in course.main("completion", shell).out

@@ -32,17 +32,17 @@ def course(make: Make) -> Folder:
     return folder
 
 
-def ran(folder: Folder, *arguments: str) -> list[str]:
-    """The scripts that a check ran, without those whose result was remembered."""
-    done = folder.main("check", "--format", "json", *arguments)
-    scripts = json.loads(done.out)["scripts"]
+def run_paths(folder: Folder, *arguments: str) -> list[str]:
+    """The scripts that a check ran, without those with a remembered result."""
+    result = folder.main("check", "--format", "json", *arguments)
+    scripts = json.loads(result.out)["scripts"]
     return [Path(script["path"]).stem for script in scripts if not script["cached"]]
 
 
-def explained(folder: Folder, path: str) -> str:
-    done = folder.main("explain", path)
-    assert (done.status, done.err) == (0, "")
-    return re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC, \d+\.\d\d s", "WHEN", done.out)
+def explain(folder: Folder, path: str) -> str:
+    result = folder.main("explain", path)
+    assert (result.status, result.err) == (0, "")
+    return re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC, \d+\.\d\d s", "WHEN", result.out)
 
 
 def verbose(folder: Folder, *arguments: str) -> str:
@@ -61,37 +61,37 @@ EDITS = [
 
 
 def test_an_edit_runs_again_what_depends_on_it(course: Folder) -> None:
-    assert ran(course) == ["hello", "reads", "helper", "helped"]
-    assert ran(course) == []
-    done = course.main("check", "--shard", "1/1")
-    assert "2 lessons, 0 scripts run, 4 cached: everything holds" in done.out
-    assert done.out.count("  cached\n") == 4
-    assert "running scripts" not in done.err
+    assert run_paths(course) == ["hello", "reads", "helper", "helped"]
+    assert run_paths(course) == []
+    result = course.main("check", "--shard", "1/1")
+    assert "2 lessons, 0 scripts run, 4 cached: everything holds" in result.out
+    assert result.out.count("  cached\n") == 4
+    assert "running scripts" not in result.err
     for path, old, new, again in EDITS:
         course.replace(path, old, new)
-        assert ran(course) == again, new
+        assert run_paths(course) == again, new
         course.replace(path, new, old)
-        assert ran(course) == [], "this was so before"
-    assert ran(course.duplicate(course.root.with_name("elsewhere"))) == []
-    # What scripts import may be found elsewhere from now on.
+        assert run_paths(course) == [], "this was so before"
+    assert run_paths(course.duplicate(course.root.with_name("elsewhere"))) == []
+    # Imports of scripts may be found elsewhere from now on.
     course.write("examples/pathlib.py", "raise ValueError\n")
-    assert ran(course) == ["hello", "reads", "helper", "helped"]
-    assert ran(course) == []
+    assert run_paths(course) == ["hello", "reads", "helper", "helped"]
+    assert run_paths(course) == []
 
 
 def test_a_damaged_entry_and_an_unreachable_cache_are_told_once_and_no_mistake(
     course: Folder,
 ) -> None:
-    done = course.main("check", "--cache", "/not/mounted/cache")
-    assert done.status == 0
-    told = [line for line in done.err.splitlines() if "shared cache" in line]
-    said = "the shared cache /not/mounted/cache cannot be used: no such file or directory"
-    assert told == [said]
+    result = course.main("check", "--cache", "/not/mounted/cache")
+    assert result.status == 0
+    warnings = [line for line in result.err.splitlines() if "shared cache" in line]
+    warning = "the shared cache /not/mounted/cache cannot be used: no such file or directory"
+    assert warnings == [warning]
     (path, *_) = sorted(p for p in (course.root / ".coursebuild/scripts").rglob("*") if p.is_file())
     path.write_bytes(path.read_bytes()[:-1])
-    done = course.main("check", "--shard", "1/1")
-    assert done.status == 0
-    (line,) = [line for line in done.err.splitlines() if "damaged" in line]
+    result = course.main("check", "--shard", "1/1")
+    assert result.status == 0
+    (line,) = [line for line in result.err.splitlines() if "damaged" in line]
     assert re.fullmatch(
         r"the entry scripts/[0-9a-f]{12}… in \.coursebuild is damaged: it is made again", line
     )
@@ -101,16 +101,16 @@ def test_a_damaged_entry_and_an_unreachable_cache_are_told_once_and_no_mistake(
 
 
 def test_update_runs_again_what_is_remembered_and_differs(course: Folder) -> None:
-    """A remembered result is one of two, so that what varies is still found."""
+    """A remembered result counts as one of two runs: outputs that vary are still found."""
     course.main("check")
-    done = course.main("update")
-    assert (done.status, "running scripts" in done.err) == (0, False)
-    assert "every recorded output is up to date" in done.out
+    result = course.main("update")
+    assert (result.status, "running scripts" in result.err) == (0, False)
+    assert "every recorded output is up to date" in result.out
     lesson = "## A\n\n" + block("dice.py", "import os\nprint(os.getpid())\n", "one of many")
     course.write(course.lesson(1), lesson)
     assert course.main("check").status == 1
-    done = course.main("update", "1.1")
-    assert (done.status, "error[output-unstable]" in done.out) == (1, True)
+    result = course.main("update", "1.1")
+    assert (result.status, "error[output-unstable]" in result.out) == (1, True)
     assert course.text(course.lesson(1)) == lesson
 
 
@@ -133,35 +133,35 @@ def test_explain_says_why_a_script_would_run(
     course: Folder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("MUJOCO_GL", raising=False)
-    assert explained(course, "examples/hello.py") == (
+    assert explain(course, "examples/hello.py") == (
         "examples/hello.py would run\n"
         "  because there is no result of it on this machine\n"
         "  of 1.1, not run yet on this machine\n"
     )
     assert "examples/hello.py: there is no result of it on this machine\n" in verbose(course)
-    told = explained(course, "examples/reads.py")
-    assert told.startswith(
+    text = explain(course, "examples/reads.py")
+    assert text.startswith(
         "examples/reads.py is remembered\n  of 1.1, last run WHEN: ok\n\n"
         "its last result depends on:\n  models/data.txt\n"
     )
-    assert told.endswith("shown, linked or quoted in:\n  content/lessons/1.1-one.md\n")
-    assert re.search(r"^  Python: CPython \d", told, re.MULTILINE)
+    assert text.endswith("shown, linked or quoted in:\n  content/lessons/1.1-one.md\n")
+    assert re.search(r"^  Python: CPython \d", text, re.MULTILINE)
     for path, old, new, reason in REASONS:
         course.replace(path, old, new)
-        assert explained(course, "examples/reads.py").startswith(
+        assert explain(course, "examples/reads.py").startswith(
             f"examples/reads.py would run again\n  because {reason}\n  of 1.1, last run WHEN: ok\n"
         )
         course.replace(path, new, old)
     (course.root / "models/data.txt").unlink()
-    assert "  because models/data.txt is gone\n" in explained(course, "examples/reads.py")
-    said = verbose(course)
-    assert "examples/reads.py: models/data.txt is gone\n" in said
-    assert "examples/hello.py" not in said
-    everything = "examples/helper.py: everything is to run again\n"
-    assert everything in verbose(course, "1.2", "--no-cache")
+    assert "  because models/data.txt is gone\n" in explain(course, "examples/reads.py")
+    lines = verbose(course)
+    assert "examples/reads.py: models/data.txt is gone\n" in lines
+    assert "examples/hello.py" not in lines
+    all_again = "examples/helper.py: everything is to run again\n"
+    assert all_again in verbose(course, "1.2", "--no-cache")
     monkeypatch.setenv("MUJOCO_GL", "osmesa")
-    told = explained(course, "examples/hello.py")
-    assert "  because environment variable MUJOCO_GL: unset → osmesa\n" in told
+    text = explain(course, "examples/hello.py")
+    assert "  because environment variable MUJOCO_GL: unset → osmesa\n" in text
 
 
 def test_explain_says_why_a_result_is_not_remembered(make: Make) -> None:
@@ -173,39 +173,39 @@ def test_explain_says_why_a_result_is_not_remembered(make: Make) -> None:
         + block("idle.py", "print(1)\n", info="norun")
     )
     folder.main("check")
-    assert explained(folder, "examples/starts.py").startswith(
+    assert explain(folder, "examples/starts.py").startswith(
         "examples/starts.py would run again\n"
         "  because its last result is not remembered: it starts other programs\n"
     )
-    told = explained(folder, "examples/slow.py")
-    assert "because its last result is not remembered: it was stopped after its time limit" in told
-    told = explained(folder, "examples/idle.py")
-    assert told.startswith("examples/idle.py is never run: its lesson says `norun`\n")
+    text = explain(folder, "examples/slow.py")
+    assert "because its last result is not remembered: it was stopped after its time limit" in text
+    text = explain(folder, "examples/idle.py")
+    assert text.startswith("examples/idle.py is never run: its lesson says `norun`\n")
 
 
 def test_explain_lessons_and_files_by_any_of_their_names(course: Folder) -> None:
     course.main("check")
     before = course.tree()
-    assert explained(course, "models/data.txt") == (
+    assert explain(course, "models/data.txt") == (
         "models/data.txt\n\n"
         "depending on it:\n"
         "  examples/reads.py is remembered\n\n"
         "shown, linked or quoted in:\n"
         "  content/lessons/1.1-one.md\n"
     )
-    assert "  examples/helped.py is remembered\n" in explained(course, "examples/helper.py")
-    assert explained(course, "content/course.toml") == (
+    assert "  examples/helped.py is remembered\n" in explain(course, "examples/helper.py")
+    assert explain(course, "content/course.toml") == (
         "content/course.toml\n\nno result of a script or lab depends on it\n"
     )
-    done = course.main("explain", "data.txt", cwd=course.root / "models")
-    assert (done.status, done.out.startswith("models/data.txt\n")) == (0, True)
+    result = course.main("explain", "data.txt", cwd=course.root / "models")
+    assert (result.status, result.out.startswith("models/data.txt\n")) == (0, True)
     assert course.tree() == before, "nothing is written"
-    course.write("examples/pathlib.py", "")  # which scripts would import from now on
-    assert "  examples/reads.py would run again\n" in explained(course, "examples/pathlib.py")
+    course.write("examples/pathlib.py", "")  # scripts would import it from now on
+    assert "  examples/reads.py would run again\n" in explain(course, "examples/pathlib.py")
     (course.root / "examples/pathlib.py").unlink()
     course.write("models/data.txt", "changed")
     for name in ("1.1", "one", "1.1-one", "content/lessons/1.1-one.md"):
-        assert explained(course, name) == (
+        assert explain(course, name) == (
             "content/lessons/1.1-one.md: 2 scripts, of which 1 would run\n\n"
             "examples/hello.py is remembered\n\n"
             "examples/reads.py would run again\n"
@@ -213,39 +213,41 @@ def test_explain_lessons_and_files_by_any_of_their_names(course: Folder) -> None
         )
     value = json.loads(course.main("explain", "examples/reads.py", "--format", "json").out)
     assert (value["path"], value["kind"]) == ("examples/reads.py", "script")
-    (own,) = value["own"]
-    assert (own["state"], own["reasons"]) == ("would run", ["models/data.txt changed"])
-    assert (own["owner"], own["outcome"]) == ("1.1", "ok")
-    assert isinstance(own["made"], int)
+    (run,) = value["own"]
+    assert (run["state"], run["reasons"]) == ("would run", ["models/data.txt changed"])
+    assert (run["owner"], run["outcome"]) == ("1.1", "ok")
+    assert isinstance(run["made"], int)
 
 
 def test_explain_tells_what_a_rule_means_anywhere(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
-    done = folder.main("explain", "footnote-unused")
-    assert (done.status, done.err) == (0, "")
-    assert done.out.startswith(
+    result = folder.main("explain", "footnote-unused")
+    assert (result.status, result.err) == (0, "")
+    assert result.out.startswith(
         "footnote-unused\n\nWarning. A footnote is written and never referred to.\n\n"
     )
-    assert "\nwarning[footnote-unused]: " in done.out
+    assert "\nwarning[footnote-unused]: " in result.out
     page = (ROOT / "docs/reference/rules.md").read_text()
-    shown = "".join(folder.main("explain", name).out for name in RULES)
-    assert shown.count("\nError. ") + shown.count("\nWarning. ") == len(RULES)
-    assert all(line in page for line in shown.splitlines())
-    told = json.loads(folder.main("explain", "footnote-unused", "--format", "json").out)
-    assert (told["name"], told["severity"]) == ("footnote-unused", "warning")
+    texts = "".join(folder.main("explain", name).out for name in RULES)
+    assert texts.count("\nError. ") + texts.count("\nWarning. ") == len(RULES)
+    assert all(line in page for line in texts.splitlines())
+    rule = json.loads(folder.main("explain", "footnote-unused", "--format", "json").out)
+    assert (rule["name"], rule["severity"]) == ("footnote-unused", "warning")
 
 
 def test_explain_what_cannot_be_explained_gives_2(course: Folder) -> None:
-    done = course.main("explain", "output-drif")
-    said = "nothing of this course is called `output-drif`; did you mean `output-drift`?"
-    assert (done.status, done.err) == (2, f"coursebuild: {said}\n")
-    done = course.main("explain", "examples/helo.py")
-    said = "nothing of this course is called `examples/helo.py`; did you mean `examples/hello.py`?"
-    assert (done.status, done.err) == (2, f"coursebuild: {said}\n")
+    result = course.main("explain", "output-drif")
+    message = "nothing of this course is called `output-drif`; did you mean `output-drift`?"
+    assert (result.status, result.err) == (2, f"coursebuild: {message}\n")
+    result = course.main("explain", "examples/helo.py")
+    message = (
+        "nothing of this course is called `examples/helo.py`; did you mean `examples/hello.py`?"
+    )
+    assert (result.status, result.err) == (2, f"coursebuild: {message}\n")
     course.write("content/course.toml", "[")
-    done = course.main("explain", "1.1")
-    said = "the course map cannot be read; `coursebuild check` says why"
-    assert (done.status, done.err) == (2, f"coursebuild: {said}\n")
+    result = course.main("explain", "1.1")
+    message = "the course map cannot be read; `coursebuild check` says why"
+    assert (result.status, result.err) == (2, f"coursebuild: {message}\n")
 
 
 PACKAGED = """
@@ -266,7 +268,7 @@ print(word, mjcourse.__name__, mjcourse.OWN, os.environ["FAST"])
 
 
 def test_scripts_import_from_the_folders_of_the_course(make: Make) -> None:
-    """Before ours; these count, like the variables that the course sets."""
+    """They come before our folders, and count as inputs, as do variables that the course sets."""
     output = "word mjcourse True 1"
     folder = make("## A\n\n" + block("a.py", PACKAGED, output, info="writes=runs/ requires=pkg"))
     folder.write("src/pkg/__init__.py", "")
@@ -275,15 +277,15 @@ def test_scripts_import_from_the_folders_of_the_course(make: Make) -> None:
     plain = folder.text("content/course.toml")
     ours = plain.replace("[course]\n", '[course]\npackages = ["src", "gone"]\n')
     folder.write("content/course.toml", f'{ours}\n[verify]\nenv = {{FAST = "1", PATH = "x"}}\n')
-    done = folder.main("check")
-    assert "there is no folder `gone`" not in done.out  # the map cannot be read yet
-    assert "`PATH` cannot be set for scripts" in done.out
+    result = folder.main("check")
+    assert "there is no folder `gone`" not in result.out  # the map cannot be read yet
+    assert "`PATH` cannot be set for scripts" in result.out
     folder.replace("content/course.toml", ', PATH = "x"', "")
     assert "error[field-value]: there is no folder `gone`" in folder.main("check").out
     folder.replace("content/course.toml", ', "gone"', "")
-    assert ran(folder) == ["a"]
+    assert run_paths(folder) == ["a"]
     assert folder.main("check").status == 0, folder.main("check").out
-    assert ran(folder) == []
+    assert run_paths(folder) == []
     for path, old, new in (
         ("src/pkg/part.py", '"word"', '"word" ""'),
         ("content/course.toml", 'FAST = "1"', 'FAST = "2"'),
@@ -291,9 +293,9 @@ def test_scripts_import_from_the_folders_of_the_course(make: Make) -> None:
         ("content/lessons/1.1-one.md", "writes=runs/", "writes=runs,out"),
     ):
         folder.replace(path, old, new)
-        assert ran(folder) == ["a"], new
+        assert run_paths(folder) == ["a"], new
         folder.replace(path, new, old)
-        assert ran(folder) == [], old
+        assert run_paths(folder) == [], old
     assert folder.text("runs/a/word.txt") == "word"
     folder.replace(folder.lesson(), "writes=runs/ ", "")
-    assert ran(folder) == ran(folder) == ["a"], "it writes into the project"
+    assert run_paths(folder) == run_paths(folder) == ["a"], "it writes into the project"

@@ -25,21 +25,21 @@ EDITED = (
 
 def test_files_are_written_once_and_removed_with_their_scripts(make: Make) -> None:
     folder = make(TWO)
-    done = folder.main("extract")
-    assert done.status == 0
-    assert "wrote examples/a.py\nwrote examples/sub/b.py\n" in done.out
+    result = folder.main("extract")
+    assert result.status == 0
+    assert "wrote examples/a.py\nwrote examples/sub/b.py\n" in result.out
     assert folder.read("examples/a.py") == b"print('a')\n"
     times = {p: (folder.root / "examples" / p).stat().st_mtime_ns for p in folder.tree("examples")}
-    for how in ((), ("--adopt",)):
-        done = folder.main("extract", *how)
-        assert (done.status, "every script is extracted already" in done.out) == (0, True)
+    for options in ((), ("--adopt",)):
+        result = folder.main("extract", *options)
+        assert (result.status, "every script is extracted already" in result.out) == (0, True)
     assert times == {p: (folder.root / "examples" / p).stat().st_mtime_ns for p in times}
     assert folder.text(folder.lesson()) == TWO
     folder.write("examples/mine.txt", "not extracted")
     folder.write(folder.lesson(), GOOD)
-    done = folder.main("extract")
-    assert done.status == 0
-    assert "removed examples/sub/b.py, which no lesson has any more" in done.out
+    result = folder.main("extract")
+    assert result.status == 0
+    assert "removed examples/sub/b.py, which no lesson has any more" in result.out
     assert set(folder.tree("examples")) == {".extracted.json", "hello.py", "mine.txt"}
     assert not (folder.root / "examples/sub").exists()
 
@@ -64,31 +64,31 @@ def test_edit_is_adopted_into_a_block_of_every_shape(make: Make) -> None:
         for number, shape in enumerate(SHAPES.values(), 1)
     ]
     folder = make(*texts)
-    for saved in SAVED:
+    for file in SAVED:
         for number, text in enumerate(texts, 1):
             folder.write(folder.lesson(number), text)
             (folder.root / f"examples/x{number}.py").unlink(missing_ok=True)
         assert folder.main("extract").status == 0
         for number in range(1, len(texts) + 1):
-            folder.write(f"examples/x{number}.py", saved)
-        done = folder.main("extract", "--adopt")
-        assert done.status == 0, done.out
+            folder.write(f"examples/x{number}.py", file)
+        result = folder.main("extract", "--adopt")
+        assert result.status == 0, result.out
         for number, (shape, text) in enumerate(zip(SHAPES, texts, strict=True), 1):
             before, _, after = text.partition("print(1)" + newline)
             lead = before.rpartition(newline)[2]
             body = [(lead + line if line else lead.rstrip()) for line in EDITED.splitlines()]
-            kept = before[: len(before) - len(lead)] if lead else before
-            whole = kept + newline.join(body) + newline + after
-            assert folder.text(folder.lesson(number)) == whole, (shape, saved)
-            assert folder.text(f"examples/x{number}.py") == EDITED, (shape, saved)
-            assert f"updated {folder.lesson(number)}\n" in done.out, shape
+            block_text = before[: len(before) - len(lead)] if lead else before
+            whole = block_text + newline.join(body) + newline + after
+            assert folder.text(folder.lesson(number)) == whole, (shape, file)
+            assert folder.text(f"examples/x{number}.py") == EDITED, (shape, file)
+            assert f"updated {folder.lesson(number)}\n" in result.out, shape
         assert "every script is extracted already" in folder.main("extract", "--adopt").out
 
 
 def test_several_edits_of_one_lesson_are_adopted_at_once(make: Make) -> None:
     folder = make(TWO + block("c.py", "print('c')", "c"), GOOD)
     folder.main("extract")
-    folder.replace(folder.lesson(), "print('c')", "print('C')")  # edited there, which stays
+    folder.replace(folder.lesson(), "print('c')", "print('C')")  # an edit, which stays
     folder.write("examples/a.py", "print('a')\nprint('more')\n")
     folder.write("examples/sub/b.py", "# b\n\nprint('b')\n")
     assert folder.main("extract", "--adopt").status == 0
@@ -97,7 +97,7 @@ def test_several_edits_of_one_lesson_are_adopted_at_once(make: Make) -> None:
     )
     assert folder.text(folder.lesson()) == adopted + block("c.py", "print('C')", "c")
     assert folder.read("examples/c.py") == b"print('C')\n"
-    assert folder.main("check", "1.1").status == 1  # other things are printed than recorded
+    assert folder.main("check", "1.1").status == 1  # it does not print what is recorded
     assert folder.main("update", "1.1").status == 0
     assert folder.main("check").status == 0
 
@@ -112,9 +112,9 @@ def test_edit_that_a_block_cannot_hold_is_left_alone(make: Make) -> None:
         (b"a\0b\n", "it holds a NUL"),
     ):
         folder.write("examples/a.py", data)
-        done = folder.main("extract", "--adopt")
-        assert done.status == 1
-        assert f"examples/a.py cannot be brought into the lesson: {says}" in done.out
+        result = folder.main("extract", "--adopt")
+        assert result.status == 1
+        assert f"examples/a.py cannot be brought into the lesson: {says}" in result.out
         assert folder.read("examples/a.py") == data
         assert folder.text(folder.lesson()) == TWO
 
@@ -126,11 +126,11 @@ def test_of_two_edits_neither_is_lost(make: Make) -> None:
     folder.replace(folder.lesson(), "print('a')", "print('A')")
     lesson = folder.read(folder.lesson())
     for command in (["extract"], ["extract", "--adopt"], ["check"]):
-        done = folder.main(*command)
-        assert done.status == 1
-        assert "-print('A')\n            +print('a')  # by hand\n" in done.out
-        assert "the block was changed as well" in done.out
-        assert "--adopt" not in done.out
+        result = folder.main(*command)
+        assert result.status == 1
+        assert "-print('A')\n            +print('a')  # by hand\n" in result.out
+        assert "the block was changed as well" in result.out
+        assert "--adopt" not in result.out
         assert folder.read("examples/a.py") == b"print('a')  # by hand\n"
         assert folder.read(folder.lesson()) == lesson
     folder.replace(folder.lesson(), "print('A')", "print('A')  # by hand")
@@ -139,7 +139,7 @@ def test_of_two_edits_neither_is_lost(make: Make) -> None:
 
 
 def test_a_read_only_example_is_adopted_and_settled(make: Make) -> None:
-    """It is derived, so it is made anew whatever its mode."""
+    """An example is derived from its lesson: it is replaced whatever its mode."""
     folder = make(TWO)
     folder.main("extract")
     folder.write("examples/a.py", b"print('edited')\r\n")

@@ -30,9 +30,9 @@ def test_figure_is_recorded_compared_and_shown(make: Make) -> None:
     first = folder.main("check")
     assert first.status == 1
     assert "figure-drift]: nothing is recorded yet of what `examples/line.py` draws" in first.out
-    updated = folder.main("update")
-    assert updated.status == 0, updated.out
-    assert "drew content/lessons/line.svg" in updated.out
+    update = folder.main("update")
+    assert update.status == 0, update.out
+    assert "drew content/lessons/line.svg" in update.out
     assert not (folder.root / "line.svg").exists()
     assert folder.main("check").status == 0
     assert folder.main("build").status == 0
@@ -51,17 +51,17 @@ def test_figure_is_recorded_compared_and_shown(make: Make) -> None:
     assert folder.main("update").status == 0
     assert folder.main("check").status == 0
     folder.replace("content/lessons/line.svg", "L5 9", "L4 9")
-    told = folder.main("check").out  # with a run that is remembered
-    assert "cached" in told and "the recorded figure differs from this run" in told
+    output = folder.main("check").out  # with a remembered run
+    assert "cached" in output and "the recorded figure differs from this run" in output
 
 
 def test_data_are_recorded_and_linked(make: Make) -> None:
     code = LINE.format(end=9) + 'with open("line.csv", "w") as file:\n    file.write("x\\n9\\n")\n'
-    drawn = block("line.py", code, "drawn True", info="figure=line.csv,line.svg")
-    text = f"## A line\n\n{drawn}Figure: A line that rises.\n"
+    lesson = block("line.py", code, "drawn True", info="figure=line.csv,line.svg")
+    text = f"## A line\n\n{lesson}Figure: A line that rises.\n"
     folder = make(text)
-    updated = folder.main("update")
-    assert updated.status == 0, updated.out
+    update = folder.main("update")
+    assert update.status == 0, update.out
     assert folder.text("content/lessons/line.csv") == "x\n9\n"
     assert folder.main("build").status == 0
     page = folder.text("public/lessons/1.1-one.html")
@@ -80,8 +80,8 @@ def test_figure_of_a_run_that_the_course_keeps_stays_as_it_was(make: Make) -> No
 
 
 def test_scripts_that_draw_under_one_name_do_not_meet(make: Make) -> None:
-    other = drawing("other.py", 3)
-    folder = make(lesson(9), f"## Other\n\n{other}Figure: ![Another](other/line.svg)\n")
+    second = drawing("other.py", 3)
+    folder = make(lesson(9), f"## Other\n\n{second}Figure: ![Another](other/line.svg)\n")
     folder.write("line.svg", "the author's own")
     assert folder.main("update").status == 0
     assert folder.main("check").status == 0

@@ -21,19 +21,19 @@ from support.scratch_course import Folder
 pytestmark = pytest.mark.site
 
 SERVED = ("compressed", "fonts", "mjb", "parts", "pictures", "published", "unchanged")
-"""Kinds of entries that are bytes of the site, or none of the memo's, which are not shared."""
+"""Kinds of entries that hold bytes of the site, or that are not shared."""
 GLOSSARY, SYMBOLS = "glossary/index.html", "symbols/index.html"
 
 
 class Trap:
-    """Ends the process when it is unpickled."""
+    """A pickle that ends the process which loads it."""
 
     def __reduce__(self) -> object:
         return os._exit, (70,)
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+def built_course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     """The course before any edit, with its site."""
     folder = Folder(tmp_path_factory.mktemp("built") / "course")
     Course(folder)
@@ -43,8 +43,8 @@ def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
 
 
 @pytest.fixture
-def course(built: Folder, tmp_path: Path) -> Course:
-    return Course(built.duplicate(tmp_path / "course"))
+def course(built_course: Folder, tmp_path: Path) -> Course:
+    return Course(built_course.duplicate(tmp_path / "course"))
 
 
 def lesson(id: str) -> str:
@@ -52,7 +52,7 @@ def lesson(id: str) -> str:
 
 
 def build(course: Course) -> dict[str, bytes]:
-    """The site, built anew from what is kept."""
+    """The site, built anew with the store."""
     shutil.rmtree(course.folder.root / "public", ignore_errors=True)
     assert course.folder.main("build", "--quiet").status == 0
     return course.folder.tree("public")
@@ -64,33 +64,33 @@ def test_an_edit_draws_the_pages_that_show_it(course: Course) -> None:
         if path.is_file():
             path.write_bytes(path.read_bytes())
     assert drawn_pages(course.folder) == set(), "they were touched, and no more"
-    one, two, three = (lesson(f"1.{n}") for n in (1, 2, 3))
+    first, second, third = (lesson(f"1.{n}") for n in (1, 2, 3))
     lists = {"index.html", "levels/1.html", "progress/index.html", "review/index.html"}
     term = "A [thing]{term} is one.\n\nProse"
     equation = "$$\nE = 1\n$$ {#eq:zero}\n\nProse"
     for id, old, new, pages in (
-        ("1.2", "Prose", "Other prose", {two}),
-        ("1.2", "Other prose", "Prose", set()),  # what was there before is known
-        ("1.2", "[^n]: A note.", "[^n]: Another note.\n\n## Second", {two}),
-        ("1.2", "print(2)", "print(22)", {two}),
-        ("1.2", "Remark", "Other", {two}),
-        ("1.2", "$x_2$", "$y$", {two, SYMBOLS}),
-        ("1.2", "$y$", '$x_2${symbol="place"}', {two, SYMBOLS}),
-        ("1.2", "First", "Last", {two, SYMBOLS}),
-        ("1.3", "Prose", "See [this](lesson:1.1). Prose", {three, one}),
-        ("1.3", "See [this]", "Look at [this](lesson:1.1) or [that]", {three}),
-        # The index of symbols leads to the glossary, which was not there.
-        ("1.1", "Prose", term, {one, GLOSSARY, SYMBOLS}),
-        ("1.2", "Prose", "See [it](term:thing). Prose", {two, GLOSSARY}),
-        ("1.1", "Prose", "Other prose", {one}),
-        ("1.1", "is one", "is none", {one, GLOSSARY}),
-        ("1.1", "= 1\n$$", "= 1\n$$ {#eq:one}", {one}),
-        ("1.2", "Prose", "By [](lesson:1.1#eq:one). Prose", {two, one}),
-        ("1.1", "Other prose", equation, {one, two}),  # of another number now
-        ("1.1", "E = 1\n$$ {#eq:one}", "E = 11\n$$ {#eq:one}", {one}),
-        ("1.2", "> [!note]", QUIZ + "> [!note]", {two, *lists}),
-        ("1.2", "Why?", "Why not?", {two}),  # its key is the same
-        ("1.2", '"why"', '"why-not"', {two, *lists}),
+        ("1.2", "Prose", "Other prose", {second}),
+        ("1.2", "Other prose", "Prose", set()),  # the pages of before are known
+        ("1.2", "[^n]: A note.", "[^n]: Another note.\n\n## Second", {second}),
+        ("1.2", "print(2)", "print(22)", {second}),
+        ("1.2", "Remark", "Other", {second}),
+        ("1.2", "$x_2$", "$y$", {second, SYMBOLS}),
+        ("1.2", "$y$", '$x_2${symbol="place"}', {second, SYMBOLS}),
+        ("1.2", "First", "Last", {second, SYMBOLS}),
+        ("1.3", "Prose", "See [this](lesson:1.1). Prose", {third, first}),
+        ("1.3", "See [this]", "Look at [this](lesson:1.1) or [that]", {third}),
+        # The index of symbols links to the glossary, which is new.
+        ("1.1", "Prose", term, {first, GLOSSARY, SYMBOLS}),
+        ("1.2", "Prose", "See [it](term:thing). Prose", {second, GLOSSARY}),
+        ("1.1", "Prose", "Other prose", {first}),
+        ("1.1", "is one", "is none", {first, GLOSSARY}),
+        ("1.1", "= 1\n$$", "= 1\n$$ {#eq:one}", {first}),
+        ("1.2", "Prose", "By [](lesson:1.1#eq:one). Prose", {second, first}),
+        ("1.1", "Other prose", equation, {first, second}),  # their number has changed
+        ("1.1", "E = 1\n$$ {#eq:one}", "E = 11\n$$ {#eq:one}", {first}),
+        ("1.2", "> [!note]", QUIZ + "> [!note]", {second, *lists}),
+        ("1.2", "Why?", "Why not?", {second}),  # its key is the same
+        ("1.2", '"why"', '"why-not"', {second, *lists}),
     ):
         course.edit(id, old, new)
         assert drawn_pages(course.folder) == pages, new
@@ -104,10 +104,10 @@ def test_an_edit_draws_the_pages_that_show_it(course: Course) -> None:
 def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
     course.titles["1.2"] = "New title"
     course.save()
-    around = {"index.html", "levels/1.html", lesson("1.1"), lesson("1.3"), SYMBOLS}
-    around.add("progress/index.html")
-    # Lesson 2.1 needs it, which the level of that one says too.
-    assert drawn_pages(course.folder) == around | {lesson("1.2"), lesson("2.1"), "levels/2.html"}
+    pages = {"index.html", "levels/1.html", lesson("1.1"), lesson("1.3"), SYMBOLS}
+    pages.add("progress/index.html")
+    # Lesson 2.1 needs it, as its level says, too.
+    assert drawn_pages(course.folder) == pages | {lesson("1.2"), lesson("2.1"), "levels/2.html"}
     course.levels["2"] = "Second"
     course.save()
     levels = {"levels/1.html", "levels/2.html", "progress/index.html"}
@@ -119,7 +119,7 @@ def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
     assert drawn_pages(course.folder) == {lesson("1.3")}
     text = course.folder.text("content/course.toml")
     course.folder.write("content/course.toml", text.replace('"Tested"', '"Renamed"'))
-    assert course.folder.main("build", "--quiet").status == 0  # over the site of before
+    assert course.folder.main("build", "--quiet").status == 0  # over the old site
     for path, page in course.folder.tree("public").items():
         if path.endswith(".html"):
             assert b"Renamed" in page and b"Tested" not in page
@@ -157,7 +157,7 @@ def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Cou
     for path in sorted((folder / "summaries").iterdir()):
         name = f"summaries/{path.name}"
         names, packed = msgspec.msgpack.decode(unsealed(name, path.read_bytes()))
-        packed[-2] = [b"junk" if isinstance(one, bytes) else one for one in packed[-2]]
+        packed[-2] = [b"junk" if isinstance(item, bytes) else item for item in packed[-2]]
         path.write_bytes(sealed(name, msgspec.msgpack.encode((names, packed))))
     for kind in ("pages", "index"):
         shutil.rmtree(folder / kind)
@@ -170,13 +170,13 @@ def test_a_mistake_that_an_edit_makes_elsewhere_is_found(course: Course) -> None
     build(course)
     course.edit("1.2", "## First", "## Last")
     for _ in range(2):
-        done = course.folder.main("build")
-        assert (done.status, "error[link-anchor]" in done.out) == (1, True)
+        result = course.folder.main("build")
+        assert (result.status, "error[link-anchor]" in result.out) == (1, True)
     course.edit("1.3", "#first", "#last")
-    done = course.folder.main("build")
-    assert done.status == 1
-    assert "public/lessons/1.1-l11.html" in done.out
-    assert "`lessons/1.2-l12.html` has no anchor `#first`" in done.out
+    result = course.folder.main("build")
+    assert result.status == 1
+    assert "public/lessons/1.1-l11.html" in result.out
+    assert "`lessons/1.2-l12.html` has no anchor `#first`" in result.out
     course.edit("1.2", "## Last", "## First")
     course.edit("1.3", "#last", "#first")
     build(course)
@@ -199,14 +199,14 @@ def test_a_mistake_that_an_edit_makes_elsewhere_is_found(course: Course) -> None
 )
 @settings(max_examples=5)
 def test_after_any_edits_the_site_is_that_of_a_clean_checkout(
-    built: Folder, stores: Path, edits: list[tuple[Edit, str, str, bool]]
+    built_course: Folder, stores: Path, edits: list[tuple[Edit, str, str, bool]]
 ) -> None:
     with tempfile.TemporaryDirectory() as scratch:
-        course = Course(built.duplicate(Path(scratch).resolve() / "edited"))
+        course = Course(built_course.duplicate(Path(scratch).resolve() / "edited"))
         folder = course.folder
-        for edit, id, word, between in edits:
+        for edit, id, word, builds_between in edits:
             course.apply(edit, id, word)
-            if between:
+            if builds_between:
                 folder.main("build", "--quiet")
         status = folder.main("build", "--quiet").status
         clean = Folder(folder.root.with_name("clean"))
@@ -228,7 +228,7 @@ def test_copies_of_the_process_give_what_one_gives(tmp_path: Path, stores: Path)
             course.write(id, LESSON.format(n=n, next="1.1", script=NORUN.format(n=n)))
         course.save()
         course.folder.borrow(stores)
-        done = course.folder.run("build", "--quiet", "--jobs", jobs)
-        assert (done.status, done.out, done.err) == (0, "", "")
+        result = course.folder.run("build", "--quiet", "--jobs", jobs)
+        assert (result.status, result.out, result.err) == (0, "", "")
         sites.append(course.folder.tree("public"))
     assert differences(*sites) == []

@@ -35,9 +35,9 @@ def mortals(module_mortals: Mortals, request: pytest.FixtureRequest) -> Mortals:
 
 
 def points(calls: list[str]) -> list[int]:
-    """Which calls to die at, counted from 1: the structural ones, and the first write by half.
+    """The calls at which to die, counted from 1: changes of folders, and the first write by half.
 
-    Of those that follow the same kind of call the last: there are rows of them.
+    Of consecutive calls of the same kind, only the last.
     """
     structural = [number for number, name in enumerate(calls, 1) if name in STRUCTURAL]
     last: dict[tuple[str, str], int] = {}
@@ -50,7 +50,7 @@ def points(calls: list[str]) -> list[int]:
 
 
 class Trials:
-    """A command that dies again and again, each time in a course as the template is."""
+    """A command that dies again and again, each time in a copy of the template."""
 
     def __init__(self, mortals: Mortals, template: Folder, place: Path, *command: str) -> None:
         self.mortals, self.template, self.command = mortals, template, command
@@ -67,21 +67,21 @@ class Trials:
         self.folder.tmp.mkdir()
 
     def deaths(self, first: str = "") -> Iterator[tuple[str, dict[str, bytes]]]:
-        """Where it died, and what that left; from the first call of a kind on."""
+        """Yield the call at which the command died, and what that left, from a kind of call on."""
         since = self.calls.index(first) if first else 0
         for fatal in points(self.calls):
             if fatal > since:
                 self.begin()
                 self.mortals.die(self.folder, *self.command, fatal=fatal)
-                where = f"killed before call {fatal}, {self.calls[fatal - 1]}"
-                yield where, self.folder.tree()
+                place = f"killed before call {fatal}, {self.calls[fatal - 1]}"
+                yield place, self.folder.tree()
 
     def run(self, *command: str) -> int:
-        """The status of a command after that, by default the same one."""
+        """The status of the next command, by default the same one."""
         return self.mortals.run(self.folder, *(command or self.command))[0]
 
     def leftovers(self) -> list[str]:
-        """What no command leaves where it got through; half an entry of the memo goes later."""
+        """Files that no command leaves at its end; half-written entries of the store go later."""
         root = self.folder.root
         parts = ("tmp", ".new-", ".coursebuild-new", ".coursebuild-old", "__pycache__")
         return [
@@ -100,9 +100,9 @@ def part(tree: dict[str, bytes], top: str) -> dict[str, bytes]:
 def test_build_killed_at_any_call_leaves_old_or_new_site(
     make: Make, mortals: Mortals, tmp_path: Path
 ) -> None:
-    """Without an exchange there is none for an instant, and the next build puts the old one back.
+    """Without an exchange of folders there is no site for an instant; the next build restores it.
 
-    Where a lesson changes again before that, the build knows which scripts it had written.
+    If a lesson changes before that, the build still knows which scripts it had written.
     """
     template = make(NEW)
     assert mortals.run(template, "check", "-q")[0] == 0  # so that no script runs later on
@@ -112,36 +112,38 @@ def test_build_killed_at_any_call_leaves_old_or_new_site(
     template.write(template.lesson(), NEW)
     trials = Trials(mortals, template, tmp_path, "build", "-q")
     new, folder = trials.new, trials.folder
-    changed = {path for path in {*old} ^ {*new} if not path.startswith("public/assets/search/")}
-    assert changed == {
+    changed_paths = {
+        path for path in {*old} ^ {*new} if not path.startswith("public/assets/search/")
+    }
+    assert changed_paths == {
         f"{place}examples/{name}.py" for place in ("", "public/") for name in ("gone", "new")
     }
     swap = "exchange" if mortals.exchanges else "rename"
     assert {swap, "replace", "link", "write", "unlink"} <= {*trials.calls}
-    # Until the sites are swapped it makes no difference how.
-    for number, (where, left) in enumerate(trials.deaths("" if mortals.exchanges else "rename")):
-        assert part(left, "content/") == part(new, "content/"), where
+    # Until the sites are swapped, how they are swapped makes no difference.
+    for number, (moment, left) in enumerate(trials.deaths("" if mortals.exchanges else "rename")):
+        assert part(left, "content/") == part(new, "content/"), moment
         site = part(left, "public/")
         if not site and not mortals.exchanges:
             aside = part(left, ".public.coursebuild-old/").items()
             site = {name.replace(".public.coursebuild-old", "public"): data for name, data in aside}
-        assert site in (part(old, "public/"), part(new, "public/")), where
+        assert site in (part(old, "public/"), part(new, "public/")), moment
         for name, data in part(left, "examples/").items():
             if name.endswith(".py"):
-                assert data in (b"", old.get(name), new.get(name)) or "tmp" in name, where
+                assert data in (b"", old.get(name), new.get(name)) or "tmp" in name, moment
         if number % 4 == 3:
             folder.replace(folder.lesson(), "# edited", "# edited again")
-            assert trials.run() == 0, where
+            assert trials.run() == 0, moment
             folder.replace(folder.lesson(), "# edited again", "# edited")
-        assert trials.run() == 0, where
-        assert (folder.tree(), trials.leftovers()) == (new, []), where
+        assert trials.run() == 0, moment
+        assert (folder.tree(), trials.leftovers()) == (new, []), moment
 
 
 @pytest.mark.parametrize("fault", ["files", pytest.param("memory", marks=pytest.mark.slow)])
 def test_build_without_files_or_memory_says_so_and_leaves_old_or_new_site(
     make: Make, mortals: Mortals, tmp_path: Path, fault: str
 ) -> None:
-    """From any call on no more can be opened or started; the next build is a whole one.
+    """From some call on, no file can be opened and no process started; the next build succeeds.
 
     asyncio prints an exception itself where it gets no sockets.
     """
@@ -155,27 +157,27 @@ def test_build_without_files_or_memory_says_so_and_leaves_old_or_new_site(
     _, calls = mortals.run(folder, "build", "-q", fault=fault)
     places = dict(zip(reversed(calls), range(len(calls), 0, -1), strict=True))
     assert len(places) > 30
-    told = ("too many open files", "cannot allocate memory", "not enough memory", "new thread")
+    messages = ("too many open files", "cannot allocate memory", "not enough memory", "new thread")
     before: dict[str, int] = {}
-    for where, fatal in sorted(places.items(), key=lambda place: place[1]):
+    for moment, fatal in sorted(places.items(), key=lambda place: place[1]):
         trials.begin()
         status, _ = mortals.run(folder, "build", "-q", fault=fault, fatal=fatal)
-        assert status in (0, 1), where
-        assert status == 0 or any(words in mortals.output.lower() for words in told), where
-        assert "Traceback" not in mortals.output or where.startswith(
+        assert status in (0, 1), moment
+        assert status == 0 or any(words in mortals.output.lower() for words in messages), moment
+        assert "Traceback" not in mortals.output or moment.startswith(
             "socket.__new__@core/run/v8"
         ), (
-            where,
+            moment,
             mortals.output,
         )
         left = folder.tree()
-        assert part(left, "content/") == part(new, "content/"), where
-        assert part(left, "public/") in (part(old, "public/"), part(new, "public/")), where
+        assert part(left, "content/") == part(new, "content/"), moment
+        assert part(left, "public/") in (part(old, "public/"), part(new, "public/")), moment
         state = {str(p): p.lstat().st_size for p in folder.root.rglob("*") if p.is_file()}
-        if state != before:  # what goes on from the same has been tried
+        if state != before:  # the next build from the same files was tried already
             before = state
-            assert trials.run() == 0, where
-            assert (folder.tree(), trials.leftovers()) == (new, []), where
+            assert trials.run() == 0, moment
+            assert (folder.tree(), trials.leftovers()) == (new, []), moment
 
 
 def test_update_killed_at_any_call_leaves_old_or_new_lessons(
@@ -187,30 +189,30 @@ def test_update_killed_at_any_call_leaves_old_or_new_lessons(
     trials = Trials(mortals, template, tmp_path, "update", "-q")
     old, new = part(template.tree(), "content/"), part(trials.new, "content/")
     assert {"replace", "write", "fsync"} <= {*trials.calls}
-    for number, (where, left) in enumerate(trials.deaths()):
-        assert all(left[name] in (old[name], new[name]) for name in old), where
+    for number, (place, left) in enumerate(trials.deaths()):
+        assert all(left[name] in (old[name], new[name]) for name in old), place
         if number % 3 == 0:  # a build clears up as well
             trials.run("build", "-q")
-            assert trials.leftovers() == [], where
-        assert trials.run() == 0, where
-        assert (part(trials.folder.tree(), "content/"), trials.leftovers()) == (new, []), where
+            assert trials.leftovers() == [], place
+        assert trials.run() == 0, place
+        assert (part(trials.folder.tree(), "content/"), trials.leftovers()) == (new, []), place
 
 
 def test_rename_killed_at_any_call_changes_all_files_or_none(
     make: Make, mortals: Mortals, tmp_path: Path
 ) -> None:
-    """The next command puts back what had been changed."""
+    """The next command undoes the changes."""
     template = make(OLD, "## Two\n\nSee [one](lesson:1.1).\n")
     assert mortals.run(template, "check", "-q")[0] == 0
     trials = Trials(mortals, template, tmp_path, "rename", "1.1", "1.7")
     old, new = part(template.tree(), "content/"), part(trials.new, "content/")
     assert len({*old.items()} ^ {*new.items()}) == 6  # the map, a lesson and its name, a link
-    for where, _ in trials.deaths():
-        assert trials.run("check", "-q") == 0, where
+    for place, _ in trials.deaths():
+        assert trials.run("check", "-q") == 0, place
         left = part(trials.folder.tree(), "content/")
-        assert left in (old, new), where
-        assert left == new or trials.run() == 0, where
-        assert (part(trials.folder.tree(), "content/"), trials.leftovers()) == (new, []), where
+        assert left in (old, new), place
+        assert left == new or trials.run() == 0, place
+        assert (part(trials.folder.tree(), "content/"), trials.leftovers()) == (new, []), place
 
 
 def test_adopting_killed_at_any_call_leaves_old_or_new_lesson(
@@ -218,13 +220,13 @@ def test_adopting_killed_at_any_call_leaves_old_or_new_lesson(
 ) -> None:
     template = make(OLD)
     assert mortals.run(template, "extract", "-q")[0] == 0
-    edited, lesson = b"print(1)\r\n# by hand\r\n", template.lesson()
-    template.write("examples/kept.py", edited)
+    edit, lesson = b"print(1)\r\n# by hand\r\n", template.lesson()
+    template.write("examples/kept.py", edit)
     trials = Trials(mortals, template, tmp_path, "extract", "--adopt", "-q")
     new = trials.new
     assert b"# by hand" in new[lesson]
-    for where, left in trials.deaths():
-        assert left[lesson] in (OLD.encode(), new[lesson]), where
-        assert left[lesson] == new[lesson] or left["examples/kept.py"] == edited, where
-        assert trials.run() == 0, where
-        assert (trials.folder.tree(), trials.leftovers()) == (new, []), where
+    for place, left in trials.deaths():
+        assert left[lesson] in (OLD.encode(), new[lesson]), place
+        assert left[lesson] == new[lesson] or left["examples/kept.py"] == edit, place
+        assert trials.run() == 0, place
+        assert (trials.folder.tree(), trials.leftovers()) == (new, []), place

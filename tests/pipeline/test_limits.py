@@ -1,4 +1,4 @@
-"""What hostile texts may take."""
+"""Limits of hostile texts."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ MAP = "content/course.toml"
 
 def test_a_line_of_megabytes_is_told_and_not_read(make: Make) -> None:
     folder = make(GOOD, "a *b* " * 1_700_000)
-    done = folder.main("check")
-    assert done.status == 1
-    assert "1.2-two.md has 10_200_000 characters, and may have 250_000" in done.out
-    assert f"{folder.lesson(2)}:1:250001" in done.out and len(done.out) < 2_000
-    assert "1 error" in done.out
+    result = folder.main("check")
+    assert result.status == 1
+    assert "1.2-two.md has 10_200_000 characters, and may have 250_000" in result.out
+    assert f"{folder.lesson(2)}:1:250001" in result.out and len(result.out) < 2_000
+    assert "1 error" in result.out
     folder.write(folder.lesson(2), GOOD.replace("hello.py", "again.py") + "words " * 50_000)
     folder.write(MAP, folder.text(MAP) + "\n[limits]\ntext = 400_000\n")
     assert folder.main("check").status == 0
@@ -30,28 +30,28 @@ def test_a_map_or_model_that_is_too_long_is_told_and_not_read(make: Make) -> Non
     folder.write("models/a.xml", short)
     folder.write("models/b.xml", long)
     folder.write("models/a.toml", "# nothing\n" * 30_000)
-    done = folder.main("check")
-    assert done.status == 1
-    assert "models/b.xml has 270_019 characters, and may have 250_000" in done.out
-    assert "models/b.xml:27778:" in done.out and "help: shorten it, or set `text`" in done.out
-    assert "models/a.toml has 300_000 characters" in done.out
-    assert "2 errors" in done.out
+    result = folder.main("check")
+    assert result.status == 1
+    assert "models/b.xml has 270_019 characters, and may have 250_000" in result.out
+    assert "models/b.xml:27778:" in result.out and "help: shorten it, or set `text`" in result.out
+    assert "models/a.toml has 300_000 characters" in result.out
+    assert "2 errors" in result.out
     folder.write(MAP, folder.text(MAP) + "\n[limits]\ntext = 400_000\n")
     assert folder.main("check").status == 0
     folder.write(MAP, folder.text(MAP) + "# and more\n" * 100_000)
-    done = folder.main("check")
-    assert done.status == 1
-    assert "course.toml has 1_100_" in done.out and "and may have 1_000_000" in done.out
-    assert "make more courses of it" in done.out
+    result = folder.main("check")
+    assert result.status == 1
+    assert "course.toml has 1_100_" in result.out and "and may have 1_000_000" in result.out
+    assert "make more courses of it" in result.out
 
 
 def test_a_script_gets_the_memory_that_the_course_allows(make: Make) -> None:
     folder = make("## A\n\n" + block("big.py", "print(len(bytearray(300 << 20)))\n", "314572800"))
     assert folder.main("check").status == 0
     folder.write(MAP, folder.text(MAP) + "\n[limits]\nscripts = 256\n")
-    done = folder.main("check")
-    assert done.status == 1
-    assert "error[script-failed]" in done.out and "MemoryError" in done.out
+    result = folder.main("check")
+    assert result.status == 1
+    assert "error[script-failed]" in result.out and "MemoryError" in result.out
 
 
 @pytest.mark.parametrize(

@@ -17,12 +17,12 @@ IDS = ("1.1", "1.2", "1.3", "2.1")
 
 
 class Preview:
-    """A course in memory that is edited, and clean builds of what its files are then."""
+    """A course in memory that is edited, and clean builds of its files."""
 
-    def __init__(self, where: Path, stores: Path) -> None:
-        self.course = Course(Folder(where / "course"))
+    def __init__(self, folder: Path, stores: Path) -> None:
+        self.course = Course(Folder(folder / "course"))
         self.course.folder.borrow(stores)
-        self.builds = Builds(where, stores)
+        self.builds = Builds(folder, stores)
         self.live = Live(self.course.folder)
         self.close = self.live.close
 
@@ -30,15 +30,15 @@ class Preview:
         before = self.course.folder.tree()
         self.course.apply(edit, id, word)
         after = self.course.folder.tree()
-        changed = {path for path in before | after if before.get(path) != after.get(path)}
-        self.live.save(*sorted(changed))
+        changed_paths = {path for path in before | after if before.get(path) != after.get(path)}
+        self.live.save(*sorted(changed_paths))
 
     def is_right(self) -> bool:
-        """Whether there is a site; it is that of a clean build."""
-        built, site = self.builds(self.course.folder), self.live.site()
-        assert (self.live.error_rules() == []) is (built is not None)
-        assert built is None or differences(site, built) == []
-        return built is not None
+        """Assert that the site is that of a clean build; return whether there is one."""
+        build, site = self.builds(self.course.folder), self.live.site()
+        assert (self.live.error_rules() == []) is (build is not None)
+        assert build is None or differences(site, build) == []
+        return build is not None
 
 
 @pytest.mark.site
@@ -66,5 +66,5 @@ def test_after_any_edits_it_is_what_a_clean_build_gives(
             for edit, id, word in data.draw(st.lists(choice, max_size=4), label="edits"):
                 preview.save(edit, id, word)
                 if data.draw(st.booleans(), label="all of it"):
-                    preview.live.rebuild.once()
+                    preview.live.rebuild.run_once()
             preview.is_right()

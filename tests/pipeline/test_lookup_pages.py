@@ -51,11 +51,11 @@ See [one](lesson:1.1).
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> dict[str, str]:
-    """The pages of a course in which all of it occurs."""
+    """The pages of a course with all of these."""
     folder = Folder(tmp_path_factory.mktemp("lookup") / "course")
     folder.fill([FIRST, SECOND, THIRD], stores)
-    done = folder.main("build")
-    assert done.status == 0, done.out + done.err
+    result = folder.main("build")
+    assert result.status == 0, result.out + result.err
     return {
         path: data.decode() for path, data in folder.tree("public").items() if path[-5:] == ".html"
     }
@@ -68,8 +68,8 @@ def entries(page: str) -> dict[str, str]:
 
 
 def text(html: str) -> str:
-    without = re.sub(r"<(annotation)\b.*?</\1>", "", html, flags=re.DOTALL)
-    return " ".join(unescape(re.sub(r"<[^>]*>", "", without)).split())
+    visible = re.sub(r"<(annotation)\b.*?</\1>", "", html, flags=re.DOTALL)
+    return " ".join(unescape(re.sub(r"<[^>]*>", "", visible)).split())
 
 
 def test_the_terms_are_in_order_whatever_their_script(site: dict[str, str]) -> None:
@@ -85,14 +85,14 @@ def test_the_terms_are_in_order_whatever_their_script(site: dict[str, str]) -> N
 def test_an_entry_is_two_sentences_or_one_and_the_formula_that_it_leads_to(
     site: dict[str, str],
 ) -> None:
-    found = entries(site["glossary/index.html"])
-    tensor = found["inertia-tensor"]
+    terms = entries(site["glossary/index.html"])
+    tensor = terms["inertia-tensor"]
     assert text(tensor).startswith("inertia tensor For a body of volume V, the inertia tensor is I")
     assert '<math display="block"' in tensor
-    assert text(found["item"]).startswith(
+    assert text(terms["item"]).startswith(
         "item An item in a list, 1 < 2. Defined in 1.1 Lesson one"
     )
-    axis = found["principal-axis"]
+    axis = terms["principal-axis"]
     assert text(axis).startswith(
         "Principal axis A principal axes is x & <b>, see. Last. Defined in"
     )
@@ -101,16 +101,16 @@ def test_an_entry_is_two_sentences_or_one_and_the_formula_that_it_leads_to(
 
 
 def test_an_entry_says_where_the_term_is_defined_and_used(site: dict[str, str]) -> None:
-    found = entries(site["glossary/index.html"])
-    one, two, three = (site[f"lessons/1.{n}.html"] for n in ("1-one", "2-two", "3-three"))
-    assert '<dfn id="term:inertia-tensor">inertia tensor</dfn>' in one
-    assert '<a href="#term%3Ainertia-tensor">it</a>' in one
-    assert '<a href="1.1-one.html#term%3Ainertia-tensor">tensor</a>' in two
-    assert '<dfn id="term:عزم-القصور">' in three
-    assert '<a href="../lessons/1.1-one.html#term%3Ainertia-tensor">' in found["inertia-tensor"]
-    assert text(found["inertia-tensor"]).endswith("Used in 1.2")
-    assert text(found["principal-axis"]).endswith("Used in 1.3")
-    assert "Used in" not in found["item"]
+    terms = entries(site["glossary/index.html"])
+    first, second, third = (site[f"lessons/1.{n}.html"] for n in ("1-one", "2-two", "3-three"))
+    assert '<dfn id="term:inertia-tensor">inertia tensor</dfn>' in first
+    assert '<a href="#term%3Ainertia-tensor">it</a>' in first
+    assert '<a href="1.1-one.html#term%3Ainertia-tensor">tensor</a>' in second
+    assert '<dfn id="term:عزم-القصور">' in third
+    assert '<a href="../lessons/1.1-one.html#term%3Ainertia-tensor">' in terms["inertia-tensor"]
+    assert text(terms["inertia-tensor"]).endswith("Used in 1.2")
+    assert text(terms["principal-axis"]).endswith("Used in 1.3")
+    assert "Used in" not in terms["item"]
 
 
 def test_nothing_hostile_is_markup(site: dict[str, str]) -> None:
@@ -122,25 +122,25 @@ def test_nothing_hostile_is_markup(site: dict[str, str]) -> None:
 
 
 def test_formulas_have_ids_numbers_and_references(site: dict[str, str]) -> None:
-    one, two = site["lessons/1.1-one.html"], site["lessons/1.2-two.html"]
-    ids = re.findall(r'<span class="equation" id="(.*?)">', one)
+    first, second = site["lessons/1.1-one.html"], site["lessons/1.2-two.html"]
+    ids = re.findall(r'<span class="equation" id="(.*?)">', first)
     assert ids == ["eq:tensor", "eq:rate", "eq:a"]
-    assert re.findall(r'<span class="equation-number">(.*?)</span>', one) == ["(1)", "(2)"]
-    assert '<a href="#eq%3Atensor">(1)</a>' in one or '<a href="#eq:tensor">(1)</a>' in one
-    assert '<a href="1.1-one.html#eq%3Atensor">(1) of Lesson 1.1</a>' in two
-    assert '<a href="1.1-one.html#eq%3Arate">(*) of Lesson 1.1</a>' in two
-    assert '<a href="1.1-one.html#eq%3Arate">rate</a>' in two
+    assert re.findall(r'<span class="equation-number">(.*?)</span>', first) == ["(1)", "(2)"]
+    assert '<a href="#eq%3Atensor">(1)</a>' in first or '<a href="#eq:tensor">(1)</a>' in first
+    assert '<a href="1.1-one.html#eq%3Atensor">(1) of Lesson 1.1</a>' in second
+    assert '<a href="1.1-one.html#eq%3Arate">(*) of Lesson 1.1</a>' in second
+    assert '<a href="1.1-one.html#eq%3Arate">rate</a>' in second
 
 
 def test_the_index_of_symbols(site: dict[str, str]) -> None:
     page = site["symbols/index.html"]
-    declared, _, others = page.partition('<section class="undeclared"')
-    rows = [text(row) for row in declared.split("<tbody>")[1:]]
+    declared_part, _, undeclared_part = page.partition('<section class="undeclared"')
+    rows = [text(row) for row in declared_part.split("<tbody>")[1:]]
     assert rows == [
         "q˙ rate <i> 1/s 1.1 Law",
         "V volume (1.1) m³ 1.1 Core, also in 1.2 voltage (1.2)",
     ]
-    symbols = [text(item) for item in others.partition("</section>")[0].split("<li>")[1:]]
+    symbols = [text(item) for item in undeclared_part.partition("</section>")[0].split("<li>")[1:]]
     assert [item.split()[0] for item in symbols] == ["a", "I", "x", "z", "ρ"]
 
 
@@ -191,12 +191,12 @@ def test_a_lesson_shows_what_it_needs_and_leads_to(make: Make) -> None:
         "1.5": ["1.3", "1.1"],
     }
     mapped(folder, lessons, {"1.2": '<img src=x onerror="alert(1)"> & عنوان', "1.4": "x" * 300})
-    done = folder.main("build")
-    assert done.status == 0, done.out
-    one = drawing(folder.text("public/lessons/1.1-l0.html"), "wide")
-    assert re.findall(r'class="node-id"[^>]*>(.*?)<', one) == ["1.1", "1.2", "1.3", "1.5"]
-    heads = re.search(r'class="heads" d="(.*?)"', one)
-    # That 1.3 and 1.5 need it follows from the way along 1.2 and 1.3.
+    result = folder.main("build")
+    assert result.status == 0, result.out
+    picture = drawing(folder.text("public/lessons/1.1-l0.html"), "wide")
+    assert re.findall(r'class="node-id"[^>]*>(.*?)<', picture) == ["1.1", "1.2", "1.3", "1.5"]
+    heads = re.search(r'class="heads" d="(.*?)"', picture)
+    # The path along 1.2 and 1.3 implies that 1.3 and 1.5 need it.
     assert heads is not None and heads[1].count("M") == 3
     level = folder.text("public/levels/1.html")
     assert "<img" not in level
@@ -211,9 +211,9 @@ def test_large_levels_and_lessons_with_many_heirs_stay_small(make: Make) -> None
     many = {f"1.{n}": ["1.1"] if n > 1 else [] for n in range(1, 41)}
     many |= {f"2.{n}": ["1.1", f"1.{n % 39 + 2}"] for n in range(1, 61)}
     mapped(folder, many, {})
-    done = folder.main("build")
-    assert done.status == 0, done.out
-    one = folder.text("public/lessons/1.1-l0.html")
-    assert drawing(one, "wide").count('class="node-id"') == 6
+    result = folder.main("build")
+    assert result.status == 0, result.out
+    html = folder.text("public/lessons/1.1-l0.html")
+    assert drawing(html, "wide").count('class="node-id"') == 6
     assert 'class="graph-' in folder.text("public/levels/1.html")
     assert 'class="graph-' not in folder.text("public/levels/2.html"), "it has sixty lessons"

@@ -20,15 +20,14 @@ FEW, MANY = 20, 50
 TEXT = 20_000
 """Bytes of prose in a lesson."""
 SLOPE = 60_000
-"""Bytes that a further lesson may take: its text, what others look at in it, names and keys of its
-files, its packed tree; no tree of its prose, of which both courses hold as much as there is room
-for."""
+"""Bytes that a further lesson may take: its text, its summary, names and keys of its files, and its
+packed tree. Unpacked trees do not count: both courses hold as many as there is room for."""
 
 
 def write_course(folder: Folder, count: int, size: int = TEXT) -> None:
-    """A course of so many lessons, each with so much prose.
+    """Write a course of some lessons, each with as much prose.
 
-    A level has ten: each page of it lists them all.
+    A level has ten lessons, since each of its pages lists them all.
     """
     ids = [f"{1 + n // 10}.{1 + n % 10}" for n in range(count)]
     entries = ['[course]\ntitle = "Long"\n']
@@ -48,9 +47,9 @@ def write_course(folder: Folder, count: int, size: int = TEXT) -> None:
 
 
 def peak(folder: Folder) -> int:
-    """The most bytes of Python's that a build holds at once, files that it makes included."""
+    """The peak of Python's memory during a build, with the files that it makes, in bytes."""
     gc.collect()
-    gc.freeze()  # else what other tests left decides how long garbage lies about
+    gc.freeze()  # else the garbage of other tests decides when the collector runs
     tracemalloc.start()
     try:
         with prepare(folder.options(), Progress(quiet=True)) as (report, site):
@@ -71,7 +70,7 @@ def test_memory_does_not_grow_with_the_lessons(
 ) -> None:
     monkeypatch.setattr(reading, "ROOM", FEW * TEXT // 2)  # else it would take hundreds of lessons
     peaks: dict[int, list[int]] = {FEW: [], MANY: []}
-    # Several times, since what else a process does at the moment can only add to it.
+    # Several times: whatever else the process does can only add to it.
     for number, count in enumerate((FEW, FEW, MANY, MANY)):
         folder = Folder(tmp_path / str(number))
         write_course(folder, count)

@@ -1,4 +1,4 @@
-"""Recorded reports on pages and inside of lessons: what fits is shown, what is due drawn again."""
+"""Recorded reports on pages and in lessons: those that fit are shown, others lead to a warning."""
 
 from __future__ import annotations
 
@@ -52,14 +52,16 @@ class Course:
     def __init__(self, folder: Folder) -> None:
         self.folder = folder
 
-    def bench(self, name: str = "box", **other: Any) -> SceneReport:
+    def bench(self, name: str = "box", **fields: Any) -> SceneReport:
         course = load_course(self.folder.root)
-        model = next(one for one in course.models if one.name == name)
-        nothing = Declarations(name, model.source)
-        declared = next((one for one in course.declarations if one.model == name), nothing)
-        digest = scene_digest(self.folder.root, model, declared)
-        here = replace(box().machine, engine=engine_version())
-        return replace(box(), **{"model": name, "digest": digest, "machine": here, **other})
+        model = next(m for m in course.models if m.name == name)
+        no_declarations = Declarations(name, model.source)
+        declarations = next(
+            (one for one in course.declarations if one.model == name), no_declarations
+        )
+        digest = scene_digest(self.folder.root, model, declarations)
+        machine = replace(box().machine, engine=engine_version())
+        return replace(box(), **{"model": name, "digest": digest, "machine": machine, **fields})
 
     def record(self) -> None:
         """Put reports into the course."""
@@ -71,8 +73,10 @@ class Course:
         self.folder.write(BENCH.path(report.model), BENCH.encode(report))
 
     def write_diet(self, message: str) -> None:
-        own = self.bench()
-        report = replace(diet(finding(message=message)), digest=own.digest, machine=own.machine)
+        bench_report = self.bench()
+        report = replace(
+            diet(finding(message=message)), digest=bench_report.digest, machine=bench_report.machine
+        )
         self.folder.write(DIET.path("box"), DIET.encode(report))
 
     def write_cases(self, note: str, engine: str = "") -> None:
@@ -81,23 +85,23 @@ class Course:
         self.folder.write(STABILITY.path(), STABILITY.encode(cases))
 
     def build(self) -> str:
-        """What is wrong, which has to be nothing that keeps the site from being published."""
-        done = self.folder.main("build", "-q")
-        assert done.status == 0, done.out
-        return done.out
+        """Build the site, which must succeed; return its warnings."""
+        result = self.folder.main("build", "-q")
+        assert result.status == 0, result.out
+        return result.out
 
     def page(self, path: str = PAGE) -> str:
         return self.folder.text(f"public/{path}")
 
     def figures(self) -> list[str]:
-        """The reports that the lesson shows, without what is drawn."""
+        """The reports that the lesson shows, without their drawings."""
         parts = self.page(SHOWING).split('<figure class="bench scenario">')[1:]
-        shown = (part.split("</figure>")[0] for part in parts)
-        return [re.sub(r"<svg.*?</svg>", "<svg>", part, flags=re.S) for part in shown]
+        figures = (part.split("</figure>")[0] for part in parts)
+        return [re.sub(r"<svg.*?</svg>", "<svg>", part, flags=re.S) for part in figures]
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+def built_course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     """The course with its site, before any change."""
     folder = Folder(tmp_path_factory.mktemp("measured") / "course")
     folder.fill([GOOD, LESSON], stores)
@@ -112,12 +116,12 @@ def built(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
 
 
 @pytest.fixture
-def course(built: Folder, tmp_path: Path) -> Course:
-    return Course(built.duplicate(tmp_path / "course"))
+def course(built_course: Folder, tmp_path: Path) -> Course:
+    return Course(built_course.duplicate(tmp_path / "course"))
 
 
-def test_what_was_recorded_is_on_its_pages_and_in_the_lesson(built: Folder) -> None:
-    course = Course(built)
+def test_what_was_recorded_is_on_its_pages_and_in_the_lesson(built_course: Folder) -> None:
+    course = Course(built_course)
     page, lesson = course.page(), course.page(SHOWING)
     assert 'class="work-precision"' in page and "Nobody reads it." in page
     assert "It swings." in course.page(NUMERICS)
@@ -177,15 +181,15 @@ def test_another_report_draws_the_pages_that_show_it_and_no_others(course: Cours
 
 
 def test_a_report_that_does_not_fit_is_told_and_not_shown(course: Course) -> None:
-    def stale() -> str:
-        told = course.build()
+    def stale_warnings() -> str:
+        result = course.build()
         assert 'class="work-precision"' not in course.page()
         assert "Not measured." in course.page()
         assert 'id="measured-awkward"' in course.page(), "so that links to it hold"
         for figure in course.figures():
             assert "Not measured. This measures it:" in figure and "<svg>" not in figure
             assert '<a href="../models/box.html#measured">box</a></figcaption>' in figure
-        return told
+        return result
 
     folder = course.folder
     for path, old, new in (
@@ -194,25 +198,25 @@ def test_a_report_that_does_not_fit_is_told_and_not_shown(course: Course) -> Non
         ("models/box.toml", '"swing"', '"swing"\nduration = 1'),
     ):
         folder.replace(path, old, new)
-        told = stale()
-        assert told.count("warning[report-stale]") == 2 and "bench-" not in told, path
-        assert "`box`, its files or its scenarios have changed since" in told
-        assert "help: make it again with `coursebuild bench box --record`" in told
-        assert "help: make it again with `coursebuild diet box --record`" in told
+        warnings = stale_warnings()
+        assert warnings.count("warning[report-stale]") == 2 and "bench-" not in warnings, path
+        assert "`box`, its files or its scenarios have changed since" in warnings
+        assert "help: make it again with `coursebuild bench box --record`" in warnings
+        assert "help: make it again with `coursebuild diet box --record`" in warnings
         assert "It swings." in course.page(NUMERICS)
         folder.replace(path, new, old)
     course.write_bench(course.bench(machine=replace(box().machine, engine="3.0.0")))
     course.write_cases("it swings", "3.0.0")
-    told = stale()
-    assert told.count("warning[report-stale]") == 2
-    assert f"it is of MuJoCo 3.0.0, and {engine_version()} is installed" in told
+    warnings = stale_warnings()
+    assert warnings.count("warning[report-stale]") == 2
+    assert f"it is of MuJoCo 3.0.0, and {engine_version()} is installed" in warnings
     assert not (folder.root / "public" / NUMERICS).exists()
     for path in (BENCH.path("box"), STABILITY.path()):
         folder.write(path, folder.read(path)[:-40])
     folder.write("content/reports/notes.json", "mine")
-    told = stale()
-    assert told.count("is damaged: ") == 2
-    assert "notes.json" not in told
+    warnings = stale_warnings()
+    assert warnings.count("is damaged: ") == 2
+    assert "notes.json" not in warnings
     (folder.root / BENCH.path("box")).unlink()
     assert course.build().count("warning[bench-unrecorded]") == 3
 

@@ -1,4 +1,4 @@
-"""What is remembered of scripts: runs here are made up, the files that they look at are real."""
+"""The memory of scripts' results; runs are invented here, the files that they read are real."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from coursebuild.core.model.results import Divergence, Outcome, Sign, Trace
 from coursebuild.core.run.dependencies import describe
 from coursebuild.core.run.memory import longest_first
 from coursebuild.core.scripts.sensitivity import amplification
-from coursebuild.report.explained import Explained, Explanation, explained_text
+from coursebuild.report.explained import Explanation, RunExplanation, explanation_text
 from coursebuild.report.terminal import Style
 from support.fake_runs import JOB, LOOKED, NOTHING, PATH, SCRIPT, Desk
 from support.poisoned_values import mutations
@@ -39,7 +39,7 @@ def entries(desk: Desk) -> list[Path]:
     return [path for path in (desk.root / ".coursebuild/scripts").rglob("*") if path.is_file()]
 
 
-# --- what is remembered
+# --- remembered results
 
 
 def test_results_and_failures_are_remembered_whole(desk: Desk) -> None:
@@ -54,11 +54,11 @@ def test_results_and_failures_are_remembered_whole(desk: Desk) -> None:
     ):
         shutil.rmtree(desk.root / ".coursebuild", ignore_errors=True)
         desk.run(outcome=outcome, status=status, stderr=stderr, seconds=2.5)
-        found, last = desk.recall(), desk.memory().last_record(PATH)
-        assert found is not None and last is not None
-        fields = found.outcome, found.status, found.stdout, found.stderr, found.seconds
+        run, last = desk.recall(), desk.memory().last_record(PATH)
+        assert run is not None and last is not None
+        fields = run.outcome, run.status, run.stdout, run.stderr, run.seconds
         assert fields == (outcome, status, "hello\n", stderr, 2.5)
-        assert found.cached and last.stored_run.seconds == 2.5
+        assert run.cached and last.stored_run.seconds == 2.5
 
 
 def outside(path: str) -> dict[str, Trace]:
@@ -80,10 +80,10 @@ FORGOTTEN: list[tuple[Outcome, dict[str, object], str]] = [
 
 
 def test_runs_that_another_may_not_repeat_are_not_remembered(desk: Desk) -> None:
-    for outcome, fields, why in FORGOTTEN:
+    for outcome, fields, reason in FORGOTTEN:
         shutil.rmtree(desk.root / ".coursebuild", ignore_errors=True)
         desk.run(outcome=outcome, **fields)
-        assert (desk.recall(), desk.rerun_reason()) == (None, why)
+        assert (desk.recall(), desk.rerun_reason()) == (None, reason)
         last = desk.memory().last_record(PATH)
         assert last is not None and last.stored_run.outcome is outcome
 
@@ -99,7 +99,7 @@ def test_another_text_option_or_environment_is_another_result(
     monkeypatch.setenv("MUJOCO_GL", "egl")
     assert desk.recall() is None
     monkeypatch.delenv("MUJOCO_GL")
-    for name in ("PATH", "HOME", "UNRELATED"):  # what a script cannot see
+    for name in ("PATH", "HOME", "UNRELATED"):  # no input of a script
         monkeypatch.setenv(name, "/nowhere")
     assert desk.recall() is not None
 
@@ -109,8 +109,8 @@ def test_a_few_results_are_kept_for_a_script(desk: Desk) -> None:
         desk.write("models/a.xml", str(number).encode())
         desk.settle()
         desk.run(LOOKED, stdout=f"{number}\n")
-    found = desk.recall()
-    assert found is not None and found.stdout == "11\n"
+    run = desk.recall()
+    assert run is not None and run.stdout == "11\n"
     assert len(entries(desk)) <= 8
 
 
@@ -121,7 +121,7 @@ def test_longest_runs_come_first_and_unknown_ones_before_them() -> None:
 
 
 def test_poisoned_results_of_a_shared_cache_are_one_or_told(tmp_path: Path) -> None:
-    """What a run printed is believed, and no other thing that somebody may have put there."""
+    """A shared entry may hold any output, but nothing else is taken from it unchecked."""
     trace = Trace(("models/a.xml",), ("models",), (), ("json",), "", (DIVERGED,), True, (STATE,))
     place = tmp_path / "shared"
     Desk(tmp_path / "maker", shared=str(place)).run(trace, figures=(("a.svg", b"<svg/>"),))
@@ -139,12 +139,14 @@ def test_poisoned_results_of_a_shared_cache_are_one_or_told(tmp_path: Path) -> N
         memory = victim.memory()
         reasons = memory.reasons(memory.inputs(JOB, SCRIPT))
         last = memory.last_record(PATH)
-        shown = Explained("script", PATH, "1.1", "remembered", tuple(reasons))
+        explanation = RunExplanation("script", PATH, "1.1", "remembered", tuple(reasons))
         if last is not None:
             depends = tuple(map(describe, last.dependencies))
             seconds = last.stored_run.seconds
-            shown = replace(shown, depends=depends, made=last.timestamp, seconds=seconds)
-        text = explained_text(Explanation(PATH, "script", (shown,)), Style(colour=False))
+            explanation = replace(
+                explanation, depends=depends, made=last.timestamp, seconds=seconds
+            )
+        text = explanation_text(Explanation(PATH, "script", (explanation,)), Style(colour=False))
         assert "\x1b" not in text
         if run is None:
             assert victim.messages in ([], [DAMAGED.format(name[:20])]), data
@@ -155,7 +157,7 @@ def test_poisoned_results_of_a_shared_cache_are_one_or_told(tmp_path: Path) -> N
     assert 10 < believed < 160
 
 
-# --- for how long it holds
+# --- when a result holds
 
 
 def write(path: str, data: bytes = b"x") -> Act:
@@ -270,8 +272,8 @@ def test_a_course_that_is_moved_runs_only_what_printed_its_place(
     desk.run(LOOKED, outcome=Outcome.FAILED, status=1, stderr=stderr)
     desk.root.rename(tmp_path / "moved")
     desk.root = tmp_path / "moved"
-    found = desk.recall()
-    assert found is not None and found.stderr == f'File "{desk.root}/examples/a.py"\n'
+    run = desk.recall()
+    assert run is not None and run.stderr == f'File "{desk.root}/examples/a.py"\n'
     printing = replace(JOB, args=("--verbose",))
     desk.run(job=printing, stdout=f"reading {desk.root}/models/a.xml\n")
     assert desk.recall(printing) is not None
@@ -312,11 +314,11 @@ WHILE_IT_RAN: tuple[tuple[Trace, Act, str], ...] = (
 
 
 def test_result_is_not_kept_where_something_was_saved_while_the_script_ran(tmp_path: Path) -> None:
-    for number, (trace, act, why) in enumerate(WHILE_IT_RAN):
+    for number, (trace, act, reason) in enumerate(WHILE_IT_RAN):
         desk = Desk(tmp_path / str(number))
         desk.run(trace, during=lambda act=act, desk=desk: act(desk))
-        assert desk.rerun_reason() == why
-        assert (desk.recall() is not None) is (why == ""), number
+        assert desk.rerun_reason() == reason
+        assert (desk.recall() is not None) is (reason == ""), number
 
 
 def test_a_module_that_appeared_while_the_script_ran_was_not_seen_by_it(desk: Desk) -> None:
@@ -337,9 +339,9 @@ def test_script_runs_again_if_and_only_if_a_file_it_read_changed(
     changes: list[tuple[str, bytes | None]],
     looked: set[str],
 ) -> None:
-    """A result is there exactly where the files that were looked at were like this before."""
+    """A result is recalled exactly if the files that were read have been in this state before."""
     desk = Desk(tmp_path_factory.mktemp("course"))
-    known: set[tuple[bytes | None, ...]] = set()
+    states: set[tuple[bytes | None, ...]] = set()
 
     def state() -> tuple[bytes | None, ...]:
         paths = [desk.root / path for path in sorted(looked)]
@@ -351,17 +353,17 @@ def test_script_runs_again_if_and_only_if_a_file_it_read_changed(
         else:
             desk.write(path, data)
         now = state()
-        found = desk.recall()
-        assert (found is not None) == (now in known)
-        if found is None:
+        run = desk.recall()
+        assert (run is not None) == (now in states)
+        if run is None:
             desk.settle()
             desk.run(files(*sorted(looked)), stdout=repr(now))
-            known.add(now)
+            states.add(now)
         else:
-            assert found.stdout == repr(now)
+            assert run.stdout == repr(now)
 
 
-# --- afresh, damaged, at once, and shared
+# --- fresh runs, damage, concurrency, sharing
 
 
 def test_a_fresh_run_says_what_differs(desk: Desk) -> None:
@@ -375,24 +377,24 @@ def test_a_fresh_run_says_what_differs(desk: Desk) -> None:
     desk.settle()
     assert desk.run(LOOKED, stdout="three\n").differing_runs == []
     desk.fresh = False
-    found = desk.recall()
-    assert found is not None and found.stdout == "three\n", "the new result is the one that is kept"
+    run = desk.recall()
+    assert run is not None and run.stdout == "three\n", "the new result is the one that is kept"
 
 
 def test_another_machine_has_the_result(desk: Desk, tmp_path: Path) -> None:
     desk.shared = str(tmp_path / "shared")
     desk.run(LOOKED, outcome=Outcome.FAILED, status=1, stderr=f'File "{desk.root}/examples/a.py"\n')
-    other = Desk(tmp_path / "other", shared=desk.shared)
-    found = other.recall()
-    assert found is not None
-    assert found.stderr == f'File "{other.root}/examples/a.py"\n'
-    other.shared = None
-    assert other.recall() is not None, "it is kept there too"
+    second_desk = Desk(tmp_path / "other", shared=desk.shared)
+    run = second_desk.recall()
+    assert run is not None
+    assert run.stderr == f'File "{second_desk.root}/examples/a.py"\n'
+    second_desk.shared = None
+    assert second_desk.recall() is not None, "it is kept there too"
     third = Desk(tmp_path / "third", shared=desk.shared)
     third.write("models/a.xml", b"other")
     assert third.recall() is None
     (path,) = (p for p in (tmp_path / "shared").rglob("*") if p.is_file())
     name = path.relative_to(tmp_path / "shared" / "coursebuild-1").as_posix()
     for number, data in enumerate((b"", b"{}", b"[1]", b"\x80\x04N.")):
-        path.write_bytes(sealed(name, data))  # whole, and no record
+        path.write_bytes(sealed(name, data))  # an intact entry that is no record
         assert Desk(tmp_path / f"new {number}", shared=desk.shared).recall() is None

@@ -1,4 +1,4 @@
-"""What MuJoCo warns of, and what it gives up, while a model is measured."""
+"""Warnings of MuJoCo, and simulations that it gives up, while a model is measured."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SINGULAR = """\
   </worldbody>
 </mujoco>
 """
-"""MuJoCo warns of its inertia when it is compiled, and in each `mj_forward`."""
+"""A model of whose inertia MuJoCo warns at compilation and in each `mj_forward`."""
 
 
 @pytest.mark.parametrize(
@@ -42,8 +42,8 @@ def test_measuring_leaves_no_log_of_mujoco(
 ) -> None:
     write(tmp_path / "content" / "course.toml", "")
     write(tmp_path / "models" / "box.xml", SINGULAR)
-    declared = TOML.replace("qvel = [1.0]", "qvel = [1.0, 0.0]")
-    write(tmp_path / "models" / "box.toml", declared)
+    declarations = TOML.replace("qvel = [1.0]", "qvel = [1.0, 0.0]")
+    write(tmp_path / "models" / "box.toml", declarations)
     monkeypatch.chdir(tmp_path)
     assert main(command) == 0
     out, err = capfd.readouterr()
@@ -61,7 +61,7 @@ CROWDED = f"""\
   </worldbody>
 </mujoco>
 """
-"""Its contacts need more memory than it asks for."""
+"""A model whose contacts need more memory than it sets."""
 
 
 def test_bench_tells_a_model_that_mujoco_gives_up(
@@ -71,9 +71,9 @@ def test_bench_tells_a_model_that_mujoco_gives_up(
     write(tmp_path / "models" / "box.xml", CROWDED)
     write(tmp_path / "models" / "box.toml", TOML.replace("qvel = [1.0]\n", ""))
     assert main(["-C", str(tmp_path), "bench", "--quick"]) == 1
-    told = capsys.readouterr().out.splitlines()
-    assert told[0].startswith(
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith(
         "error[model-error]: the model `box` cannot be measured: mj_stackAlloc: out of memory"
     )
-    assert told[1] == "  --> models/box.xml:1:1"
+    assert lines[1] == "  --> models/box.xml:1:1"
     assert not list(tmp_path.rglob("MUJOCO_LOG*"))

@@ -26,7 +26,7 @@ COURSES = ("full", "unicode", "real")
 
 
 def notebook_client(notebook: Any, **options: Any) -> Any:
-    from nbclient import NotebookClient  # a second, which all who collect this file would wait
+    from nbclient import NotebookClient  # takes a second, even for collecting this file
 
     return NotebookClient(notebook, **options)
 
@@ -55,23 +55,23 @@ def test_notebooks_of_course_run_in_an_empty_folder(
         Source("content/course.toml", folder.text("content/course.toml"))
     ).value
     assert course is not None
-    known = frozenset(kind.name for kind in (*CALLOUTS, *course.callouts))
+    callouts = frozenset(kind.name for kind in (*CALLOUTS, *course.callouts))
     compared = 0
     for number, path in enumerate(notebooks(folder)):
         printed = executed(path, tmp_path / f"{number}")
         text = folder.read(f"content/lessons/{path.stem}.md").decode()
-        document = parse_document(Source("a.md", text), known, lesson=True).value
+        document = parse_document(Source("a.md", text), callouts, lesson=True).value
         for recording in document_blocks(document):
             if isinstance(recording, Recording) and recording.script in printed:
-                how = recording.comparison or course.comparison
-                verdict = compare(recording, how, course.filters, printed[recording.script])
+                comparison = recording.comparison or course.comparison
+                verdict = compare(recording, comparison, course.filters, printed[recording.script])
                 assert verdict.status in ("verified", "volatile"), verdict.changes
                 compared += 1
     assert compared >= (2 if name != "unicode" else 1)
 
 
 def executed(path: Path, folder: Path) -> dict[str, str]:
-    """Run a notebook from top to bottom in an empty folder; gives what its scripts printed."""
+    """Run a notebook from top to bottom in an empty folder; return what its scripts printed."""
     folder.mkdir()
     notebook = nbformat.read(path, as_version=4)
     client = notebook_client(
@@ -119,12 +119,12 @@ def test_notebook_brings_the_modules_its_scripts_import(make: Make, tmp_path: Pa
     for cell in notebook.cells:
         if "later.py" in cell.source.split("\n")[0] and cell.cell_type == "code":
             cell.source = cell.source.replace("x = 1", "x = 7")
-    changed = tmp_path / "changed.ipynb"
-    nbformat.write(notebook, changed)
+    edited_notebook = tmp_path / "changed.ipynb"
+    nbformat.write(notebook, edited_notebook)
     notebook.cells.append(
         nbformat.v4.new_code_cell("%%example examples/again.py\nfrom first import *")
     )
-    nbformat.write(notebook, changed)
+    nbformat.write(notebook, edited_notebook)
     client = notebook_client(
         notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(place)}}
     )

@@ -48,7 +48,7 @@ def with_environment(make: Make, script: str, printed: str) -> Folder:
 
 
 def environment(folder: Folder) -> Path:
-    """Make it; gives the folder of its packages."""
+    """Make an environment; return the folder of its packages."""
     prefix = folder.root / ".venv"
     subprocess.run([sys.executable, "-m", "venv", "--clear", "--without-pip", prefix], check=True)
     (packages,) = prefix.glob("lib/python*/site-packages")
@@ -70,11 +70,11 @@ def install(packages: Path, version: str, name: str) -> None:
 
 
 def test_scripts_find_what_is_installed_in_the_environment_of_the_course(course: Folder) -> None:
-    """And run again when something is installed there; of here they find `mjcourse` only."""
+    """They run again when something is installed there, and find only `mjcourse` of ours."""
     (packages,) = (course.root / ".venv").glob("lib/python*/site-packages")
-    done = course.run("check")
-    assert done.status == 0, done.out + done.err
-    assert "1 script" in done.out
+    result = course.run("check")
+    assert result.status == 0, result.out + result.err
+    assert "1 script" in result.out
     again = course.run("check")
     assert again.status == 0
     assert "nothing has changed since the last check" in again.out
@@ -120,39 +120,39 @@ WRONG: tuple[tuple[Callable[[Path], object], str], ...] = (
 
 
 def test_an_environment_in_which_scripts_cannot_run_is_told(course: Folder) -> None:
-    done = course.main("check", "--against", "3.1.0")
-    assert done.status == 2
-    assert "scripts of this course run with .venv/bin/python" in done.err
-    for spoil, said in WRONG:
+    result = course.main("check", "--against", "3.1.0")
+    assert result.status == 2
+    assert "scripts of this course run with .venv/bin/python" in result.err
+    for spoil, message in WRONG:
         spoil(course.root / ".venv")
-        done = course.main("check")
-        assert done.status == 1
-        assert done.out.startswith(said), done.out
-        assert "--> content/course.toml:" in done.out
-        assert done.out.count("error[") == 1
+        result = course.main("check")
+        assert result.status == 1
+        assert result.out.startswith(message), result.out
+        assert "--> content/course.toml:" in result.out
+        assert result.out.count("error[") == 1
         environment(course)
     python = course.root / PYTHON
     python.unlink()
     python.write_text("#!/bin/sh\nexit 3\n")
     python.chmod(0o755)
-    done = course.main("check", "--no-cache")
-    assert done.status == 1
-    assert f"{python} cannot run scripts" in done.err
+    result = course.main("check", "--no-cache")
+    assert result.status == 1
+    assert f"{python} cannot run scripts" in result.err
 
 
 def test_the_sandbox_has_this_environment_and_no_other_folder_it_names(make: Make) -> None:
-    """The folder of its Python stands in a file of the course, where it may be anything."""
+    """A file of the course names the folder of its Python, and may name any folder."""
     script = "import os, sys, planet\nprint(planet.NAME, os.path.exists(sys.argv[1]))"
     folder = with_environment(make, script, "Mars False")
     require_sandbox(folder.root)
     home = folder.root.parent / "home"
     (home / "lib").mkdir(parents=True)
     folder.replace(folder.lesson(), "file=examples/a.py", f'file=examples/a.py args="{home}"')
-    done = folder.main("check", "--sandbox")
-    assert done.status == 0, done.out
+    result = folder.main("check", "--sandbox")
+    assert result.status == 0, result.out
     settings = folder.root / ".venv/pyvenv.cfg"
-    named = f"home = {home}/bin\n"
+    home_line = f"home = {home}/bin\n"
     lines = settings.read_text().splitlines(keepends=True)
-    settings.write_text("".join(named if line.startswith("home") else line for line in lines))
-    done = folder.main("check", "--sandbox", "--no-cache")
-    assert done.status == 1 and "cannot run scripts" in done.err
+    settings.write_text("".join(home_line if line.startswith("home") else line for line in lines))
+    result = folder.main("check", "--sandbox", "--no-cache")
+    assert result.status == 1 and "cannot run scripts" in result.err

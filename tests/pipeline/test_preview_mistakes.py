@@ -26,30 +26,30 @@ def test_mistakes_are_shown_and_clear_by_themselves(
     make: Make, browser: Browser, tmp_path: Path
 ) -> None:
     folder = make(GOOD, "## Two\n")
-    editor, told = tmp_path / "code", tmp_path / "told"
-    editor.write_text(f'#!/bin/sh\necho "$@" > "{told}"\n')
+    editor, calls = tmp_path / "code", tmp_path / "told"
+    editor.write_text(f'#!/bin/sh\necho "$@" > "{calls}"\n')
     editor.chmod(0o755)
     with serve_preview(folder, env={"VISUAL": str(editor)}) as preview:
         preview.wait_for_line("checked: ")
-        other = PreviewPage(browser, preview, "lessons/1.2-two.html")
-        with other, PreviewPage(browser, preview, LESSON) as opened:
-            page = opened.page
+        second_page = PreviewPage(browser, preview, "lessons/1.2-two.html")
+        with second_page, PreviewPage(browser, preview, LESSON) as page_open:
+            page = page_open.page
             panel = page.get_by_role("region", name="Problems")
             expect(panel).to_have_count(0)
             folder.replace(folder.lesson(), "## Hello\n", "## Never\n\n[x](lesson:9.9)\n")
             see(panel)
             expect(panel).to_contain_text("The last good page is shown")
             panel.get_by_role("button", name="content/lessons/1.1-one.md:3:5").click()
-            wait_for_file(told, 1)
-            assert told.read_text() == f"--goto {folder.root / folder.lesson()}:3:5\n"
+            wait_for_file(calls, 1)
+            assert calls.read_text() == f"--goto {folder.root / folder.lesson()}:3:5\n"
             expect(panel).to_contain_text("lesson 9.9 is linked to, and the course map does not")
             expect(panel.locator(".preview-source mark")).to_have_text("lesson:9.9")
             expect(page.locator(".prose h2").first).to_contain_text("Hello")
-            see(other.page.get_by_role("region", name="Problems"))
-            expect(other.page.get_by_role("region", name="Problems")).to_contain_text(
+            see(second_page.page.get_by_role("region", name="Problems"))
+            expect(second_page.page.get_by_role("region", name="Problems")).to_contain_text(
                 "What is wrong with the course"
             )
-            # It can be put away, by keyboard too, and comes back for another mistake.
+            # The list can be closed, by keyboard too, and opens again for another mistake.
             panel.get_by_role("button", name="Close").click()
             expect(panel).to_have_count(0)
             button = page.get_by_role("button", name="1 mistake")
@@ -63,11 +63,11 @@ def test_mistakes_are_shown_and_clear_by_themselves(
             expect(page.get_by_role("button", name="2 mistakes")).to_be_visible()
             folder.replace(folder.lesson(), "[x](lesson:9.9)", "[x](lesson:9.9) $\\frac{1$")
             see(panel)
-            # What keeps this page comes first, elsewhere what keeps that one.
+            # On each page, the mistakes that keep it from being drawn come first.
             kinds = ["Blocks this page", "Blocks this page", "Mistake"]
             expect(panel.locator("strong")).to_have_text(kinds)
             kinds = ["Blocks this page", "Mistake", "Mistake"]
-            elsewhere = other.page.get_by_role("region", name="Problems")
+            elsewhere = second_page.page.get_by_role("region", name="Problems")
             expect(elsewhere.locator("strong")).to_have_text(kinds)
             expect(elsewhere.get_by_role("listitem").first).to_contain_text("1.2-two.md:1:5")
             folder.write(folder.lesson(2), "## Two\n")
@@ -75,8 +75,8 @@ def test_mistakes_are_shown_and_clear_by_themselves(
             folder.write(folder.lesson(), GOOD.replace("## Hello", "## Mended"))
             expect(panel).to_have_count(0)
             expect(page.locator(".prose h2").first).to_contain_text("Mended")
-            expect(other.page.get_by_role("region", name="Problems")).to_have_count(0)
-            opened.check_unbroken()
+            expect(second_page.page.get_by_role("region", name="Problems")).to_have_count(0)
+            page_open.check_unbroken()
 
 
 def test_drift_is_shown_in_its_place_and_accepted(make: Make, browser: Browser) -> None:
@@ -121,18 +121,18 @@ with open("a.csv", "w") as file:
 with open("b.png", "wb") as file:
     Image.new("L", (50, 20), 50).save(file, "PNG")
 """
-    drawn = block("a.py", code, info="figure=a.svg,a.csv,b.png")
-    folder = make(f"## A\n\n{drawn}Figure: ![A line](a.svg)\n\nFigure: ![A box](b.png)\n")
+    lesson = block("a.py", code, info="figure=a.svg,a.csv,b.png")
+    folder = make(f"## A\n\n{lesson}Figure: ![A line](a.svg)\n\nFigure: ![A box](b.png)\n")
     assert folder.run("update").status == 0
     with lesson_page(folder, browser) as page:
         folder.write(folder.lesson(), folder.text(folder.lesson()).replace("50", "40"))
         for name in ("A line", "A box"):
-            shown = page.locator("figure.figure", has=page.get_by_alt_text(name, exact=True))
-            box = shown.get_by_role("group", name="Recorded figure, and this run").first
+            figures = page.locator("figure.figure", has=page.get_by_alt_text(name, exact=True))
+            box = figures.get_by_role("group", name="Recorded figure, and this run").first
             see(box)
             see(box.get_by_alt_text(f"{name} (recorded)"))
             see(box.get_by_alt_text(f"{name} (this run)"))
-            expect(shown.locator("> img").first).to_be_hidden()
+            expect(figures.locator("> img").first).to_be_hidden()
         expect(page.get_by_role("region", name="Problems")).to_have_count(0)
         sizes = "images => images.map((one) => one.naturalWidth)"
         assert box.locator("img").evaluate_all(sizes) == [50, 40]

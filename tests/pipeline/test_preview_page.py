@@ -42,7 +42,7 @@ def test_what_was_not_touched_stays_as_and_where_it_is(make: Make, browser: Brow
         hint = page.locator("details.hint")
         hint.locator("summary").click()
         page.get_by_role("button", name="Copy").focus()
-        marked = page.locator("h2, .script, .hint, math").evaluate_all(
+        elements = page.locator("h2, .script, .hint, math").evaluate_all(
             "elements => elements.map((element) => (element.mine = true)).length"
         )
         page.evaluate(
@@ -56,10 +56,10 @@ def test_what_was_not_touched_stays_as_and_where_it_is(make: Make, browser: Brow
         expect(hint).to_have_attribute("open", "")
         expect(page.get_by_role("button", name="Copy")).to_be_focused()
         wait_for_condition(page, lambda: page.evaluate("String(getSelection())") == "mpha")
-        kept = page.locator("h2, .script, .hint, math").evaluate_all(
+        elements_after = page.locator("h2, .script, .hint, math").evaluate_all(
             "elements => elements.filter((element) => element.mine).length"
         )
-        assert kept == marked
+        assert elements_after == elements
         place = page.locator("p", has_text="Paragraph 40.")
         place.scroll_into_view_if_needed()
         top = "element => element.getBoundingClientRect().top"
@@ -74,10 +74,10 @@ def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
     folder = make(RICH)
     with serve_preview(folder) as preview:
         preview.wait_for_line("checked: ")
-        with PreviewPage(browser, preview, LESSON) as opened:
-            page = opened.page
+        with PreviewPage(browser, preview, LESSON) as window:
+            page = window.page
             text = folder.text(folder.lesson())
-            for old, new, shown in (
+            for old, new, visible_text in (
                 ("## Hello", "## Good morning", "main h2:first-of-type >> text=Good morning"),
                 ("$x^2$", "$z^{17}$", "math >> text=17"),
                 ("*emphasis*", "**strength**", "strong >> text=strength"),
@@ -89,12 +89,12 @@ def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
             ):
                 text = text.replace(old, new)
                 folder.write(folder.lesson(), text)
-                see(page.locator(shown).first)
+                see(page.locator(visible_text).first)
             expect(page.locator("p", has_text="Paragraph 7.")).to_have_count(0)
-            # What scripts make of a page, they make of its new parts as well.
+            # Scripts also prepare the new parts of a page.
             see(page.locator(".code").get_by_role("button", name="Copy"))
             expect(page.locator(".toc a").first).to_contain_text("Good morning")
-            # The living page is the page that is loaded anew.
+            # The updated page equals the page after a reload.
             red = page.locator("p", has_text="Red")
             expect(red).to_have_css("color", "rgb(255, 0, 0)")
             structure = """() => {
@@ -107,9 +107,9 @@ def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
               }
               return page.innerHTML
             }"""
-            see(page.locator(".question.is-live"))  # its script comes when it is needed
+            see(page.locator(".question.is-live"))  # its script is loaded when it is needed
             living = page.evaluate(structure)
-            opened.check_unbroken()
+            window.check_unbroken()
             page.reload()
             see(page.locator(".question.is-live"))
             wait_for_condition(page, lambda: page.evaluate(structure) == living)
@@ -141,12 +141,12 @@ def test_page_that_goes_and_one_that_comes(make: Make, browser: Browser) -> None
     map_ = folder.text("content/course.toml")
     with serve_preview(folder) as preview:
         preview.wait_for_line("checked: ")
-        with PreviewPage(browser, preview, "lessons/1.2-two.html") as opened:
-            page = opened.page
+        with PreviewPage(browser, preview, "lessons/1.2-two.html") as window:
+            page = window.page
             folder.write("content/course.toml", map_.replace('"two"', '"zwei"'))
             (folder.root / folder.lesson(2)).rename(folder.root / "content/lessons/1.2-zwei.md")
             see(page.locator(".preview-button", has_text="this page is gone"))
-            opened.check_unbroken()
+            window.check_unbroken()
             with PreviewPage(browser, preview, "lessons/1.2-two.html") as missing:
                 expect(missing.page.locator("main")).to_contain_text("There is no page")
                 family = re.compile("Source Serif")
@@ -162,14 +162,14 @@ def test_preview_that_stops_and_starts_again(make: Make, browser: Browser) -> No
     with serve_preview(folder) as preview:
         preview.wait_for_line("checked: ")
         port = preview.port
-        opened = PreviewPage(browser, preview, LESSON)
-    with opened:
-        see(opened.page.locator(".preview-button", has_text="the preview has stopped"))
+        window = PreviewPage(browser, preview, LESSON)
+    with window:
+        see(window.page.locator(".preview-button", has_text="the preview has stopped"))
         folder.replace(folder.lesson(), "## Hello", "## Back")
         with serve_preview(folder, "--port", str(port)):
-            expect(opened.page.locator(".prose h2")).to_contain_text("Back")
-            expect(opened.page.locator(".preview-button")).to_be_hidden()
-            assert opened.page.evaluate("window.same")
+            expect(window.page.locator(".prose h2")).to_contain_text("Back")
+            expect(window.page.locator(".preview-button")).to_be_hidden()
+            assert window.page.evaluate("window.same")
 
 
 ATTACK = """
@@ -221,8 +221,8 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
                 page.goto(url)
                 (frame,) = page.main_frame.child_frames
                 wait_for_condition(page, lambda frame=frame: frame.url.startswith("chrome-error:"))
-                said = page.evaluate(STEAL, address)
-                assert set(said.values()) == {"refused"}, said
+                answer = page.evaluate(STEAL, address)
+                assert set(answer.values()) == {"refused"}, answer
                 assert page.evaluate("window.draft") == "nothing"
                 page.get_by_role("button", name="Go").click()
                 expect(page.locator("body")).to_have_text(re.compile("of other origins"))
@@ -232,18 +232,18 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
 
 
 def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> None:
-    """Where everything that it can show is shown at once, light and dark."""
+    """With everything that it can show at once, light and dark."""
     axe = (ROOT / "site/node_modules/axe-core/axe.min.js").read_text("utf-8")
     rules = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "best-practice"]
     folder = make(GOOD.replace("3.14159\n```", "3\n```") + "`7`{out}\n", "[x](lesson:9.9)\n")
     with serve_preview(folder) as preview:
         preview.wait_for_line("link-lesson")
-        with PreviewPage(browser, preview, LESSON) as opened:
-            page = opened.page
+        with PreviewPage(browser, preview, LESSON) as window:
+            page = window.page
             see(page.get_by_role("button", name="Accept this output"))
             see(page.get_by_role("region", name="Problems"))
             page.evaluate(axe)
             for scheme in ("light", "dark"):
                 page.emulate_media(color_scheme=scheme)
-                found = page.evaluate("rules => axe.run({ runOnly: rules })", rules)
-                assert [(v["id"], v["nodes"][0]["html"]) for v in found["violations"]] == []
+                audit = page.evaluate("rules => axe.run({ runOnly: rules })", rules)
+                assert [(v["id"], v["nodes"][0]["html"]) for v in audit["violations"]] == []

@@ -17,12 +17,12 @@ def test_drift_is_not_published_and_update_puts_it_back(make: Make) -> None:
     assert folder.main("build").status == 0
     good, site = folder.read(folder.lesson()), folder.tree("public")
     folder.replace(folder.lesson(), "hello 3.14159\n", "hello 3.14158\n")
-    done = folder.main("build")
-    assert done.status == 1
+    result = folder.main("build")
+    assert result.status == 1
     line = folder.text(folder.lesson()).splitlines().index("hello 3.14158") + 1
-    assert f"--> {folder.lesson()}:{line}:7\n" in done.out
-    assert "nothing was published; public stays as it is\n" in done.out
-    assert "run `coursebuild update 1.1`" in done.out
+    assert f"--> {folder.lesson()}:{line}:7\n" in result.out
+    assert "nothing was published; public stays as it is\n" in result.out
+    assert "run `coursebuild update 1.1`" in result.out
     assert folder.tree("public") == site
     assert folder.main("update", "1.1").status == 0
     assert folder.read(folder.lesson()) == good
@@ -54,9 +54,9 @@ def test_site_stays_as_it_was_whatever_the_mistake(make: Make) -> None:
 
 def test_nothing_is_published_before_there_is_a_site(make: Make) -> None:
     folder = make(GOOD + "[gone](lesson:7.7)\n")
-    done = folder.main("build")
-    assert done.status == 1
-    assert "\nnothing was published\n" in done.out
+    result = folder.main("build")
+    assert result.status == 1
+    assert "\nnothing was published\n" in result.out
     assert folder.entries() == [
         ".coursebuild",
         "content",
@@ -72,8 +72,8 @@ def test_nothing_is_published_before_there_is_a_site(make: Make) -> None:
 def test_files_of_somebody_else_are_never_removed(make: Make) -> None:
     folder = make(GOOD)
     folder.write("out/notes.txt", "mine")
-    done = folder.main("build", "--out", "out")  # refused before any script runs
-    assert (done.status, done.out) == (2, "")
+    result = folder.main("build", "--out", "out")  # refused before any script runs
+    assert (result.status, result.out) == (2, "")
     assert not (folder.root / "examples").exists()
     assert folder.read("out/notes.txt") == b"mine"
 
@@ -81,15 +81,15 @@ def test_files_of_somebody_else_are_never_removed(make: Make) -> None:
 def test_caches_that_are_gone_or_damaged_are_made_again(make: Make, stores: Path) -> None:
     folder = make(GOOD + "Őrült żółw\n")  # for which fonts are cut
     assert folder.main("build").status == 0
-    site, kept = folder.tree(), folder.root / ".coursebuild"
-    (kept / "fonts").unlink()
-    shutil.copytree(stores / "fonts", kept / "fonts")
-    for font in (kept / "fonts").iterdir():
+    site, caches = folder.tree(), folder.root / ".coursebuild"
+    (caches / "fonts").unlink()
+    shutil.copytree(stores / "fonts", caches / "fonts")
+    for font in (caches / "fonts").iterdir():
         font.write_bytes(b"")
     assert folder.main("build").status == 0
     assert folder.tree() == site
-    shutil.rmtree(kept)
-    kept.mkdir()
-    (kept / "fonts").symlink_to(stores / "fonts")
+    shutil.rmtree(caches)
+    caches.mkdir()
+    (caches / "fonts").symlink_to(stores / "fonts")
     assert folder.main("build").status == 0
     assert folder.tree() == site

@@ -27,7 +27,7 @@ def original(built_courses: BuiltCourses) -> Folder:
 def test_build_elsewhere_in_another_environment_gives_the_same_bytes(
     original: Folder, tmp_path: Path, stores: Path
 ) -> None:
-    """What labs did is known; that they do the same again is tried with all else made anew."""
+    """With the stored results of labs; the next test runs labs again."""
     folder = course_copy("full", tmp_path / "anderswo ünd 別" / "a course", stores)
     for name in TRIALS:
         (folder.root / ".coursebuild" / name).symlink_to(original.root / ".coursebuild" / name)
@@ -40,9 +40,11 @@ def test_build_elsewhere_in_another_environment_gives_the_same_bytes(
         "SOURCE_DATE_EPOCH": "1",
         "USER": "somebody",
     }
-    where = str(folder.root)
-    done = folder.run("-C", where, "build", "--jobs", "3", "--quiet", cwd=tmp_path, env=environment)
-    assert done.status == 0, done.out
+    root = str(folder.root)
+    result = folder.run(
+        "-C", root, "build", "--jobs", "3", "--quiet", cwd=tmp_path, env=environment
+    )
+    assert result.status == 0, result.out
     assert differences(original.tree(), folder.tree()) == []
 
 
@@ -50,7 +52,7 @@ def test_build_elsewhere_in_another_environment_gives_the_same_bytes(
 def test_build_without_caches_and_with_files_in_another_order_gives_the_same_bytes(
     original: Folder, tmp_path: Path
 ) -> None:
-    """Fonts are cut anew; the folders' entries are made in reverse."""
+    """Fonts are cut again, and the files of folders are created in reverse order."""
     root = tmp_path / "reverse"
     for path in sorted(FULL.rglob("*"), reverse=True):
         if path.is_file():
@@ -60,8 +62,8 @@ def test_build_without_caches_and_with_files_in_another_order_gives_the_same_byt
             target.chmod(0o600)
     folder = Folder(root)
     folder.tmp.mkdir()
-    done = folder.run("build", env={"PYTHONHASHSEED": "1"})
-    assert done.status == 0, done.out
+    result = folder.run("build", env={"PYTHONHASHSEED": "1"})
+    assert result.status == 0, result.out
     assert differences(original.tree(), folder.tree()) == []
 
 

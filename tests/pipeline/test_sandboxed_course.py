@@ -1,4 +1,4 @@
-"""Courses of strangers: `--sandbox`, through the whole tool."""
+"""Courses of strangers: `--sandbox` in all commands."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def test_what_a_script_changes_is_told_and_in_the_sandbox_does_not_happen(make: 
     assert not (folder.root / "new").exists()
     outside = folder.main("check")
     assert outside.status == 0 and (folder.root / "new").exists()
-    for done in (inside, outside):
-        assert "warning[script-writes]: `examples/a.py` writes outside its" in done.out
-        assert f"--> {folder.lesson()}:5:1" in done.out
+    for result in (inside, outside):
+        assert "warning[script-writes]: `examples/a.py` writes outside its" in result.out
+        assert f"--> {folder.lesson()}:5:1" in result.out
 
 
 def test_code_that_the_tool_would_run_is_refused(make: Make) -> None:
@@ -42,16 +42,16 @@ def test_code_that_the_tool_would_run_is_refused(make: Make) -> None:
     require_sandbox(folder.root)
     map = folder.text("content/course.toml")
     folder.write("features/evil.py", "open('evil', 'w')\n")
-    named = map.replace("[course]\n", '[course]\nfeatures = ["features/evil.py"]\n')
-    folder.write("content/course.toml", named)
-    done = folder.main("check", "--sandbox")
-    assert (done.status, done.out) == (1, "")
-    assert "`features/evil.py` is code that the tool would run" in done.err
+    with_feature = map.replace("[course]\n", '[course]\nfeatures = ["features/evil.py"]\n')
+    folder.write("content/course.toml", with_feature)
+    result = folder.main("check", "--sandbox")
+    assert (result.status, result.out) == (1, "")
+    assert "`features/evil.py` is code that the tool would run" in result.err
     assert not (folder.root / "evil").exists()
     folder.write("content/course.toml", map)
     folder.write("theme/templates/page.html", "{{ 1 }}")
-    done = folder.main("build", "--sandbox")
-    assert done.status == 1 and "`theme/templates/` is code" in done.err
+    result = folder.main("build", "--sandbox")
+    assert result.status == 1 and "`theme/templates/` is code" in result.err
 
 
 def test_nothing_runs_without_a_sandbox(
@@ -59,9 +59,9 @@ def test_nothing_runs_without_a_sandbox(
 ) -> None:
     folder = make(GOOD)
     monkeypatch.setenv("PATH", str(tmp_path))
-    done = folder.main("check", "--sandbox")
-    assert (done.status, done.out) == (1, "")
-    assert done.err == (
+    result = folder.main("check", "--sandbox")
+    assert (result.status, result.out) == (1, "")
+    assert result.err == (
         "coursebuild: `--sandbox` needs Bubblewrap, and there is no program `bwrap`\n"
         "  help: install it, as by `apt-get install bubblewrap`\n"
     )

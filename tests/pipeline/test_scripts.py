@@ -1,4 +1,4 @@
-"""Extracted files as learners run them, and simulations that are lost, through the whole tool."""
+"""Extracted files as learners run them, and diverged simulations, through the commands."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from support.scratch_course import Make, block
 pytestmark = pytest.mark.site
 
 
-# --- simulations that are lost
+# --- diverged simulations
 
 MODEL = """
 <mujoco model="cart">
@@ -34,8 +34,8 @@ def test_lost_simulation_fails_every_command_unless_its_lesson_says_so(make: Mak
         return "## One\n\n" + block("a.py", LOST.replace("1e15", force), output, info=info)
 
     def rules() -> list[str]:
-        found = json.loads(folder.main("check", "--format", "json").out)
-        return [each["rule"] for each in found["diagnostics"]]
+        report = json.loads(folder.main("check", "--format", "json").out)
+        return [diagnostic["rule"] for diagnostic in report["diagnostics"]]
 
     folder = make(lesson("1e15"))
     first, again = folder.main("check"), folder.main("check")
@@ -50,11 +50,11 @@ def test_lost_simulation_fails_every_command_unless_its_lesson_says_so(make: Mak
     assert not (folder.root / "public").exists()
     assert not list(folder.root.rglob("MUJOCO_LOG*"))
     folder.write(folder.lesson(), lesson("1e15", output="error 1.0"))
-    done = folder.main("update")
-    assert (done.status, "error[script-diverged]" in done.out) == (1, True)
+    result = folder.main("update")
+    assert (result.status, "error[script-diverged]" in result.out) == (1, True)
     for text, expected in (
         (lesson("1e15"), ["script-diverged"]),
-        (lesson("1e15", "diverges"), []),  # as it is remembered
+        (lesson("1e15", "diverges"), []),  # from the store
         (lesson("0.0", "diverges"), ["script-stable"]),
         (lesson("0.0"), []),
     ):

@@ -94,24 +94,26 @@ print("right" if data.qpos[0] == 0.75 else "left or right")
 PLAIN = "print('nothing moves', 1.5)\n"
 
 
-def measured(folder: Folder, *arguments: str) -> dict[str, Any]:
+def measure(folder: Folder, *arguments: str) -> dict[str, Any]:
     report = json.loads(folder.main("check", "--sensitivity", "--format", "json", *arguments).out)
     assert report["summary"]["errors"] == 0, report["diagnostics"]
-    return {one["path"]: one for one in report["sensitivity"]} | {
-        "noise": sorted(re.findall(r"examples/\w+\.py", d["message"])[0] for d in noise(report))
+    return {script["path"]: script for script in report["sensitivity"]} | {
+        "noise": sorted(
+            re.findall(r"examples/\w+\.py", d["message"])[0] for d in noise_warnings(report)
+        )
     }
 
 
-def noise(report: dict[str, Any]) -> list[dict[str, Any]]:
-    """What is warned of; there is nothing else."""
-    assert {each["rule"] for each in report["diagnostics"]} <= {"output-noise"}
-    found: list[dict[str, Any]] = report["diagnostics"]
-    return found
+def noise_warnings(report: dict[str, Any]) -> list[dict[str, Any]]:
+    """The warnings of noise in a report that has no other diagnostics."""
+    assert {diagnostic["rule"] for diagnostic in report["diagnostics"]} <= {"output-noise"}
+    diagnostics: list[dict[str, Any]] = report["diagnostics"]
+    return diagnostics
 
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
-    """A course with all of the scripts, after one look at their digits."""
+    """A course with all of the scripts, whose sensitivity was measured once."""
     folder = Folder(tmp_path_factory.mktemp("sensitivity") / "course")
     scripts = [("double", DOUBLE), ("fall", FALL), ("limit", LIMIT), ("plain", PLAIN)]
     scripts += [(name, SWING.replace("INTEGRATOR", name)) for name in ("Euler", "RK4")]
@@ -123,20 +125,22 @@ def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
 
 
 @pytest.fixture(scope="module")
-def found(course: Folder) -> dict[str, Any]:
-    return measured(course)
+def by_path(course: Folder) -> dict[str, Any]:
+    return measure(course)
 
 
 def test_double_pendulum_is_chaotic_and_keeps_its_first_digits(
-    course: Folder, found: dict[str, Any]
+    course: Folder, by_path: dict[str, Any]
 ) -> None:
-    script = found["examples/double.py"]
+    script = by_path["examples/double.py"]
     assert script["chaotic"]
     assert script["amplification"] > 1e10
     assert script["numbers"] == 8
     lines = course.text(course.lesson()).splitlines()
     first = next(i for i, line in enumerate(lines, 1) if line.startswith("t 1.0 "))
-    doubted = {(one["line"] - first, one["column"]): one["repeat"] for one in script["doubts"]}
+    doubted = {
+        (doubt["line"] - first, doubt["column"]): doubt["repeat"] for doubt in script["doubts"]
+    }
     rows = {line for line, _ in doubted}
     assert 0 not in rows, "after a second all holds"
     assert set(doubted.values()) <= {0, 1}
@@ -145,30 +149,30 @@ def test_double_pendulum_is_chaotic_and_keeps_its_first_digits(
     assert 3 not in rows, "the number of joints is exact"
 
 
-def test_what_holds_and_what_does_not(course: Folder, found: dict[str, Any]) -> None:
-    script = found["examples/fall.py"]
+def test_what_holds_and_what_does_not(course: Folder, by_path: dict[str, Any]) -> None:
+    script = by_path["examples/fall.py"]
     assert (script["status"], script["chaotic"]) == ("measured", False)
     assert all(doubt["repeat"] == doubt["digits"] for doubt in script["doubts"])
     assert script["amplification"] < 1e4
     assert script["numbers"] == 3
-    [flip] = found["examples/limit.py"]["flips"]  # at a border other words are printed
+    [flip] = by_path["examples/limit.py"]["flips"]  # other words are printed near a threshold
     assert (flip["printed"], flip["other"]) == ("", "left or ")
-    doubts = found["examples/loose.py"]["doubts"]
+    doubts = by_path["examples/loose.py"]["doubts"]
     assert doubts and not any(doubt["compared"] for doubt in doubts)
     assert "(allowed for)" in course.main("check", "--sensitivity").out
-    # Warned of is what is compared and does not hold.
-    assert found["noise"] == ["examples/double.py", "examples/limit.py"]
+    # Only digits that are compared and do not repeat lead to warnings.
+    assert by_path["noise"] == ["examples/double.py", "examples/limit.py"]
     for form in ("junit", "sarif", "github"):
         assert "output-noise" in course.main("check", "--sensitivity", "--format", form).out, form
     report = json.loads(course.main("check", "--format", "json").out)
     assert ("sensitivity" in report, report["diagnostics"]) == (False, [])
 
 
-def test_digits_that_are_converged_are_right(course: Folder, found: dict[str, Any]) -> None:
-    exact = 0.9723658841  # rad, by Jacobi's functions
+def test_digits_that_are_converged_are_right(course: Folder, by_path: dict[str, Any]) -> None:
+    exact = 0.9723658841  # rad, by Jacobi's elliptic functions
     for name, least in (("Euler", 1), ("RK4", 4)):
-        # The count and the timestep are those of the whole.
-        [doubt] = found[f"examples/{name}.py"]["doubts"]
+        # The count and the timestep are those of the whole run.
+        [doubt] = by_path[f"examples/{name}.py"]["doubts"]
         assert doubt["repeat"] == doubt["digits"], "all runs print the same"
         assert doubt["printed"] != f"{exact:.7f}", "which is not right"
         assert least <= doubt["converged"] < doubt["digits"], name
@@ -176,37 +180,37 @@ def test_digits_that_are_converged_are_right(course: Folder, found: dict[str, An
         assert abs(float(doubt["instead"]) - exact) < 10**-decimals, name
 
 
-def test_report_as_text(course: Folder, found: dict[str, Any]) -> None:
-    done = course.main("check", "--sensitivity")
-    assert done.status == 0
-    assert "moving initial states" not in done.err, "all is remembered"
-    said = done.out[done.out.index("digits that repeat") :].splitlines()
-    assert said[:2] == [
+def test_report_as_text(course: Folder, by_path: dict[str, Any]) -> None:
+    result = course.main("check", "--sensitivity")
+    assert result.status == 0
+    assert "moving initial states" not in result.err, "all is remembered"
+    lines = result.out[result.out.index("digits that repeat") :].splitlines()
+    assert lines[:2] == [
         "digits that repeat when initial states are moved by 1e-12 (relative), and",
         "digits that are converged: half the timestep does not change them",
     ]
-    at = next(i for i, line in enumerate(said) if "examples/fall.py" in line)
+    at = next(i for i, line in enumerate(lines) if "examples/fall.py" in line)
     head = (
         "some      examples/fall.py  of 3 numbers 3 repeat in full, 2 are converged in full, states"
     )
-    assert said[at].startswith(head)
-    assert said[at].endswith(" times as far apart as they began")
+    assert lines[at].startswith(head)
+    assert lines[at].endswith(" times as far apart as they began")
     assert re.search(
-        r"of 5 digits 5 repeat, [0-4] are converged, print \S+  \(half the", said[at + 1]
+        r"of 5 digits 5 repeat, [0-4] are converged, print \S+  \(half the", lines[at + 1]
     )
-    assert "not asked examples/plain.py  it does not use MuJoCo" in said
+    assert "not asked examples/plain.py  it does not use MuJoCo" in lines
 
 
 def test_drifted_outputs_are_not_asked_and_a_warning_may_be_silenced(
-    course: Folder, found: dict[str, Any], tmp_path: Path
+    course: Folder, by_path: dict[str, Any], tmp_path: Path
 ) -> None:
-    copied = course.duplicate(tmp_path / "copied")
+    copy = course.duplicate(tmp_path / "copied")
     silence = '\n[[silence]]\nrule = "output-noise"\nreason = "the lesson is about borders"\n'
-    copied.write("content/course.toml", copied.text("content/course.toml") + silence)
-    assert measured(copied)["noise"] == []
-    copied.replace(copied.lesson(), "bodies 2\n```", "bodies 3\n```")
-    report = json.loads(copied.main("check", "--sensitivity", "--format", "json").out)
-    status = {one["path"]: one["status"] for one in report["sensitivity"]}
+    copy.write("content/course.toml", copy.text("content/course.toml") + silence)
+    assert measure(copy)["noise"] == []
+    copy.replace(copy.lesson(), "bodies 2\n```", "bodies 3\n```")
+    report = json.loads(copy.main("check", "--sensitivity", "--format", "json").out)
+    status = {script["path"]: script["status"] for script in report["sensitivity"]}
     assert status["examples/fall.py"] == "drifted"
 
 
@@ -215,8 +219,8 @@ def test_only_the_lessons_that_are_named(make: Make) -> None:
         "## One\n\n" + block("a.py", PLAIN, "nothing moves 1.5"),
         "## Two\n\n" + block("b.py", LIMIT, "right"),
     )
-    found = measured(folder, "1.1")
-    assert (set(found), found["noise"]) == ({"examples/a.py", "noise"}, [])
+    by_script = measure(folder, "1.1")
+    assert (set(by_script), by_script["noise"]) == ({"examples/a.py", "noise"}, [])
 
 
 # --- update
@@ -225,24 +229,24 @@ def test_only_the_lessons_that_are_named(make: Make) -> None:
 def test_update_warns_of_noise_that_it_records_and_asks_only_where_it_writes(make: Make) -> None:
     folder = make("## One\n\n" + block("a.py", DOUBLE, "?") + block("b.py", FALL, "?"))
     assert "moving initial states" not in folder.main("update", "--dry-run").err
-    done = folder.main("update")
-    assert done.status == 0
-    assert done.out.count("warning[output-noise]") == 1
-    assert "`examples/a.py` prints digits that are noise" in done.out
-    place = done.out[done.out.index("--> ") :].split()[1]
+    result = folder.main("update")
+    assert result.status == 0
+    assert result.out.count("warning[output-noise]") == 1
+    assert "`examples/a.py` prints digits that are noise" in result.out
+    place = result.out[result.out.index("--> ") :].split()[1]
     line = folder.text(folder.lesson()).splitlines()[int(place.split(":")[1]) - 1]
     assert line.startswith("t 30.0 "), "the place is that in the lesson as it is now"
     before = folder.main("explain", "examples/b.py").out
     folder.replace(folder.lesson(), 'print(f"x ', 'print(f"x = ')
-    done = folder.main("update")
-    assert done.status == 0
-    assert "output-noise" not in done.out
-    assert "moving initial states, 1 of 4 (1)" in done.err
-    assert "halving" not in done.err
-    done = folder.main("update")
-    assert "moving initial states" not in done.err
-    assert "every recorded output is up to date" in done.out
-    # Runs with moved states are remembered like others, and in the place of none.
+    result = folder.main("update")
+    assert result.status == 0
+    assert "output-noise" not in result.out
+    assert "moving initial states, 1 of 4 (1)" in result.err
+    assert "halving" not in result.err
+    result = folder.main("update")
+    assert "moving initial states" not in result.err
+    assert "every recorded output is up to date" in result.out
+    # Runs with moved states are remembered, too, and replace no other results.
     folder.replace(folder.lesson(), 'print(f"x = ', 'print(f"x ')
     assert folder.main("explain", "examples/b.py").out == before
     folder.main("update", "-q")

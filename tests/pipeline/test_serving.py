@@ -1,4 +1,4 @@
-"""`serve`: a preview in a process of its own, asked over HTTP."""
+"""`serve`: requests to a preview in a process."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.site
 
 @pytest.fixture(scope="module")
 def preview(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[Preview]:
-    """A preview that opens a browser, which notes what it was told and how it was answered."""
+    """A preview that opens a browser, which records its arguments and the answer."""
     folder = Folder(tmp_path_factory.mktemp("served") / "a cöurse")
     folder.fill([GOOD + "![A](../pic%20ä.svg) and $x$\n"], stores)
     folder.write("content/pic ä.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>')
@@ -41,9 +41,9 @@ def preview(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[
 
 
 def test_browser_is_opened_when_the_address_answers(preview: Preview) -> None:
-    told = preview.folder.tmp / "told"
-    wait_for_file(told)
-    assert told.read_text() == f"http://127.0.0.1:{preview.port}/ 200"
+    calls = preview.folder.tmp / "told"
+    wait_for_file(calls)
+    assert calls.read_text() == f"http://127.0.0.1:{preview.port}/ 200"
 
 
 def test_pages_and_files_have_their_types(preview: Preview) -> None:
@@ -80,19 +80,19 @@ def test_every_address_of_a_page_is_there(preview: Preview) -> None:
 def test_what_has_its_hash_in_its_name_may_be_kept(preview: Preview) -> None:
     page = preview.get("/index.html")[2].decode()
     (style,) = re.findall(r'href="(assets/[^"]+\.css)"', page)
-    for path, kept in (
+    for path, cache_control in (
         (f"/{style}", "max-age=31536000, immutable"),
         ("/assets/nothing.00000000.css", "no-store"),
         ("/index.html", "no-store"),
     ):
-        assert preview.get(path)[1]["Cache-Control"] == kept
+        assert preview.get(path)[1]["Cache-Control"] == cache_control
 
 
 def test_address_of_nothing_has_the_page_that_says_so(preview: Preview) -> None:
     status, headers, body = preview.get("/no/such/page.html")
     assert (status, headers["Content-Type"]) == (404, "text/html; charset=utf-8")
     assert b"There is no page at this address" in body
-    assert b'data-page="no/such/page.html" data-state=""' in body  # it is told once it is there
+    assert b'data-page="no/such/page.html" data-state=""' in body  # it is told when it connects
 
 
 OUTSIDE = (
@@ -117,12 +117,12 @@ OUTSIDE = (
 
 
 def test_nothing_but_the_site_is_served(preview: Preview) -> None:
-    given = []
+    answers = []
     for path in OUTSIDE:
         status, _, body = preview.get(path)
         if status != 404 or b"not of the site" in body or b"root:" in body:
-            given.append((path, status))
-    assert given == []
+            answers.append((path, status))
+    assert answers == []
 
 
 def test_head_has_no_body_and_other_methods_are_refused(preview: Preview) -> None:
@@ -131,18 +131,18 @@ def test_head_has_no_body_and_other_methods_are_refused(preview: Preview) -> Non
         assert (status, body) == (404 if path == "/nothing" else 200, b"")
         assert headers["Content-Type"].startswith("text/")
     methods = ("PUT", "DELETE", "OPTIONS", "TRACE", "NONSENSE")
-    found = {method: preview.get("/", method)[0] for method in methods}
-    assert found == dict.fromkeys(methods, 501)
+    statuses = {method: preview.get("/", method)[0] for method in methods}
+    assert statuses == dict.fromkeys(methods, 501)
 
 
-# --- who is answered
+# --- access
 
 SITE, MODE, DEST = "Sec_Fetch_Site", "Sec_Fetch_Mode", "Sec_Fetch_Dest"
 LINK = {SITE: "cross-site", MODE: "navigate", DEST: "document"}
 CALLERS: tuple[tuple[dict[str, str], int], ...] = (
     ({"Host": "127.0.0.1:PORT"}, 200),
     ({"Host": "LOCALHOST:PORT"}, 200),
-    ({"Host": "localhost:9"}, 200),  # a port that is forwarded
+    ({"Host": "localhost:9"}, 200),  # a forwarded port
     ({"Host": "[::1]:PORT"}, 200),
     ({"Host": "192.0.2.7"}, 200),  # an address cannot be made to point elsewhere
     ({"Host": "evil.example:PORT"}, 403),
@@ -170,22 +170,22 @@ PRIVATE = {
 
 
 def test_other_origins_can_only_link_to_the_preview(preview: Preview) -> None:
-    wrong = []
+    failures = []
     for path, method in (("/", "GET"), ("/search/index.js", "GET"), ("/", "POST"), ("/", "PUT")):
-        for given, status in CALLERS:
-            headers = {n: v.replace("PORT", str(preview.port)) for n, v in given.items()}
-            got, told, body = preview.get(path, method, **headers)
+        for caller, status in CALLERS:
+            headers = {n: v.replace("PORT", str(preview.port)) for n, v in caller.items()}
+            got_status, answer_headers, body = preview.get(path, method, **headers)
             expected = {"GET": status, "PUT": 501}.get(method, 403)
-            if method == "POST" and given == {"Origin": "http://127.0.0.1:PORT"}:
+            if method == "POST" and caller == {"Origin": "http://127.0.0.1:PORT"}:
                 expected = 405
-            told_more = got == 403 and b"Scratch" in body
-            if got != expected or told_more or told | PRIVATE != told:
-                wrong.append((path, method, given, got, told))
-    assert wrong == []
+            told_more = got_status == 403 and b"Scratch" in body
+            if got_status != expected or told_more or answer_headers | PRIVATE != answer_headers:
+                failures.append((path, method, caller, got_status, answer_headers))
+    assert failures == []
 
 
 def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> None:
-    """Of a course that names everything from where the published site will be, too."""
+    """Also for a course that will be published in a folder of a host."""
     origins = ("vscode-webview:", "https://*.example.org:8080")
     folder = make(GOOD)
     folder.replace("content/course.toml", "[course]", '[course]\nbase_url = "https://x.org/a/b"')
@@ -195,13 +195,13 @@ def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> No
         assert (status, headers["Content-Security-Policy"]) == (200, policy)
         assert preview.get("/", **{SITE: "cross-site", DEST: "script"})[0] == 403
         status, _, body = preview.get("/no/such/page.html")
-        found = re.findall(rb'<link rel="stylesheet" href="(/a/b/assets/[^"]+)">', body)
-        assert (status, len(found)) == (404, 1)
-        assert preview.get(found[0].decode())[1]["Content-Type"] == "text/css; charset=utf-8"
+        sheets = re.findall(rb'<link rel="stylesheet" href="(/a/b/assets/[^"]+)">', body)
+        assert (status, len(sheets)) == (404, 1)
+        assert preview.get(sheets[0].decode())[1]["Content-Type"] == "text/css; charset=utf-8"
         assert b"Scratch" in preview.get("/a/b/")[2]
-    for wrong in ("example.org", "https://a;script-src *", "*"):
-        done = folder.main("serve", "--embed", wrong)
-        assert (done.status, "is no origin" in done.err) == (2, True)
+    for bad_origin in ("example.org", "https://a;script-src *", "*"):
+        result = folder.main("serve", "--embed", bad_origin)
+        assert (result.status, "is no origin" in result.err) == (2, True)
 
 
 def test_other_machines_need_the_token_of_the_link(make: Make) -> None:
@@ -218,22 +218,22 @@ def test_other_machines_need_the_token_of_the_link(make: Make) -> None:
         assert (status, headers["Location"]) == (303, "/evil.example/?a=1")
         cookie, *rules = headers["Set-Cookie"].split("; ")
         assert rules == ["Path=/", "HttpOnly", "SameSite=Lax"]
-        for known, status in ((f"a=b; {cookie}", 200), (f"{cookie}x", 403), (cookie[:-1], 403)):
-            assert preview.get("/", Cookie=known, **away)[0] == status, known
+        for cookies, status in ((f"a=b; {cookie}", 200), (f"{cookie}x", 403), (cookie[:-1], 403)):
+            assert preview.get("/", Cookie=cookies, **away)[0] == status, cookies
         assert preview.get("/", Cookie=cookie, **{SITE: "cross-site"})[0] == 403
         assert listening(preview) == ["00000000"]
 
 
 def listening(preview: Preview) -> list[str]:
     """The addresses at which something listens on the preview's port."""
-    found = []
+    addresses = []
     for table in ("/proc/net/tcp", "/proc/net/tcp6"):
         with contextlib.suppress(FileNotFoundError):
             for row in Path(table).read_text().splitlines()[1:]:
                 address, state = row.split()[1], row.split()[3]
                 if state == "0A" and address.endswith(f":{preview.port:04X}"):
-                    found.append(address.partition(":")[0])
-    return found
+                    addresses.append(address.partition(":")[0])
+    return addresses
 
 
 def test_preview_listens_on_the_loopback_only(preview: Preview) -> None:
@@ -241,7 +241,10 @@ def test_preview_listens_on_the_loopback_only(preview: Preview) -> None:
 
 
 def test_port_or_host_that_cannot_be_had_is_told(preview: Preview) -> None:
-    for host, why in (("127.0.0.1", "Address already in use"), ("no.invalid", "Name or service")):
-        done = preview.folder.main("serve", "--host", host, "--port", str(preview.port))
-        assert (done.status, done.out) == (2, "")
-        assert f"port {preview.port} of {host} cannot be used: {why}" in done.err
+    for host, reason in (
+        ("127.0.0.1", "Address already in use"),
+        ("no.invalid", "Name or service"),
+    ):
+        result = preview.folder.main("serve", "--host", host, "--port", str(preview.port))
+        assert (result.status, result.out) == (2, "")
+        assert f"port {preview.port} of {host} cannot be used: {reason}" in result.err

@@ -1,4 +1,4 @@
-"""`serve`: saves of every kind, what open pages are told of them, and how a preview ends."""
+"""`serve`: saves of every kind, the news for open pages, and how a preview ends."""
 
 from __future__ import annotations
 
@@ -30,31 +30,31 @@ def test_page_is_told_of_every_save(make: Make) -> None:
         assert shows(b"Hello again")
         folder.replace(folder.lesson(), "3.14159\n```", "3.14158\n```")
         events.wait_until_settled("output-drift")
-        assert shows(b"3.14158")  # the page is new, and says what is wrong with it
+        assert shows(b"3.14158")  # the page is redrawn, and shows the mistake
         folder.replace(folder.lesson(), "## Hello again\n", "## Never [x](lesson:9.9)\n")
-        events.until(lambda told: "link-lesson" in told.rules())
+        events.until(lambda page: "link-lesson" in page.rules())
         assert events.news["kept"]
         assert shows(b"Hello again") and not shows(b"Never")  # the last good page
-        with preview.events("index.html") as late:  # a page that is opened now is told as well
-            late.until(lambda told: "link-lesson" in told.rules())
+        with preview.events("index.html") as late:  # a page that is opened now gets the news, too
+            late.until(lambda page: "link-lesson" in page.rules())
         folder.write(folder.lesson(), GOOD)
         events.wait_until_settled()
         assert shows(b"Hello") and not shows(b"Hello again")
         # The map is gone, and back.
         map_ = folder.read("content/course.toml")
         (folder.root / "content/course.toml").unlink()
-        events.until(lambda told: "map-missing" in told.rules())
+        events.until(lambda page: "map-missing" in page.rules())
         assert shows(b"Hello")
         folder.write("content/course.toml", map_)
         events.wait_until_settled()
 
 
 def test_terminal_tells_what_is_new_and_what_is_gone(make: Make) -> None:
-    """Wherever lines have moved to."""
+    """Mistakes whose lines have moved are not new."""
     folder = make(GOOD)
     with serve_preview(folder) as preview:
         preview.wait_for_line("checked: everything holds")
-        for text, mistakes, said in (
+        for text, mistakes, verdict in (
             ("[a](lesson:8.1)\n\n[b](lesson:8.2)\n", ["8.1", "8.2"], "2 errors (2 new)"),
             ("Text.\n\n[b](lesson:8.2)\n\n[c](#c)\n", ["link-anchor"], "2 errors (1 new, 1 gone)"),
             ("More.\n\nText.\n\n[b](lesson:8.2)\n\n[c](#c)\n", [], "still 2 errors"),
@@ -63,13 +63,15 @@ def test_terminal_tells_what_is_new_and_what_is_gone(make: Make) -> None:
         ):
             before = len(preview.lines)
             folder.write(folder.lesson(), GOOD + text)
-            preview.wait_for_line(f"checked: {said}", before)
+            preview.wait_for_line(f"checked: {verdict}", before)
             lines = preview.lines[before:]
             new = [line for line in lines if line.startswith("error[")]
             assert len(new) == len(mistakes)
             assert all(mistake in line for mistake, line in zip(mistakes, new, strict=True))
-            gone = [line for line in lines if line.startswith(f"gone: {folder.lesson()}:")]
-            assert len(gone) == {"2 errors (1 new, 1 gone)": 1, "": 2}.get(said if text else "", 0)
+            gone_lines = [line for line in lines if line.startswith(f"gone: {folder.lesson()}:")]
+            assert len(gone_lines) == {"2 errors (1 new, 1 gone)": 1, "": 2}.get(
+                verdict if text else "", 0
+            )
 
 
 def in_place(path: Path, text: str) -> None:
@@ -121,8 +123,8 @@ def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make)
             events.wait_for_change()
             assert name.encode() in preview.get("/lessons/1.1-one.html")[2], name
             events.wait_until_settled()
-            told = [line for line in preview.lines[before:] if not line.startswith("checked")]
-            assert len(told) == 1 and told[0].startswith("changed: content/lessons/1.1-one.md (")
+            lines = [line for line in preview.lines[before:] if not line.startswith("checked")]
+            assert len(lines) == 1 and lines[0].startswith("changed: content/lessons/1.1-one.md (")
         before = len(preview.lines)
         for path in pictures:
             (folder.root / path).unlink()
@@ -132,8 +134,8 @@ def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make)
         for page in ("1.1-one", "1.6-six"):
             assert b"Two" in preview.get(f"/lessons/{page}.html")[2]
         events.wait_until_settled()
-        changed = [line for line in preview.lines[before:] if line.startswith("changed: ")]
-        assert len(changed) == 1, changed
+        change_lines = [line for line in preview.lines[before:] if line.startswith("changed: ")]
+        assert len(change_lines) == 1, change_lines
 
 
 def test_pages_elsewhere_are_followed_and_two_browsers_told_alike(make: Make) -> None:
@@ -147,18 +149,18 @@ def test_pages_elsewhere_are_followed_and_two_browsers_told_alike(make: Make) ->
             folder.write("README.md", "Two.\n")
             events.wait_for_change()
             assert b"Two." in preview.get("/readme.html")[2]
-        with preview.events() as one, preview.events() as two:
-            one.wait_until_settled()
-            two.wait_until_settled()
-            assert (old := one.state) == two.state
+        with preview.events() as first, preview.events() as second:
+            first.wait_until_settled()
+            second.wait_until_settled()
+            assert (old := first.state) == second.state
             folder.replace(folder.lesson(), "## Hello", "## Both")
-            assert one.wait_for_change().state == two.wait_for_change().state
+            assert first.wait_for_change().state == second.wait_for_change().state
         folder.replace(folder.lesson(), "## Both", "## Later")
-        with preview.events("lessons/1.2-two.html") as other:
-            other.wait_until_settled()
-            assert other.pages == 1  # nothing of its own changed
+        with preview.events("lessons/1.2-two.html") as second_page:
+            second_page.wait_until_settled()
+            assert second_page.pages == 1  # nothing of its own changed
         with preview.events() as back:
-            assert back.until(lambda told: bool(told.state)).state not in (old, one.state)
+            assert back.until(lambda page: bool(page.state)).state not in (old, first.state)
             back.wait_until_settled()
 
 
@@ -169,12 +171,12 @@ def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_fo
     folder = make("## First\n\n" + block("x.py", code, "1", info="timeout=3000"))
     with serve_preview(folder) as preview, preview.events() as events:
         wait_for_file(folder.root / "begun")
-        assert events.until(lambda told: bool(told.news["scripts"])).news["scripts"] == [
+        assert events.until(lambda page: bool(page.news["scripts"])).news["scripts"] == [
             {"path": "examples/x.py", "state": "running"}
         ]
-        # It goes on while something else is saved.
+        # It continues while another file is saved.
         folder.replace(folder.lesson(), "## First", "## Second")
-        events.until(lambda told: b"Second" in preview.get("/lessons/1.1-one.html")[2])
+        events.until(lambda page: b"Second" in preview.get("/lessons/1.1-one.html")[2])
         folder.write("go", "")
         events.wait_until_settled("script-writes")
         assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
@@ -182,7 +184,7 @@ def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_fo
         (folder.root / "go").unlink()
         folder.replace(folder.lesson(), "print(1)", "print(int(1))")
         wait_for_file(folder.root / "begun", 2)
-        events.until(lambda told: told.news["scripts"][0]["state"] == "running")
+        events.until(lambda page: page.news["scripts"][0]["state"] == "running")
         folder.replace(folder.lesson(), HELD, "")
         events.wait_until_settled("script-writes")
         assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
@@ -198,8 +200,8 @@ def test_what_a_script_prints_is_shown_while_others_run(make: Make) -> None:
         events.wait_until_settled()
         (folder.root / "go").unlink()
         folder.write("models/data.txt", "2")
-        events.until(lambda told: told.news["outputs"][0]["state"] == "drift")
-        assert events.news["outputs"][1]["state"] == "verified"  # as far as is known
+        events.until(lambda page: page.news["outputs"][0]["state"] == "drift")
+        assert events.news["outputs"][1]["state"] == "verified"  # with what is known
         folder.write("go", "")
         events.wait_until_settled("output-drift", "output-drift")
         assert all(output["offer"] for output in events.news["outputs"])
@@ -211,7 +213,7 @@ def test_course_that_is_wrong_from_the_beginning(make: Make) -> None:
     folder.write("content/course.toml", "[course\n")
     page = "/lessons/1.1-one.html"
     with serve_preview(folder) as preview, preview.events() as events:
-        events.until(lambda told: "map-syntax" in told.rules())
+        events.until(lambda page: "map-syntax" in page.rules())
         status, _, body = preview.get("/")
         assert status == 404
         assert b"Nothing is built yet." in body and b"/.coursebuild/preview.js" in body
@@ -224,7 +226,7 @@ def test_course_that_is_wrong_from_the_beginning(make: Make) -> None:
         assert b"/.coursebuild/preview.js" in body
         assert b"Scratch" in preview.get("/")[2]
         folder.write(folder.lesson(), GOOD)
-        events.until(lambda told: told.state != "")
+        events.until(lambda page: page.state != "")
         assert b"hello 3.14159" in preview.get(page)[2]
     assert not (folder.root / "public").exists()
 

@@ -1,4 +1,4 @@
-"""Work divided between machines: everything exactly once, whatever each of them knows."""
+"""Work divided among machines: everything is done exactly once."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_every_name_is_in_exactly_one_part(
     assert set(parts) == set(names)
     assert set(parts.values()) <= set(range(1, count + 1))
     assert split(list(reversed(names)), count, dict(reversed(seconds.items()))) == parts
-    alike = list(split(names, count, {}).values())  # without times they are equally large
+    alike = list(split(names, count, {}).values())  # without times, all parts are equally large
     sizes = [alike.count(part) for part in range(1, count + 1)]
     assert max(sizes) - min(sizes) <= 1
 
@@ -74,8 +74,8 @@ def test_file_that_holds_no_timings_is_refused_and_kept(tmp_path: Path) -> None:
         file.write_bytes(data)
         with pytest.raises(UsageError) as caught:
             read_timings(str(file))
-        said = f"--timings: {file} holds no times; `--write-timings` writes such a file"
-        assert str(caught.value) == said
+        message = f"--timings: {file} holds no times; `--write-timings` writes such a file"
+        assert str(caught.value) == message
         with pytest.raises(UsageError):
             write_timings(str(file), {"a": 1.0}, ["a"])
         assert file.read_bytes() == data, "what somebody else put there stays"
@@ -84,23 +84,23 @@ def test_file_that_holds_no_timings_is_refused_and_kept(tmp_path: Path) -> None:
 def test_timings_that_cannot_be_read_or_written_are_told(tmp_path: Path) -> None:
     with pytest.raises(UsageError) as caught:
         read_timings(str(tmp_path / "none.json"))
-    said = f"--timings: {tmp_path}/none.json cannot be read: no such file or directory"
-    assert str(caught.value) == said
+    message = f"--timings: {tmp_path}/none.json cannot be read: no such file or directory"
+    assert str(caught.value) == message
     (tmp_path / "file").write_text("")
     with pytest.raises(UsageError, match=r"^--write-timings: "):
         write_timings(str(tmp_path / "file/times.json"), {"a": 1.0}, ["a"])
 
 
 def test_times_are_written_sorted_and_merged(tmp_path: Path) -> None:
-    one, two = tmp_path / "1.json", tmp_path / "2.json"
-    write_timings(str(one), {"b": 2.00049, "a": 1.0, "old": 3.0}, ["a", "b", "old"])
-    write_timings(str(one), {"b": 5.0}, ["a", "b"])
-    assert json.loads(one.read_bytes()) == {"seconds": {"a": 1.0, "b": 5.0}}
-    assert one.read_bytes().startswith(b'{\n  "seconds": {\n    "a": 1.0,')
-    assert read_timings(str(one)) == {"a": 1.0, "b": 5.0}
-    write_timings(str(two), {"b": 2.0, "c": 3.0}, ["b", "c"])
-    first = read_shard("1/2", [str(one), str(two)])
-    assert first == read_shard("1/2", [str(two), str(one)])
+    first_file, second_file = tmp_path / "1.json", tmp_path / "2.json"
+    write_timings(str(first_file), {"b": 2.00049, "a": 1.0, "old": 3.0}, ["a", "b", "old"])
+    write_timings(str(first_file), {"b": 5.0}, ["a", "b"])
+    assert json.loads(first_file.read_bytes()) == {"seconds": {"a": 1.0, "b": 5.0}}
+    assert first_file.read_bytes().startswith(b'{\n  "seconds": {\n    "a": 1.0,')
+    assert read_timings(str(first_file)) == {"a": 1.0, "b": 5.0}
+    write_timings(str(second_file), {"b": 2.0, "c": 3.0}, ["b", "c"])
+    first = read_shard("1/2", [str(first_file), str(second_file)])
+    assert first == read_shard("1/2", [str(second_file), str(first_file)])
     assert first is not None and dict(first.seconds) == {"a": 1.0, "b": 5.0, "c": 3.0}
 
 
@@ -116,23 +116,25 @@ def test_all_parts_together_are_the_course(make: Make) -> None:
     folder = make(LESSON + block("bad.py", "print(1)\n", "2"))
     times = folder.root / "times.json"
     assert folder.main("check", "--write-timings", str(times)).status == 1
-    everything = ["examples/bad.py", *(f"examples/s{number}.py" for number in range(5))]
-    assert sorted(read_timings(str(times))) == everything
-    for more in ([], ["--timings", str(times)]):
-        found: list[str] = []
+    all_paths = ["examples/bad.py", *(f"examples/s{number}.py" for number in range(5))]
+    assert sorted(read_timings(str(times))) == all_paths
+    for options in ([], ["--timings", str(times)]):
+        paths: list[str] = []
         for part in (1, 2, 3):
-            done = folder.main("check", "--shard", f"{part}/3", "--format", "json", *more)
-            scripts = [script["path"] for script in json.loads(done.out)["scripts"]]
-            assert done.status == ("examples/bad.py" in scripts), "its mistake is told there alone"
-            found += scripts
-        assert sorted(found) == everything
+            result = folder.main("check", "--shard", f"{part}/3", "--format", "json", *options)
+            scripts = [script["path"] for script in json.loads(result.out)["scripts"]]
+            assert result.status == ("examples/bad.py" in scripts), (
+                "its mistake is told there alone"
+            )
+            paths += scripts
+        assert sorted(paths) == all_paths
 
 
 @pytest.mark.site
 def test_a_part_with_nothing_to_do_is_no_mistake(make: Make) -> None:
     folder = make("## A\n\n" + block("a.py", "print(1)\n", "1"))
     reports = [folder.main("check", "--shard", f"{part}/3") for part in (1, 2, 3)]
-    assert [done.status for done in reports] == [0, 0, 0]
-    ends = sorted(done.out.splitlines()[-1] for done in reports)
+    assert [result.status for result in reports] == [0, 0, 0]
+    ends = sorted(result.out.splitlines()[-1] for result in reports)
     assert [end for end in ends if "0 scripts run" in end] == ends[:2]
     assert "this was part 1/3 of the work: " in reports[0].out

@@ -1,4 +1,4 @@
-"""What is kept of a document in the place of its text tells the rest of the course the same."""
+"""Summaries of documents serve the rest of the course as well as the whole documents."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ FIXTURES = [
 ENTRY = '[[level.lesson]]\nid = "1.{0}"\nslug = "l"\ntitle = "L"\nstatus = "complete"\n'
 
 
-def known_of(loaded: Parsed[Course | None]) -> Iterator[object]:
-    """What is known of a course by its documents, first what is wrong with it."""
-    course = loaded.value
+def parts_of(parsed_course: Parsed[Course | None]) -> Iterator[object]:
+    """The diagnostics of a course, then what its documents hold for the others."""
+    course = parsed_course.value
     assert course is not None
     extracted = extract(course)
     runs = [
@@ -38,7 +38,7 @@ def known_of(loaded: Parsed[Course | None]) -> Iterator[object]:
         for i, e in enumerate(extracted.value, 1)
     ]
     verdicts = verify(course, runs)
-    yield {(d.rule, d.span.path, d.span.start, d.message) for d in loaded.diagnostics}
+    yield {(d.rule, d.span.path, d.span.start, d.message) for d in parsed_course.diagnostics}
     yield [(t.text, t.code, t.block.span, t.lines_before) for t in mjcf_texts(course)]
     yield extracted.diagnostics
     yield [(e.path, e.text, e.owner, e.script) for e in extracted.value]
@@ -51,7 +51,7 @@ def known_of(loaded: Parsed[Course | None]) -> Iterator[object]:
 
 
 def test_course_of_summaries_tells_what_the_whole_course_tells(tmp_path: Path) -> None:
-    """Of lessons as they are just read, and from the store."""
+    """For lessons that were just read, and from the store."""
     entries = "".join(ENTRY.format(n) for n in range(len(FIXTURES)))
     folder = Folder(tmp_path)
     folder.write(
@@ -60,14 +60,14 @@ def test_course_of_summaries_tells_what_the_whole_course_tells(tmp_path: Path) -
     )
     for n, path in enumerate(FIXTURES):
         folder.write(f"content/lessons/1.{n}-l.md", path.read_bytes())
-    (wrong, *whole) = known_of(load(tmp_path))
+    (diagnostics, *whole) = parts_of(load(tmp_path))
     for _ in range(2):
         with Documents(Memo(tmp_path), 1) as documents:
-            (found, *kept) = known_of(load(tmp_path, documents))
-        assert isinstance(found, set) and isinstance(wrong, set)
-        assert len(wrong) > 1000
-        assert found > wrong, "formulas are looked at as well"
-        assert kept == whole
+            (diagnostics_of_summaries, *parts_of_summaries) = parts_of(load(tmp_path, documents))
+        assert isinstance(diagnostics_of_summaries, set) and isinstance(diagnostics, set)
+        assert len(diagnostics) > 1000
+        assert diagnostics_of_summaries > diagnostics, "formulas are looked at as well"
+        assert parts_of_summaries == whole
 
 
 TEXT = "".join(

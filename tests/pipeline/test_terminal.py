@@ -66,23 +66,23 @@ class Terminal:
             preexec_fn=_controlling,
         )
         os.close(slave)
-        self.shown = ""
+        self.coloured_output = ""
         self._letters = codecs.getincrementaldecoder("utf-8")()
 
     def read(self, until: str | None = None, seconds: float = 300.0) -> str:
-        """What is shown, up to what fits a pattern or the end."""
+        """Read what is shown, up to a match of a pattern or to the end."""
         end = time.monotonic() + seconds
-        while until is None or not re.search(until, self.shown):
+        while until is None or not re.search(until, self.coloured_output):
             left = end - time.monotonic()
-            assert left > 0, f"{until!r} was not shown, but {self.shown!r}"
+            assert left > 0, f"{until!r} was not shown, but {self.coloured_output!r}"
             if not select.select([self.master], [], [], left)[0]:
                 continue
             try:
                 data = os.read(self.master, 1 << 16)
-            except OSError:  # EIO: nobody has the terminal open any more
+            except OSError:  # EIO: no process has the terminal open any more
                 break
-            self.shown += self._letters.decode(data)
-        return self.shown
+            self.coloured_output += self._letters.decode(data)
+        return self.coloured_output
 
     def type(self, keys: bytes) -> None:
         os.write(self.master, keys)
@@ -95,31 +95,31 @@ def _controlling() -> None:
 
 @contextlib.contextmanager
 def terminal(folder: Folder, *arguments: str, columns: int = 80, **env: str) -> Iterator[Terminal]:
-    made = Terminal(folder, *arguments, columns=columns, **env)
+    session = Terminal(folder, *arguments, columns=columns, **env)
     try:
-        with kill_at_end(made.process):
-            yield made
+        with kill_at_end(session.process):
+            yield session
     finally:
-        os.close(made.master)
+        os.close(session.master)
 
 
-def screen(shown: str) -> str:
-    """What stays on a terminal: an erased line does not."""
+def screen(output: str) -> str:
+    """What stays on a terminal, without erased lines."""
     lines = []
-    for line in shown.replace("\r\n", "\n").split("\n"):
+    for line in output.replace("\r\n", "\n").split("\n"):
         lines.append(line.rpartition(ERASE)[2])
     return re.sub(r"\x1b\[[0-9;]*m", "", "\n".join(lines))
 
 
 def test_a_terminal_shows_what_runs_and_then_only_the_results(make: Make) -> None:
-    held = block("a.py", HELD + "print(1)", "1", info="timeout=600")
-    folder = make("## One\n\n" + held + block("b.py", "print(2)", "2"))
-    with terminal(folder, "check", "--jobs", "2") as shown:
-        shown.read("running scripts 0/2  ")
-        shown.read(r"running scripts 1/2  examples/a\.py [1-9]\d* s")
+    lesson = block("a.py", HELD + "print(1)", "1", info="timeout=600")
+    folder = make("## One\n\n" + lesson + block("b.py", "print(2)", "2"))
+    with terminal(folder, "check", "--jobs", "2") as window:
+        window.read("running scripts 0/2  ")
+        window.read(r"running scripts 1/2  examples/a\.py [1-9]\d* s")
         folder.write("go", "")
-        text = shown.read()
-        assert shown.process.wait(120) == 0, text
+        text = window.read()
+        assert window.process.wait(120) == 0, text
     assert without_seconds(screen(text)) == (
         "ok       examples/a.py  # s\n"
         "ok       examples/b.py  # s\n"
@@ -132,11 +132,11 @@ def test_a_terminal_shows_what_runs_and_then_only_the_results(make: Make) -> Non
 def test_the_live_line_fits_the_terminal(make: Make) -> None:
     names = [f"{'長い名前' * 4}_{n}.py" for n in range(3)]
     folder = make("## One\n\n" + "".join(block(name, HELD, info="timeout=600") for name in names))
-    with terminal(folder, "check", "--jobs", "3", columns=44) as shown:
-        shown.read("running scripts 0/3  examples/長い")
+    with terminal(folder, "check", "--jobs", "3", columns=44) as window:
+        window.read("running scripts 0/3  examples/長い")
         folder.write("go", "")
-        text = shown.read()
-        assert shown.process.wait(120) == 0
+        text = window.read()
+        assert window.process.wait(120) == 0
     live = [part.partition("\r")[0] for part in text.split(ERASE) if part.startswith("running")]
     assert live
     assert max(sum(2 if ch > "⺀" else 1 for ch in line) for line in live) <= 43
@@ -147,18 +147,18 @@ def test_colours_are_for_a_terminal_that_wants_them(
 ) -> None:
     folder = make(GOOD + "[gone](lesson:7.7)\n")
 
-    def shown(**env: str) -> str:
-        with terminal(folder, "check", **env) as opened:
-            text = opened.read()
-            assert opened.process.wait(120) == 1
+    def coloured_output(**env: str) -> str:
+        with terminal(folder, "check", **env) as window:
+            text = window.read()
+            assert window.process.wait(120) == 1
         assert "error[link-lesson]: " in re.sub(r"\x1b\[[0-9;]*m", "", text)
         return text
 
-    dumb = shown(TERM="dumb")
+    dumb = coloured_output(TERM="dumb")
     assert "\x1b" not in dumb
     assert "  examples/hello.py\r\n" in dumb
-    assert "\x1b[" in shown(NO_COLOR="").replace(ERASE, "")
-    assert "\x1b" not in shown(NO_COLOR="1").replace(ERASE, "")
+    assert "\x1b[" in coloured_output(NO_COLOR="").replace(ERASE, "")
+    assert "\x1b" not in coloured_output(NO_COLOR="1").replace(ERASE, "")
     for forced, none, coloured in (("1", "", True), ("", "", False), ("1", "1", False)):
         monkeypatch.setenv("FORCE_COLOR", forced)
         monkeypatch.setenv("NO_COLOR", none)
@@ -166,33 +166,33 @@ def test_colours_are_for_a_terminal_that_wants_them(
 
 
 def test_quiet_on_a_terminal_shows_nothing(make: Make) -> None:
-    with terminal(make(GOOD), "build", "--quiet") as shown:
-        assert shown.read() == ""
-        assert shown.process.wait(120) == 0
+    with terminal(make(GOOD), "build", "--quiet") as window:
+        assert window.read() == ""
+        assert window.process.wait(120) == 0
 
 
 def test_ctrl_c_in_a_terminal_interrupts(make: Make) -> None:
     folder = make("## One\n\n" + slow("slow.py"))
-    with terminal(folder, "check") as shown:
-        shown.read(r"examples/slow\.py [1-9]\d* s")
-        shown.type(b"\x03")
-        text = shown.read()
-        assert shown.process.wait(120) == 130
+    with terminal(folder, "check") as window:
+        window.read(r"examples/slow\.py [1-9]\d* s")
+        window.type(b"\x03")
+        text = window.read()
+        assert window.process.wait(120) == 130
     assert screen(text).replace("^C", "").strip() == "interrupted"
     wait_until_alone(folder)
 
 
 def test_ctrl_c_ends_a_preview_whatever_it_does(make: Make) -> None:
-    """A script and a lab, in haste; nothing, once."""
+    """While a script and a lab run, by several Ctrl-C; while nothing runs, by one."""
     lab = {"title": "A lab", "model": "ball", "readouts": [{"label": "t", "expr": "data.time"}]}
     folder = make("## One\n\n" + slow("slow.py") + f"```lab\n{json.dumps(lab)}\n```\n")
     ball = "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
     folder.write("models/ball.xml", ball)
-    with terminal(folder, "serve", "--port", "0", **SILENT) as shown:
-        shown.read("running scripts 0/1")
-        shown.type(b"\x03\x03\x03\x03")
-        text = shown.read()
-        assert shown.process.wait(120) == 130
+    with terminal(folder, "serve", "--port", "0", **SILENT) as window:
+        window.read("running scripts 0/1")
+        window.type(b"\x03\x03\x03\x03")
+        text = window.read()
+        assert window.process.wait(120) == 130
     assert screen(text).rstrip().endswith("interrupted")
     assert "Traceback" not in text
     wait_until_alone(folder)
@@ -201,13 +201,13 @@ def test_ctrl_c_ends_a_preview_whatever_it_does(make: Make) -> None:
     folder.write(
         folder.lesson(), "## One\n\n" + block("a.py", "import shared\nprint(shared.X)", "1")
     )
-    with terminal(folder, "serve", "--port", "0", "--host", "0.0.0.0") as shown:
-        shown.read("everything holds")
+    with terminal(folder, "serve", "--port", "0", "--host", "0.0.0.0") as window:
+        window.read("everything holds")
         folder.write("lib/shared.py", "X = 2\n")
-        shown.read("output-drift")
-        shown.type(b"\x03")
-        text = shown.read()
-        assert shown.process.wait(120) == 130
+        window.read("output-drift")
+        window.type(b"\x03")
+        text = window.read()
+        assert window.process.wait(120) == 130
     assert "▄" in text, "the link as a picture, for the camera of a phone"
     wait_until_alone(folder)
 
@@ -220,7 +220,7 @@ def test_reader_that_has_seen_enough_makes_no_noise_and_the_verdict_stands(make:
     folder = make(GOOD + mistakes)
     for arguments in (["check", "--format", "json"], ["extract"]):
         read, write = os.pipe()
-        os.close(read)  # nobody will ever read
+        os.close(read)  # nothing is ever read from it
         with kill_at_end(folder.start(*arguments, stdout=write, stderr=subprocess.PIPE)) as process:
             os.close(write)
             errors = process.communicate(timeout=120)[1].decode()
@@ -243,8 +243,8 @@ def test_full_disk_is_told(make: Make) -> None:
 def test_build_with_closed_streams_works(make: Make) -> None:
     folder = make(GOOD)
     line = ["bash", "-c", '"$@" >&- 2>&- <&-', "bash", *command("build")]
-    done = subprocess.run(line, cwd=folder.root, env=folder.environment(), capture_output=True)
-    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+    result = subprocess.run(line, cwd=folder.root, env=folder.environment(), capture_output=True)
+    assert (result.returncode, result.stdout, result.stderr) == (0, b"", b"")
     assert (folder.root / "public/index.html").is_file()
 
 
@@ -304,8 +304,8 @@ def test_ctrl_c_ends_waiting_for_another_run(make: Make) -> None:
         second = folder.start("check", stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         with kill_at_end(second):
             assert second.stderr is not None
-            said = second.stderr.readline().decode()
-            assert f"another coursebuild (process {first.pid}) is at work" in said
+            line = second.stderr.readline().decode()
+            assert f"another coursebuild (process {first.pid}) is at work" in line
             os.killpg(second.pid, signal.SIGINT)
             assert second.wait(120) == 130
         os.killpg(first.pid, signal.SIGINT)
@@ -317,6 +317,6 @@ def test_the_folder_of_a_course_may_vanish(make: Make, tmp_path: Path) -> None:
     code = "import os, shutil\nshutil.rmtree(os.getcwd())"
     folder = make("## One\n\n" + block("x.py", code))
     folder.main("extract")
-    done = folder.run("-C", str(folder.root), "check", cwd=tmp_path)
-    assert "Traceback" not in done.err
-    assert done.status in (0, 1)
+    result = folder.run("-C", str(folder.root), "check", cwd=tmp_path)
+    assert "Traceback" not in result.err
+    assert result.status in (0, 1)

@@ -1,4 +1,4 @@
-"""A course with a look of its own: that of docs/how-to/theme.md, built, changed and previewed."""
+"""A course with the theme of docs/how-to/theme.md: built, changed and previewed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FONTS = ROOT / "site/dist/fonts"
 
 @pytest.fixture
 def course(tmp_path: Path, stores: Path) -> Folder:
-    """The course of the docs, its fonts those that are at hand."""
+    """The course of the docs, with fonts of ours."""
     picture = io.BytesIO()
     Image.new("RGB", (64, 64)).save(picture, "PNG")
     folder = Folder(tmp_path / "course")
@@ -53,14 +53,14 @@ def course(tmp_path: Path, stores: Path) -> Folder:
 
 
 def asset(course: Folder, pattern: str) -> str:
-    """The one file of `assets/` that is called so, and its text."""
+    """The only file of `assets/` with this name, and its text."""
     (path,) = (path for path in course.tree("public") if re.fullmatch(f"assets/{pattern}", path))
     return course.text(f"public/{path}")
 
 
 def test_theme_is_on_every_page_and_in_what_pages_share(course: Folder) -> None:
-    done = course.main("build")
-    assert (done.status, "warning" in done.out) == (0, False), done.out
+    result = course.main("build")
+    assert (result.status, "warning" in result.out) == (0, False), result.out
     html = course.text(LESSON)
     logo = r'<img src="../assets/logo{}\.\w+\.svg" alt="" class="figure-{}" width="42" height="28">'
     title = logo.format("", "light") + logo.format("-dark", "dark") + "<span>Oscillations</span>"
@@ -75,8 +75,8 @@ def test_theme_is_on_every_page_and_in_what_pages_share(course: Folder) -> None:
         ("italic", "Caladea-Italic"),
         ("normal", "Caladea-Bold"),
     ]
-    kept = re.findall(r'"Source Serif 4 Variable";.*?url\("fonts/([\w-]+)', css)
-    assert sorted(kept) == [
+    font_files = re.findall(r'"Source Serif 4 Variable";.*?url\("fonts/([\w-]+)', css)
+    assert sorted(font_files) == [
         f"source-serif-4-{x}-opsz-{y}" for x in ("cyrillic", "greek") for y in ("italic", "normal")
     ]
     assert "Caladea-Regular.ttf, Caladea-Italic.ttf, Caladea-Bold.ttf\n" in asset(
@@ -84,9 +84,9 @@ def test_theme_is_on_every_page_and_in_what_pages_share(course: Folder) -> None:
     )
     manifest = json.loads(course.text("public/manifest.webmanifest"))
     assert [icon["sizes"] for icon in manifest["icons"]] == ["any", "64x64"]
-    listed = json.loads(course.text("public/files.json"))["shell"]["files"]
-    assert {icon["src"] for icon in manifest["icons"]} & listed.keys()
-    assert len([path for path in listed if "logo" in path]) == 2
+    shell_files = json.loads(course.text("public/files.json"))["shell"]["files"]
+    assert {icon["src"] for icon in manifest["icons"]} & shell_files.keys()
+    assert len([path for path in shell_files if "logo" in path]) == 2
     assert course.main("export", "page").status == 0
     assert "#e8a9bd" in course.text("course.html")
 
@@ -111,8 +111,8 @@ def test_each_change_of_a_theme_is_in_the_next_build_and_in_the_preview(
     course: Folder, live: Callable[[Folder], Live]
 ) -> None:
     assert course.main("new", "template", "base.html").status == 0
-    shown = live(course)
-    shown.site()
+    preview = live(course)
+    preview.site()
     base = course.text("theme/templates/base.html")
     changes = {
         "theme/logo.svg": LOGO.format("h30"),
@@ -123,13 +123,13 @@ def test_each_change_of_a_theme_is_in_the_next_build_and_in_the_preview(
     for path, text in changes.items():
         before = course.tree("public")
         course.write(path, text)
-        shown.save(path)
-        site = shown.site()
-        done = course.main("build")
-        assert (done.status, "warning" in done.out) == (0, False), done.out
-        built = course.tree("public")
-        assert built != before, path
-        assert site == {name: built[name] for name in site}, path
+        preview.save(path)
+        site = preview.site()
+        result = course.main("build")
+        assert (result.status, "warning" in result.out) == (0, False), result.out
+        site_files = course.tree("public")
+        assert site_files != before, path
+        assert site == {name: site_files[name] for name in site}, path
     assert "<body data-own " in course.text(LESSON)
     clean = course.main("build", "--no-cache", "--out", "clean")
     assert (clean.status, course.tree("clean")) == (0, course.tree("public"))
@@ -141,21 +141,21 @@ def test_template_that_fails_is_told_in_the_preview_until_it_is_mended(
     course.main("new", "template", "lesson.html")
     path = "theme/templates/lesson.html"
     good = course.text(path)
-    shown = live(course)
+    preview = live(course)
     page = LESSON.removeprefix("public/")
-    assert shown.find(page)
+    assert preview.find(page)
     course.write(path, f"{good}{{{{ nothing.here }}}}\n")
-    shown.save(path)
-    assert (shown.find(page), shown.error_rules()) == (None, ["template-broken"])
+    preview.save(path)
+    assert (preview.find(page), preview.error_rules()) == (None, ["template-broken"])
     course.write(path, good)
-    shown.save(path)
-    assert (shown.find(page) is not None, shown.error_rules()) == (True, [])
+    preview.save(path)
+    assert (preview.find(page) is not None, preview.error_rules()) == (True, [])
 
 
 def test_grounds_and_accent_are_those_of_the_style_sheet() -> None:
     tokens = (ROOT / "site/css/tokens.css").read_text(encoding="utf-8")
-    found = dict(re.findall(r"--(paper|sheet|accent): light-dark\((.*?)\)", tokens))
-    pairs = {name: tuple(value.split(", ")) for name, value in found.items()}
+    colours = dict(re.findall(r"--(paper|sheet|accent): light-dark\((.*?)\)", tokens))
+    pairs = {name: tuple(value.split(", ")) for name, value in colours.items()}
     assert (*zip(GROUNDS_LIGHT, GROUNDS_DARK, strict=True),) == (pairs["paper"], pairs["sheet"])
     assert accents(Theme()) == pairs["accent"]
 

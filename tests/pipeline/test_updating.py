@@ -1,4 +1,4 @@
-"""`update`: new outputs by span, every other byte as it was, and nobody's work overwritten."""
+"""`update`: it changes outputs and no other byte, and overwrites nobody's work."""
 
 from __future__ import annotations
 
@@ -62,15 +62,15 @@ UPDATED = EVERYTHING.replace(
 
 
 def test_update_changes_outputs_and_no_other_byte(make: Make) -> None:
-    """Line ends of Windows and a byte order mark stay, too."""
+    """Not even line ends of Windows or a byte order mark."""
     folder = make(("\ufeff" + EVERYTHING).replace("\n", "\r\n").encode())
-    done = folder.main("update")
-    assert done.status == 0, done.out
-    got = folder.text(folder.lesson())
-    assert got == ("\ufeff" + UPDATED).replace("\n", "\r\n").replace("never", clock(got))
+    result = folder.main("update")
+    assert result.status == 0, result.out
+    text = folder.text(folder.lesson())
+    assert text == ("\ufeff" + UPDATED).replace("\n", "\r\n").replace("never", clock(text))
     assert folder.main("check").status == 0
     assert folder.main("update").status == 0
-    assert folder.text(folder.lesson()) == got  # volatile text too
+    assert folder.text(folder.lesson()) == text  # volatile text too
 
 
 def clock(text: str) -> str:
@@ -84,17 +84,17 @@ def test_update_writes_what_drifted_in_the_chosen_lessons_and_nothing_the_second
     stale = [f"## {n}\n\n" + block(f"{n}.py", f"print('{n}')", "OLD") for n in "abc"]
     folder = make(*stale, GOOD)
     assert folder.main("check").status == 1
-    done = folder.main("update", "1.2", "three", "four")
-    assert "\n3 lessons, 2 scripts run, 1 cached" in done.out
+    result = folder.main("update", "1.2", "three", "four")
+    assert "\n3 lessons, 2 scripts run, 1 cached" in result.out
     assert folder.text(folder.lesson(1)) == stale[0]
     assert folder.text(folder.lesson(2)) == stale[1].replace("OLD", "b")
     assert folder.text(folder.lesson(3)) == stale[2].replace("OLD", "c")
     once = folder.tree("content")
     times = {path: (folder.root / "content" / path).stat().st_mtime_ns for path in once}
-    done = folder.main("update", "1.2", "three", "four")
-    assert done.status == 0
-    assert "\nevery recorded output is up to date\n" in done.out
-    assert "\n3 lessons, 0 scripts run, 3 cached" in done.out
+    result = folder.main("update", "1.2", "three", "four")
+    assert result.status == 0
+    assert "\nevery recorded output is up to date\n" in result.out
+    assert "\n3 lessons, 0 scripts run, 3 cached" in result.out
     assert folder.tree("content") == once
     assert {p: (folder.root / "content" / p).stat().st_mtime_ns for p in once} == times
 
@@ -103,8 +103,8 @@ def test_dry_run_shows_the_difference_and_writes_nothing(make: Make) -> None:
     folder = make(GOOD.replace("hello 3.14159\n", "hello 3.14158\n"), GOOD.replace("hello", "two"))
     folder.main("extract")
     before = folder.tree()
-    done = folder.main("update", "--dry-run")
-    assert done.status == 0
+    result = folder.main("update", "--dry-run")
+    assert result.status == 0
     assert (
         f"would update {folder.lesson()}\n"
         f"--- {folder.lesson()}\n"
@@ -114,7 +114,7 @@ def test_dry_run_shows_the_difference_and_writes_nothing(make: Make) -> None:
         "-hello 3.14158\n"
         "+hello 3.14159\n"
         " ```\n"
-    ) in done.out
+    ) in result.out
     assert folder.tree() == before
 
 
@@ -124,22 +124,22 @@ def test_a_script_that_fails_is_told_at_its_line_as_it_is_now(make: Make) -> Non
         + block("grows.py", "for i in range(9):\n    print(i)", "0")
         + block("fails.py", "print('a')\n1/0", "OLD")
     )
-    done = folder.main("update")
-    assert done.status == 1
+    result = folder.main("update")
+    assert result.status == 1
     line = folder.text(folder.lesson()).splitlines().index("1/0") + 1
     assert line > 20
-    assert f"--> {folder.lesson()}:{line}:1\n" in done.out
+    assert f"--> {folder.lesson()}:{line}:1\n" in result.out
     assert "OLD" in folder.text(folder.lesson())
-    assert "up to date" not in done.out
+    assert "up to date" not in result.out
 
 
 def test_an_update_of_a_course_with_other_mistakes(make: Make) -> None:
     latin = b"## One\n\ncaf\xe9\n\n" + block("x.py", "print(1)", "OLD").encode()
     folder = make(latin, GOOD.replace("hello 3.14159\n", "OLD\n") + "[gone](lesson:7.7)\n")
-    done = folder.main("update")
-    assert done.status == 1
-    assert "error[link-lesson]" in done.out
-    assert "error[file-encoding]: byte 0xe9 is not UTF-8" in done.out
+    result = folder.main("update")
+    assert result.status == 1
+    assert "error[link-lesson]" in result.out
+    assert "error[file-encoding]: byte 0xe9 is not UTF-8" in result.out
     assert folder.read(folder.lesson(1)) == latin
     assert "hello 3.14159\n" in folder.text(folder.lesson(2))
 
@@ -150,17 +150,17 @@ def test_update_writes_the_parts_of_files_that_a_lesson_shows(make: Make) -> Non
     folder.write(
         "src/ball.py", "class Ball:\n    @property\n    def fall(self):\n\n        return 1\n"
     )
-    done = folder.main("check")
-    assert (done.status, done.out.count("error[")) == (1, 1)
-    assert "this is not what `src/ball.py` holds" in done.out
+    result = folder.main("check")
+    assert (result.status, result.out.count("error[")) == (1, 1)
+    assert "this is not what `src/ball.py` holds" in result.out
     assert folder.main("update").status == 0
-    shown = "   @property\n   def fall(self):\n\n       return 1\n"
-    assert fence.format(shown) in folder.text(folder.lesson())
+    part = "   @property\n   def fall(self):\n\n       return 1\n"
+    assert fence.format(part) in folder.text(folder.lesson())
     assert folder.main("build").status == 0
     assert "src/ball.py" in folder.text("public/lessons/1.1-one.html")
     folder.replace("src/ball.py", "return 1", "return 2")
-    done = folder.main("build")
-    assert "it has `return 2` here" in done.out
+    result = folder.main("build")
+    assert "it has `return 2` here" in result.out
 
 
 TRAIN = """

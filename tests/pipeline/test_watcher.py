@@ -1,4 +1,4 @@
-"""Watching a course: every change of its files is told of, and nothing else."""
+"""Watching a course: every change of its files is reported, and nothing else."""
 
 from __future__ import annotations
 
@@ -42,33 +42,33 @@ def root(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def saves(root: Path) -> Iterator[FolderWatcher]:
-    found = FolderWatcher(root)
-    found.watch_also(frozenset({"docs/guide.md", LESSON, *CHANGED}), {"lib", "."})
-    found.start()
-    yield found
-    found.stop()
+    watcher = FolderWatcher(root)
+    watcher.watch_also(frozenset({"docs/guide.md", LESSON, *CHANGED}), {"lib", "."})
+    watcher.start()
+    yield watcher
+    watcher.stop()
 
 
-def told(saves: FolderWatcher, wanted: set[str]) -> set[str]:
-    """What is told of until all that is wanted was."""
-    found: set[str] = set()
+def wait_for_changes(saves: FolderWatcher, paths: set[str]) -> set[str]:
+    """Wait until changes of all these paths were reported; return all that were."""
+    changes: set[str] = set()
     until = time.monotonic() + 120
-    while not found >= wanted:
-        assert time.monotonic() < until, f"{wanted - found} is missing in {found}"
-        found |= saves.get(0.2)
-    while more := saves.get(0.1):
-        found |= more
-    return found
+    while not changes >= paths:
+        assert time.monotonic() < until, f"{paths - changes} is missing in {changes}"
+        changes |= saves.get(0.2)
+    while further := saves.get(0.1):
+        changes |= further
+    return changes
 
 
-def told_of_a_save(root: Path, saves: FolderWatcher, path: str) -> None:
-    """A new folder is watched a moment after it is there: its files are saved until then."""
+def wait_for_save(root: Path, saves: FolderWatcher, path: str) -> None:
+    """Save a file in a new folder until it is reported: watching begins a moment late."""
     until = time.monotonic() + 120
-    found: frozenset[str] = frozenset()
-    while path not in found:
+    changes: frozenset[str] = frozenset()
+    while path not in changes:
         assert time.monotonic() < until
         (root / path).write_text("more")
-        found |= saves.get(1.0)
+        changes |= saves.get(1.0)
 
 
 def test_every_change_is_told_of_and_nothing_else(root: Path, saves: FolderWatcher) -> None:
@@ -91,7 +91,7 @@ def test_every_change_is_told_of_and_nothing_else(root: Path, saves: FolderWatch
     odd = [f"content/{name}" for name in ("a\nb.md", "é ß.md", "x" * 255)]
     for path in odd:
         (root / path).write_text("x")
-    assert told(saves, {*CHANGED, *odd}) == {*CHANGED, *odd, "content/lessons/other.md"}
+    assert wait_for_changes(saves, {*CHANGED, *odd}) == {*CHANGED, *odd, "content/lessons/other.md"}
 
 
 def test_folders_that_are_made_later(root: Path, saves: FolderWatcher) -> None:
@@ -99,23 +99,23 @@ def test_folders_that_are_made_later(root: Path, saves: FolderWatcher) -> None:
     (root / "models/deep/deeper/a.xml").write_text("<mujoco/>")
     (root / "content/pages/one").mkdir(parents=True)
     (root / "content/pages/one/a.md").write_text("x")
-    assert told(saves, {"models"}) & {"content", "content/pages"}
+    assert wait_for_changes(saves, {"models"}) & {"content", "content/pages"}
     (root / "lib/new").mkdir(parents=True)
     for path in ("models/deep/deeper/a.xml", "content/pages/one/a.md", "lib/new/a.py"):
-        told_of_a_save(root, saves, path)
+        wait_for_save(root, saves, path)
     (root / "far").mkdir()
     saves.watch_also(frozenset({"docs/guide.md", "far/later.md"}))
     for path in ("far/later.md", "docs/guide.md"):
-        told_of_a_save(root, saves, path)
+        wait_for_save(root, saves, path)
 
 
 def test_folders_that_go_and_come_back_or_are_others(root: Path, saves: FolderWatcher) -> None:
     shutil.rmtree(root / "content")
-    told(saves, {"content"})
+    wait_for_changes(saves, {"content"})
     (root / "content/lessons").mkdir(parents=True)
     (root / LESSON).write_text("again")
-    told(saves, {"content"})
-    told_of_a_save(root, saves, LESSON)
+    wait_for_changes(saves, {"content"})
+    wait_for_save(root, saves, LESSON)
     for folder, news, file in (
         ("content", "content", LESSON),
         ("docs", "docs/guide.md", "docs/guide.md"),
@@ -123,14 +123,14 @@ def test_folders_that_go_and_come_back_or_are_others(root: Path, saves: FolderWa
         shutil.copytree(root / folder, root / f"new {folder}")
         (root / folder).rename(root / f"old {folder}")
         (root / f"new {folder}").rename(root / folder)
-        told(saves, {news})
-        told_of_a_save(root, saves, file)
+        wait_for_changes(saves, {news})
+        wait_for_save(root, saves, file)
 
 
 def test_while_no_folder_changes_watching_is_not_begun_again(
     root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whatever were saved between two beginnings would be missed."""
+    """Saves between an end and a beginning would be missed."""
     counts: Counter[str] = Counter()
     really = watchfiles.watch
 
@@ -154,7 +154,7 @@ def test_files_in_a_linked_folder(root: Path) -> None:
     (root / "content/near").symlink_to(root / "far")
     saves = FolderWatcher(root)
     saves.start()
-    told_of_a_save(root, saves, "content/near/a.svg")
+    wait_for_save(root, saves, "content/near/a.svg")
     saves.stop()
 
 
@@ -163,4 +163,4 @@ def test_who_waits_is_woken_when_watching_ends(saves: FolderWatcher) -> None:
     thread.start()
     assert not saves.get(600.0)
     thread.join()
-    assert saves.stopped
+    assert saves.is_stopped

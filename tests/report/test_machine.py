@@ -106,8 +106,8 @@ def test_junit_is_xml_and_counts() -> None:
         "failures": "3",
         "skipped": "2",
     }
-    why = [found.get("message") for found in suite.iter("skipped")]
-    assert why == ["needs torch", "not run"]
+    reasons = [case.get("message") for case in suite.iter("skipped")]
+    assert reasons == ["needs torch", "not run"]
     assert suite.find("./testcase[@name='1.1-lab-2']/failure") is not None
     assert suite.find("./testcase[@name='1.1-lab-1']/failure") is None
     failure = suite.find("./testcase[@name='content/lessons/1.1-a,b.md']/failure")

@@ -15,7 +15,7 @@ from coursebuild.report import (
 )
 
 
-def shown(diagnostic: Diagnostic, width: int = 100) -> str:
+def render(diagnostic: Diagnostic, width: int = 100) -> str:
     return diagnostic_text(diagnostic, Style(width=width))
 
 
@@ -37,7 +37,7 @@ def test_frame_label_help_and_notes() -> None:
         help="run `coursebuild update 4.2`",
         notes=[note, place],
     )
-    assert shown(diagnostic) == (
+    assert render(diagnostic) == (
         "error[output-drift]: recorded output differs from this run\n"
         "  --> content/lessons/4.2-x.md:210:26\n"
         "    |\n"
@@ -52,7 +52,7 @@ def test_frame_label_help_and_notes() -> None:
 
 def test_tabs_wide_characters_and_controls_keep_the_marks_in_place() -> None:
     source, a, b = at("\t量x\x1b[31mwrong", "wrong")
-    assert shown(diagnose("math-syntax", source.span(a, b), "m")).split("\n")[3:5] == [
+    assert render(diagnose("math-syntax", source.span(a, b), "m")).split("\n")[3:5] == [
         "  1 |     量x␛[31mwrong",
         "    |             ^^^^^",
     ]
@@ -60,19 +60,19 @@ def test_tabs_wide_characters_and_controls_keep_the_marks_in_place() -> None:
 
 def test_a_span_over_several_lines_marks_the_rest_of_its_first() -> None:
     source, _, _ = at("abc def\nghi", "def")
-    lines = shown(diagnose("fence-unclosed", source.span(4, 11), "m")).split("\n")
+    lines = render(diagnose("fence-unclosed", source.span(4, 11), "m")).split("\n")
     assert lines[3:5] == ["  1 | abc def", "    |     ^^^"]
 
 
 def test_an_empty_span_and_the_end_of_the_text_get_one_mark() -> None:
     source = Source("a.md", "abc")
-    assert shown(diagnose("fence-unclosed", source.span(3, 3), "m")).split("\n")[4] == "    |    ^"
+    assert render(diagnose("fence-unclosed", source.span(3, 3), "m")).split("\n")[4] == "    |    ^"
 
 
 def test_a_long_line_is_cut_around_the_marked_part() -> None:
     text = "x" * 3000 + "WRONG" + "y" * 3000
     source, a, b = at(text, "WRONG")
-    lines = shown(diagnose("json-syntax", source.span(a, b), "m"), width=80).split("\n")
+    lines = render(diagnose("json-syntax", source.span(a, b), "m"), width=80).split("\n")
     assert len(lines[3]) <= 82
     column = lines[4].index("^")
     assert lines[3][column : column + 5] == "WRONG"
@@ -83,7 +83,7 @@ def test_a_long_line_is_cut_around_the_marked_part() -> None:
 
 def test_a_long_line_without_width_is_cut_too() -> None:
     source, a, b = at("a" + "\u200d" * 3000 + "WRONG", "WRONG")
-    lines = shown(diagnose("json-syntax", source.span(a, b), "m"), width=80).split("\n")
+    lines = render(diagnose("json-syntax", source.span(a, b), "m"), width=80).split("\n")
     assert len(lines[3]) < 200 and lines[3].endswith("WRONG")
 
 
@@ -91,7 +91,7 @@ def test_a_file_without_text_has_no_frame() -> None:
     diagnostic = diagnose(
         "map-missing", Source("content/course.toml", "").span(), "there is no content/course.toml"
     )
-    assert shown(diagnostic) == (
+    assert render(diagnostic) == (
         "error[map-missing]: there is no content/course.toml\n  --> content/course.toml:1:1"
     )
 
@@ -120,8 +120,8 @@ def test_colour_is_only_colour() -> None:
     import re
 
     coloured = diagnostic_text(diagnostic, Style(colour=True))
-    assert coloured != shown(diagnostic)
-    assert re.sub(r"\x1b\[[0-9;]*m", "", coloured) == shown(diagnostic)
+    assert coloured != render(diagnostic)
+    assert re.sub(r"\x1b\[[0-9;]*m", "", coloured) == render(diagnostic)
 
 
 def test_labs_are_listed_like_scripts() -> None:

@@ -45,7 +45,7 @@ def test_icons_are_what_a_browser_draws(icons: Any, browsers: Mapping[str, Brows
         page = context.new_page()
         for side in (64, 192):
             theirs = np.array(page.evaluate(draw, [ICON, side]), float).reshape(side, side, 4)
-            ours = read_png(icons.drawn(shapes, icons.Picture("x", side))).astype(float)
+            ours = read_png(icons.draw(shapes, icons.Picture("x", side))).astype(float)
             # Without opacity a colour means nothing.
             off = np.abs(theirs * theirs[..., 3:] - ours * ours[..., 3:]) / 255
             assert off.mean() < 1, side
@@ -54,7 +54,7 @@ def test_icons_are_what_a_browser_draws(icons: Any, browsers: Mapping[str, Brows
 
 def test_icon_has_ground_where_a_system_cuts(icons: Any) -> None:
     shapes = icons.shapes(ICON)
-    pixels = read_png(icons.drawn(shapes, icons.Picture("x", 96, full=True, share=0.8)))
+    pixels = read_png(icons.draw(shapes, icons.Picture("x", 96, full=True, share=0.8)))
     assert (pixels[..., 3] == 255).all()
     ground = np.array(shapes[0].colour)
     y, x = np.mgrid[0:96, 0:96] + 0.5

@@ -93,8 +93,8 @@ def drawn_pages(folder: Folder) -> set[str]:
     """Return the pages that a build draws anew."""
     with prepare(folder.options(), Progress(quiet=True)) as (report, site):
         assert site is not None, report.diagnostics
-        assert len(set(site.drawn)) == len(site.drawn)
-        return set(site.drawn)
+        assert len(set(site.drawn_pages)) == len(site.drawn_pages)
+        return set(site.drawn_pages)
 
 
 QUIZ = """```quiz

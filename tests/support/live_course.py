@@ -36,7 +36,7 @@ class Live:
         """Take a save; whether the fast way was taken."""
         if self.session.edit(paths) is not None:
             return True
-        self.session.take_others()
+        self.session.take_other_saves()
         return False
 
     def find(self, path: str) -> bytes | None:
@@ -44,7 +44,7 @@ class Live:
 
     def site(self) -> dict[str, bytes]:
         """Everything, once all is known."""
-        self.rebuild.once()
+        self.rebuild.run_once()
         files = {path: self.find(path) for path in self.session.files.paths}
         return {p: d for p, d in files.items() if d is not None and _is_compared(p)}
 

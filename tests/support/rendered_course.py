@@ -155,7 +155,7 @@ class Made(Struct, frozen=True):
             library = Library.of(course, self.results, self.assets, reports or Reports())
             options = Options(root, 1, quiet=True, cache=Memo(Path(KEPT.name)))
             with Documents(options.store, 1) as documents:
-                site = SiteMaker(library, self.assets, documents, options).made()
+                site = SiteMaker(library, self.assets, documents, options).make_site()
                 files_by_path = {file.path: file.make() for file in site.files}
         assert [file.path for file in site.files] == sorted(files_by_path)
         assert site.file_list is not None

@@ -45,7 +45,7 @@ def test_the_fonts_that_most_courses_need_are_cut(assets: Assets) -> None:
 
 def test_copies_are_up_to_date() -> None:
     """If not, run `python site/bundle.py`."""
-    made = runpy.run_path(str(ROOT / "site" / "prepare_copies.py"))["prepared"](assets_dir())
+    made = runpy.run_path(str(ROOT / "site" / "prepare_copies.py"))["compress"](assets_dir())
     folder = assets_dir() / FOLDER
     assert made == {name: (folder / name).read_bytes() for name in made}
 

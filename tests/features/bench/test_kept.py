@@ -141,14 +141,14 @@ def test_terminal_shows_what_is_measured_just_now(monkeypatch: pytest.MonkeyPatc
     terminal = Terminal()
     progress = Progress(terminal)
     with progress.stage("measuring", 2):
-        progress.started("box")
-        progress.doing("box", "swing: RK4 at 0.002 s")
+        progress.start("box")
+        progress.describe("box", "swing: RK4 at 0.002 s")
         until = time.monotonic() + 120
         while not re.search(r"box \(swing: RK4 at 0\.002 s\) \d+ s", terminal.getvalue()):
             assert time.monotonic() < until
             time.sleep(0.01)
-        progress.finished("box", "measured", 1.0)
-        progress.known()
+        progress.finish("box", "measured", 1.0)
+        progress.skip()
         while "measuring 2/2  \r" not in terminal.getvalue():
             assert time.monotonic() < until
             time.sleep(0.01)

@@ -86,18 +86,18 @@ class MeasuringRun:
                 # The run that held the lock may have measured it.
                 report = self.load(kind, parts, report_type)
                 if report is None:
-                    self.progress.started(name)
+                    self.progress.start(name)
                     start = time.monotonic()
                     try:
                         report = measure()
                     except CannotMeasureError as error:
                         self.diagnostics.append(error.diagnostic)
                     verdict = f"not {self.success}" if report is None else self.success
-                    self.progress.finished(name, verdict, time.monotonic() - start)
+                    self.progress.finish(name, verdict, time.monotonic() - start)
                     if report is not None:
                         self.save(kind, parts, report)
                     return report
-        self.progress.known()
+        self.progress.skip()
         return report
 
     def load(self, kind: str, parts: tuple[object, ...], report_type: type[_T]) -> _T | None:

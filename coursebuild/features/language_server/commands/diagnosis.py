@@ -41,9 +41,9 @@ def current_diagnostics(session: Session) -> tuple[Diagnostic, ...]:
 @lru_cache(maxsize=1)
 def _diagnose(session: Session, version: int) -> tuple[Diagnostic, ...]:
     """Cached, since an editor asks with each move of its cursor."""
-    with session.changed:
-        course, library, verified = session.course, session.library, session.verified
-        diagnostics, last_run = session.found_by_reading, session.found_by_running
+    with session.condition:
+        course, library, verified = session.course, session.library, session.verified_course
+        diagnostics, last_run = session.reading_diagnostics, session.running_diagnostics
     if course is not None and library is not None and verified is not None:
         sources, old_sources = ({s.path: s for s in c.sources} for c in (course, verified))
         changed_paths = {path for path, s in sources.items() if s != old_sources.get(path)}

@@ -83,7 +83,7 @@ class Server:
         encoding = self.client.workspace.position_encoding or "utf-16"
         self.places.encoding = types.PositionEncodingKind(encoding).value
         self._loop = asyncio.get_running_loop()
-        self.session.tell()
+        self.session.notify()
 
     # --- edits
 
@@ -121,9 +121,9 @@ class Server:
         session, version = self.session, -1
         last_sent: dict[str, list[types.Diagnostic]] = {}
         while True:
-            with session.changed:
+            with session.condition:
                 while self._loop is None or session.version == version:
-                    session.changed.wait()
+                    session.condition.wait()
                 version = session.version
             by_uri: dict[str, list[types.Diagnostic]] = {uri: [] for uri in last_sent}
             for diagnostic in current_diagnostics(session):

@@ -68,7 +68,7 @@ def compile_scene(root: Path, scene: CourseScene, *, quick: bool) -> CompiledSce
     with _report_errors(scene):
         model = _compile_model(root, scene)
         exact = _exact_motion(root, scene)
-        scenarios = scenes(model, scene.declared, quick=quick)
+        scenarios = scenes(model, scene.declarations, quick=quick)
         scenarios = tuple(replace(scenario, exact=exact) for scenario in scenarios)
         spec = mujoco.MjSpec.from_file(str(root / scene.model.source.path))
         return CompiledScene(scene, model, scenarios, spec)
@@ -121,7 +121,7 @@ def _report_errors(scene: CourseScene) -> Iterator[None]:
         with silent():
             yield
     except SceneError as error:
-        place = error.span or scene.declared.source.span(0, 0)
+        place = error.span or scene.declarations.source.span(0, 0)
         diagnostic = diagnose("scenario-model", place, error.message, help=error.help)
         raise CannotMeasureError(diagnostic) from None
     except mujoco.FatalError as error:  # such as a model that asks for less memory than it needs
@@ -173,7 +173,7 @@ def add_card(
     source = scene.model.source
     with silent():  # MuJoCo would write its warnings into the working directory
         model = _compile_model(root, scene)
-        scenarios = scenes(model, scene.declared)
+        scenarios = scenes(model, scene.declarations)
         touching_pairs = {
             pair for scenario in scenarios for pair in watch(model, scenario).touching_pairs
         }

@@ -113,7 +113,7 @@ def _compare(recorded: SceneReport, report: SceneReport, scene: CourseScene) -> 
     ):
         if before != now:
             remarks.append(f"recorded with {program}{before}, measured with {now}")
-    departures = scene_departures(recorded, report, scene.declared.bench)
+    departures = scene_departures(recorded, report, scene.declarations.bench)
     return RecordCheck(report.model, BENCH.path(report.model), departures, tuple(remarks))
 
 
@@ -152,7 +152,7 @@ class SceneRun(MeasuringRun):
         compiled_scene = self.measuring.compile_scene(root, scene, quick=self.quick)
 
         def tell(text: str) -> None:
-            self.progress.doing(name, text)
+            self.progress.describe(name, text)
 
         settings = {"quick": self.quick, "timed": timed, "tell": tell}
         report = SceneReport(
@@ -176,7 +176,7 @@ class SceneRun(MeasuringRun):
                     SweepReport,
                     partial(self.measuring.run_sweep, compiled_scene, sweep, **settings),
                 )
-                for sweep in scene.declared.sweeps
+                for sweep in scene.declarations.sweeps
             ),
         )
         if self.cards and report.scenarios:

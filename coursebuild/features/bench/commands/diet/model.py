@@ -48,7 +48,7 @@ class DietModel:
         self.root = root
         self.scene = scene
         self.path = scene.model.source.path
-        self.keeps = {" ".join(keep.finding.split()): keep for keep in scene.declared.keep}
+        self.keeps = {" ".join(keep.finding.split()): keep for keep in scene.declarations.keep}
         self.locked = _find_locked_files(root, files, self.path, scene.model.source.text)
         self.readers = _find_readers(root, files, course, scene)
         self._files: dict[str, bytes | None] = {}
@@ -83,7 +83,7 @@ class DietModel:
         source = self.scene.model.source
         try:
             text = open_model(self.path, self.read, self.compile)
-            declarations = self.scene.declared
+            declarations = self.scene.declarations
             order = Order(
                 self.scene.name,
                 self.scene.digest,
@@ -140,7 +140,7 @@ class DietModel:
         """Return the digest of the model as it is on the disk now."""
         text = (self.read(self.path) or b"").decode("utf-8")
         model = MjcfModel(self.scene.name, Source(self.path, text))
-        return scene_digest(self.root, model, self.scene.declared)
+        return scene_digest(self.root, model, self.scene.declarations)
 
 
 def _find_locked_files(root: Path, files: CourseFiles, path: str, text: str) -> Mapping[str, str]:
@@ -165,9 +165,9 @@ def _find_readers(
 ) -> tuple[Reader, ...]:
     """List everything in the course that may read a model, its observables included."""
     readers = list(readers_of(course, root, files, scene))
-    scenarios = scene.declared.scenarios
+    scenarios = scene.declarations.scenarios
     names = frozenset(s.observable.name for s in scenarios if s.observable is not None)
     fields = {"energy"} if any("energy" in (s.conserved or ()) for s in scenarios) else set()
     if names or fields:
-        readers.append(Reader(scene.declared.source.path, names=names, words=frozenset(fields)))
+        readers.append(Reader(scene.declarations.source.path, names=names, words=frozenset(fields)))
     return tuple(readers)

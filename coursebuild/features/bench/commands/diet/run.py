@@ -108,7 +108,7 @@ class _DietRun(MeasuringRun):
         return None if report is None else replace(report, digest=model.digest())
 
     def _survey(self, model: DietModel) -> Survey:
-        tell, rerun = partial(self.progress.doing, model.scene.name), None
+        tell, rerun = partial(self.progress.describe, model.scene.name), None
         if not self.quick and self.course is not None:
             rerun = Reruns(self.options, self.course, model.scene).first_difference
         return model.survey(self.machine, quick=self.quick, tell=tell, rerun=rerun)
@@ -137,7 +137,7 @@ class _DietRun(MeasuringRun):
         """Return all that a report depends on; first the digest of the model."""
         scene = model.scene
         parts: list[object] = [scene.digest, scene.name, self.quick, self.code, self.machine]
-        for keep in scene.declared.keep:
+        for keep in scene.declarations.keep:
             place = keep.finding_span
             parts.append((keep.finding, keep.reason, place.line, place.column))
         parts += model.locked.items()
