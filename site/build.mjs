@@ -27,8 +27,8 @@ const LATIN = ['latin', 'latin-ext', 'vietnamese']
 const ALL = [...LATIN, 'greek', 'cyrillic']
 
 /**
- * Where each font comes from: the package, and of each of its style sheets the subsets that are taken.
- * `whole` marks a font that is one file: its unicode-range names only a part of what the file holds.
+ * The fonts: the package of each, and of each of its style sheets the subsets to take.
+ * `whole` marks a font that is one file, whose unicode-range names only a part of the file's characters.
  */
 const FONTS = [
   {
@@ -45,13 +45,13 @@ const FONTS = [
   { name: '@fontsource/stix-two-math', sheets: { '400.css': ['latin'] }, whole: true },
 ]
 
-/** The script for an engine that knows neither modules nor addresses. */
+/** The script for a bare V8, which has neither modules nor URLs. */
 const TRIAL = 'lab-trial.js'
 
-/** A mistake in the sources or the packages: it is told without a stack. */
+/** A mistake in the sources or the packages, reported without a stack. */
 class BuildError extends Error {}
 
-/** The folder of an installed package, looked for as Node does, in each node_modules from here upwards. */
+/** The folder of an installed package, searched as Node does, in each node_modules from here upwards. */
 function packageFolder(name) {
   for (let folder = HERE; ; folder = dirname(folder)) {
     const candidate = join(folder, 'node_modules', name)
@@ -90,14 +90,14 @@ async function bundle(options) {
   }
 }
 
-/** The engine's glue has a branch for Node, which no bundle needs, and which cannot be bundled for a page. */
+/** Removes the branch for Node from the engine's glue: no bundle needs it, and it cannot be bundled for a page. */
 const withoutNode = {
   name: 'without-node',
   setup(building) {
     building.onLoad({ filter: /@mujoco\/mujoco\/mujoco\.js$/ }, async ({ path }) => {
       const source = await readFile(path, 'utf8')
-      const [start, end, ...more] = source.split(/^var ENVIRONMENT_IS_NODE = .*$/m)
-      if (end === undefined || more.length > 0) throw new Error('ENVIRONMENT_IS_NODE is not defined as expected')
+      const [start, end, ...rest] = source.split(/^var ENVIRONMENT_IS_NODE = .*$/m)
+      if (end === undefined || rest.length > 0) throw new Error('ENVIRONMENT_IS_NODE is not defined as expected')
       return { contents: (start + end).replaceAll(/\bENVIRONMENT_IS_NODE\b/g, 'false'), loader: 'js' }
     })
   },
@@ -110,12 +110,12 @@ async function bundleScripts(out) {
   if (entries.length === 0) throw new BuildError('site/js holds no script: nothing to bundle')
   const options = { outdir: join(out, 'js'), platform: 'browser', target: 'es2022', plugins: [withoutNode] }
   const names = new Set()
-  for (const [format, chosen, define] of [
+  for (const [format, group, define] of [
     ['esm', entries.filter((file) => file !== TRIAL), {}],
     ['iife', entries.filter((file) => file === TRIAL), { 'import.meta.url': '"file:///engine.js"' }],
   ]) {
-    if (chosen.length === 0) continue
-    const entryPoints = chosen.map((file) => join('js', file))
+    if (group.length === 0) continue
+    const entryPoints = group.map((file) => join('js', file))
     for (const name of await bundle({ ...options, entryPoints, format, define })) names.add(name)
   }
   return names
@@ -153,7 +153,7 @@ function descriptor(rule, name) {
 }
 
 /**
- * The faces of one font, from the style sheets of its package, as fonts.json lists them:
+ * The faces of a font, from the style sheets of its package, in the form of fonts.json:
  * {family, subset, file, style, weight: [min, max], unicode_range: text or null for the whole font}.
  */
 async function readFaces(font) {
@@ -164,11 +164,11 @@ async function readFaces(font) {
     const rules = [...css.matchAll(/@font-face\s*\{[^}]*\}/g)].map(([rule]) => rule)
     for (const subset of subsets) {
       const name = new RegExp(`url\\(\\./files/(${basename(font.name)}-${subset}-[a-z0-9]+-[a-z]+\\.woff2)\\)`)
-      const found = rules.filter((rule) => name.test(rule))
-      if (found.length !== 1) {
-        throw new BuildError(`${font.name}/${sheet} has ${found.length} faces for ${subset}, not 1`)
+      const matches = rules.filter((rule) => name.test(rule))
+      if (matches.length !== 1) {
+        throw new BuildError(`${font.name}/${sheet} has ${matches.length} faces for ${subset}, not 1`)
       }
-      faces.push(readFace(found[0], subset, name.exec(found[0])[1], font.whole))
+      faces.push(readFace(matches[0], subset, name.exec(matches[0])[1], font.whole))
     }
   }
   return faces
@@ -188,17 +188,17 @@ function readFace(rule, subset, file, whole) {
 
 async function copyFonts(out) {
   await mkdir(join(out, 'fonts'), { recursive: true })
-  const all = []
+  const faces = []
   for (const font of FONTS) {
     for (const face of await readFaces(font)) {
       await copyFile(join(packageFolder(font.name), 'files', face.file), join(out, 'fonts', face.file))
-      all.push(face)
+      faces.push(face)
     }
   }
-  await writeFile(join(out, 'fonts', 'fonts.json'), JSON.stringify(all, null, 2) + '\n')
+  await writeFile(join(out, 'fonts', 'fonts.json'), JSON.stringify(faces, null, 2) + '\n')
 }
 
-/** One file for each package: "@scope/name" becomes scope-name.txt. For a package without one, licences/ has it. */
+/** Copy the licence of each package: "@scope/name" becomes scope-name.txt. licences/ holds those that a package lacks. */
 async function copyLicences(names, out) {
   await mkdir(join(out, 'licences'), { recursive: true })
   for (const name of [...names].sort()) {

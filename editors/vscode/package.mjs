@@ -16,7 +16,7 @@ const { metafile } = await build({
 });
 const names = Object.keys(metafile.inputs).map((path) => /^node_modules\/((?:@[^/]+\/)?[^/]+)/.exec(path)?.[1]);
 const licences = [...new Set(names.filter(Boolean))].sort().map((name) => {
-  const file = readdirSync(`node_modules/${name}`).find((one) => /^licen[cs]e/i.test(one));
+  const file = readdirSync(`node_modules/${name}`).find((entry) => /^licen[cs]e/i.test(entry));
   if (!file) throw new Error(`${name} has no licence file`);
   return `${name}\n\n${readFileSync(`node_modules/${name}/${file}`, 'utf8')}`;
 });

@@ -68,12 +68,12 @@ async function keepUp(place, store, onList = () => {}) {
   const keep = storedChoice(document)
   const worker = await activeWorker(navigator, root)
   let offered = false
-  const report = async ({ end, here, total, full, lost }) => {
+  const report = async ({ end, here: count, total, full, lost }) => {
     if (!offered && (end || (await store.lists()).length > 0)) {
       offered = true
       await onList()
     }
-    say(place, fill(!end ? 'busy' : full ? 'full' : lost ? 'lost' : 'done', { n: here, total }))
+    say(place, fill(!end ? 'busy' : full ? 'full' : lost ? 'lost' : 'done', { n: count, total }))
   }
   // One report after the other: the first ones wait for the store, and must not be shown after the last.
   let lastReport = Promise.resolve()
@@ -85,7 +85,7 @@ async function keepUp(place, store, onList = () => {}) {
 /** Replace the text of the page without scripts by the choices. */
 async function offer(place, store) {
   const list = await newestList(store)
-  const stored = storedChoice(document)
+  const currentChoice = storedChoice(document)
   const automatic = list && groupsFor('auto', list, isSparing(navigator.connection)).includes('text') ? 'text' : 'read'
   const group = document.createElement('fieldset')
   const legend = document.createElement('legend')
@@ -97,7 +97,7 @@ async function offer(place, store) {
     button.type = 'radio'
     button.name = 'keep'
     button.value = choice
-    button.checked = choice === (stored === 'auto' ? automatic : stored)
+    button.checked = choice === (currentChoice === 'auto' ? automatic : currentChoice)
     button.addEventListener('change', () => choose(place, store, choice))
     const size = list ? megabytes((SIZES[choice] ?? []).reduce((sum, name) => sum + list.bytes[name], 0)) : '…'
     const text = document.createElement('span')
@@ -112,8 +112,8 @@ async function offer(place, store) {
 }
 
 async function newestList(store) {
-  const [stored] = storedChoice(document) === 'none' ? [] : await store.lists()
-  if (stored) return stored.list
+  const [newest] = storedChoice(document) === 'none' ? [] : await store.lists()
+  if (newest) return newest.list
   try {
     return parseList(await (await fetch(new URL(FILES, root))).text())
   } catch {

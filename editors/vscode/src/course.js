@@ -1,9 +1,9 @@
-// What is found out about a course without the editor: where its command is, which page shows a file.
+// Functions about a course that need no editor: where its command is, which page shows a file.
 
 const fs = require('node:fs');
 const path = require('node:path');
 
-/** The nearest folder of a course, from a file or folder upwards; none: undefined. */
+/** The nearest folder of a course, from a file or folder upwards, or undefined. */
 function courseOf(place, exists = fs.existsSync) {
   for (let folder = place; ; folder = path.dirname(folder)) {
     if (exists(path.join(folder, 'content', 'course.toml'))) return folder;
@@ -11,7 +11,7 @@ function courseOf(place, exists = fs.existsSync) {
   }
 }
 
-/** The command of a course; undefined where there is none. A setting counts, wherever it leads. */
+/** The command of a course, or undefined. A setting is used without checking that the file exists. */
 function commandOf(setting, folder, { env = process.env, platform = process.platform, exists = fs.existsSync } = {}) {
   const { join, isAbsolute, delimiter } = platform === 'win32' ? path.win32 : path.posix;
   const [bin, name] = platform === 'win32' ? ['Scripts', 'coursebuild.exe'] : ['bin', 'coursebuild'];
@@ -19,11 +19,11 @@ function commandOf(setting, folder, { env = process.env, platform = process.plat
     if (!/[\\/]/.test(setting)) return setting;
     return isAbsolute(setting) ? setting : join(folder, setting);
   }
-  const known = (env.PATH ?? '').split(delimiter).filter(Boolean);
-  return [join(folder, '.venv', bin), ...known].map((one) => join(one, name)).find(exists);
+  const pathFolders = (env.PATH ?? '').split(delimiter).filter(Boolean);
+  return [join(folder, '.venv', bin), ...pathFolders].map((location) => join(location, name)).find(exists);
 }
 
-/** The address of the page that shows a file of the course, below that of the site. */
+/** The address of the page that shows a file of the course, relative to the site. */
 function pageOf(file, map) {
   const lesson = /^content\/lessons\/([^/]+)\.md$/.exec(file);
   if (lesson) return `lessons/${encodeURIComponent(lesson[1])}.html`;
@@ -34,7 +34,7 @@ function pageOf(file, map) {
   return '';
 }
 
-/** The address that the preview says it has; undefined where a text says none. */
+/** The address of the preview in the text that it prints, or undefined. */
 function addressIn(text) {
   return /serving (http:\/\/\S+?\/)/.exec(text)?.[1];
 }

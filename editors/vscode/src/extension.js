@@ -1,4 +1,4 @@
-// Starts the language server of each course that is open, and its preview when it is asked for.
+// Starts the language server of each open course, and its preview on demand.
 
 const path = require('node:path');
 const vscode = require('vscode');
@@ -18,17 +18,17 @@ exports.activate = (context) => {
     vscode.commands.registerCommand('coursebuild.restart', restart),
     vscode.workspace.onDidChangeWorkspaceFolders(startAll),
     vscode.workspace.onDidChangeConfiguration((event) => event.affectsConfiguration('coursebuild') && restart()),
-    vscode.window.onDidChangeActiveTextEditor((editor) => previews.forEach((one) => one.show(editor))),
+    vscode.window.onDidChangeActiveTextEditor((editor) => previews.forEach((view) => view.show(editor))),
   );
   return startAll();
 };
 
 exports.deactivate = () => {
-  previews.forEach((one) => one.process.kill('SIGINT'));
+  previews.forEach((view) => view.process.kill('SIGINT'));
   return stopAll();
 };
 
-/** A server for each course among the folders; of one that is gone it ends. */
+/** Start a server for each course among the folders, and stop those of removed courses. */
 async function startAll() {
   const places = (vscode.workspace.workspaceFolders ?? []).map((folder) => courseOf(folder.uri.fsPath));
   const courses = new Set(places.filter(Boolean));
@@ -59,12 +59,12 @@ async function start(folder) {
     await client.start();
   } catch {
     clients.delete(folder);
-    missing(`The language server does not start: ${command}`, "pip install 'coursebuild[lsp]'");
+    reportMissing(`The language server does not start: ${command}`, "pip install 'coursebuild[lsp]'");
   }
 }
 
-async function stopAll(which = () => true) {
-  for (const folder of [...clients.keys()].filter(which)) {
+async function stopAll(accepts = () => true) {
+  for (const folder of [...clients.keys()].filter(accepts)) {
     const client = clients.get(folder);
     clients.delete(folder);
     await client.dispose();
@@ -79,21 +79,21 @@ async function restart() {
 function preview() {
   const editor = vscode.window.activeTextEditor;
   const folder = (editor && courseOf(editor.document.uri.fsPath)) ?? [...clients.keys()][0];
-  const known = previews.get(folder);
-  const command = folder && !known && find(folder);
-  if (known) known.panel.reveal(undefined, true);
+  const open = previews.get(folder);
+  const command = folder && !open && find(folder);
+  if (open) open.panel.reveal(undefined, true);
   else if (command) previews.set(folder, new Preview(folder, command, output, () => previews.delete(folder)));
 }
 
-/** The command of a course; who has none is told what to do. */
+/** The command of a course; if there is none, the user is told what to do. */
 function find(folder) {
   const command = commandOf(vscode.workspace.getConfiguration('coursebuild').get('command'), folder);
-  if (!command) missing('There is no coursebuild in .venv or on the path.', "python -m venv .venv && .venv/bin/pip install 'coursebuild[lsp]'");
+  if (!command) reportMissing('There is no coursebuild in .venv or on the path.', "python -m venv .venv && .venv/bin/pip install 'coursebuild[lsp]'");
   return command;
 }
 
-async function missing(what, cure) {
-  const said = await vscode.window.showErrorMessage(`${what} Install it with: ${cure}`, 'Open Settings', 'Try Again');
-  if (said === 'Open Settings') vscode.commands.executeCommand('workbench.action.openSettings', 'coursebuild.command');
-  if (said === 'Try Again') restart();
+async function reportMissing(problem, remedy) {
+  const choice = await vscode.window.showErrorMessage(`${problem} Install it with: ${remedy}`, 'Open Settings', 'Try Again');
+  if (choice === 'Open Settings') vscode.commands.executeCommand('workbench.action.openSettings', 'coursebuild.command');
+  if (choice === 'Try Again') restart();
 }

@@ -6,12 +6,12 @@ const path = require('node:path');
 const vscode = require('vscode');
 const { addressIn, courseOf, pageOf } = require('./course');
 
-// Who may show the preview in a frame: the panel, and the window around it.
+// The origins that may show the preview in a frame: the panel, and the window around it.
 const EMBED = ['--embed', 'vscode-webview:', '--embed', 'vscode-file:'];
 
 class Preview {
-  /** `ended` hears when the panel is closed or the preview ends. */
-  constructor(folder, command, output, ended) {
+  /** `onEnd` is called when the panel is closed or the preview ends. */
+  constructor(folder, command, output, onEnd) {
     this.folder = folder;
     this.panel = vscode.window.createWebviewPanel(
       'coursebuild.preview',
@@ -24,23 +24,23 @@ class Preview {
     this.process.on('error', (error) => output.appendLine(String(error)));
     this.process.on('close', (code) => {
       if (code !== null && code !== 0 && code !== 130) {
-        vscode.window.showErrorMessage('The preview has ended.', 'Show Why').then((said) => said && output.show());
+        vscode.window.showErrorMessage('The preview has ended.', 'Show Why').then((choice) => choice && output.show());
       }
       this.panel.dispose();
-      ended();
+      onEnd();
     });
-    let said = '';
-    const hear = (data) => {
+    let text = '';
+    const onOutput = (data) => {
       output.append(String(data));
-      said += this.address ? '' : data;
-      this.address ??= addressIn(said);
+      text += this.address ? '' : data;
+      this.address ??= addressIn(text);
       this.show(vscode.window.activeTextEditor);
     };
-    this.process.stdout.on('data', hear);
-    this.process.stderr.on('data', hear);
+    this.process.stdout.on('data', onOutput);
+    this.process.stderr.on('data', onOutput);
   }
 
-  /** Show the page of the file in an editor, where it is another than before. */
+  /** Show the page of the file in an editor, unless it is shown already. */
   async show(editor) {
     const file = editor?.document.uri.fsPath;
     if (!this.address || (file && (!file.endsWith('.md') || courseOf(file) !== this.folder)) || (!file && this.page)) return;

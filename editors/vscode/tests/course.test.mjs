@@ -17,7 +17,7 @@ test('the course of a file is the nearest folder with a map', () => {
 
 test('the command is that of the setting, of .venv, of the path', () => {
   const env = { PATH: '/usr/bin:/opt/bin' };
-  const find = (setting, ...there) => commandOf(setting, '/c', { env, platform: 'linux', exists: among(...there) });
+  const find = (setting, ...exists) => commandOf(setting, '/c', { env, platform: 'linux', exists: among(...exists) });
   assert.equal(find('', '/c/.venv/bin/coursebuild', '/opt/bin/coursebuild'), '/c/.venv/bin/coursebuild');
   assert.equal(find('', '/opt/bin/coursebuild'), '/opt/bin/coursebuild');
   assert.equal(find(''), undefined);

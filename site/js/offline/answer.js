@@ -54,11 +54,11 @@ async function answerPage(request, path, { store, fetch, preload, wait, waitUnti
     )
   const earliest = await Promise.race([network, wait(PATIENCE)])
   if (earliest?.response && earliest.response.status < 500) return earliest.response
-  const stored = await store.find(pagesFor(path))
-  if (stored) {
+  const copy = await store.find(pagesFor(path))
+  if (copy) {
     waitUntil(network)
-    onStored(stored.digest)
-    return stored.response
+    onStored(copy.digest)
+    return copy.response
   }
   const { response } = await network
   if (response) return response
@@ -70,8 +70,8 @@ async function answerPage(request, path, { store, fetch, preload, wait, waitUnti
 }
 
 async function answerLasting(request, path, { store, fetch, waitUntil }) {
-  const stored = (await store.get(path, '')) ?? (await store.find([path]))?.response
-  if (stored) return stored
+  const copy = (await store.get(path, '')) ?? (await store.find([path]))?.response
+  if (copy) return copy
   const response = await fetch(request)
   if (response.status === 200 && response.type === 'basic') waitUntil(storeUsed(store, path, response.clone()))
   return response
@@ -93,16 +93,16 @@ async function answerFile(request, path, { store, fetch }) {
   try {
     return await fetch(request)
   } catch (error) {
-    const stored = await store.find([path])
-    if (stored) return stored.response
+    const copy = await store.find([path])
+    if (copy) return copy.response
     throw error
   }
 }
 
 /** Answer with a range of a file: browsers request videos in ranges. */
 async function answerPart(request, path, { store, fetch }) {
-  const stored = isLasting(path) ? await store.get(path, '') : null
-  if (stored) return sliceOf(stored, request.headers.get('Range'))
+  const copy = isLasting(path) ? await store.get(path, '') : null
+  if (copy) return sliceOf(copy, request.headers.get('Range'))
   try {
     return await fetch(request)
   } catch (error) {

@@ -19,8 +19,8 @@ export function addCopyButtons(part, words) {
     button.textContent = words('code.copy')
     button.setAttribute('aria-live', 'polite')
     button.addEventListener('click', async () => {
-      const copied = await copyText(codeOf(listing))
-      button.textContent = words(copied ? 'code.copied' : 'code.failed')
+      const isCopied = await copyText(codeOf(listing))
+      button.textContent = words(isCopied ? 'code.copied' : 'code.failed')
       setTimeout(() => (button.textContent = words('code.copy')), SHOWN_FOR)
     })
     target.prepend(button)

@@ -24,8 +24,8 @@ export function noteTops(notes, obstacles, end) {
     if (mark === null) return null
     let top = firstFreeTop(Math.max(mark, nextFree), height, obstacles)
     if (top + height > end) {
-      const raised = end - height // the last may begin above its mark
-      top = raised >= Math.max(nextFree, 0) && firstFreeTop(raised, height, obstacles) === raised ? raised : null
+      const highest = end - height // the last may begin above its mark
+      top = highest >= Math.max(nextFree, 0) && firstFreeTop(highest, height, obstacles) === highest ? highest : null
     }
     if (top === null || Math.abs(top - mark) > FAR) return null
     nextFree = top + height + GAP

@@ -91,9 +91,9 @@ export function keepOffline(window, words) {
   let version = null
   const check = async (force) => {
     const worker = await activeWorker(navigator, root)
-    visit(window, worker, { keep: storedChoice(document), look: force }, ({ end, now, shown: stored }) => {
+    visit(window, worker, { keep: storedChoice(document), look: force }, ({ end, now, shown: storedVersion }) => {
       if (!end || !now) return
-      version ??= stored || now
+      version ??= storedVersion || now
       if (now !== version) offerReload(document, words)
     })
   }

@@ -12,12 +12,12 @@ const PATIENCE = 600 // ms
 const count = (number, noun) => `${number} ${noun}${number === 1 ? '' : 's'}`
 
 /** The text of the button. */
-export function summary({ problems, busy, trouble }, lost, gone) {
+export function summary({ problems, busy, trouble }, lost, isGone) {
   const errors = problems.filter(({ severity }) => severity === 'error').length
   const warnings = problems.length - errors
   const parts = []
   if (lost) parts.push('the preview has stopped')
-  if (gone) parts.push('this page is gone')
+  if (isGone) parts.push('this page is gone')
   if (trouble) parts.push('the checks could not be done')
   if (errors) parts.push(count(errors, 'mistake'))
   if (warnings) parts.push(count(warnings, 'warning'))

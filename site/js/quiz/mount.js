@@ -35,8 +35,8 @@ export function mountQuestion(element, words, progress = null, { fresh = false }
     element.dispatchEvent(new CustomEvent('coursebuild:answered', { bubbles: true, detail }))
   }
   const question = new Question(element, words, record)
-  const stored = fresh ? null : progress?.get(place.quiz, place.key)
-  if (stored) question.restore(stored)
+  const storedAnswer = fresh ? null : progress?.get(place.quiz, place.key)
+  if (storedAnswer) question.restore(storedAnswer)
   const name = `${place.quiz}/${place.key}`
   if (!fresh && drafts.has(name)) question.showDraft(drafts.get(name))
   drafts.delete(name)
@@ -66,8 +66,8 @@ function placeOf(element) {
 /** Follow a change in another tab, unless the reader is editing the answer here. */
 function follow(question, { quiz, key }, progress) {
   if (question.dirty) return
-  const stored = progress.get(quiz, key)
-  if (stored?.at === question.savedAt) return
-  if (stored) question.restore(stored)
+  const storedAnswer = progress.get(quiz, key)
+  if (storedAnswer?.at === question.savedAt) return
+  if (storedAnswer) question.restore(storedAnswer)
   else if (question.result) question.empty()
 }

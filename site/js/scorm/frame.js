@@ -49,8 +49,8 @@ function watchReading(window, visit, onChange) {
     if (window.document.visibilityState !== 'visible') return
     const { top, height } = text.getBoundingClientRect()
     reading.look(-top / height, (window.innerHeight - top) / height)
-    const passed = headings.filter((heading) => heading.getBoundingClientRect().top <= window.innerHeight / 4)
-    visit.isAt(passed.at(-1)?.id ?? '')
+    const passedHeadings = headings.filter((heading) => heading.getBoundingClientRect().top <= window.innerHeight / 4)
+    visit.isAt(passedHeadings.at(-1)?.id ?? '')
     if (!reading.isRead) return
     visit.wasRead()
     onChange()

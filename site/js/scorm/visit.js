@@ -38,8 +38,8 @@ export class Visit {
       if (answer.lesson === lesson) this.#keepNewest(answer)
     }
     for (const { quiz, key, ...answer } of this.#answers.values()) {
-      const stored = progress.get(quiz, key)
-      if (answer.given !== null && (!stored || stored.at < answer.at)) progress.put(quiz, key, { ...answer, lesson })
+      const storedAnswer = progress.get(quiz, key)
+      if (answer.given !== null && (!storedAnswer || storedAnswer.at < answer.at)) progress.put(quiz, key, { ...answer, lesson })
     }
     if (read) progress.markLesson(lesson, true)
   }

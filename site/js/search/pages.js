@@ -102,9 +102,9 @@ async function byParts(word, parts, source) {
   const lines = await Promise.all(parts.map(async (part) => (await source.shard(shardOf(source.listing, part))).get(part)))
   if (lines.includes(undefined)) return
   const pagesByPart = lines.map((line) => new Map(readPages(line)))
-  const [smallest, ...others] = pagesByPart
+  const [smallest, ...rest] = pagesByPart
   for (const [page, weight] of smallest) {
-    if (others.every((pages) => pages.has(page))) raise(word.pages, page, PARTS, weight)
+    if (rest.every((pages) => pages.has(page))) raise(word.pages, page, PARTS, weight)
   }
   if (word.pages.size > 0) parts.forEach((part) => word.terms.set(part, PARTS))
 }

@@ -6,8 +6,8 @@ const key = (course) => `coursebuild.search.${course}`
 /** The last queries, the newest first. */
 export function recentQueries(course, storage = openStorage()) {
   try {
-    const stored = JSON.parse(storage.getItem(key(course)))
-    return Array.isArray(stored) ? stored.filter((query) => typeof query === 'string' && query !== '').slice(0, MOST) : []
+    const queries = JSON.parse(storage.getItem(key(course)))
+    return Array.isArray(queries) ? queries.filter((query) => typeof query === 'string' && query !== '').slice(0, MOST) : []
   } catch {
     return []
   }

@@ -31,7 +31,7 @@ const NAMES = (
   'alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi omicron pi rho sigma tau upsilon phi chi ' +
   'psi omega sigma epsilon theta phi pi rho'
 ).split(' ')
-const GREEK = Object.fromEntries([...'αβγδεζηθικλμνξοπρστυφχψωςϵϑϕϖϱ'].map((letter, at) => [letter, NAMES[at]]))
+const GREEK = Object.fromEntries([...'αβγδεζηθικλμνξοπρστυφχψωςϵϑϕϖϱ'].map((letter, index) => [letter, NAMES[index]]))
 
 const ROWS =
   '\\u0e00-\\u0eff\\u1000-\\u109f\\u1780-\\u17ff\\u3005-\\u3007\\u3040-\\u30ff' +

@@ -127,8 +127,8 @@ export class Instrument {
   listeners() {
     const { words, notices, config } = this
     return {
-      state: (state, reason) => this.changed(state, reason),
-      ready: ({ values }) => this.opened(values),
+      state: (state, reason) => this.onStateChange(state, reason),
+      ready: ({ values }) => this.onReady(values),
       samples: (samples, fresh) => this.collect(samples, fresh),
       refresh: (frame, now) => this.refresh(frame, now),
       controls: (values) => {
@@ -144,7 +144,7 @@ export class Instrument {
     }
   }
 
-  opened(values) {
+  onReady(values) {
     this.update(values)
     const { pendingAction, playRequested: pressed } = this
     this.pendingAction = null
@@ -153,7 +153,7 @@ export class Instrument {
     if (pressed) this.simulation.play()
   }
 
-  changed(state, reason) {
+  onStateChange(state, reason) {
     this.state = state
     this.element.dataset.state = state
     this.textAt = this.plotAt = -Infinity // so that the next refresh shows the numbers of the last picture
