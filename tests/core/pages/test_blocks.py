@@ -29,8 +29,8 @@ def receipt(html: str) -> str:
 
 def test_a_script_and_its_output_are_one_object_in_callouts_and_lists_too(make: Make) -> None:
     lines = (SCRIPT + OUTPUT).strip().split("\n")
-    for first, others in (("> ", "> "), ("- ", "  ")):
-        html = make(first + f"\n{others}".join(lines)).html()
+    for first, indent in (("> ", "> "), ("- ", "  ")):
+        html = make(first + f"\n{indent}".join(lines)).html()
         assert html.count("<figure") == 1
         assert html.count("<samp>") == 1
 
@@ -57,9 +57,9 @@ def test_an_output_in_the_next_list_item_stays_apart_from_the_script(make: Make)
 def test_the_receipt_of_an_output_says_how_it_was_compared(
     make: Make, keys: str, status: str, expected: str
 ) -> None:
-    """The others are in `tests/courses/full`."""
-    made = make(SCRIPT + OUTPUT.replace("text", f"text{keys}"), status=status)
-    assert receipt(made.html()) == expected
+    """`tests/courses/full` has the other comparisons."""
+    course = make(SCRIPT + OUTPUT.replace("text", f"text{keys}"), status=status)
+    assert receipt(course.html()) == expected
 
 
 def test_a_keyframe_without_a_name_is_numbered(make: Make) -> None:
@@ -72,8 +72,8 @@ def test_a_long_script_is_folded_and_loses_no_line(make: Make) -> None:
     html = make(f"```python file=examples/a.py\n{body}```\n").html()
     assert "<summary>lines 1–9: docstring, imports, A, B, C</summary>" in html
     assert "<summary>lines 38–127: f2, f3, f4, f5, f6, f7</summary>" in html
-    shown = "".join(findall(r"<code class=\"language-python\">(.*?)</code></pre>", html, flags=16))
-    assert unescape(sub(r"</?span[^>]*>", "", shown)) == body.rstrip("\n") + "\n"
+    code = "".join(findall(r"<code class=\"language-python\">(.*?)</code></pre>", html, flags=16))
+    assert unescape(sub(r"</?span[^>]*>", "", code)) == body.rstrip("\n") + "\n"
 
 
 def test_control_characters_of_an_output_are_shown(make: Make) -> None:

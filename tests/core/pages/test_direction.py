@@ -1,4 +1,4 @@
-"""Which way a language runs, and how text and numbers of it are set."""
+"""The direction of languages, and how their text and numbers are set."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ LANGUAGES = {
 }
 
 
-@pytest.mark.parametrize("way", LANGUAGES)
-def test_the_direction_of_a_language_is_that_of_its_script(way: str) -> None:
-    assert [code for code in LANGUAGES[way].split() if direction(code) != way] == []
+@pytest.mark.parametrize("side", LANGUAGES)
+def test_the_direction_of_a_language_is_that_of_its_script(side: str) -> None:
+    assert [code for code in LANGUAGES[side].split() if direction(code) != side] == []
 
 
 @pytest.mark.parametrize(
-    ("text", "found"),
+    ("text", "expected"),
     [
         ("a mass of 5 kg falls", "a mass of 5\u00a0kg falls"),
         ("9.81 m/s² and 3 N·m", "9.81\u00a0m/s² and 3\u00a0N·m"),
@@ -45,12 +45,12 @@ def test_the_direction_of_a_language_is_that_of_its_script(way: str) -> None:
         ("5 kg mass, 2 m in 3 s more", "5\u00a0kg mass, 2\u00a0m in 3\u00a0s more"),
     ],
 )
-def test_numbers_keep_their_units(text: str, found: str) -> None:
-    assert join_units(text) == found
+def test_numbers_keep_their_units(text: str, expected: str) -> None:
+    assert join_units(text) == expected
 
 
 @pytest.mark.parametrize(
-    ("text", "kept"),
+    ("text", "expected"),
     [
         ("التسارع -9.81 m/s² هنا", ["-9.81 m/s²"]),
         ("من −3 إلى +4.5", ["−3", "+4.5"]),
@@ -60,9 +60,9 @@ def test_numbers_keep_their_units(text: str, found: str) -> None:
         ("2024-11-20", []),
     ],
 )
-def test_quantities_in_text_from_the_right(text: str, kept: list[str]) -> None:
+def test_quantities_in_text_from_the_right(text: str, expected: list[str]) -> None:
     pieces = list(split_quantities(text))
-    assert [piece for piece, is_kept in pieces if is_kept] == kept
+    assert [piece for piece, is_quantity in pieces if is_quantity] == expected
     assert "".join(piece for piece, _ in pieces) == text
 
 
@@ -72,18 +72,18 @@ def test_finding_quantities_loses_no_character(text: str) -> None:
     assert join_units(text).replace("\u00a0", " ") == text.replace("\u00a0", " ")
     assert 0 <= unit_length(text) <= len(text)
 
-    for way in ("ltr", "rtl"):
-        html = str(text_html(text, way))
+    for side in ("ltr", "rtl"):
+        html = str(text_html(text, side))
         assert unescape(re.sub("</?bdi[^>]*>", "", html)) == join_units(text)
 
 
 def test_pages_say_their_direction_and_hold_numbers_and_units_together(make: Make) -> None:
     hebrew = MAP.replace('"en"', '"he"').replace("A body falls.", "-3 m")
-    made = make("It is $x$ kg and $y$ kilos.", course=hebrew)
-    page = made.site()["lessons/0.1-falling.html"].decode()
+    course = make("It is $x$ kg and $y$ kilos.", course=hebrew)
+    page = course.site()["lessons/0.1-falling.html"].decode()
     assert '<html lang="he" dir="rtl" ' in page
     assert '<p class="lead"><bdi dir="ltr">-3\u00a0m</bdi></p>' in page
     math = '<math class="inline"><mi>x</mi></math>'
-    assert f'<bdi dir="ltr">{math}\u00a0kg</bdi> and ' in made.html()
-    assert made.html().count("<bdi") == 1
+    assert f'<bdi dir="ltr">{math}\u00a0kg</bdi> and ' in course.html()
+    assert course.html().count("<bdi") == 1
     assert f"{math}\u00a0kg and " in make("It is $x$ kg and $y$ kilos.").html()

@@ -1,4 +1,4 @@
-"""Which parts of a long script are folded."""
+"""The parts of long scripts that are folded."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def test_a_remainder_is_folded_from_12_lines_on() -> None:
 
 def test_a_guard_of_up_to_12_lines_stays() -> None:
     code = function("one", 44) + function("two", 20) + 'if __name__ == "__main__":\n'
-    guarded = (Part(1, 44, False), Part(45, 64, True, names=("two",)), Part(65, 76, False))
-    assert fold(code + "    one()\n" * 11) == guarded
+    parts = (Part(1, 44, False), Part(45, 64, True, names=("two",)), Part(65, 76, False))
+    assert fold(code + "    one()\n" * 11) == parts
     assert fold(code + "    one()\n" * 12)[1:] == (Part(45, 77, True, names=("two",)),)
 
 
@@ -98,8 +98,8 @@ def test_parts_follow_each_other_and_cover_the_script(pieces: list[str]) -> None
     parts = fold(code)
     assert parts[0].first == 1
     assert parts[-1].last == max(code.count("\n"), 1)
-    for one, next_one in itertools.pairwise(parts):
-        assert next_one.first == one.last + 1
-        assert one.folded or next_one.folded
+    for previous, next_part in itertools.pairwise(parts):
+        assert next_part.first == previous.last + 1
+        assert previous.folded or next_part.folded
     assert any(not part.folded for part in parts)
     assert all(part.last - part.first + 1 >= HEAD for part in parts if part.folded)

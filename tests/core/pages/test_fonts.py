@@ -39,8 +39,8 @@ def jobs(assets: Assets, text: str, mathematics: str = FORMULAS) -> tuple[FontJo
     return font_jobs(data, text, mathematics)
 
 
-def only(found: tuple[FontJob, ...], family: str, style: str = "normal") -> list[FontJob]:
-    return [job for job in found if (job.face.family, job.face.style) == (family, style)]
+def jobs_of(all_jobs: tuple[FontJob, ...], family: str, style: str = "normal") -> list[FontJob]:
+    return [job for job in all_jobs if (job.face.family, job.face.style) == (family, style)]
 
 
 def font_of(job: FontJob) -> TTFont:
@@ -49,43 +49,45 @@ def font_of(job: FontJob) -> TTFont:
 
 @pytest.fixture(scope="module")
 def mathematical(assets: Assets) -> TTFont:
-    (job,) = only(jobs(assets, ""), MATH)
+    (job,) = jobs_of(jobs(assets, ""), MATH)
     assert len(subset_font(job)) < 80_000
     return font_of(job)
 
 
 def test_a_text_font_has_what_the_pages_use_its_axes_and_their_names(assets: Assets) -> None:
-    (latin,) = only(jobs(assets, "ordinary text"), TEXT)
+    (latin,) = jobs_of(jobs(assets, "ordinary text"), TEXT)
     font = font_of(latin)
     assert set("The quick brown fox, 1–2 “x” …") <= set(map(chr, font.getBestCmap()))
     axes = {axis.axisTag: (axis.minValue, axis.maxValue) for axis in font["fvar"].axes}
     assert axes["wght"] == (400, 700)
     assert axes["opsz"][0] < 10 < 40 < axes["opsz"][1]
-    wanted = {1, 2, 4, 6, *(axis.axisNameID for axis in font["fvar"].axes)}
-    assert wanted <= {name.nameID for name in font["name"].names}
+    name_ids = {1, 2, 4, 6, *(axis.axisNameID for axis in font["fvar"].axes)}
+    assert name_ids <= {name.nameID for name in font["name"].names}
     assert len(subset_font(latin)) < 75_000
 
 
 def test_other_scripts_come_only_where_they_are_used(assets: Assets) -> None:
     plain = jobs(assets, "ordinary")
     mixed = jobs(assets, "Łódź, привет")
-    assert {job.face.subset for job in only(plain, TEXT)} == {"latin"}
-    assert {job.face.subset for job in only(mixed, TEXT)} == {"latin", "latin-ext", "cyrillic"}
-    cyrillic = next(job for job in only(mixed, TEXT) if job.face.subset == "cyrillic")
+    assert {job.face.subset for job in jobs_of(plain, TEXT)} == {"latin"}
+    assert {job.face.subset for job in jobs_of(mixed, TEXT)} == {"latin", "latin-ext", "cyrillic"}
+    cyrillic = next(job for job in jobs_of(mixed, TEXT) if job.face.subset == "cyrillic")
     assert cyrillic.characters == "веипрт"
 
 
 def test_no_character_is_in_two_files_of_a_face(assets: Assets) -> None:
     for style in ("normal", "italic"):
-        given = [c for job in only(jobs(assets, "†łα → x̄"), TEXT, style) for c in job.characters]
-        assert len(given) == len(set(given))
+        characters = [
+            c for job in jobs_of(jobs(assets, "†łα → x̄"), TEXT, style) for c in job.characters
+        ]
+        assert len(characters) == len(set(characters))
 
 
 def test_the_math_font_keeps_its_table_variants_and_italics(mathematical: TTFont) -> None:
     font = mathematical
     cmap = font.getBestCmap()
-    wanted = set(FORMULAS) | {italic_letter(c) for c in "IVrdmkcω"} | {"ℎ", "𝐻", "𝜕", "𝛻"}
-    assert {c for c in wanted if ord(c) not in cmap} == set()
+    characters = set(FORMULAS) | {italic_letter(c) for c in "IVrdmkcω"} | {"ℎ", "𝐻", "𝜕", "𝛻"}
+    assert {c for c in characters if ord(c) not in cmap} == set()
     table = font["MATH"].table
     assert table.MathConstants.AxisHeight.Value > 0
     variants = table.MathVariants
@@ -99,13 +101,13 @@ def test_the_math_font_keeps_its_table_variants_and_italics(mathematical: TTFont
 
 
 def test_no_radical_is_much_wider_than_the_smallest(mathematical: TTFont) -> None:
-    """A browser leaves room for the widest behind each root."""
+    """A browser leaves room for the widest one after each root."""
     font = mathematical
     radical = font.getBestCmap()[ord("√")]
     variants = font["MATH"].table.MathVariants
-    drawn = variants.VertGlyphConstruction[variants.VertGlyphCoverage.glyphs.index(radical)]
-    names = {each.VariantGlyph for each in drawn.MathGlyphVariantRecord}
-    names |= {part.glyph for part in drawn.GlyphAssembly.PartRecords}
+    construction = variants.VertGlyphConstruction[variants.VertGlyphCoverage.glyphs.index(radical)]
+    names = {variant.VariantGlyph for variant in construction.MathGlyphVariantRecord}
+    names |= {part.glyph for part in construction.GlyphAssembly.PartRecords}
     assert len(names) >= 5
     for name in names:
         advance, bearing = font["hmtx"][name]
@@ -115,17 +117,17 @@ def test_no_radical_is_much_wider_than_the_smallest(mathematical: TTFont) -> Non
 
 
 def test_a_site_without_formulas_has_no_math_font(assets: Assets) -> None:
-    assert only(jobs(assets, "text", ""), MATH) == []
-    assert len(only(jobs(assets, "text", ""), CODE)) == 1
+    assert jobs_of(jobs(assets, "text", ""), MATH) == []
+    assert len(jobs_of(jobs(assets, "text", ""), CODE)) == 1
 
 
 def test_the_same_job_gives_the_same_bytes_and_key(assets: Assets) -> None:
-    one, two = jobs(assets, "text"), jobs(assets, "text")
-    assert [job.key for job in one] == [job.key for job in two]
-    small, again = (only(jobs(assets, "привет"), CODE)[1] for _ in range(2))
+    first, second = jobs(assets, "text"), jobs(assets, "text")
+    assert [job.key for job in first] == [job.key for job in second]
+    small, again = (jobs_of(jobs(assets, "привет"), CODE)[1] for _ in range(2))
     assert small.face.subset == "cyrillic"
     assert subset_font(small) == subset_font(again)
-    assert {job.key for job in one}.isdisjoint(
+    assert {job.key for job in first}.isdisjoint(
         job.key for job in jobs(assets, "text é ñ", FORMULAS + "ℵ") if job.face.subset == "latin"
     )
 
@@ -154,12 +156,12 @@ def test_the_list_of_fonts_says_what_they_hold(assets: Assets) -> None:
 
 
 def test_rules_have_fallbacks_of_the_same_measure(assets: Assets) -> None:
-    found = jobs(assets, "text")
-    css = face_rules((job, f"fonts/{job.face.file}") for job in found)
-    assert css.count("@font-face") == len(found) + len(FALLBACKS)
+    cut_fonts = jobs(assets, "text")
+    css = face_rules((job, f"fonts/{job.face.file}") for job in cut_fonts)
+    assert css.count("@font-face") == len(cut_fonts) + len(FALLBACKS)
     assert 'font-family:"Source Serif 4 Variable fallback";font-style:normal;src:local(' in css
     for local, scale in (("Times New Roman", "111."), ("DejaVu Serif", "87.1")):
         rule = css.split(f'local("{local}"')[1].split("}")[0]
         assert f"size-adjust:{scale}" in rule, "as wide as the web font"
     assert 'font-family:"STIX Two Math";font-style:normal;font-weight:400;' in css
-    assert css.count("font-display:swap") == len(found)
+    assert css.count("font-display:swap") == len(cut_fonts)

@@ -10,10 +10,10 @@ ROW = "<mrow><mi>alpha</mi><mrow><mi>beta</mi></mrow><mo>=</mo></mrow>"
 END = "<mrow><mi>gamma</mi><mo>+</mo><mn>123456</mn></mrow>"
 
 
-@pytest.mark.parametrize("between", ["", "<mspace/>"])
-def test_a_long_formula_is_cut_between_its_outermost_rows(between: str) -> None:
-    cut = f"<math>{ROW}</math><math>{between}{END}</math>"
-    assert split_formula(f"<math>{ROW}{between}{END}</math>") == cut
+@pytest.mark.parametrize("space", ["", "<mspace/>"])
+def test_a_long_formula_is_cut_between_its_outermost_rows(space: str) -> None:
+    expected = f"<math>{ROW}</math><math>{space}{END}</math>"
+    assert split_formula(f"<math>{ROW}{space}{END}</math>") == expected
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ NOTE = '<annotation encoding="application/x-tex">=2</annotation></semantics></ma
         (f"\n<math><semantics><mo>≈</mo>{TWO}", f'\n<math><semantics><mo lspace="0em">≈</mo>{TWO}'),
         (f"{TWO}<mo>&lt;</mo></mrow>{NOTE} 3", f'{TWO}<mo rspace="0em">&lt;</mo></mrow>{NOTE} 3'),
         ("a <math><mo>=</mo></math> b", 'a <math><mo lspace="0em" rspace="0em">=</mo></math> b'),
-        *((same, same) for same in (
+        *((unchanged, unchanged) for unchanged in (
             f"of {X}<math><mo>=</mo>{TWO}</math> m",
             f"of <math>{TWO}<mo>=</mo></math><math>{TWO}</math> m",
             f"of <math><mo>sin</mo>{TWO}</math> m",

@@ -56,8 +56,8 @@ def test_unknown_languages_are_plain_escaped_text(language: str) -> None:
 
 
 def test_forbidden_characters_are_shown_as_symbols() -> None:
-    shown = "\u241b[31mred\u241b[0m\u2400\u240d\u2421\ufffd\ufffd\ufffd\t\n"
-    assert visible("\x1b[31mred\x1b[0m\0\r\x7f\x85\ufffe\U0010ffff\t\n") == shown
+    expected = "\u241b[31mred\u241b[0m\u2400\u240d\u2421\ufffd\ufffd\ufffd\t\n"
+    assert visible("\x1b[31mred\x1b[0m\0\r\x7f\x85\ufffe\U0010ffff\t\n") == expected
 
 
 @given(st.text())

@@ -46,4 +46,4 @@ def test_elements_are_found() -> None:
     (root,) = parse_html('<div class="a b"><p><b>1</b></p><b>2<b>3</b></b></div>')
     assert isinstance(root, HtmlElement)
     assert root.classes == {"a", "b"} and root.text == "123"
-    assert [one.text for one in root.nearest("b")] == ["1", "23"]
+    assert [element.text for element in root.nearest("b")] == ["1", "23"]

@@ -21,22 +21,22 @@ def graphs(draw: st.DrawFn) -> Graph:
     return draw(st.permutations(nodes)), edges
 
 
-def laid_out(nodes: list[str], edges: list[Edge], width: float = 40.0, gap: float = 8.0) -> Layout:
+def lay_out(nodes: list[str], edges: list[Edge], width: float = 40.0, gap: float = 8.0) -> Layout:
     return layered_layout(nodes, edges, width, gap, 10.0)
 
 
-def reach(nodes: list[str], edges: list[Edge] | tuple[Edge, ...]) -> set[Edge]:
-    """All pairs of which the second can be come to from the first."""
-    found = set(edges)
-    while more := {(a, d) for a, b in found for c, d in found if b == c} - found:
-        found |= more
-    return found
+def reachable_pairs(nodes: list[str], edges: list[Edge] | tuple[Edge, ...]) -> set[Edge]:
+    """All pairs of nodes with a path from the first to the second."""
+    pairs = set(edges)
+    while further := {(a, d) for a, b in pairs for c, d in pairs if b == c} - pairs:
+        pairs |= further
+    return pairs
 
 
 @settings(max_examples=50)
 @given(graphs())
 def test_every_arrow_leads_down_and_meets_its_nodes(graph: Graph) -> None:
-    layout = laid_out(*graph)
+    layout = lay_out(*graph)
     nodes = {node.id: node for node in layout.nodes}
     assert list(nodes) == graph[0]
     assert [(edge.start, edge.end) for edge in layout.edges] == graph[1]
@@ -50,7 +50,7 @@ def test_every_arrow_leads_down_and_meets_its_nodes(graph: Graph) -> None:
 @settings(max_examples=50)
 @given(graphs(), st.floats(0, 30))
 def test_no_node_overlaps_another_or_sticks_out(graph: Graph, gap: float) -> None:
-    layout = laid_out(*graph, gap=gap)
+    layout = lay_out(*graph, gap=gap)
     for level in range(layout.layers):
         row = sorted(node.x for node in layout.nodes if node.layer == level)
         assert row, "an empty layer"
@@ -65,9 +65,9 @@ def test_a_reduced_graph_leads_as_far_with_no_arrow_too_many(graph: Graph) -> No
     nodes, edges = graph
     edges_left = transitive_reduction(nodes, edges)
     assert set(edges_left) <= set(edges)
-    assert reach(nodes, edges_left) == reach(nodes, edges)
+    assert reachable_pairs(nodes, edges_left) == reachable_pairs(nodes, edges)
     for edge in edges_left:
-        assert edge not in reach(nodes, [other for other in edges_left if other != edge])
+        assert edge not in reachable_pairs(nodes, [e for e in edges_left if e != edge])
 
 
 def test_arrows_of_unknown_nodes_and_repeated_ones_are_left_out() -> None:
@@ -81,4 +81,4 @@ def test_a_chain_longer_than_the_stack_is_laid_out() -> None:
     nodes = [str(n) for n in range(1100)]
     edges = list(pairwise(nodes))
     assert transitive_reduction(nodes, [*edges, ("0", "1099")]) == tuple(edges)
-    assert laid_out(nodes, edges).layers == 1100
+    assert lay_out(nodes, edges).layers == 1100

@@ -29,14 +29,16 @@ def test_links_that_lead_somewhere_are_not_told() -> None:
     assert check_links(site(page)) == ()
 
 
-def test_broken_links_are_told_with_what_is_nearest() -> None:
+def test_broken_links_are_reported_with_the_nearest_target() -> None:
     page = (
         '<p id="conservation">\n<a href="#conservatoin">1</a>\n'
         '<img src="../assets/sites.css" srcset="x.png 2x">\n<a href="../../up.html">2</a>'
         '<a href="b.html#x">3</a><script src=gone.js></script><a href="http://[">4</a>'
     )
-    found = [(broken.url, broken.reason, broken.suggestion) for broken in check_links(site(page))]
-    assert found == [
+    broken_links = [
+        (broken.url, broken.reason, broken.suggestion) for broken in check_links(site(page))
+    ]
+    assert broken_links == [
         ("#conservatoin", "`lessons/a.html` has no anchor `#conservatoin`", "conservation"),
         ("../../up.html", "no file `up.html` in the site", None),
         ("../assets/sites.css", "no file `assets/sites.css` in the site", "assets/site.css"),

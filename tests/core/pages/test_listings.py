@@ -81,7 +81,7 @@ def test_the_picture_of_a_code_is_the_code(text: str) -> None:
     svg = qr_svg(text, 'a "label"')
     assert 'aria-label="a &#34;label&#34;"' in svg
     code = segno.make_qr(text, error="m")
-    drawn = set()
+    modules = set()
     x = y = 0
     for command, first, second in re.findall(
         r"([Mmh])(-?\d+)(?: (\d+)(?:\.5)?)?", svg.split(' d="')[1]
@@ -91,9 +91,9 @@ def test_the_picture_of_a_code_is_the_code(text: str) -> None:
         elif command == "m":
             x += int(first)
         else:
-            drawn |= {(x + n, y) for n in range(int(first))}
+            modules |= {(x + n, y) for n in range(int(first))}
             x += int(first)
-    assert drawn == {
+    assert modules == {
         (x, y) for y, row in enumerate(code.matrix) for x, dark in enumerate(row) if dark
     }
     size = len(code.matrix) + 8
@@ -114,11 +114,11 @@ NAMES = st.lists(
 
 @given(st.lists(NAMES | st.sampled_from(["a.L1", "a.L2", "a.L9", "b.c.L4", "a.out"]), max_size=6))
 def test_of_the_lines_of_a_listing_the_last_is_kept(ids: list[str]) -> None:
-    known = {name: linked_lines(name) for name in ids}
+    lines_by_id = {name: linked_lines(name) for name in ids}
     last: dict[str, int] = {}
-    for lines in filter(None, known.values()):
+    for lines in filter(None, lines_by_id.values()):
         last[lines[0]] = max(last.get(lines[0], 0), lines[2])
-    others = {name for name, lines in known.items() if lines is None}
+    other_ids = {name for name, lines in lines_by_id.items() if lines is None}
     short = merge_line_ids(ids)
-    assert short == others | {f"{stem}.L{line}" for stem, line in last.items()}
+    assert short == other_ids | {f"{stem}.L{line}" for stem, line in last.items()}
     assert all(has_anchor(short, name) for name in ids)

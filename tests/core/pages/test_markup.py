@@ -21,12 +21,12 @@ from support.plain_html import WORDS, PlainContext
 KINDS = frozenset({"note"})
 
 
-def parsed(text: str) -> Document:
+def parse(text: str) -> Document:
     return parse_document(Source("x.md", text), KINDS, lesson=False).value
 
 
 class Page(PlainContext):
-    """A context that shows what it was asked."""
+    """A context whose answers show the question."""
 
     def __init__(self, words: Strings = WORDS, direction: Literal["", "ltr", "rtl"] = "") -> None:
         self.words, self.direction = words, direction
@@ -57,7 +57,7 @@ class Page(PlainContext):
 
 
 def html(text: str) -> str:
-    return str(render_blocks(parsed(text).blocks, Page()))
+    return str(render_blocks(parse(text).blocks, Page()))
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_a_task_list_has_labelled_boxes() -> None:
 
 
 def test_footnotes_and_their_references_link_to_each_other() -> None:
-    document = parsed("a[^x] b[^y] c[^x]\n\n[^x]: *One*.\n[^y]: - item\n")
+    document = parse("a[^x] b[^y] c[^x]\n\n[^x]: *One*.\n[^y]: - item\n")
     assert str(render_blocks(document.blocks, Page())) == (
         '<p>a<sup class="footnote-ref"><a href="#fn:1" id="fnref:1" role="doc-noteref"'
         ' aria-label="Footnote 1">1</a></sup> b<sup class="footnote-ref"><a href="#fn:2"'
@@ -139,7 +139,7 @@ def test_footnotes_and_their_references_link_to_each_other() -> None:
 
 
 def test_words_can_be_translated() -> None:
-    document = parsed("## A\n\nb[^x]\n\n[^x]: c\n")
+    document = parse("## A\n\nb[^x]\n\n[^x]: c\n")
     german = """[markup]
         anchor = 'Zum "Teil"'
         footnotes = "Fußnoten"
@@ -154,8 +154,8 @@ def test_words_can_be_translated() -> None:
 def test_text_is_escaped_wherever_it_stands() -> None:
     nasty = '"><script>'
     text = f"\\<script> `{nasty}` [a](b '{nasty}') ![{nasty}](c) $\"><x$\n\n    {nasty}\n"
-    written = html(f"{text}\n## \\<script>\n\n- \\<script>\n\n| \\<script> |\n| - |\n")
-    assert "<script" not in written and written.count("&lt;script") == 8
+    page_html = html(f"{text}\n## \\<script>\n\n- \\<script>\n\n| \\<script> |\n| - |\n")
+    assert "<script" not in page_html and page_html.count("&lt;script") == 8
     assert '">' not in html('[a](<b"\\>c>)').removeprefix('<p><a href="/UrlTarget?a&amp;b">')
 
 
@@ -165,11 +165,12 @@ _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
 @given(st.text(alphabet="aµ 0123.,·kgm²<>&\"'×−%°\n\u00a0", max_size=24) | st.text())
 def test_text_has_its_quantities_kept_and_is_escaped(text: str) -> None:
     inlines = (Text(Span(Source("x.md", ""), 0, 0), text),)
-    known = join_units(text).translate(_ESCAPES)
-    assert render_inlines(inlines, Page(direction="ltr")) == known
+    expected = join_units(text).translate(_ESCAPES)
+    assert render_inlines(inlines, Page(direction="ltr")) == expected
     pieces = (
-        (Markup(one.translate(_ESCAPES)), kept) for one, kept in split_quantities(join_units(text))
+        (Markup(piece.translate(_ESCAPES)), is_quantity)
+        for piece, is_quantity in split_quantities(join_units(text))
     )
-    known = "".join(isolate_ltr(html) if kept else html for html, kept in pieces)
-    assert render_inlines(inlines, Page(direction="rtl")) == known
+    expected = "".join(isolate_ltr(html) if is_quantity else html for html, is_quantity in pieces)
+    assert render_inlines(inlines, Page(direction="rtl")) == expected
     assert render_inlines(inlines, Page()) == text.translate(_ESCAPES)

@@ -36,27 +36,27 @@ def test_nothing_else_is_there() -> None:
 
 def test_the_fonts_that_most_courses_need_are_cut(assets: Assets) -> None:
     faces = read_faces(assets.file("fonts/fonts.json"))
-    given = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
-    for job in font_jobs(given, "".join(BASE), "x"):
-        made = prepared_file("fonts", job.key)
-        assert made == (None if job.face.family == MATH else subset_font(job))
+    fonts = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
+    for job in font_jobs(fonts, "".join(BASE), "x"):
+        cut_font = prepared_file("fonts", job.key)
+        assert cut_font == (None if job.face.family == MATH else subset_font(job))
     assert prepared_file("fonts", "0" * 64) is None
 
 
 def test_copies_are_up_to_date() -> None:
     """If not, run `python site/bundle.py`."""
-    made = runpy.run_path(str(ROOT / "site" / "prepare_copies.py"))["compress"](assets_dir())
+    copies = runpy.run_path(str(ROOT / "site" / "prepare_copies.py"))["compress"](assets_dir())
     folder = assets_dir() / FOLDER
-    assert made == {name: (folder / name).read_bytes() for name in made}
+    assert copies == {name: (folder / name).read_bytes() for name in copies}
 
 
 def test_a_copy_is_that_of_the_script_as_it_is_published(assets: Any) -> None:
-    """All that pages of every course refer to and that shrinks, but for the style sheet."""
-    asked: dict[str, bytes | None] = {}
+    """The compressible files that pages of every course refer to, except the style sheet."""
+    copies_by_key: dict[str, bytes | None] = {}
 
     def keep(key: str, make: Callable[[], bytes]) -> bytes:
-        asked[key] = prepared_file("copies", key)
-        return asked[key] or make()
+        copies_by_key[key] = prepared_file("copies", key)
+        return copies_by_key[key] or make()
 
     names = [name for name in SCRIPTS if name != "theme.js"]  # which is too small
     scripts = [OutputFile(f"assets/{n}", page_script(assets.file(SCRIPTS[n]))) for n in names]
@@ -67,7 +67,7 @@ def test_a_copy_is_that_of_the_script_as_it_is_published(assets: Any) -> None:
         path, _, suffix = copy.path.rpartition(".")
         undo = brotli.decompress if suffix == "br" else gzip.decompress
         assert undo(copy.make()) == whole[path]
-    assert None not in asked.values()
+    assert None not in copies_by_key.values()
     assert prepared_file("copies", "0" * 64) is None
 
 
@@ -76,6 +76,6 @@ def test_templates_are_up_to_date(tmp_path: Path) -> None:
     texts = template_texts()
     compile_templates(texts, tmp_path)
     name = compiled_name(texts)
-    made = {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()}
-    there = (assets_dir() / FOLDER / name).glob("*.py")
-    assert {path.name: path.read_bytes() for path in there} == made
+    compiled = {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()}
+    bundled = (assets_dir() / FOLDER / name).glob("*.py")
+    assert {path.name: path.read_bytes() for path in bundled} == compiled

@@ -35,7 +35,7 @@ def test_the_key_of_an_output_question_is_what_the_script_printed(make: Make) ->
 
 
 @pytest.mark.parametrize(
-    ("how", "rule"),
+    ("comparison", "rule"),
     [
         ("exact", "exact"),
         ("digits", "digits"),
@@ -44,9 +44,9 @@ def test_the_key_of_an_output_question_is_what_the_script_printed(make: Make) ->
     ],
 )
 def test_an_output_question_is_graded_as_its_recording_is_compared(
-    make: Make, how: str, rule: str
+    make: Make, comparison: str, rule: str
 ) -> None:
-    recorded = f"Output:\n\n```text {how}\none\ntwo\n```\n\n"
+    recorded = f"Output:\n\n```text {comparison}\none\ntwo\n```\n\n"
     html = make(output_question(2).replace("```quiz", f"{recorded}```quiz")).html()
     assert f'data-answer="two" data-compare="{rule}">' in html
 

@@ -23,13 +23,13 @@ PIECES = [
 html = st.lists(st.sampled_from(PIECES), max_size=20).map("".join)
 
 
-def recorded(body: str) -> tuple[PageRecord, str]:
+def record_of(body: str) -> tuple[PageRecord, str]:
     return record(PageHead("x.html", "page", "Títle", ""), Markup(body), "")
 
 
 @given(html)
 def test_the_facts_of_a_page_are_its_characters(body: str) -> None:
-    facts, body = recorded(body)
+    facts, body = record_of(body)
     formula = re.compile(r"<math\b.*?</math>", re.DOTALL)
     # A reference ends where a tag begins.
     text = unescape(re.sub(r"<[^>]*>", "\0", formula.sub("\0", body)))
@@ -40,12 +40,12 @@ def test_the_facts_of_a_page_are_its_characters(body: str) -> None:
 
 
 def test_a_long_page_is_looked_through_once() -> None:
-    """With something left to look at after the last character that counts, at each place."""
-    assert recorded("λ" + "a > b & c " * 40_000)[0].text == "íλ"
+    """Even with much to scan after the last character that counts."""
+    assert record_of("λ" + "a > b & c " * 40_000)[0].text == "íλ"
 
 
 def test_formula_style_and_forbidden_character_are_changed_and_noted() -> None:
-    made, html = recorded(
+    page_record, html = record_of(
         '<p id="a&amp;b">é <math><mtd style="padding: 0"/><mi id="m">ẋ</mi></math>, \x07</p>'
         '<a href="x.html#y" name="n">&lambda;</a><img src="a.png" srcset="b.png 2x, c.png">'
         '<b title="id=no" data-x="no">x</b><!-- <i id="no"> --><title id="t">a</title>'
@@ -55,13 +55,13 @@ def test_formula_style_and_forbidden_character_are_changed_and_noted() -> None:
         f'<p id="a&amp;b">é <span class="held"><math><mtd class="{padding}"/>'
         '<mi id="m">ẋ</mi></math>,</span> ␇</p>'
     )
-    assert made.declarations == ("padding: 0",)
-    assert made.ids == ("a&b", "m", "n", "t")
-    assert made.references == (("a.png", ""), ("b.png", ""), ("c.png", ""), ("x.html", "y"))
-    assert (made.text, made.mathematics) == ("íλ", " ẋ")
+    assert page_record.declarations == ("padding: 0",)
+    assert page_record.ids == ("a&b", "m", "n", "t")
+    assert page_record.references == (("a.png", ""), ("b.png", ""), ("c.png", ""), ("x.html", "y"))
+    assert (page_record.text, page_record.mathematics) == ("íλ", " ẋ")
 
 
 @given(st.text() | st.text(alphabet="<>/=\"' bidstyle-!&;#\n\u00a0m", max_size=60))
 def test_any_text_is_recorded_and_markup_is_taken_as_text(html: str) -> None:
-    """What is put into `Markup` would be escaped."""
-    assert type(recorded(html)[1]) is str
+    """`Markup` would escape what is inserted."""
+    assert type(record_of(html)[1]) is str

@@ -60,8 +60,8 @@ FILES = {
 
 @pytest.fixture(scope="module")
 def site(make: Make) -> dict[str, bytes]:
-    found: dict[str, bytes] = make(LESSON).site(FILES)
-    return found
+    files: dict[str, bytes] = make(LESSON).site(FILES)
+    return files
 
 
 def pages(site: dict[str, bytes]) -> dict[str, str]:
@@ -70,7 +70,7 @@ def pages(site: dict[str, bytes]) -> dict[str, str]:
 
 def test_names_of_shared_files_are_their_content(site: dict[str, bytes]) -> None:
     for path, data in site.items():
-        # What the search loads, and fonts, are named by what they are made from, before they are.
+        # Fonts and what the search loads are named after their inputs, before they are made.
         if path.startswith("assets/") and not path.startswith(("assets/search/", "assets/fonts/")):
             is_copy = path.endswith((".br", ".gz"))
             assert is_copy or path.split(".")[-2] == hashlib.sha256(data).hexdigest()[:8]
@@ -96,8 +96,8 @@ def test_every_address_is_relative_but_on_the_page_for_missing_ones(site: dict[s
 
 
 def test_without_a_base_address_nothing_needs_one(make: Make) -> None:
-    made = make(LESSON)
-    bare = replace(made, course=replace(made.course, base_url=""))
+    course = make(LESSON)
+    bare = replace(course, course=replace(course.course, base_url=""))
     site = bare.site(FILES)
     assert "sitemap.xml" not in site
     assert site["robots.txt"] == b"User-agent: *\nAllow: /\n"
@@ -156,16 +156,16 @@ class Elements(HTMLParser):
 
     def __init__(self, page: str) -> None:
         super().__init__()
-        self.found: list[str] = []
+        self.names: list[str] = []
         self.feed(page)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.found.append(tag)
+        self.names.append(tag)
 
 
 def test_nothing_hostile_gets_through(make: Make) -> None:
-    made = make(LESSON)
-    course = made.course
+    rendered = make(LESSON)
+    course = rendered.course
     levels = tuple(
         replace(
             level,
@@ -186,12 +186,12 @@ def test_nothing_hostile_gets_through(make: Make) -> None:
         levels=levels,
         pages=tuple(replace(page, title=HOSTILE) for page in course.pages),
     )
-    results = replace(made.results, engine=HOSTILE, python=HOSTILE)
-    clean = pages(made.site(FILES))
-    for path, page in pages(replace(made, course=hostile, results=results).site(FILES)).items():
+    results = replace(rendered.results, engine=HOSTILE, python=HOSTILE)
+    clean = pages(rendered.site(FILES))
+    for path, page in pages(replace(rendered, course=hostile, results=results).site(FILES)).items():
         assert "\x07" not in page
-        assert Elements(page).found.count("script") == Elements(clean[path]).found.count("script")
-        assert Elements(page).found.count("b") == Elements(clean[path]).found.count("b") == 0
+        assert Elements(page).names.count("script") == Elements(clean[path]).names.count("script")
+        assert Elements(page).names.count("b") == Elements(clean[path]).names.count("b") == 0
         for block in re.findall(r'<script type="application/ld\+json">(.*?)</script>', page):
             assert json.loads(block)["name"] in (HOSTILE, HOSTILE.replace("\x07", "␇"))
 
@@ -226,8 +226,8 @@ def test_the_page_home_opens_the_home_page(make: Make) -> None:
 
 
 def test_styles_in_elements_become_classes_of_the_sheet(make: Make) -> None:
-    made = make('Text.\n\n<p style="color: red">x</p>\n')
-    site = made.site(FILES)
+    rendered = make('Text.\n\n<p style="color: red">x</p>\n')
+    site = rendered.site(FILES)
     page = pages(site)["lessons/0.1-falling.html"]
     (name,) = re.findall(r'<p class="(s[0-9a-f]{7})">x</p>', page)
     (sheet,) = (data.decode() for path, data in site.items() if path.endswith(".css"))

@@ -36,21 +36,28 @@ def test_a_regional_language_takes_the_general_one_first(assets: Assets) -> None
 
 
 def test_every_text_that_is_asked_for_exists_and_every_one_is_used(assets: Assets) -> None:
-    """Keys that are put together at run time are named here by their beginning."""
-    made = ("callout.", "overlay.", "status.", "code.docstring", "code.imports", "theme.")
-    made += ("lab.live.", "measured.reference_", "numerics.case_")
+    """Keys that are made at run time are listed here by prefix."""
+    run_time_prefixes = (
+        "callout.",
+        "overlay.",
+        "status.",
+        "code.docstring",
+        "code.imports",
+        "theme.",
+    )
+    run_time_prefixes += ("lab.live.", "measured.reference_", "numerics.case_")
     text = "".join(text for path, text in assets.templates if path.endswith(".html"))
     for folder in ("core/pages", "features"):
         modules = sorted((ROOT / "coursebuild" / folder).rglob("*.py"))
         text += "".join(path.read_text() for path in modules)
     scripts = "".join(p.read_text() for p in sorted((ROOT / "site" / "js").rglob("*.js")))
     words = strings_for(assets.templates, "en")
-    known = {re.sub(r"\.(one|other)$", "", key) for key in words.texts}
-    quoted = set(re.findall(r"""["']([a-z]+\.[a-z_.]+)["']""", text))
-    asked = set(re.findall(r"""(?:\bt|words)\(\s*["']([a-z_.]+)["']""", text))
-    assert asked - known == {key for key in asked if key.endswith(".")}
-    quoted |= set(re.findall(r"""["'`]([a-z]+\.[a-z_.]+)["'`]""", scripts))
-    unused = {key for key in known - quoted if not key.startswith(made)}
-    # Keys of tables are put together from the table's name and words that are looked up in it.
-    said = set(re.findall(r"[a-z]+", text + scripts))
-    assert {key for key in unused if not set(re.split(r"[._]", key)) <= said} == set()
+    keys = {re.sub(r"\.(one|other)$", "", key) for key in words.texts}
+    quoted_keys = set(re.findall(r"""["']([a-z]+\.[a-z_.]+)["']""", text))
+    called_keys = set(re.findall(r"""(?:\bt|words)\(\s*["']([a-z_.]+)["']""", text))
+    assert called_keys - keys == {key for key in called_keys if key.endswith(".")}
+    quoted_keys |= set(re.findall(r"""["'`]([a-z]+\.[a-z_.]+)["'`]""", scripts))
+    unused = {key for key in keys - quoted_keys if not key.startswith(run_time_prefixes)}
+    # Keys of tables are made from the table's name and words looked up in it.
+    words_in_code = set(re.findall(r"[a-z]+", text + scripts))
+    assert {key for key in unused if not set(re.split(r"[._]", key)) <= words_in_code} == set()

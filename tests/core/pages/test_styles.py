@@ -27,12 +27,12 @@ PAD = class_name("padding: 0")
     ],
 )
 def test_a_style_becomes_a_class(html: str, expected: str | None) -> None:
-    page, found = hoist_styles(html)
+    page, declarations = hoist_styles(html)
     assert page == (
         expected or f'<b class="{class_name("background: url(" + chr(34) + "a" + chr(34) + ")")}">'
     )
     assert "style" not in page.lower().replace(PAD, "")
-    assert len(found) == ("padding" in html or "background" in html)
+    assert len(declarations) == ("padding" in html or "background" in html)
 
 
 @pytest.mark.parametrize(

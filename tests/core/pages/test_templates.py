@@ -27,8 +27,8 @@ def test_compiled_templates_write_what_their_texts_do(tmp_path: Path) -> None:
 
 def test_an_edited_template_is_not_taken_from_what_was_compiled(tmp_path: Path) -> None:
     compile_templates(TEXTS, tmp_path)
-    edited = (TEXTS[0], ("part.html", "edited"))
-    assert templates_of(edited, tmp_path).get_template("part.html").render() == "edited"
+    texts = (TEXTS[0], ("part.html", "edited"))
+    assert templates_of(texts, tmp_path).get_template("part.html").render() == "edited"
 
 
 def test_what_is_not_there_is_an_error() -> None:

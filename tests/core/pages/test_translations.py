@@ -22,7 +22,7 @@ FORMS = {
 }
 """The forms that numbers of things take in a language."""
 PROMISES = {f"promise.{kind.name}" for kind in CALLOUTS}
-"""What only translations have: in English the vocabulary itself says it."""
+"""Keys that only translations have: in English the vocabulary has these texts."""
 
 
 def entries(language: str) -> dict[str, str]:
@@ -30,15 +30,15 @@ def entries(language: str) -> dict[str, str]:
 
 
 def with_forms(table: dict[str, str]) -> dict[str, dict[str, str]]:
-    """Texts by key, each with its forms; of one without them the only one is nameless."""
-    found: dict[str, dict[str, str]] = {}
+    """Texts by key, each with its forms; a text without forms has one with an empty name."""
+    forms_by_key: dict[str, dict[str, str]] = {}
     for key, text in table.items():
         stem, _, form = key.rpartition(".")
         if form in CATEGORIES and f"{stem}.other" in table:
-            found.setdefault(stem, {})[form] = text
+            forms_by_key.setdefault(stem, {})[form] = text
         else:
-            found[key] = {"": text}
-    return found
+            forms_by_key[key] = {"": text}
+    return forms_by_key
 
 
 def places(text: str) -> set[str]:
@@ -47,16 +47,16 @@ def places(text: str) -> set[str]:
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_translation_is_complete_and_has_the_same_values(language: str) -> None:
-    """A form for a single number may say it in words."""
-    ours, theirs = with_forms(entries(DEFAULT_LANGUAGE)), with_forms(entries(language))
-    assert sorted(ours.keys() - theirs.keys()) == [], "missing"
-    assert theirs.keys() - ours.keys() == PROMISES
-    for key in ours.keys() & theirs.keys():
-        wanted = set().union(*map(places, ours[key].values()))
-        assert set().union(*map(places, theirs[key].values())) == wanted, key
-        for form, text in theirs[key].items():
-            said = {"n"} if form in ("zero", "one", "two") else set()
-            assert wanted - places(text) <= said, f"{key}.{form}"
+    """A form for a single number may write it in words."""
+    english, translation = with_forms(entries(DEFAULT_LANGUAGE)), with_forms(entries(language))
+    assert sorted(english.keys() - translation.keys()) == [], "missing"
+    assert translation.keys() - english.keys() == PROMISES
+    for key in english.keys() & translation.keys():
+        fields = set().union(*map(places, english[key].values()))
+        assert set().union(*map(places, translation[key].values())) == fields, key
+        for form, text in translation[key].items():
+            optional = {"n"} if form in ("zero", "one", "two") else set()
+            assert fields - places(text) <= optional, f"{key}.{form}"
     forbidden = set("\u200b\u2066\u2067\u2068\u2069\u202a\u202b\u202c\u202d\u202e\ufeff")
     text = (FOLDER / f"{language}.toml").read_text("utf-8")
     assert not forbidden & set(text), "direction is a matter of the pages"

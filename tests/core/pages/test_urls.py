@@ -33,9 +33,9 @@ def test_a_browser_resolves_an_address_to_its_path() -> None:
         assert not href.startswith("/") and "//" not in href, (start, end)
         for base in BASES:
             page = base + (start if start == "index.html" else Place("index.html").href(start))
-            found = urlsplit(urljoin(page, href))
-            wanted = (urlsplit(base).path + end, "x%20y")
-            assert (unquote(found.path), found.fragment) == wanted, (base, start, end)
+            address = urlsplit(urljoin(page, href))
+            expected = (urlsplit(base).path + end, "x%20y")
+            assert (unquote(address.path), address.fragment) == expected, (base, start, end)
 
 
 def test_addresses_are_as_short_as_they_can_be() -> None:

@@ -46,7 +46,7 @@ LIBRARY = {
     "period": (OutputFile("period.py", b"import scipy.special\nimport swing\n"),),
     "helper": (OutputFile("helper.py", b"a script of the course has this name"),),
 }
-AROUND = Surroundings(
+SURROUNDINGS = Surroundings(
     packages=(Package("numpy", "numpy", "2.4.6"), Package("yaml", "PyYAML", "6.0.3")),
     library=lambda name: LIBRARY.get(name, ()),
     model_files=(OutputFile("models/meshes/hand.obj", b"v 0 0 0\n"),),
@@ -55,29 +55,31 @@ AROUND = Surroundings(
 
 
 @pytest.fixture
-def made(make: Make) -> Any:
-    found = make(ONE, **{"1.1": TWO})
+def rendered(make: Make) -> Any:
+    rendered = make(ONE, **{"1.1": TWO})
     facts = ModelFacts(1, 1, 0, 0, 0, 0, 0.002, "Euler", 1.0, (), (), (),
                        ("models/part.xml", "models/meshes/hand.obj"))  # fmt: skip
     models = tuple(
         MjcfModel(name, Source(f"models/{name}.xml", f"<mujoco model='{name}'/>\n"))
         for name in ("arm", "part", "box")
     )
-    results = replace(found.results, models=(("arm", CompileResult("", None, facts)),))
-    return replace(found, course=replace(found.course, models=models), results=results)
+    results = replace(rendered.results, models=(("arm", CompileResult("", None, facts)),))
+    return replace(rendered, course=replace(rendered.course, models=models), results=results)
 
 
-def packed(made: Any) -> dict[str, bytes]:
-    library = Library.of(made.course, made.results, made.assets)
-    return {archive.path: archive.pack() for archive in make_archives(library, AROUND)}
+def packed_archives(rendered: Any) -> dict[str, bytes]:
+    library = Library.of(rendered.course, rendered.results, rendered.assets)
+    return {archive.path: archive.pack() for archive in make_archives(library, SURROUNDINGS)}
 
 
-def archives(made: Any) -> dict[str, zipfile.ZipFile]:
-    return {path: zipfile.ZipFile(io.BytesIO(data)) for path, data in packed(made).items()}
+def open_archives(rendered: Any) -> dict[str, zipfile.ZipFile]:
+    return {
+        path: zipfile.ZipFile(io.BytesIO(data)) for path, data in packed_archives(rendered).items()
+    }
 
 
-def test_the_course_archive_has_scripts_models_library_and_requirements(made: Any) -> None:
-    archive = archives(made)["examples.zip"]
+def test_the_course_archive_has_scripts_models_library_and_requirements(rendered: Any) -> None:
+    archive = open_archives(rendered)["examples.zip"]
     assert archive.namelist() == [
         "bodies-axes/README.md",
         "bodies-axes/examples/helper.py",
@@ -103,20 +105,20 @@ def test_the_course_archive_has_scripts_models_library_and_requirements(made: An
     assert find_imports("import (\n") == frozenset()
 
 
-def test_a_lesson_archive_has_what_its_scripts_import(made: Any) -> None:
-    found = archives(made)
-    names = found["lessons/0.1-falling.zip"].namelist()
+def test_a_lesson_archive_has_what_its_scripts_import(rendered: Any) -> None:
+    by_path = open_archives(rendered)
+    names = by_path["lessons/0.1-falling.zip"].namelist()
     assert "0.1-falling/examples/helper.py" in names
     assert [n for n in names if "three" in n or "swing" in n or "matplotlibrc" in n] == []
-    other = found["lessons/1.1-spinning.zip"]
-    assert [name for name in other.namelist() if "models" in name or "mjcourse" in name] == []
-    needed = other.read("1.1-spinning/requirements.txt").decode().split()
-    assert needed == ["PyYAML==6.0.3", "matplotlib", "scipy", "torch"]
+    spinning = by_path["lessons/1.1-spinning.zip"]
+    assert [name for name in spinning.namelist() if "models" in name or "mjcourse" in name] == []
+    requirements = spinning.read("1.1-spinning/requirements.txt").decode().split()
+    assert requirements == ["PyYAML==6.0.3", "matplotlib", "scipy", "torch"]
 
 
-def test_the_bytes_depend_on_the_content_alone(made: Any) -> None:
-    assert packed(made) == packed(made)
-    for archive in archives(made).values():
+def test_the_bytes_depend_on_the_content_alone(rendered: Any) -> None:
+    assert packed_archives(rendered) == packed_archives(rendered)
+    for archive in open_archives(rendered).values():
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
         assert {entry.external_attr >> 16 for entry in archive.infolist()} == {0o100644}
         assert archive.testzip() is None
@@ -134,8 +136,8 @@ print(path.read_text().strip().splitlines()[0], spatial.__name__)
     zipfile.ZipFile(io.BytesIO(site["examples.zip"])).extractall(tmp_path)
     command = [sys.executable, "-I", "-c", RUNNER]
     folder = tmp_path / "bodies-axes"
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert (done.stdout, done.stderr) == ('<mujoco model="box"> mjcourse.spatial\n', "")
+    process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert (process.stdout, process.stderr) == ('<mujoco model="box"> mjcourse.spatial\n', "")
 
 
 RUNNER = """
