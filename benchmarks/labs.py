@@ -171,9 +171,9 @@ def run_native(text: str, steps: int) -> Callable[[], float]:
         else:
             mujoco.mj_resetData(model, data)
         mujoco.mj_forward(model, data)
-        began = time.perf_counter()
+        start = time.perf_counter()
         mujoco.mj_step(model, data, nstep=steps)
-        return steps / (time.perf_counter() - began)
+        return steps / (time.perf_counter() - start)
 
     return run
 

@@ -134,13 +134,13 @@ class Server(http.server.SimpleHTTPRequestHandler):
         copy = file.with_name(file.name + ".br")
         packed = copy.read_bytes() if copy.is_file() else brotli.compress(data, quality=5)
         # What is compressed already, as Pagefind's files are, is sent as it is.
-        small = len(packed) < len(data)
-        body = packed if small else data
+        is_compressed = len(packed) < len(data)
+        body = packed if is_compressed else data
         self.sent.append((path, len(body), len(data)))
         self.send_response(200)
         self.send_header("Content-Type", self.guess_type(str(file)))
         self.send_header("Content-Length", str(len(body)))
-        if small:
+        if is_compressed:
             self.send_header("Content-Encoding", "br")
         self.end_headers()
         self.wfile.write(body)
@@ -300,11 +300,11 @@ def peer_index(site: Path, folder: Path, program: Path) -> dict[str, float]:
     runs = []
     for _ in range(2):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        began = time.perf_counter()
+        start = time.perf_counter()
         subprocess.run([*command, "lessons/*.html"], check=True, stdout=subprocess.DEVNULL)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        runs.append((cpu, time.perf_counter() - began))
+        runs.append((cpu, time.perf_counter() - start))
     files = [path for path in (folder / "pagefind").rglob("*") if path.is_file()]
     return {
         "cpu_s": runs[0][0],

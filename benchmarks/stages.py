@@ -63,9 +63,9 @@ def time_candidates(
     seconds: dict[str, list[float]] = {name: [] for name in candidates}
     for _ in range(repeat):
         for name, work in candidates.items():
-            began = clock()
+            start = clock()
             work()
-            seconds[name].append(clock() - began)
+            seconds[name].append(clock() - start)
     return seconds
 
 

@@ -37,7 +37,7 @@ class Site:
     """Its text."""
     places: Places
     edits: int = 0
-    cleared: int = 0
+    moved_count: int = 0
     """How many files and folders were moved away."""
     failure: str = ""
     """The part that failed, if any: then its figures are incomplete."""
@@ -70,8 +70,8 @@ class Site:
     def _move_away(self, path: Path) -> None:
         if path.exists() or path.is_symlink():
             self.earlier.mkdir(exist_ok=True)
-            self.cleared += 1
-            path.rename(self.earlier / str(self.cleared))
+            self.moved_count += 1
+            path.rename(self.earlier / str(self.moved_count))
 
     @property
     def earlier(self) -> Path:
@@ -181,7 +181,7 @@ def one_round(site: Site) -> None:
         site.note(COLD, site.build())
     site.note(UNCHANGED, site.build())
     word = site.edit()
-    took = site.build()
+    seconds = site.build()
     if word not in site.page():
         raise CommandError("what was edited is not in the built page")
-    site.note(EDITED, took)
+    site.note(EDITED, seconds)

@@ -32,7 +32,7 @@ def time_command(command: Sequence[str], folder: Path, environment: Mapping[str,
         CommandError: it failed; with the end of its output.
     """
     with tempfile.TemporaryFile() as output:
-        began = time.perf_counter()
+        start = time.perf_counter()
         process = subprocess.run(
             command,
             cwd=folder,
@@ -43,12 +43,12 @@ def time_command(command: Sequence[str], folder: Path, environment: Mapping[str,
             check=False,
             timeout=LIMIT,
         )
-        took = time.perf_counter() - began
+        seconds = time.perf_counter() - start
         if process.returncode:
             output.seek(0)
             text = output.read().decode(errors="replace")[-2000:]
             raise CommandError(f"{' '.join(command)}: status {process.returncode}\n{text}")
-    return took
+    return seconds
 
 
 def peak_memory(command: Sequence[str], folder: Path, environment: Mapping[str, str]) -> float:

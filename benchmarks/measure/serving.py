@@ -53,10 +53,10 @@ def one_server(site: Site, edits: int) -> None:
             time.sleep(1)
             for i in range(edits + 1):
                 word = site.edit()
-                took = reader.until(word, EDIT_LIMIT)
+                seconds = reader.until(word, EDIT_LIMIT)
                 if i:
-                    site.note(SERVED, took)
-                time.sleep(0.5 + took)
+                    site.note(SERVED, seconds)
+                time.sleep(0.5 + seconds)
         except TimeoutError as error:
             output.seek(0)
             text = output.read().decode(errors="replace")[-2000:]
@@ -76,17 +76,17 @@ class Reader:
 
     def until(self, word: str, limit: float) -> float:
         """Ask until the page has the word; gives the seconds that it took."""
-        began = time.perf_counter()
+        start = time.perf_counter()
         while True:
             text = self.get()
-            took = time.perf_counter() - began
+            seconds = time.perf_counter() - start
             if text is not None and word in text:
-                return took
+                return seconds
             if self.process.poll() is not None:
                 raise TimeoutError(f"the server ended with status {self.process.returncode}")
-            if took > limit:
-                raise TimeoutError(f"{self.path} does not say {word!r} after {took:.0f} s")
-            time.sleep(max(0.001, took / 50))
+            if seconds > limit:
+                raise TimeoutError(f"{self.path} does not say {word!r} after {seconds:.0f} s")
+            time.sleep(max(0.001, seconds / 50))
 
     def get(self) -> str | None:
         """The page, if there is one now."""

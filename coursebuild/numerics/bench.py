@@ -175,15 +175,19 @@ def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
         notes.append(
             f"errors count until {reference.horizon:.6g} s: the motion is not known beyond"
         )
-    driven = driving_force(model, pilot.scene.scenario)
-    if driven:
-        notes.append(f"energy is not judged: {driven}")
+    drivers = driving_force(model, pilot.scene.scenario)
+    if drivers:
+        notes.append(f"energy is not judged: {drivers}")
     states = np.abs(np.hstack([reference.states.qpos, reference.states.qvel, reference.states.act]))
     if np.any((states > 0) & (states < np.finfo(np.float64).tiny)):
         notes.append("the state holds subnormal numbers, with which processors are slow")
-    soft = refsafe_from(model) if pilot.constrained else math.inf
-    if any((row.searched[1] if row.largest is None else row.largest) > soft for row in largest):
-        notes.append(f"beyond {soft:.6g} s refsafe softens constraints: stable, but another model")
+    refsafe_limit = refsafe_from(model) if pilot.constrained else math.inf
+    if any(
+        (row.searched[1] if row.largest is None else row.largest) > refsafe_limit for row in largest
+    ):
+        notes.append(
+            f"beyond {refsafe_limit:.6g} s refsafe softens constraints: stable, but another model"
+        )
     return tuple(note for note in notes if note)
 
 
@@ -237,10 +241,12 @@ def _measure_setting(
     model, pilot, cone = basis.model, basis.pilot, basis.cones[setting.cone]
     variant = with_setting(model, setting)
     steps, energy = round(pilot.scene.scenario.duration / setting.timestep), basis.energy
-    unknown = dict.fromkeys(("figure", "energy_drift", "momentum_drift", "slip", "cost", "seconds"))
-    unknown |= dict.fromkeys(("position", "attitude", "velocity", "growth", "dominated_by"))
+    no_figures = dict.fromkeys(
+        ("figure", "energy_drift", "momentum_drift", "slip", "cost", "seconds")
+    )
+    no_figures |= dict.fromkeys(("position", "attitude", "velocity", "growth", "dominated_by"))
     row = WorkPrecisionRow(  # as of a run that MuJoCo refuses
-        **unknown,
+        **no_figures,
         setting=setting,
         status="diverged",
         reasons=(),
@@ -319,5 +325,5 @@ def _quantity_error(
         quantity_values(model, scene, s) for s in (reference.states, reference.second_states)
     )
     floor = FLOORS * float(np.linalg.norm(exact - second, axis=1).max())
-    apart = np.linalg.norm(quantity_values(model, scene, states) - exact, axis=1)
-    return max(float(apart.max()), floor), max(float(apart[-1]), floor)
+    distances = np.linalg.norm(quantity_values(model, scene, states) - exact, axis=1)
+    return max(float(distances.max()), floor), max(float(distances[-1]), floor)

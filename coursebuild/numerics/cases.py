@@ -126,8 +126,8 @@ def _costs(
 
 def _note(problem: Problem) -> str:
     model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
-    driven = problem.search and driving_force(model, problem.scenario)
-    parts = (problem.note, f"energy is not judged: {driven}" if driven else "")
+    drivers = problem.search and driving_force(model, problem.scenario)
+    parts = (problem.note, f"energy is not judged: {drivers}" if drivers else "")
     return "; ".join(part for part in parts if part)
 
 

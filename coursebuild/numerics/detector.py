@@ -113,8 +113,8 @@ def _sunk(data: Any, thickness: Array) -> float:
     if data.ncon == 0:
         return 0.0
     contact = data.contact
-    thinner = thickness[contact.geom].min(axis=1)
-    return max(0.0, float(np.max(-contact.dist / thinner)))
+    half_thickness = thickness[contact.geom].min(axis=1)
+    return max(0.0, float(np.max(-contact.dist / half_thickness)))
 
 
 def _larger(before: float, values: Array) -> float:
@@ -129,9 +129,9 @@ def judge(
 
     `before` holds the peaks on the way, `setup` the bounds.
     """
-    most = update_peaks(data, Peaks() if before is None else before)
+    peaks = update_peaks(data, Peaks() if before is None else before)
     symptoms: list[tuple[RunStatus, str]] = []
-    if not most.finite:
+    if not peaks.finite:
         symptoms.append((RunStatus.DIVERGED, "the state is not finite"))
     for kind, subject in _BAD.items():
         if data.warning[int(kind)].number:
@@ -140,18 +140,18 @@ def judge(
         text = f"the clock says {data.time:.6g} s after {elapsed:.6g} s: the state was reset"
         symptoms.append((RunStatus.RESET, text))
     for size, bound, subject in (
-        (most.position, setup.position_bound, "positions"),
-        (most.velocity, setup.velocity_bound, "velocities"),
+        (peaks.position, setup.position_bound, "positions"),
+        (peaks.velocity, setup.velocity_bound, "velocities"),
     ):
-        if most.finite and not size <= bound:
+        if peaks.finite and not size <= bound:
             text = f"{subject} reached {size / bound:.3g} times what can be"
             symptoms.append((RunStatus.SLOW_GROWTH, text))
-    if most.finite and not most.energy <= setup.energy_bound:
-        text = f"energy reached {most.energy:.3g} J, where {setup.energy_bound:.3g} J can be"
+    if peaks.finite and not peaks.energy <= setup.energy_bound:
+        text = f"energy reached {peaks.energy:.3g} J, where {setup.energy_bound:.3g} J can be"
         symptoms.append((RunStatus.SLOW_GROWTH, text))
-    deep = max(most.penetration / setup.penetration_bound, most.sunk)
-    if not deep <= 1.0:
-        text = f"bodies lie {deep:.3g} times as deep in each other as they may"
+    depth_ratio = max(peaks.penetration / setup.penetration_bound, peaks.sunk)
+    if not depth_ratio <= 1.0:
+        text = f"bodies lie {depth_ratio:.3g} times as deep in each other as they may"
         symptoms.append((RunStatus.DIVERGED, text))
     worst = max((status for status, _ in symptoms), key=list(RunStatus).index, default=RunStatus.OK)
     return RunJudgement(worst, tuple(text for _, text in symptoms))
@@ -166,15 +166,20 @@ def deepest_contact(data: Any) -> float:
 
 def driving_force(model: Any, scenario: Scenario) -> str:
     """What may raise the energy of a motion, or store some that is not counted; "" for nothing."""
-    commanded = np.any(scenario.controls) or (
+    has_commands = np.any(scenario.controls) or (
         scenario.keyframe >= 0 and np.any(model.key_ctrl[scenario.keyframe])
     )
-    acting = model.nu and not model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    has_actuators = model.nu and not model.opt.disableflags & int(
+        mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    )
     damping = model.dof_damping, model.tendon_damping
-    fluid = model.opt.density > 0 or model.opt.viscosity > 0
+    has_fluid = model.opt.density > 0 or model.opt.viscosity > 0
     causes = (
-        (acting and (commanded or model.na or np.any(model.actuator_biastype)), "actuators act"),
-        (fluid and np.any(model.opt.wind), "wind blows"),
+        (
+            has_actuators and (has_commands or model.na or np.any(model.actuator_biastype)),
+            "actuators act",
+        ),
+        (has_fluid and np.any(model.opt.wind), "wind blows"),
         (np.any(model.body_gravcomp), "gravity is compensated"),
         (min(np.min(values, initial=0) for values in damping) < 0, "damping is negative"),
         (model.nflex, "a flex stores energy"),

@@ -269,13 +269,13 @@ def refsafe_from(model: Any) -> float:
     """
     if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_REFSAFE):
         return math.inf
-    disabled = int(model.opt.disableflags)
-    touching = (model.geom_contype | model.geom_conaffinity) != 0
-    if disabled & int(mujoco.mjtDisableBit.mjDSBL_CONTACT) or model.ngeom < 2:
-        touching = np.zeros(model.ngeom, dtype=bool)
+    flags = int(model.opt.disableflags)
+    can_touch = (model.geom_contype | model.geom_conaffinity) != 0
+    if flags & int(mujoco.mjtDisableBit.mjDSBL_CONTACT) or model.ngeom < 2:
+        can_touch = np.zeros(model.ngeom, dtype=bool)
     constants = np.concatenate(
         [
-            model.geom_solref[touching, 0],
+            model.geom_solref[can_touch, 0],
             model.pair_solref[:, 0],
             model.eq_solref[:, 0],
             model.jnt_solref[model.jnt_limited != 0, 0],

@@ -158,8 +158,8 @@ def tends_to(model: Any, setup: Setup, states: EngineStates, step: float, partin
         return True
     for part in _PARTS:
         now = _gaps(model, setup, states, step / part)
-        apart = np.flatnonzero(before > parting)
-        at = int(apart[0]) if apart.size else int(np.argmax(before))
+        parted = np.flatnonzero(before > parting)
+        at = int(parted[0]) if parted.size else int(np.argmax(before))
         if now[at] <= max(NEARER * before[at], AGREED):
             return True
         before = now

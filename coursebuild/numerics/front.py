@@ -32,14 +32,16 @@ class FrontPoint(Struct, frozen=True):
 
     def beats(self, rival: FrontPoint) -> bool:
         """Whether this is clearly better in one respect, and no worse in the other."""
-        exacter = self.error * (1 + ERROR_SLACK) < rival.error
-        no_worse = self.error <= rival.error * (1 + ERROR_SLACK)
-        return (self.is_cheaper(rival) and no_worse) or (exacter and not rival.is_cheaper(self))
+        is_more_accurate = self.error * (1 + ERROR_SLACK) < rival.error
+        is_no_worse = self.error <= rival.error * (1 + ERROR_SLACK)
+        return (self.is_cheaper(rival) and is_no_worse) or (
+            is_more_accurate and not rival.is_cheaper(self)
+        )
 
     def is_cheaper(self, rival: FrontPoint) -> bool:
         """Whether this costs less, beyond what timing can tell."""
-        apart = self.cost.high < rival.cost.low
-        return apart and self.cost.value * (1 + COST_SLACK) < rival.cost.value
+        is_separate = self.cost.high < rival.cost.low
+        return is_separate and self.cost.value * (1 + COST_SLACK) < rival.cost.value
 
 
 def _place(row: WorkPrecisionRow) -> FrontPoint | None:
@@ -53,7 +55,8 @@ def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:
     """Rows that say whether they are on the front, and otherwise which row dominates them."""
     places = {n: place for n, row in enumerate(rows) if (place := _place(row)) is not None}
     better = {
-        n: [m for m, rival in places.items() if rival.beats(mine)] for n, mine in places.items()
+        n: [m for m, rival in places.items() if rival.beats(own_place)]
+        for n, own_place in places.items()
     }
 
     def worth(n: int) -> tuple[float, int]:
@@ -77,14 +80,14 @@ def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
     if row.reasons:
         return _verdict_of_lost(rows, row)
     error = None if is_noticeable is None else row.seen
-    mine, remark = _place(row), _describe_error(error)
-    if mine is None:
+    own_place, remark = _place(row), _describe_error(error)
+    if own_place is None:
         text = "nothing was timed, so that no setting can be called better"
         return RowVerdict(False, None, None, None, is_noticeable, text + remark)
     if error is not None and error >= 1:
         remark += _cheapest_unseen(
             rows,
-            mine.cost.value,
+            own_place.cost.value,
             hopeless=all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None),
         )
     if row.dominated_by is None:
@@ -94,8 +97,8 @@ def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
     better_place = _place(better)
     assert better_place is not None
     ratios = (
-        better_place.cost.value / mine.cost.value,
-        better_place.error / mine.error if mine.error else 1.0,
+        better_place.cost.value / own_place.cost.value,
+        better_place.error / own_place.error if own_place.error else 1.0,
     )
     text = f"{setting_text(better.setting)} is {_describe_ratios(*ratios)}"
     return RowVerdict(False, row.dominated_by, *ratios, is_noticeable, text + remark)

@@ -81,8 +81,10 @@ def bulirsch_stoer(
             total = y + change
             y, carry = total, (total - y) - change
             now = goal if whole else now + step
-            grown = float(step) * min(_GROW, _SAFETY * max(ratio, 1e-12) ** (-1 / (2 * columns)))
-            trial = max(trial, grown) if whole else grown
+            next_trial = float(step) * min(
+                _GROW, _SAFETY * max(ratio, 1e-12) ** (-1 / (2 * columns))
+            )
+            trial = max(trial, next_trial) if whole else next_trial
         states.append(y.copy())
     return np.array(states)
 

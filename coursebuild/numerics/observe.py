@@ -123,11 +123,11 @@ _STILL = 1e-3
 def find_sticks(model: Any, scene: Scene, states: EngineStates) -> Sticks:
     """The pairs of geoms that stick in a motion, from sample to sample."""
     fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * float(model.stat.extent))
-    slow = [
+    slow_pairs = [
         frozenset(pair for pair, speed in speeds.items() if speed < max(_SLOW * fall, _STILL))
         for speeds in surface_speeds(model, scene, states)
     ]
-    return tuple(slow[max(0, i - 1)] & slow[i] for i in range(len(slow)))
+    return tuple(slow_pairs[max(0, i - 1)] & slow_pairs[i] for i in range(len(slow_pairs)))
 
 
 def measure_slip(model: Any, scene: Scene, states: EngineStates, sticks: Sticks) -> float:
@@ -176,8 +176,8 @@ def contact_speeds(model: Any, data: Any, contact: Any) -> tuple[float, float]:
     relative = _velocity(model, data, second, contact.pos)
     relative = relative - _velocity(model, data, first, contact.pos)
     normal = contact.frame[:3]
-    apart = float(normal @ relative)
-    return apart, float(np.linalg.norm(relative - normal * apart))
+    parting_speed = float(normal @ relative)
+    return parting_speed, float(np.linalg.norm(relative - normal * parting_speed))
 
 
 def _velocity(model: Any, data: Any, geom: int, point: Array) -> Array:

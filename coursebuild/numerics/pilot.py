@@ -97,7 +97,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
                 advance(variant, twin, steps_per_sample)
                 gap[index] = position_distance(variant, data.qpos, twin.qpos)
     horizons, rates = zip(*(_horizon(times, gap) for gap in gaps), strict=True)
-    grown = [rate for rate in rates if rate is not None]
+    growth_rates = [rate for rate in rates if rate is not None]
     return Pilot(
         scene=scene,
         setup=_bounds(variant, scenario, peaks),
@@ -105,7 +105,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
         constrained=look.constrained,
         jumps=look.jumps(variant),
         horizons=(min(horizons), max(horizons)),
-        lyapunov=float(np.median(grown)) if grown else None,
+        lyapunov=float(np.median(growth_rates)) if growth_rates else None,
     )
 
 
@@ -196,10 +196,10 @@ def _twins(model: Any, scenario: Scenario) -> list[Any]:
 
 
 def _horizon(times: Array, gaps: Array) -> tuple[float, float | None]:
-    apart = np.flatnonzero(gaps >= APART)
-    if not apart.size:
+    parted = np.flatnonzero(gaps >= APART)
+    if not parted.size:
         return float(times[-1]), None
-    end = int(apart[0])
+    end = int(parted[0])
     growth = math.log(float(gaps[end]) / NUDGE) / float(times[end])
     return float(times[max(0, end - 1)]), growth
 
@@ -208,13 +208,15 @@ def _bounds(model: Any, scenario: Scenario, peaks: Peaks) -> Setup:
     extent = float(model.stat.extent)
     fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * extent)
     # A hinge without limits may go round the other way.
-    hinged = bool(np.any(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE))
-    round_and_round = 2 * peaks.velocity * scenario.duration if hinged else 0.0
-    driven = bool(driving_force(model, scenario))
-    resting = float(model.body_mass.sum()) * max(_RESTING * fall, 1e-3) ** 2
+    has_hinges = bool(np.any(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE))
+    round_and_round = 2 * peaks.velocity * scenario.duration if has_hinges else 0.0
+    is_driven = bool(driving_force(model, scenario))
+    rest_energy = float(model.body_mass.sum()) * max(_RESTING * fall, 1e-3) ** 2
     return Setup(
         scenario=scenario,
         position_bound=2 * peaks.position + ROOM * max(extent, 1.0) + round_and_round,
-        velocity_bound=ROOM * max(peaks.velocity, fall, 1e-3) if driven else math.inf,
-        energy_bound=math.inf if driven else peaks.energy + ROOM * max(peaks.kinetic, resting),
+        velocity_bound=ROOM * max(peaks.velocity, fall, 1e-3) if is_driven else math.inf,
+        energy_bound=math.inf
+        if is_driven
+        else peaks.energy + ROOM * max(peaks.kinetic, rest_energy),
     )

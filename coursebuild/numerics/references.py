@@ -190,8 +190,8 @@ def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         if not np.isfinite(run.states.qpos).all():
             raise SceneError(f"it diverges even at {step:g} s a step")
         runs.append(run.states)
-    apart = np.flatnonzero(position_distances(model, runs[0].qpos, runs[1].qpos) > PARTED)
-    good = max(1, int(apart[0])) if apart.size else len(runs[0].times)
+    parted = np.flatnonzero(position_distances(model, runs[0].qpos, runs[1].qpos) > PARTED)
+    good = max(1, int(parted[0])) if parted.size else len(runs[0].times)
     states, second_states = (motion.head(good) for motion in runs)
     source = f"the engine itself: implicitfast at {step:g} s, Newton's solver"
     second = f"the same under Euler at {2 * step:g} s"
@@ -231,12 +231,12 @@ def _with_closed_form(
     """Put a closed form first, and what was integrated second."""
     gap = largest_errors(errors(motion, second.motion))
     states = states_of(model, motion, second.states)
-    away = float(position_distances(model, states.qpos, second.states.qpos).max(initial=0.0))
+    distance = float(position_distances(model, states.qpos, second.states.qpos).max(initial=0.0))
     floor = least
     if second.kind == "ode":
-        if not away <= FOREIGN:
+        if not distance <= FOREIGN:
             message = f"{subject} is not this scene's motion"
-            help = f"the two are {away:.2g} apart (rad, or relative to the extent)"
+            help = f"the two are {distance:.2g} apart (rad, or relative to the extent)"
             raise SceneError(message, place, help)
         floor = least.at_least(gap)
     return replace(
@@ -319,8 +319,8 @@ def find_conserved(model: Any, pilot: Pilot, reference: KnownMotion) -> tuple[fl
     if not pilot.smooth or reference.kind == "self":
         return None, False
     drifts = energy_drift(run), momentum_drift(run)
-    steady = [drift is not None and abs(drift) < CONSERVED for drift in drifts]
-    return scale if steady[0] else None, steady[1]
+    is_conserved = [drift is not None and abs(drift) < CONSERVED for drift in drifts]
+    return scale if is_conserved[0] else None, is_conserved[1]
 
 
 def mean_late_energy(model: Any, pilot: Pilot, reference: KnownMotion) -> float | None:

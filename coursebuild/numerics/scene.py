@@ -223,9 +223,9 @@ def _sample_steps(basis: int, total: int) -> int:
     divisors = {*small, *(basis // n for n in small)}
 
     def badness(steps: int) -> float:
-        odd = 3 - min(3, (steps & -steps).bit_length() - 1)
-        away = math.log(steps * LOOKS / total)
-        return (away if away > 0 else -away / 2) + 0.7 * odd
+        odd_factors = 3 - min(3, (steps & -steps).bit_length() - 1)
+        deviation = math.log(steps * LOOKS / total)
+        return (deviation if deviation > 0 else -deviation / 2) + 0.7 * odd_factors
 
     return min(sorted(divisors), key=badness)
 

@@ -97,11 +97,13 @@ def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[Stabl
     search = (max(low, duration / MOST_STEPS), min(high, duration / FEWEST_STEPS))
     if search[1] <= search[0]:
         return ()
-    thick = thickness(model)
+    half_thickness = thickness(model)
 
     def row(integrator: Integrator) -> StableRow:
         def attempt(step: float) -> StabilityTrial:
-            return run_trial(pilot.setup, with_integrator(model, integrator, step), duration, thick)
+            return run_trial(
+                pilot.setup, with_integrator(model, integrator, step), duration, half_thickness
+            )
 
         return stable_row(integrator, scan(attempt, search, quick=quick), pilot.setup, duration)
 

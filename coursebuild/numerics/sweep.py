@@ -174,18 +174,18 @@ def _measure_variant(
         run = simulate(Setup(scenario=scene.scenario), model, thickness(model))
     except mujoco.FatalError as error:
         return replace(row, status="diverged", reasons=(f"MuJoCo does not run it: {error}",))
-    judged = run.judgement
-    row = replace(row, status=judged.status.value, reasons=judged.reasons)
-    if not judged.ok:
+    judgement = run.judgement
+    row = replace(row, status=judgement.status.value, reasons=judgement.reasons)
+    if not judgement.ok:
         return row
     row = _with_contacts(scene.scenario, model, row)
     if base_states is None:
         return row
     row = replace(row, change=visible_error(base, scene, run.states, base_states))
     if quantity_name(base, scene):
-        mine = quantity_values(model, scene, run.states)
-        apart = np.linalg.norm(mine - quantity_values(base, scene, base_states), axis=1)
-        row = replace(row, figure=float(apart.max()))
+        values = quantity_values(model, scene, run.states)
+        distances = np.linalg.norm(values - quantity_values(base, scene, base_states), axis=1)
+        row = replace(row, figure=float(distances.max()))
     return row
 
 
@@ -196,7 +196,7 @@ class _Hit(Struct):
     """Speed with which they approach at the beginning, m/s."""
     contact: Any
     """The latest one."""
-    apart: float = 0.0
+    parting: float = 0.0
     """Speed with which they part at the end, m/s; 0 if they stay together."""
     slid: float = 0.0
     """Distance slid, m."""
@@ -204,45 +204,45 @@ class _Hit(Struct):
 
 def _with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
     """Add what contacts and solver do, step by step."""
-    stepped = _runnable(model)
-    stepped.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_FWDINV)
-    step = float(stepped.opt.timestep)
+    model_copy = _runnable(model)
+    model_copy.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_FWDINV)
+    step = float(model_copy.opt.timestep)
     steps = scenario.steps(step) * len(scenario.times)
-    data, scratch = initial_data(scenario, stepped), initial_data(scenario, stepped)
+    data, scratch = initial_data(scenario, model_copy), initial_data(scenario, model_copy)
     now: dict[Pair, _Hit] = {}
     hits: list[_Hit] = []
     deepest = residual = force = iterations = 0.0
     for command in scenario.commands(step):
         if command:
             data.ctrl[:] = command
-        advance(stepped, data)
+        advance(model_copy, data)
         residual = max(residual, float(data.solver_fwdinv.max()))
         force = max(force, float(np.linalg.norm(data.qfrc_constraint)))
         iterations += int(data.solver_niter.sum())
         scratch.qpos[:], scratch.qvel[:] = data.qpos, data.qvel
-        mujoco.mj_fwdPosition(stepped, scratch)
-        mujoco.mj_fwdVelocity(stepped, scratch)
+        mujoco.mj_fwdPosition(model_copy, scratch)
+        mujoco.mj_fwdVelocity(model_copy, scratch)
         before, now = now, {}
         for contact in touching_contacts(scratch):
             pair = (int(contact.geom[0]), int(contact.geom[1]))
-            apart, sliding = contact_speeds(stepped, scratch, contact)
+            parting_speed, sliding = contact_speeds(model_copy, scratch, contact)
             hit = before.pop(pair, None) or now.get(pair)
             if hit is None:
-                hit = _Hit(-apart, contact)
+                hit = _Hit(-parting_speed, contact)
                 hits.append(hit)
             if pair not in now:
                 hit.slid += sliding * step
             now[pair], hit.contact = hit, copy.copy(contact)
             deepest = max(deepest, -float(contact.dist))
         for hit in before.values():
-            hit.apart = max(0.0, contact_speeds(stepped, scratch, hit.contact)[0])
+            hit.parting = max(0.0, contact_speeds(model_copy, scratch, hit.contact)[0])
     closing = (hit for hit in hits if hit.closing > 0)
     hardest = max(closing, key=lambda hit: hit.closing, default=None)
     return replace(
         row,
         penetration=deepest if hits else None,
         slip=max(hit.slid for hit in hits) if hits else None,
-        restitution=hardest.apart / hardest.closing if hardest is not None else None,
+        restitution=hardest.parting / hardest.closing if hardest is not None else None,
         residual=residual / force if force else None,
         iterations=iterations / steps if force else None,
     )

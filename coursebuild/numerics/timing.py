@@ -60,8 +60,8 @@ class Timing(Struct, frozen=True):
     @property
     def certain(self) -> bool:
         """Whether the ratio differs from 1 by more than the measurement's uncertainty."""
-        off = not self.ratio.low <= 1.0 <= self.ratio.high
-        return off and abs(self.ratio.value - 1.0) > 0.03
+        differs = not self.ratio.low <= 1.0 <= self.ratio.high
+        return differs and abs(self.ratio.value - 1.0) > 0.03
 
 
 def time_jobs(
@@ -70,7 +70,7 @@ def time_jobs(
     """Time jobs, of which number `baseline` is what the others are compared with."""
     times = np.zeros((MOST, len(jobs)))
     budget, began = _QUICK_BUDGET if quick else _BUDGET, clock()
-    collecting = gc.isenabled()
+    gc_was_enabled = gc.isenabled()
     gc.disable()
     try:
         repeats = [_count_repeats(job, clock) for job in jobs]
@@ -85,7 +85,7 @@ def time_jobs(
             if widest <= _ENOUGH or clock() - began > budget:
                 break
     finally:
-        if collecting:
+        if gc_was_enabled:
             gc.enable()
     return timings
 
@@ -108,9 +108,9 @@ def _time_job(job: Job, times: int, clock: Clock) -> int:
 def _timings(times: Array, baseline: int) -> tuple[Timing, ...]:
     """The timings of jobs, from the times (n, jobs) of n rounds."""
     count = len(times)
-    again = np.random.default_rng(0).integers(count, size=(_DRAWS, count))
+    resamples = np.random.default_rng(0).integers(count, size=(_DRAWS, count))
     lowest = np.quantile(times, 0.1, axis=0)
-    redrawn = np.quantile(times[again], 0.1, axis=1)
+    redrawn = np.quantile(times[resamples], 0.1, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios, redrawn_ratios = (
             lowest / lowest[baseline],

@@ -111,8 +111,8 @@ def _group(
     words: Strings, place: urls.Place, number: int, cases: Sequence[CaseReport]
 ) -> CaseGroup:
     key = f"numerics.case_{number}"
-    several = not number or len(cases) > 1
-    title = words(key) if several and words.has(key) else cases[0].title
+    has_group_title = not number or len(cases) > 1
+    title = words(key) if has_group_title and words.has(key) else cases[0].title
     return CaseGroup(number, title, tuple(case_view(words, place, report) for report in cases))
 
 
@@ -235,12 +235,12 @@ def _figures(words: Strings, report: CaseReport) -> Grid | None:
 
 
 def _figure(words: Strings, line: FigureLine) -> tuple[str, ...]:
-    measured = words("numerics.infinite") if line.measured is None else power(line.measured)
+    measured_text = words("numerics.infinite") if line.measured is None else power(line.measured)
     difference: str = ""
     if line.exact is not None and line.measured is not None:
         difference = power(line.measured - line.exact, 2)
     spread = "" if line.spread is None else " … ".join(map(power, line.spread))
-    return measured, spread, power(line.exact), difference
+    return measured_text, spread, power(line.exact), difference
 
 
 def _orders(words: Strings, report: CaseReport) -> Grid | None:
@@ -266,9 +266,9 @@ def _notes(words: Strings, report: CaseReport) -> list[str]:
     formulas = dict.fromkeys(line.formula for line in report.boundaries if line.formula)
     if formulas:
         notes.append(words("numerics.theory", sources="; ".join(formulas)))
-    softened = sorted({line.timestep for line in report.errors if line.refsafe})
-    if softened:
-        times = ", ".join(seconds_text(step) for step in softened)
+    softened_steps = sorted({line.timestep for line in report.errors if line.refsafe})
+    if softened_steps:
+        times = ", ".join(seconds_text(step) for step in softened_steps)
         notes.append(words("measured.refsafe", settings=times))
     runs = ((f"{run.integrator} at {seconds_text(run.timestep)}", run) for run in report.errors)
     return [*notes, *lost_runs(runs)]

@@ -139,11 +139,11 @@ def exponents(integrator: Integrator) -> list[float]:
         for _ in scenario.times:
             for state in (data, neighbour):
                 advance(model, state, scenario.steps(_STEP))
-            apart = np.concatenate([neighbour.qpos - data.qpos, neighbour.qvel - data.qvel])
-            size = float(np.linalg.norm(apart))
+            separation = np.concatenate([neighbour.qpos - data.qpos, neighbour.qvel - data.qvel])
+            size = float(np.linalg.norm(separation))
             total += math.log(size / distance)
-            neighbour.qpos[:] = data.qpos + apart[:2] * distance / size
-            neighbour.qvel[:] = data.qvel + apart[2:] * distance / size
+            neighbour.qpos[:] = data.qpos + separation[:2] * distance / size
+            neighbour.qvel[:] = data.qvel + separation[2:] * distance / size
         rates.append(total / _SPAN)
     return rates
 

@@ -84,8 +84,10 @@ class Bounce(Struct, frozen=True):
         gap, speed, rate, contact = self.gap, self.speed, self.rate, math.pi / self.rate
         t = times - gap / speed
         touching = [t < 0, t < contact]
-        away = gap - speed * (t - contact)
-        place = np.select(touching, [speed * times, gap + speed / rate * np.sin(rate * t)], away)
+        return_place = gap - speed * (t - contact)
+        place = np.select(
+            touching, [speed * times, gap + speed / rate * np.sin(rate * t)], return_place
+        )
         velocity = np.select(touching, [np.full_like(t, speed), speed * np.cos(rate * t)], -speed)
         return motion_without_attitude(times, place[:, None], velocity[:, None])
 
@@ -153,13 +155,13 @@ class TouchingCradle(Bounce, frozen=True):
 
         begin = self.gap / self.speed
         place, speed = np.zeros((len(times), 3)), np.zeros((len(times), 3))
-        flying = times <= begin
-        place[flying, 0], speed[flying, 0] = self.speed * times[flying], self.speed
-        if not flying.all():
+        is_flying = times <= begin
+        place[is_flying, 0], speed[is_flying, 0] = self.speed * times[is_flying], self.speed
+        if not is_flying.all():
             start = np.array([self.gap, 0.0, 0.0, self.speed, 0.0, 0.0])
-            later = times[~flying] - begin
-            states = bulirsch_stoer(rate, start, later, 1e-14, columns=4, first=1e-6)
-            place[~flying], speed[~flying] = states[:, :3], states[:, 3:]
+            contact_times = times[~is_flying] - begin
+            states = bulirsch_stoer(rate, start, contact_times, 1e-14, columns=4, first=1e-6)
+            place[~is_flying], speed[~is_flying] = states[:, :3], states[:, 3:]
         return motion_without_attitude(times, place, speed)
 
 
@@ -216,21 +218,21 @@ def problems() -> tuple[Problem, ...]:
         smooth=False,
         note="an impact begins within a step: no order is to be expected",
     )
-    exchanged = "equal masses exchange their velocities"
+    law = "equal masses exchange their velocities"
     cradle = replace(
         impact,
         name="newtons-cradle",
         title="Newton's cradle with gaps",
         mjcf=CRADLE,
         scenario=_CRADLE_SCENARIO,
-        reference=Reference("closed", exchanged, Cradle()),
+        reference=Reference("closed", law, Cradle()),
         checks=(
             ScalarCheck(
                 "velocity of the last ball, 20 steps in a contact",
                 "m/s",
                 SPEED,
                 lambda integrator: last_velocity(CRADLE, _CRADLE_SCENARIO, integrator, 2, 20),
-                exchanged,
+                law,
             ),
         ),
         note="a cradle whose balls touch is another problem: all contacts act at once",

@@ -229,8 +229,8 @@ def _without_contact(
     if text.model.nflex or not pairs:
         return []
     if not touching:
-        off = set_option(text.main, "flag", "contact", "disable")
-        return [Item(whole, "contact", None, edits=off)]
+        disabling = set_option(text.main, "flag", "contact", "disable")
+        return [Item(whole, "contact", None, edits=disabling)]
     explicit = {int(g) for g in (*text.model.pair_geom1, *text.model.pair_geom2)}
     idle = {geom for pair in pairs for geom in pair} - explicit
     idle -= {geom for pair in touching for geom in pair}

@@ -83,8 +83,8 @@ def compare(base: Any, variant: Any, index: IndexMap, scenes: Sequence[Scene]) -
         if not _same_bits(base, variant, index, scene):
             identical = False
             # What sleeps would be awake after each shot.
-            apart = _largest_departure(base, variant, index, scene, whole=bool(sleeps))
-            difference = max(difference, apart)
+            departure = _largest_departure(base, variant, index, scene, whole=bool(sleeps))
+            difference = max(difference, departure)
         if difference > TOLERANCE and not sleeps:
             break
     return MotionComparison(identical, difference)
@@ -190,7 +190,7 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
     data = initial_data(scene.scenario, model)
     start, steps_made = float(data.time), 0
     touching: set[tuple[int, int]] = set()
-    peaks, constrained, thick = Peaks(), False, thickness(model)
+    peaks, constrained, half_thickness = Peaks(), False, thickness(model)
     for command in scene.scenario.commands(scene.timestep):
         if command:
             data.ctrl[:] = command
@@ -200,7 +200,7 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
         if data.ncon:
             pairs = data.contact.geom[data.contact.exclude == 0]  # none has a force within its gap
             touching |= {(min(p), max(p)) for p in pairs.tolist() if min(p) >= 0}
-        peaks = update_peaks(data, peaks, thick)
+        peaks = update_peaks(data, peaks, half_thickness)
         if not peaks.finite:
             break
     judgement = judge(model, data, start + steps_made * scene.timestep, peaks)

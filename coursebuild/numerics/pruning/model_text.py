@@ -82,7 +82,10 @@ class ModelText:
     def files(self, edits: Iterable[ModelEdit]) -> dict[str, bytes]:
         """The new bytes of each file that these edits change."""
         data = {document.path: document.data for document in self.documents}
-        return {path: apply_edits(data[path], some) for path, some in _group_by_path(edits).items()}
+        return {
+            path: apply_edits(data[path], file_edits)
+            for path, file_edits in _group_by_path(edits).items()
+        }
 
     def ids(self, element: Element) -> Thing | None:
         """The thing that an element becomes; `None` where that is not known."""

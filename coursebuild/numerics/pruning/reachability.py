@@ -52,8 +52,8 @@ def possible_pairs(model: Any) -> frozenset[Pair]:
 def iterate_pairs(model: Any) -> Iterator[Pair]:
     """The same pairs one after the other, as there may be many; some come twice."""
     flags = int(model.opt.disableflags)
-    off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    if flags & int(off):
+    disabling = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    if flags & int(disabling):
         return
     for first, second in zip(model.pair_geom1, model.pair_geom2, strict=True):
         yield _sort_pair(int(first), int(second))
@@ -68,8 +68,8 @@ def iterate_pairs(model: Any) -> Iterator[Pair]:
     kind, affinity = model.geom_contype, model.geom_conaffinity
     body = model.geom_bodyid
     for a in range(model.ngeom):
-        match = ((kind[a] & affinity[a + 1 :]) | (kind[a + 1 :] & affinity[a])) != 0
-        for b in (np.nonzero(match)[0] + a + 1).tolist():
+        may_touch = ((kind[a] & affinity[a + 1 :]) | (kind[a + 1 :] & affinity[a])) != 0
+        for b in (np.nonzero(may_touch)[0] + a + 1).tolist():
             weld_a, weld_b = int(weld[body[a]]), int(weld[body[b]])
             if weld_a == weld_b or not (moves[weld_a] or moves[weld_b]):
                 continue

@@ -195,9 +195,9 @@ class _Surveyor:
         confirmed = largest_subset(unkept, lambda groups: not self._find_changed_output(groups))
         for group in unkept:
             if group not in confirmed:
-                speaker = self._find_changed_output([group])
+                source = self._find_changed_output([group])
                 self._reject(
-                    group.items, group.finding.difference, f"{speaker} says something else then"
+                    group.items, group.finding.difference, f"{source} says something else then"
                 )
         return [group for group in groups if group.finding.kept or group in confirmed]
 
@@ -257,8 +257,10 @@ class _Surveyor:
         return result is not None and result.identical
 
     def _may_sleep(self) -> bool:
-        asleep = int(self.order.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
-        return bool(asleep or any(reader.touches({"enableflags"}) for reader in self.order.readers))
+        sleep_flag = int(self.order.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
+        return bool(
+            sleep_flag or any(reader.touches({"enableflags"}) for reader in self.order.readers)
+        )
 
     def _try_by_running(self, proved_groups: Sequence[_PrunedGroup]) -> list[_PrunedGroup]:
         text = self.order.text
@@ -305,8 +307,8 @@ class _Surveyor:
             return None
         group = self._make_group(removable, reason, SAME, results[-1].difference)
         saving = group.finding.saving
-        slow = saving.time is None or not (saving.certain and saving.time >= LEAST)
-        if self.order.clock is not None and slow and not reason:
+        is_slow = saving.time is None or not (saving.certain and saving.time >= LEAST)
+        if self.order.clock is not None and is_slow and not reason:
             self._reject(removable, results[-1].difference, "it saves no time")
             return None
         return group

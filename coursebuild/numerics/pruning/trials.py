@@ -47,12 +47,12 @@ def largest_subset(items: Sequence[_T], holds: Callable[[list[_T]], bool]) -> li
     """
     subset: list[_T] = []
 
-    def add(some: Sequence[_T]) -> None:
-        if holds([*subset, *some]):
-            subset.extend(some)
-        elif len(some) > 1:
-            add(some[: len(some) // 2])
-            add(some[len(some) // 2 :])
+    def add(candidates: Sequence[_T]) -> None:
+        if holds([*subset, *candidates]):
+            subset.extend(candidates)
+        elif len(candidates) > 1:
+            add(candidates[: len(candidates) // 2])
+            add(candidates[len(candidates) // 2 :])
 
     left = list(items)
     while left:

@@ -254,7 +254,7 @@ def _ticks_x(x: Scale) -> list[tuple[float, str]]:
     """As many ticks as fit without their texts touching."""
     for most in (9, 7, 5, 4, 3, 2):
         ticks = x.ticks(most)
-        wide = [(at, text_width(text, TICK_SIZE)) for at, text in ticks]
-        if all(b - a >= (w + v) / 2 + 8 for (a, w), (b, v) in pairwise(wide)):
+        ticks_with_widths = [(at, text_width(text, TICK_SIZE)) for at, text in ticks]
+        if all(b - a >= (w + v) / 2 + 8 for (a, w), (b, v) in pairwise(ticks_with_widths)):
             return ticks
     return ticks[:1]

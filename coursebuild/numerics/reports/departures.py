@@ -138,14 +138,14 @@ def _compare_figures(old: _Figures, new: _Figures) -> Iterator[tuple[str, tuple[
     """The figures of both that differ: recorded, measured, and the band, in words."""
     for name in (name for name in old if name in new):
         a, b = old[name], new[name]
-        wide = a if (a.share or 0, a.least) >= (b.share or 0, b.least) else b
-        band, unlike = wide.band, a.value != b.value
+        wider = a if (a.share or 0, a.least) >= (b.share or 0, b.least) else b
+        band, differs = wider.band, a.value != b.value
         if isinstance(a.value, float | int) and isinstance(b.value, float | int):
-            room = max(a.least, b.least) + (wide.share or 0.0) * abs(a.value)
-            unlike = unlike if wide.share is None else not abs(b.value - a.value) <= room
+            room = max(a.least, b.least) + (wider.share or 0.0) * abs(a.value)
+            differs = differs if wider.share is None else not abs(b.value - a.value) <= room
         elif isinstance(a.value, str) or isinstance(b.value, str):
             band = "the same"
-        if unlike:
+        if differs:
             yield name, (*(_value_text(figure.value, band) for figure in (a, b)), band)  # type: ignore[misc]
             if name == "status":
                 return  # what else differs does so for that reason
@@ -268,6 +268,6 @@ def _figure(line: FigureLine, share: float, least: float) -> _Figures:
     figures = {f"exact {line.name}": _Figure(line.exact, _SAME)}
     if line.exact is None:
         return figures | {line.name: _Figure(line.measured, share, _ROUNDING)}
-    off = None if line.measured is None else line.measured - line.exact
+    error = None if line.measured is None else line.measured - line.exact
     room = _ROUNDING * max(abs(line.exact), abs(line.measured or 0.0)) + least
-    return figures | {f"{line.name}, against theory": _Figure(off, share, room)}
+    return figures | {f"{line.name}, against theory": _Figure(error, share, room)}

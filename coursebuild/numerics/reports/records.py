@@ -99,15 +99,15 @@ def _scene_flaw(report: SceneReport, model: str) -> str:
     if len(set(names)) < len(names):
         return "holds two scenarios of one name"
     for scenario in report.scenarios:
-        pointed = [row.dominated_by for row in scenario.rows] + [scenario.verdict.better]
-        if not all(0 <= at < len(scenario.rows) for at in pointed if at is not None):
+        row_numbers = [row.dominated_by for row in scenario.rows] + [scenario.verdict.better]
+        if not all(0 <= at < len(scenario.rows) for at in row_numbers if at is not None):
             return f"points at a row that scenario `{scenario.name}` does not have"
     return _model_flaw("bench", report, model)
 
 
 def _case_flaw(cases: tuple[CaseReport, ...], _: str) -> str:
-    twice = len({case.name for case in cases}) < len(cases)
-    return "holds two cases of one name" if twice else ""
+    has_duplicates = len({case.name for case in cases}) < len(cases)
+    return "holds two cases of one name" if has_duplicates else ""
 
 
 BENCH = ReportKind("bench", "scene", SceneReport, ".bench.json", _scene_flaw)

@@ -127,12 +127,12 @@ def key(entries: Iterable[Entry], left: float, top: float, width: float) -> tupl
     x, y = left, top
     for entry in entries:
         text = shorten_to_width(entry.text, width - left - 40, TICK_SIZE)
-        wide = 30 + text_width(text, TICK_SIZE) + 10
-        if x > left and x + wide > width:
+        entry_width = 30 + text_width(text, TICK_SIZE) + 10
+        if x > left and x + entry_width > width:
             x, y = left, y + ROW
         parts += _key_mark(entry, x + 14, y - 4)
         parts.append(label(x + 30, y, text, FINE))
-        x += wide
+        x += entry_width
     return "".join(parts), y + 6
 
 

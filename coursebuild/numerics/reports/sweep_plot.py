@@ -64,12 +64,12 @@ def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
     texts = [*(f"  {row.value}" for row in sweep.rows), *(row.parameter for row in sweep.rows)]
     left = min(0.45 * width, max(text_width(text, TICK_SIZE) for text in texts) + 16)
     column_count = 1 if narrow else len(figures)
-    wide = (width - left - 14 - _GAP * (column_count - 1)) / column_count
+    scale_width = (width - left - 14 - _GAP * (column_count - 1)) / column_count
     parts: list[str] = []
     top = bottom = 0.0
     for n, figure in enumerate(figures):
-        start = left + (n % column_count) * (wide + _GAP)
-        scale = _scale(sweep.rows, figure, start, start + wide)
+        start = left + (n % column_count) * (scale_width + _GAP)
+        scale = _scale(sweep.rows, figure, start, start + scale_width)
         names = left if n % column_count == 0 else 0.0
         bottom = _panel(parts, sweep, figure, scale, top, names)
         top = bottom if narrow else top
