@@ -24,7 +24,7 @@ from support.workflows import Runner, Step, commit, git
 
 PAGES = ("continuous-integration", "publish")
 FENCES = [fence for page in PAGES for fence in fences(DOCS / f"how-to/{page}.md")]
-WRITTEN = {fence.value("file"): fence.text for fence in FENCES if fence.value("file")}
+DOCUMENTED = {fence.value("file"): fence.text for fence in FENCES if fence.value("file")}
 COURSE = ".github/workflows/course.yml"
 WEEKLY = ".github/workflows/weekly.yml"
 PINNED = re.compile(
@@ -39,23 +39,23 @@ ACTION = yaml.safe_load((ROOT / "action.yml").read_text())
 
 
 def workflow(path: str = COURSE) -> dict[str, Any]:
-    found: dict[str, Any] = yaml.safe_load(WRITTEN[path])
-    return found
+    documented: dict[str, Any] = yaml.safe_load(DOCUMENTED[path])
+    return documented
 
 
 def publishing_elsewhere() -> list[dict[str, Any]]:
-    """The documented workflow with each of the jobs that may take the place of its last."""
+    """The documented workflow with each of the jobs that can replace its last one."""
     jobs = [yaml.safe_load(fence.text) for fence in FENCES if fence.is_("publish")]
     return [{**workflow(), "jobs": workflow()["jobs"] | job} for job in jobs]
 
 
-def everything() -> list[dict[str, Any]]:
-    own = yaml.safe_load((ROOT / COURSE).read_text())
-    return [own, workflow(), workflow(WEEKLY), *publishing_elsewhere()]
+def all_workflows() -> list[dict[str, Any]]:
+    project_workflow = yaml.safe_load((ROOT / COURSE).read_text())
+    return [project_workflow, workflow(), workflow(WEEKLY), *publishing_elsewhere()]
 
 
 def jobs() -> list[dict[str, Any]]:
-    return [job for one in everything() for job in one["jobs"].values()]
+    return [job for data in all_workflows() for job in data["jobs"].values()]
 
 
 def commands(steps: list[dict[str, Any]]) -> list[str]:
@@ -69,7 +69,7 @@ def commands(steps: list[dict[str, Any]]) -> list[str]:
 def test_documented_workflows_are_those_of_a_new_course(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     assert folder.main("init").status == 0
-    assert {path: folder.text(path) for path in (COURSE, WEEKLY)} == WRITTEN
+    assert {path: folder.text(path) for path in (COURSE, WEEKLY)} == DOCUMENTED
 
 
 def test_github_takes_the_workflows_and_the_action() -> None:
@@ -79,16 +79,16 @@ def test_github_takes_the_workflows_and_the_action() -> None:
     }
     check = {name: Draft7Validator(json.loads(text)) for name, text in texts.items()}
     release = yaml.safe_load((ROOT / ".github/workflows/release.yml").read_text())
-    for one in (*everything(), release):
-        shown = {("on" if key is True else key): value for key, value in one.items()}  # YAML 1.1
-        check["workflows"].validate(shown)
+    for data in (*all_workflows(), release):
+        keyed = {("on" if key is True else key): value for key, value in data.items()}  # YAML 1.1
+        check["workflows"].validate(keyed)
     check["actions"].validate(ACTION)
 
 
 def test_course_code_runs_with_no_secret_and_no_right_to_write() -> None:
-    for one in everything():
-        assert one["permissions"] == {"contents": "read"}
-        assert "pull_request_target" not in str(one)
+    for data in all_workflows():
+        assert data["permissions"] == {"contents": "read"}
+        assert "pull_request_target" not in str(data)
     for job in jobs():
         trusted = "secrets." in str(job) or "write" in job.get("permissions", {}).values()
         runs_the_course = "coursebuild" in str(job["steps"]) or "checkout" in str(job["steps"])
@@ -100,15 +100,15 @@ def test_course_code_runs_with_no_secret_and_no_right_to_write() -> None:
 
 
 def test_actions_are_pinned_and_no_expression_becomes_code() -> None:
-    (shown,) = (yaml.safe_load(fence.text) for fence in FENCES if fence.is_("action"))
-    steps = [step for job in jobs() for step in job["steps"]] + shown + ACTION["runs"]["steps"]
-    used = [step["uses"] for step in steps if "uses" in step]
-    assert [name for name in used if not PINNED.fullmatch(name)] == []
+    (example,) = (yaml.safe_load(fence.text) for fence in FENCES if fence.is_("action"))
+    steps = [step for job in jobs() for step in job["steps"]] + example + ACTION["runs"]["steps"]
+    actions = [step["uses"] for step in steps if "uses" in step]
+    assert [name for name in actions if not PINNED.fullmatch(name)] == []
     assert [line for line in commands(steps) if "${{" in line] == []
     for step in steps:
         if step.get("uses", "").startswith("actions/checkout@"):
             assert step["with"]["persist-credentials"] is False
-    assert shown[0]["with"].keys() == ACTION["inputs"].keys()
+    assert example[0]["with"].keys() == ACTION["inputs"].keys()
 
 
 def test_every_command_line_is_accepted() -> None:
@@ -145,8 +145,8 @@ def runner(course: Folder, tmp_path: Path) -> Runner:
     return Runner(tmp_path / "service", course.root, {name: f"<{name}>" for name in secrets})
 
 
-def push(runner: Runner, which: dict[str, Any] | None = None) -> dict[str, list[Step]]:
-    return runner.run(which or workflow(), "main", event_name="push")
+def push(runner: Runner, data: dict[str, Any] | None = None) -> dict[str, list[Step]]:
+    return runner.run(data or workflow(), "main", event_name="push")
 
 
 def propose(runner: Runner, course: Folder, lesson: str) -> list[Step]:
@@ -158,9 +158,9 @@ def propose(runner: Runner, course: Folder, lesson: str) -> list[Step]:
     git(course.root, "checkout", "-q", "-B", "merged", "main")
     git(course.root, "merge", "-q", "--no-ff", "-m", "merged", "change")
     event = {"event_name": "pull_request", "event.pull_request.base.sha": base}
-    done = runner.run(workflow(), "merged", **event)
-    assert [*done] == ["check"]
-    return done["check"]
+    steps_by_job = runner.run(workflow(), "merged", **event)
+    assert [*steps_by_job] == ["check"]
+    return steps_by_job["check"]
 
 
 def statuses(steps: list[Step]) -> list[int]:
@@ -172,30 +172,30 @@ def test_only_main_is_published_and_a_pull_request_is_told_what_it_does(
     course: Folder, runner: Runner
 ) -> None:
     require_sandbox(course.root)
-    done = push(runner)
-    assert {name: statuses(steps) for name, steps in done.items()} == {
+    steps_by_job = push(runner)
+    assert {name: statuses(steps) for name, steps in steps_by_job.items()} == {
         "build": [0, 0],
         "publish": [],
     }
     page = runner.folder / "pages/lessons/1.2-two.html"
     assert ">2</" in page.read_text()
-    kept = [*runner.caches]
-    assert kept == [f"course-{git(course.root, 'rev-parse', 'main')}"]
+    caches = [*runner.caches]
+    assert caches == [f"course-{git(course.root, 'rev-parse', 'main')}"]
 
-    wrong = propose(runner, course, SECOND.replace("```text\n2", "```text\n3"))
-    assert statuses(wrong) == [0, 0, 1, 0], "without a build, and with a report"
-    assert wrong[2].out.startswith(f"::error file={course.lesson(2)},line=10,col=1,")
+    steps_with_mistake = propose(runner, course, SECOND.replace("```text\n2", "```text\n3"))
+    assert statuses(steps_with_mistake) == [0, 0, 1, 0], "without a build, and with a report"
+    assert steps_with_mistake[2].out.startswith(f"::error file={course.lesson(2)},line=10,col=1,")
     assert "| `examples/two.py` | 1.2 | numeric: 1 (relative, up to 5.0e-01) |" in runner.summary
     assert "-2\n+3\n" in runner.summary
     assert runner.summary.endswith("Not compared: there is no site in `preview`.\n")
 
-    right = propose(
+    steps_without_mistake = propose(
         runner, course, SECOND.replace("print(2)", "print(12)").replace("\n2\n", "\n12\n")
     )
-    assert statuses(right) == [0] * 5, right
-    assert "running scripts (1)\n" in right[2].err, "the other one is kept"
+    assert statuses(steps_without_mistake) == [0] * 5, steps_without_mistake
+    assert "running scripts (1)\n" in steps_without_mistake[2].err, "the other one is kept"
     assert "\n| the whole site | " in runner.summary
-    assert [*runner.caches] == kept
+    assert [*runner.caches] == caches
     assert ">12</" not in page.read_text()
     pip, *sudo = f"pip install coursebuild=={__version__}", *SUDO
     assert runner.notes == [pip, pip, *sudo, pip, *sudo]
@@ -204,9 +204,9 @@ def test_only_main_is_published_and_a_pull_request_is_told_what_it_does(
 @pytest.mark.site
 def test_publishing_elsewhere_sends_what_main_built(runner: Runner) -> None:
     netlify, rsync = publishing_elsewhere()
-    for which in (netlify, rsync):
-        done = push(runner, which)
-        assert statuses(done["publish"]) == [0, 0], done["publish"]
+    for data in (netlify, rsync):
+        steps_by_job = push(runner, data)
+        assert statuses(steps_by_job["publish"]) == [0, 0], steps_by_job["publish"]
         page = runner.folder / "sent/lessons/1.2-two.html"
         assert ">2</" in page.read_text()
         page.unlink()
@@ -224,15 +224,15 @@ def test_weekly_everything_is_run_anew_and_with_the_newest_engine(
     engine = engine_version()
     name = f"mujoco-{engine}"
     with zipfile.ZipFile(tmp_path / f"{name}-py3-none-any.whl", "w") as wheel:
-        about = f"Metadata-Version: 2.1\nName: mujoco\nVersion: {engine}\n"
-        wheel.writestr(f"{name}.dist-info/METADATA", about)
+        metadata = f"Metadata-Version: 2.1\nName: mujoco\nVersion: {engine}\n"
+        wheel.writestr(f"{name}.dist-info/METADATA", metadata)
         wheel.writestr(f"{name}.dist-info/WHEEL", "Wheel-Version: 1.0\nTag: py3-none-any\n")
     runner.environment |= {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(tmp_path)}
-    done = runner.run(workflow(WEEKLY), "main")
-    assert {name: statuses(steps) for name, steps in done.items()} == {
+    steps_by_job = runner.run(workflow(WEEKLY), "main")
+    assert {name: statuses(steps) for name, steps in steps_by_job.items()} == {
         "anew": [0, 0],
         "newest-engine": [0, 0, 0],
-    }, done
+    }, steps_by_job
     assert runner.summary.startswith(f"```text\nMuJoCo {engine} against {engine}, ")
     assert runner.summary.endswith("\n```\n")
 
@@ -242,12 +242,12 @@ def test_action_installs_what_is_asked_for_and_runs_a_command(
     course: Folder, runner: Runner
 ) -> None:
     defaults = {name: value["default"] for name, value in ACTION["inputs"].items()}
-    above, steps = course.root.parent, ACTION["runs"]["steps"]
-    done = runner.action(above, steps, **{**defaults, "path": course.root.name})
-    assert statuses(done) == [0, 0], done
-    given = {"version": "0.9.0", "path": course.root.name, "command": "build --out ../site"}
-    assert statuses(runner.action(above, steps, **given)) == [0, 0]
-    assert (above / "site/index.html").is_file()
+    parent, steps = course.root.parent, ACTION["runs"]["steps"]
+    results = runner.action(parent, steps, **{**defaults, "path": course.root.name})
+    assert statuses(results) == [0, 0], results
+    inputs = {"version": "0.9.0", "path": course.root.name, "command": "build --out ../site"}
+    assert statuses(runner.action(parent, steps, **inputs)) == [0, 0]
+    assert (parent / "site/index.html").is_file()
     assert runner.notes == [f"pip install {ROOT}", "pip install coursebuild==0.9.0"]
 
 
@@ -258,8 +258,8 @@ def test_hooks_stop_a_commit_with_a_mistake(course: Folder, runner: Runner) -> N
     assert all(re.search(hook["files"], course.lesson()) for hook in HOOKS)
     steps = [{"run": hook["entry"]} for hook in HOOKS]
     assert statuses(runner.action(course.root, steps)) == [0, 0]
-    wrong = SECOND.replace("```text\n2", "```text\n3")
-    course.write(course.lesson(2), wrong + "\n\n\n")
-    done = runner.action(course.root, steps)
-    assert (statuses(done), course.text(course.lesson(2))) == ([0, 1], wrong.rstrip() + "\n")
-    assert done[1].out.startswith("error[output-drift]")
+    lesson = SECOND.replace("```text\n2", "```text\n3")
+    course.write(course.lesson(2), lesson + "\n\n\n")
+    results = runner.action(course.root, steps)
+    assert (statuses(results), course.text(course.lesson(2))) == ([0, 1], lesson.rstrip() + "\n")
+    assert results[1].out.startswith("error[output-drift]")

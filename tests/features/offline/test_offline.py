@@ -81,11 +81,11 @@ def test_an_edit_changes_its_line_and_no_other(site: dict[str, bytes], make: Mak
         return set(files["files.json"].decode().splitlines())
 
     new_site = make("## One\n\nTxet.\n").site()
-    gone, new = lines(site) - lines(new_site), lines(new_site) - lines(site)
-    paths = {line.split('"')[1] for line in new if line.startswith('"')}
+    old_lines, new_lines = lines(site) - lines(new_site), lines(new_site) - lines(site)
+    paths = {line.split('"')[1] for line in new_lines if line.startswith('"')}
     assert "lessons/0.1-falling.html" in paths
     assert not {path for path in paths if path.endswith((".css", ".woff2"))}
-    assert len(gone) == len(new)
+    assert len(old_lines) == len(new_lines)
 
 
 def test_the_list_of_a_site_is_what_is_there(site: dict[str, bytes]) -> None:
