@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from msgspec.structs import replace
 
-from coursebuild.core.engine.publish import check_out, publish
+from coursebuild.core.engine.publish import check_output_folder, publish
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model.results import Results
 from coursebuild.pipeline.check import read_and_verify
@@ -35,7 +35,7 @@ MakeSite: TypeAlias = "Callable[[Course, Results, Documents, Options, Reports], 
 def build(options: Options, out: Path) -> Report:
     """Publish the course into `out` (relative to the course's folder), or nothing."""
     progress, place = Progress(quiet=options.quiet), options.root / out
-    check_out(options.root, place)
+    check_output_folder(options.root, place)
     with project_lock(options.root, progress.say), prepare(options, progress) as (report, site):
         if site is None:
             stays = f"; {out} stays as it is" if place.exists() else ""

@@ -1,6 +1,6 @@
 """Publishing a site: written whole beside the old one, then swapped in, or not at all.
 
-Entry points: `check_out`, which says early whether a site may go somewhere; `publish`.
+Entry points: `check_output_folder`, which says early whether a site may go somewhere; `publish`.
 
 1. The place is checked: it is neither the project nor a folder of the author's, and holds no file
    that we did not put there. One build publishes to a place at a time.
@@ -47,7 +47,7 @@ _UNSUPPORTED = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, err
 _AUTHORED = ("content", "features", "models", "examples", ".coursebuild", ".git")
 
 
-def check_out(root: Path, out: Path) -> Path:
+def check_output_folder(root: Path, out: Path) -> Path:
     """Return where the site goes: `out`, or the folder it links to; undo a killed build.
 
     Raises:
@@ -86,7 +86,7 @@ def publish(
         EffectError: it cannot be written; the old site is still there.
         ValueError: a path is not valid in a site (a bug of the caller).
     """
-    place = check_out(root, out)
+    place = check_output_folder(root, out)
     root = Path(os.path.realpath(root))
     keyed = with_keys(files, file_list)
     try:

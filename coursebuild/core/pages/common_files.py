@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from html import unescape
 
 from msgspec import Struct
 
-from coursebuild.core.features import Feature, PagePart
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.model.theme import Theme, ThemeFile
 from coursebuild.core.pages import fonts, styles
@@ -91,63 +90,87 @@ def common_files(
 
     Without a function `cut_font`, fonts are published whole.
     """
-    files: list[SiteFile] = []
-
-    def publish(path: str, data: bytes) -> str:
-        name = hashed_name(f"assets/{path}", data)
-        files.append(OutputFile(name, data))
-        return name
-
-    @functools.cache
-    def script(name: str) -> str:
-        return publish(name, page_script(assets.file(SCRIPTS.get(name, f"js/{name}"))))
-
-    def feature_script(feature: Feature, part: PagePart) -> str:
-        return publish(f"{feature.name}.js", page_script(part.code.encode()))
-
-    def font(job: fonts.FontJob) -> str:
-        stem, _, ending = job.face.file.rpartition(".")
-        if cut_font is None:
-            ending = "woff2" if job.data.startswith(b"wOF2") else ending
-            return publish(f"fonts/{stem}.{ending}", job.data)
-        # The name comes from the input, so that it can be cut while pages are written.
-        key = job.key
-        name = f"assets/fonts/{stem}.{key[:8]}.woff2"
-        files.append(CachedFile(name, key, functools.partial(cut_font, job)))
-        return name
-
-    def picture(name: str, file: ThemeFile | None) -> str:
-        return "" if file is None else publish(f"{name}.{file.ending}", file.data)
-
-    cut_fonts = [(job, font(job)) for job in needed_fonts(assets, facts, theme)]
+    shared = _SharedFiles(assets)
+    cut_fonts = [
+        (job, shared.add_font(job, cut_font)) for job in needed_fonts(assets, facts, theme)
+    ]
     rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in cut_fonts)
     style = styles.style_rules(facts.declarations) + "".join(f.style for f in features())
     style += theme_style(theme)
-    scripts = [
-        (part.mark, script(part.bundled) if part.bundled else feature_script(feature, part))
-        for feature in features()
-        for part in feature.parts
-        if part.bundled or part.code
-    ]
-    if theme.icon is None and theme.touch_icon is None:
-        icon = publish("icon.svg", assets.template("icon.svg").encode())
-        touch_icon = publish("icon-touch.png", assets.file("icons/icon-touch.png"))
-    else:
-        icon = picture("icon", theme.icon or theme.touch_icon)
-        touch_icon = picture("icon-touch", theme.touch_icon)
+    part_scripts = tuple(shared.add_part_scripts())
+    icon, touch_icon = shared.add_icons(theme)
+    sheet = rules.encode() + assets.file("css/site.css") + style.encode()
     names = Names(
-        style=publish("site.css", rules.encode() + assets.file("css/site.css") + style.encode()),
-        theme_script=script("theme.js"),
-        script=script("site.js"),
+        style=shared.add("site.css", sheet),
+        theme_script=shared.add_script("theme.js"),
+        script=shared.add_script("site.js"),
         icon=icon,
-        credits=publish("licences.txt", _licences(assets, theme)),
+        credits=shared.add("licences.txt", _licences(assets, theme)),
         touch_icon=touch_icon,
-        scripts=tuple(scripts),
-        logo=picture("logo", theme.logo),
-        logo_dark=picture("logo-dark", theme.logo_dark),
+        scripts=part_scripts,
+        logo=shared.add_picture("logo", theme.logo),
+        logo_dark=shared.add_picture("logo-dark", theme.logo_dark),
         logo_width=_logo_width(theme.logo or theme.logo_dark),
     )
-    return tuple(files), names
+    return tuple(shared.files), names
+
+
+class _SharedFiles:
+    """Collects files for all pages; each method returns the site path of what it adds."""
+
+    def __init__(self, assets: Assets) -> None:
+        self._assets = assets
+        self._script_names: dict[str, str] = {}
+        self.files: list[SiteFile] = []
+
+    def add(self, path: str, data: bytes) -> str:
+        name = hashed_name(f"assets/{path}", data)
+        self.files.append(OutputFile(name, data))
+        return name
+
+    def add_script(self, name: str) -> str:
+        """Add a bundled script, once."""
+        if name not in self._script_names:
+            code = self._assets.file(SCRIPTS.get(name, f"js/{name}"))
+            self._script_names[name] = self.add(name, page_script(code))
+        return self._script_names[name]
+
+    def add_part_scripts(self) -> Iterator[tuple[str, str]]:
+        """Add the scripts of parts of pages, each after the mark of the part."""
+        for feature in features():
+            for part in feature.parts:
+                if part.bundled:
+                    yield part.mark, self.add_script(part.bundled)
+                elif part.code:
+                    yield part.mark, self.add(f"{feature.name}.js", page_script(part.code.encode()))
+
+    def add_font(
+        self, job: fonts.FontJob, cut_font: Callable[[fonts.FontJob], bytes] | None
+    ) -> str:
+        stem, _, ending = job.face.file.rpartition(".")
+        if cut_font is None:
+            ending = "woff2" if job.data.startswith(b"wOF2") else ending
+            return self.add(f"fonts/{stem}.{ending}", job.data)
+        # The name comes from the input, so that it can be cut while pages are written.
+        key = job.key
+        name = f"assets/fonts/{stem}.{key[:8]}.woff2"
+        self.files.append(CachedFile(name, key, functools.partial(cut_font, job)))
+        return name
+
+    def add_picture(self, name: str, file: ThemeFile | None) -> str:
+        return "" if file is None else self.add(f"{name}.{file.ending}", file.data)
+
+    def add_icons(self, theme: Theme) -> tuple[str, str]:
+        """Add the icon and the one for touch screens: those of the course, if it has any."""
+        if theme.icon is None and theme.touch_icon is None:
+            return (
+                self.add("icon.svg", self._assets.template("icon.svg").encode()),
+                self.add("icon-touch.png", self._assets.file("icons/icon-touch.png")),
+            )
+        return (
+            self.add_picture("icon", theme.icon or theme.touch_icon),
+            self.add_picture("icon-touch", theme.touch_icon),
+        )
 
 
 def _logo_width(logo: ThemeFile | None) -> int:
