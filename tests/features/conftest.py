@@ -1,4 +1,4 @@
-"""Small courses for the tests of features; one is exported once for all that look at it."""
+"""Small courses for the tests of features; one is exported once for all of them."""
 
 from __future__ import annotations
 

@@ -100,7 +100,7 @@ BROKEN = {
 }
 
 
-def test_a_feature_that_cannot_be_loaded_is_told_at_its_place_in_the_map(course: Folder) -> None:
+def test_broken_feature_is_reported_at_its_place_in_the_map(course: Folder) -> None:
     def check() -> str:
         result = course.main("check")
         assert result.status == 1
@@ -140,7 +140,7 @@ def test_the_example_of_the_docs_works(course: Folder) -> None:
 
 
 def test_the_walk_of_the_docs_ends_with_diagrams(course: Folder) -> None:
-    """Each step takes the place of what has its name in the feature as it is made."""
+    """Each step replaces the definitions of the same names in the generated feature."""
     assert course.main("new", "feature", "mermaid").status == 0
     step_nodes = [node for step in STEPS for node in ast.parse(step).body]
     names = {defined_name(node) for node in step_nodes if defined_name(node)} | {"check"}
@@ -207,14 +207,14 @@ def test_a_page_of_a_feature_follows_the_course(
     assert not [path for path in inventory.tree("public") if "inventory" in path]
 
 
-def test_a_broken_link_of_a_page_of_a_feature_is_told(inventory: Folder) -> None:
+def test_broken_link_of_a_feature_page_is_reported(inventory: Folder) -> None:
     inventory.replace("features/inventory.py", 'href="{}"', 'href="{}l"')
     result = inventory.main("build")
     assert result.status == 1
     assert "error[link-broken]: `../models/box.htmll` leads nowhere" in result.out
 
 
-def test_a_page_that_cannot_be_added_is_told(inventory: Folder) -> None:
+def test_page_that_cannot_be_added_is_reported(inventory: Folder) -> None:
     code = inventory.text("features/inventory.py")
     for name, message in (
         ("search", "there is a page `search` already"),

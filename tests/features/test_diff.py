@@ -1,4 +1,4 @@
-"""`coursebuild diff`: what a change does, told to those who review it."""
+"""`coursebuild diff`: the report of a change for its reviewers."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def change(course: Folder) -> None:
     course.write("content/lessons/flip.svg", SVG % 60)
 
 
-def test_everything_that_a_change_does_is_told(
+def test_report_has_every_effect_of_a_change(
     course: Folder, tmp_path: Path, rewriting: bool
 ) -> None:
     shutil.copytree(course.root, tmp_path / "before")
@@ -96,7 +96,7 @@ def test_everything_that_a_change_does_is_told(
     assert not (course.root / "examples").exists(), "nothing was run"
 
 
-def test_nothing_is_told_of_what_stays(course: Folder) -> None:
+def test_report_without_changes(course: Folder) -> None:
     report = course.main("diff", "HEAD").out
     assert "Lessons and pages: no change.\n" in report
     assert report.count("\n\nNo change.\n") == 4

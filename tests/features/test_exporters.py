@@ -112,7 +112,7 @@ def test_export_is_refused_where_it_would_be_in_the_way(course: Folder) -> None:
     assert course.text("notes.txt") == "mine"
 
 
-def test_unknown_and_broken_exporters_are_told(course: Folder) -> None:
+def test_unknown_and_broken_exporters_are_reported(course: Folder) -> None:
     result = course.main("export", "docx")
     offers = "epub, lessons, page, qti, scorm"
     assert result.status == 2
@@ -140,7 +140,9 @@ def test_nothing_is_written_where_something_is_wrong_or_there_is_nothing(course:
     assert course.read("lessons.csv") == first_export
 
 
-def test_full_disk_leaves_what_was_there(course: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_leaves_the_earlier_export(
+    course: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert course.main("export", "scorm").status == 0
     first_export = course.read("course-scorm.zip")
 

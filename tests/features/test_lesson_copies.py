@@ -184,7 +184,7 @@ def test_a_model_that_readers_edit_is_shown_as_code(files: dict[str, bytes]) -> 
     assert '<code class="language-xml">' in still
 
 
-def test_ids_of_cells_stay_where_others_are_edited(make: Make, files: dict[str, bytes]) -> None:
+def test_an_edit_keeps_the_ids_of_other_cells(make: Make, files: dict[str, bytes]) -> None:
     new_text = LESSON.replace("### Never", "## New\n\nText.\n\n### Never").replace(
         "a *number*", "b"
     )

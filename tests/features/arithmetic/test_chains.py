@@ -1,4 +1,4 @@
-"""Arithmetic in formulas: what holds is passed, a wrong digit is told, and no text is too odd."""
+"""Arithmetic in formulas: correct numbers pass, a wrong digit is found, any text can be checked."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ TOKENS = (
 ).split()
 
 
-def test_what_holds_is_passed_and_symbols_are_left_alone() -> None:
+def test_correct_arithmetic_passes_and_symbols_are_not_checked() -> None:
     failures = [
         (tex, comparisons)
         for texts, is_compared in ((HOLDS, True), (SILENT, False))
@@ -50,13 +50,13 @@ def test_what_holds_is_passed_and_symbols_are_left_alone() -> None:
     assert failures == []
 
 
-def test_sides_without_a_number_to_compare_are_held_against_each_other() -> None:
+def test_sides_without_a_numeral_are_compared_with_each_other() -> None:
     (comparison,) = check_arithmetic(r"\sqrt{2} = \sqrt{2.01}")
     assert comparison.message == "1.414213562 and 1.417744688 are not the same"
 
 
 @given(st.lists(st.decimals(-1000, 1000, places=4), min_size=1, max_size=6), st.integers(-9, 9))
-def test_a_sum_is_told_just_where_its_last_digit_is_wrong(terms: list[Decimal], off: int) -> None:
+def test_a_sum_is_wrong_exactly_if_its_last_digit_is(terms: list[Decimal], off: int) -> None:
     result = sum(terms) + Decimal(off).scaleb(-4)
     tex = " + ".join(f"({term:f})" for term in terms) + f" = {result:f}"
     (comparison,) = check_arithmetic(tex)
@@ -66,12 +66,12 @@ def test_a_sum_is_told_just_where_its_last_digit_is_wrong(terms: list[Decimal], 
 
 
 @given(st.lists(st.sampled_from(TOKENS), max_size=40).map(" ".join) | st.text(max_size=60))
-def test_no_text_is_too_odd(tex: str) -> None:
+def test_any_text_can_be_checked(tex: str) -> None:
     for comparison in check_arithmetic(tex):
         assert 0 <= comparison.start <= comparison.end <= len(tex)
 
 
-def test_what_nests_too_deep_is_not_understood() -> None:
+def test_deep_nesting_is_not_understood() -> None:
     for tex in ("(" * 2400 + "1" + ")" * 2400, r"\sqrt" * 900 + "1", "1 + " * 1200 + "1"):
         (comparison,) = check_arithmetic(tex + " = 1")
         assert comparison.message == "it is too long"

@@ -12,7 +12,7 @@ from support.scratch_course import ROOT, Folder
 pytestmark = [pytest.mark.site, pytest.mark.engine]
 
 
-def test_doctor_says_what_works_and_how_to_mend_what_does_not(tmp_path: Path) -> None:
+def test_doctor_reports_what_works_and_a_cure_for_the_rest(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     folder.tmp.mkdir()
     result = folder.run("doctor", env={"MUJOCO_GL": "disabled"})

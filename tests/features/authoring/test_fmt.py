@@ -1,4 +1,4 @@
-"""Lessons are formatted: tidy, the same to a reader, and no other when formatted again."""
+"""Formatted lessons are tidy, mean the same, and do not change when formatted again."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ TIDY = {
 
 
 @pytest.mark.parametrize(("text", "expected"), TIDY.values(), ids=TIDY)
-def test_text_is_tidied_and_its_lines_kept(text: str, expected: str) -> None:
+def test_text_is_tidied_and_keeps_its_lines(text: str, expected: str) -> None:
     assert tidy(text) == expected
 
 
@@ -135,7 +135,7 @@ def test_command_formats_the_course_by_the_width_of_its_map(
     assert course.main("fmt", "--check") == CommandResult(0, "", "")
 
 
-def test_command_leaves_what_it_cannot_read(make: Make) -> None:
+def test_command_leaves_unreadable_files(make: Make) -> None:
     course = make('## A\n\n```quiz\n{ "id": "x"\n```\n', b"## B\ncaf\xe9\n", "## C\ntext\n")
     before = course.tree()
     result = course.main("fmt")

@@ -1,4 +1,4 @@
-"""A new course: it is whole, right on any machine, and takes the place of nothing."""
+"""A new course: complete, valid on any machine, and written over nothing."""
 
 from __future__ import annotations
 

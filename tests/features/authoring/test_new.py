@@ -1,4 +1,4 @@
-"""New lessons and models: their files, and the entry in a map that stays as its author wrote it."""
+"""New lessons, models, templates and features: their files, and their entries in the map."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ PLACES = {
 }
 
 
-def test_entry_is_put_where_it_belongs_and_all_else_stays() -> None:
+def test_entry_is_inserted_in_order_and_the_rest_is_unchanged() -> None:
     for case, (before, after) in PLACES.items():
         for end in ("\n", "\r\n"):
             course = parse_course_map(Source(MAP, before.replace("\n", end))).value
@@ -95,7 +95,7 @@ REFUSED = [
 ]
 
 
-def test_what_cannot_be_added_changes_nothing(make: Make) -> None:
+def test_refused_addition_changes_nothing(make: Make) -> None:
     folder = make(FIRST)
     folder.write("content/lessons/1.7-there.md", "## There\n")
     folder.write("models/there.xml", "<mujoco/>")

@@ -1,4 +1,4 @@
-"""A lesson gets another id: every form of a link follows, what is in doubt is told, all or none."""
+"""Renaming a lesson: all forms of links follow, doubtful places are listed, all or nothing."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ REFUSED = [
 ]
 
 
-def test_what_cannot_be_renamed_changes_nothing(course: Folder) -> None:
+def test_refused_renaming_changes_nothing(course: Folder) -> None:
     course.write("content/lessons/1.8-two.md", "## There\n")
     before = course.tree()
     for arguments, message in REFUSED:

@@ -1,4 +1,4 @@
-"""The workflows of docs/how-to: GitHub takes them, and each step does what is said."""
+"""The workflows of docs/how-to: GitHub accepts them, and each step does what the docs say."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ def statuses(steps: list[Step]) -> list[int]:
 
 
 @pytest.mark.site
-def test_only_main_is_published_and_a_pull_request_is_told_what_it_does(
+def test_only_main_is_published_and_a_pull_request_gets_a_report(
     course: Folder, runner: Runner
 ) -> None:
     require_sandbox(course.root)
@@ -238,9 +238,7 @@ def test_weekly_everything_is_run_anew_and_with_the_newest_engine(
 
 
 @pytest.mark.site
-def test_action_installs_what_is_asked_for_and_runs_a_command(
-    course: Folder, runner: Runner
-) -> None:
+def test_action_installs_a_version_and_runs_a_command(course: Folder, runner: Runner) -> None:
     defaults = {name: value["default"] for name, value in ACTION["inputs"].items()}
     parent, steps = course.root.parent, ACTION["runs"]["steps"]
     results = runner.action(parent, steps, **{**defaults, "path": course.root.name})

@@ -94,7 +94,7 @@ def test_ebook_of_every_construct_and_of_wild_html_is_valid(full_course: Folder)
     full_course.replace(MAP, "[course]\n", f"[course]\n{SITE}")
 
 
-def test_page_of_every_construct_and_of_wild_html_needs_no_other_file(full_course: Folder) -> None:
+def test_page_of_every_construct_and_of_wild_html_is_self_contained(full_course: Folder) -> None:
     page = export(full_course, "page").read_text("utf-8")
     ids = re.findall(r' id="([^"]*)"', page)
     assert len(ids) == len(set(ids)) and page.count("<h1") == 1

@@ -1,4 +1,4 @@
-"""The HTML of a lesson in another place: well-formed XML, ids of its own, other links."""
+"""The HTML of a lesson rewritten for a book: well-formed XML, new ids and links."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def walk(content: Iterable[HtmlContent]) -> Iterator[HtmlElement]:
             yield from walk(child.children)
 
 
-def test_what_becomes_of_html() -> None:
+def test_rewriting_html() -> None:
     cases = [
         ("<h2 id=a>A</h2>", '<h4 id="1.1--a">A</h4>'),
         ("<h6>A</h6>", "<h6>A</h6>"),
@@ -94,7 +94,7 @@ def test_what_becomes_of_html() -> None:
     assert [html_for_page(html) for html, _ in cases] == [expected for _, expected in cases]
 
 
-def test_what_becomes_of_html_as_xml() -> None:
+def test_rewriting_html_as_xml() -> None:
     cases = [
         ('<p id="1 é">a<br>&nbsp;&amp;\x07', '<p id="_1_20__e9_">a<br/>\xa0&amp;\ufffd</p>'),
         ("<b @x=1 y:z=2 ok=3>b</b>", '<b ok="3">b</b>'),

@@ -20,7 +20,7 @@ GENERATED = ("public", "examples", ".coursebuild")
 
 
 def texts(folder: Path) -> dict[str, bytes]:
-    """All files of a folder but for those that the tool makes anew."""
+    """Return all files of a folder except generated ones."""
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))

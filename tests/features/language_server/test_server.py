@@ -99,7 +99,7 @@ def unchanged(editor: Editor) -> Iterator[None]:
 # --- diagnostics
 
 
-def test_mistakes_are_told_as_they_are_typed_and_nothing_is_saved(editor: Editor) -> None:
+def test_mistakes_are_reported_while_typing_and_nothing_is_saved(editor: Editor) -> None:
     editor.write(TWO, LINKS.replace("\n", "\r\n") + "\r\n🙂 𝄞 Lesson 9.9 is not there.\r\n")
     (mistake,) = editor.until(TWO, "link-lesson")
     place = types.Position(5, 13)  # in UTF-16, of which the two characters before take two each
@@ -116,14 +116,14 @@ def test_mistakes_are_told_as_they_are_typed_and_nothing_is_saved(editor: Editor
     assert editor.folder.text(TWO) == LINKS
 
 
-def test_a_mistake_says_where_else_it_is(editor: Editor) -> None:
+def test_a_mistake_has_related_places(editor: Editor) -> None:
     editor.write(TWO, LINKS + "\nA [moment of inertia]{term} again.\n")
     (diagnostic,) = editor.until(TWO, "term-repeated")
     (note,) = diagnostic.related_information or ()
     assert (editor.places.path(note.location.uri), note.location.range.start.line) == (ONE, 2)
 
 
-def test_what_a_script_printed_is_compared_as_one_types(editor: Editor) -> None:
+def test_outputs_are_compared_while_typing(editor: Editor) -> None:
     editor.until(ONE)
     typed = FALL.replace("at 1.000 m\n```", "at 1.700 m\n```").replace("`1.000`", "`1.3`")
     typed = f"New lines above.\n\n{typed}"
@@ -152,7 +152,7 @@ def test_scripts_run_when_they_are_saved(editor: Editor) -> None:
     editor.until(ONE)
 
 
-def test_what_running_found_follows_its_lines(editor: Editor) -> None:
+def test_diagnostics_of_a_run_follow_their_lines(editor: Editor) -> None:
     typed = FALL.replace("print(", "print(1 / 0, ")
     editor.write(ONE, typed)
     editor.save(ONE)
@@ -161,7 +161,7 @@ def test_what_running_found_follows_its_lines(editor: Editor) -> None:
     editor.until(ONE, "script-failed", line=diagnostic.range.start.line + 2)
 
 
-def test_a_map_that_is_being_written_is_told_and_the_rest_stays(editor: Editor) -> None:
+def test_a_broken_map_is_reported_and_the_last_course_stays(editor: Editor) -> None:
     text = editor.texts[MAP]
     editor.write(MAP, text + "\n[[silence]]\nrule = \n")
     (diagnostic,) = editor.until(MAP, "map-syntax")
@@ -232,7 +232,7 @@ HOVERS = [
 ]
 
 
-def test_what_something_is(editor: Editor) -> None:
+def test_hovers(editor: Editor) -> None:
     for path in (ONE, TWO, MAP):
         editor.until(path)
     texts = [(path, needle, editor.hover_text(path, needle)) for path, needle, _ in HOVERS]
@@ -255,7 +255,7 @@ DEFINITIONS = [
 ]
 
 
-def test_where_something_is_said(editor: Editor) -> None:
+def test_definitions(editor: Editor) -> None:
     places = [(path, needle, editor.definition(path, needle)) for path, needle, _ in DEFINITIONS]
     assert places == DEFINITIONS
 
@@ -284,7 +284,7 @@ def test_where_something_is_said(editor: Editor) -> None:
         (MAP, "\n[[level.lesson]]\nstatus = |", "draft", '"draft"'),
     ],
 )
-def test_what_may_be_written(editor: Editor, path: str, typed: str, label: str, new: str) -> None:
+def test_completions(editor: Editor, path: str, typed: str, label: str, new: str) -> None:
     editor.write(path, editor.texts[path] + "\n" + typed.replace("|", "", 1))
     item = editor.proposals(path, typed)[label]
     assert isinstance(item.text_edit, types.TextEdit)
@@ -295,7 +295,7 @@ def test_what_may_be_written(editor: Editor, path: str, typed: str, label: str, 
     assert text.endswith(start + new + after.removeprefix('"'))
 
 
-def test_keys_that_are_given_and_those_of_other_questions_are_not_proposed(editor: Editor) -> None:
+def test_existing_keys_and_those_of_other_questions_are_not_proposed(editor: Editor) -> None:
     editor.write(TWO, '```quiz\n{"questions": [{"kind": "numeric", "q": "?", }]}\n```\n')
     assert not {"options", "q", "kind"} & editor.proposals(TWO, '"q": "?", |').keys()
 
@@ -329,7 +329,7 @@ def test_a_proposal_of_a_diagnostic_is_a_quick_fix(editor: Editor) -> None:
     assert editor.apply_edits(fix.edit.changes)[ONE] == text.replace("1.200", "1.000")
 
 
-def test_a_lesson_gets_another_id_everywhere(editor: Editor) -> None:
+def test_renaming_a_lesson(editor: Editor) -> None:
     place = editor.identifier(TWO), editor.place(TWO, "lesson:1.|1#fall")
     name = editor.request("prepare_rename", types.PrepareRenameParams(*place))
     assert name.range.end.character - name.range.start.character == len("1.1")
@@ -353,7 +353,7 @@ def rename(editor: Editor, path: str, needle: str, name: str) -> dict[str, str]:
     return {} if edit is None else editor.apply_edits(edit.changes)
 
 
-def test_a_term_and_a_label_get_another_name_everywhere(editor: Editor) -> None:
+def test_renaming_a_term_and_a_label(editor: Editor) -> None:
     text = LINKS + "\n[again][r] and [the term](lesson:1.1#term:moment-of-inertia).\n\n"
     text += "[r]: lesson:1.1#eq:energy\n"
     editor.write(TWO, text)
@@ -381,7 +381,7 @@ def test_a_term_and_a_label_get_another_name_everywhere(editor: Editor) -> None:
             rename(editor, TWO, needle, name)
 
 
-def test_headings_and_what_can_be_folded(editor: Editor) -> None:
+def test_headings_and_folds(editor: Editor) -> None:
     editor.write(TWO, "## A\n\n### B `c`\n\n> [!tip]\n> Fold\n\n## D\n\n```text\nx\n```\n")
     document = editor.identifier(TWO)
     symbols = editor.request("document_symbol", types.DocumentSymbolParams(document))

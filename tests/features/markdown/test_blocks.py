@@ -68,7 +68,7 @@ def rewrite(markdown: str) -> str:
 
 
 def meaning(markdown: str) -> str:
-    """Its HTML, as far as white space does not count."""
+    """Return its HTML with normalized white space."""
     return re.sub(r"\s+", " ", plain_html(read(markdown)))
 
 
@@ -97,7 +97,7 @@ def test_any_text_means_the_same(text: str) -> None:
 
 
 def plainly(markdown: str) -> str:
-    """Its meaning, but for empty paragraphs and for the word after a fence."""
+    """Return its meaning without empty paragraphs and the word after a fence."""
     html = re.sub(r' class="language-[^"]*"|<p>\s*</p>', "", meaning(markdown))
     return re.sub(r"[\s\\]+|<br />", " ", html).strip()
 

@@ -36,7 +36,7 @@ def digest(name: str) -> str:
 
 
 def file(path: str, size: int = 100) -> FileFacts:
-    """A file; one whose name has a place for digits gets those of its content."""
+    """Return a file; `#` in its name stands for the digits of its content's hash."""
     return FileFacts(path.replace("#", digest(path)[:8]), digest(path), size)
 
 
@@ -71,7 +71,7 @@ def test_a_page_of_more_than_a_mebibyte_is_for_those_who_ask_for_everything() ->
     assert len(groups["text"]["files"]) == 2, "what scripts of every page need is kept with them"
 
 
-def test_a_name_with_a_hash_of_something_else_needs_one() -> None:
+def test_a_name_with_a_foreign_hash_needs_a_digest() -> None:
     groups = read_listing(FileFacts("assets/a.0123abcd.js", digest("a"), 1))
     assert groups["text"]["files"] == {"assets/a.0123abcd.js": digest("a")[:12]}
 
@@ -88,7 +88,7 @@ def test_an_edit_changes_its_line_and_no_other(site: dict[str, bytes], make: Mak
     assert len(old_lines) == len(new_lines)
 
 
-def test_the_list_of_a_site_is_what_is_there(site: dict[str, bytes]) -> None:
+def test_the_list_has_the_files_of_the_site(site: dict[str, bytes]) -> None:
     data = json.loads(site["files.json"])
     files = {
         path: d for name in ("shell", "text", "rest") for path, d in data[name]["files"].items()
@@ -113,7 +113,7 @@ def test_the_list_is_json_with_a_line_for_each_file(names: list[str]) -> None:
     assert [*json.loads(text)["text"]["files"]] == [file.path for file in files]
 
 
-def test_the_manifest_names_what_is_there(site: dict[str, bytes]) -> None:
+def test_the_manifest_names_existing_icons(site: dict[str, bytes]) -> None:
     manifest = json.loads(site["manifest.webmanifest"])
     assert (manifest["start_url"], manifest["scope"], manifest["id"]) == ("./", "./", "./")
     for icon in manifest["icons"]:

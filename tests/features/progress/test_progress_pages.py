@@ -1,4 +1,4 @@
-"""What pages say of lessons for the reader's progress, and the two pages that are about it."""
+"""The data about lessons in pages for the reader's progress, and the two pages about it."""
 
 from __future__ import annotations
 

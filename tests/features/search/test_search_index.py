@@ -1,4 +1,4 @@
-"""The files of the index: what they hold, how few an edit touches, and that nothing else counts."""
+"""The files of the index: their content, how few an edit changes, and that only pages matter."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def lines(terms: dict[str, int]) -> bytes:
 
 
 def decode_shard(data: bytes) -> dict[str, list[tuple[int, int]]]:
-    """A shard by its terms, as the browser reads it."""
+    """Read a shard as the browser does: the pages and weights of each term."""
     text = json.loads(data.decode().partition(",")[2].partition(",")[2].rstrip()[:-1])
     pages_by_term: dict[str, list[tuple[int, int]]] = {}
     for line in text.split("\n") if text else ():
@@ -95,7 +95,9 @@ def shards(files: dict[str, CachedFile]) -> dict[int, dict[str, list[tuple[int, 
 
 
 @pytest.mark.parametrize("pages", [1, 3, 40, 150])
-def test_every_term_stands_once_where_the_browser_looks(library: Library, pages: int) -> None:
+def test_every_term_is_in_the_one_shard_that_the_browser_loads(
+    library: Library, pages: int
+) -> None:
     terms = course(pages)
     plan = IndexPlan.of(pages)
     terms_by_shard = shards(search_site(library, terms))

@@ -1,4 +1,4 @@
-"""What pages are found by, as sections, and the files that a browser loads of it."""
+"""The sections of pages for the search, and the files of them that a browser loads."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_pages_that_are_searched_and_that_are_not(make: Make) -> None:
     assert model[1] == Section("x", "Facts", 2, ())
 
 
-def test_terms_stand_by_the_best_place_and_how_often(make: Make) -> None:
+def test_terms_have_weights_by_place_and_frequency(make: Make) -> None:
     piece = SectionPiece("text", "body body body body; inertia")
     code = SectionPiece("code", "body mj_step " + "x1 " * 10 + "y1 " * 9 + "z1 " * 4 + "w1 " * 3)
     sections = (Section("a", "Inertia", 2, (piece, code), ("frac",)),)

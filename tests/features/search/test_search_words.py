@@ -1,4 +1,4 @@
-"""What texts and formulas are found by; the browser's half of these rules is tested under Node."""
+"""The terms of texts and formulas; the browser's half of these rules is tested under Node."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_terms_are_those_that_the_browser_makes() -> None:
     assert [[text, terms_of(text)] for text, _ in AGREED["terms"]] == AGREED["terms"]
 
 
-def test_terms_are_kept_where_the_browser_looks_for_them() -> None:
+def test_shelves_are_those_of_the_browser() -> None:
     for term, shelf, fuzzy, _ in AGREED["shelves"]:
         assert (shelf_of(term), is_fuzzy(term)) == (shelf, fuzzy), term
 

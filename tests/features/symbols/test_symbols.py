@@ -75,7 +75,7 @@ def test_the_symbols_of_a_formula(typeset: Typeset, tex: str, expected: list[str
     assert read(typeset(tex)) == expected
 
 
-def test_the_same_symbol_in_other_surroundings_is_the_same(typeset: Typeset) -> None:
+def test_a_symbol_does_not_depend_on_its_formula(typeset: Typeset) -> None:
     alone = symbols(typeset(r"\dot q_1"))
     assert len(alone) == 1
     for tex in (r"-\dot q_1", r"\dot{q}_{1}^2", r"\tfrac12 m\dot q_1", r"e^{\dot q_1}"):
@@ -87,7 +87,7 @@ NAMES = r"\mathrm{Re} \mathit{St}".split()
 NO_SYMBOL = r"mg v^2 A^\top I=1 1 \frac{a}{b}".split()
 
 
-def test_what_is_a_single_symbol_is_the_one_that_formulas_have(typeset: Typeset) -> None:
+def test_a_single_symbol_equals_that_of_a_formula(typeset: Typeset) -> None:
     for tex in SINGLE:
         assert symbols(typeset(f"1 + {tex}")) == (only_symbol(typeset(tex)),)
     assert [tex for tex in (*NAMES, *NO_SYMBOL) if only_symbol(typeset(tex))] == NAMES
