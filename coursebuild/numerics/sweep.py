@@ -113,8 +113,10 @@ def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], l
     """Give the elements of a variation a value; what they had before, and have now."""
     match = _PARAMETER.fullmatch(part.parameter)
     kind, name, field = match.group("kind", "name", "field") if match else ("", "", "")
-    several = getattr(spec, _PLURALS.get(kind, f"{kind}s"), ())
-    elements = [spec.option] if kind == "option" else [o for o in several if name in (None, o.name)]
+    candidates = getattr(spec, _PLURALS.get(kind, f"{kind}s"), ())
+    elements = (
+        [spec.option] if kind == "option" else [o for o in candidates if name in (None, o.name)]
+    )
     if match is None or not elements or not hasattr(elements[0], field):
         message = f"the model has no parameter `{part.parameter}`"
         help = "it is named as in `mujoco.MjSpec`: `option.timestep`, `geom:ball.solref[0]`"
@@ -198,7 +200,7 @@ class _Hit(Struct):
     """The latest one."""
     parting: float = 0.0
     """Speed with which they part at the end, m/s; 0 if they stay together."""
-    slid: float = 0.0
+    distance: float = 0.0
     """Distance slid, m."""
 
 
@@ -209,7 +211,7 @@ def _with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
     step = float(model_copy.opt.timestep)
     steps = scenario.steps(step) * len(scenario.times)
     data, scratch = initial_data(scenario, model_copy), initial_data(scenario, model_copy)
-    now: dict[Pair, _Hit] = {}
+    current: dict[Pair, _Hit] = {}
     hits: list[_Hit] = []
     deepest = residual = force = iterations = 0.0
     for command in scenario.commands(step):
@@ -222,26 +224,26 @@ def _with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
         scratch.qpos[:], scratch.qvel[:] = data.qpos, data.qvel
         mujoco.mj_fwdPosition(model_copy, scratch)
         mujoco.mj_fwdVelocity(model_copy, scratch)
-        before, now = now, {}
+        previous, current = current, {}
         for contact in touching_contacts(scratch):
             pair = (int(contact.geom[0]), int(contact.geom[1]))
             parting_speed, sliding = contact_speeds(model_copy, scratch, contact)
-            hit = before.pop(pair, None) or now.get(pair)
+            hit = previous.pop(pair, None) or current.get(pair)
             if hit is None:
                 hit = _Hit(-parting_speed, contact)
                 hits.append(hit)
-            if pair not in now:
-                hit.slid += sliding * step
-            now[pair], hit.contact = hit, copy.copy(contact)
+            if pair not in current:
+                hit.distance += sliding * step
+            current[pair], hit.contact = hit, copy.copy(contact)
             deepest = max(deepest, -float(contact.dist))
-        for hit in before.values():
+        for hit in previous.values():
             hit.parting = max(0.0, contact_speeds(model_copy, scratch, hit.contact)[0])
     closing = (hit for hit in hits if hit.closing > 0)
     hardest = max(closing, key=lambda hit: hit.closing, default=None)
     return replace(
         row,
         penetration=deepest if hits else None,
-        slip=max(hit.slid for hit in hits) if hits else None,
+        slip=max(hit.distance for hit in hits) if hits else None,
         restitution=hardest.parting / hardest.closing if hardest is not None else None,
         residual=residual / force if force else None,
         iterations=iterations / steps if force else None,
