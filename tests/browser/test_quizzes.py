@@ -116,8 +116,8 @@ def test_number_is_judged_and_told_what_is_wrong_with_it(lesson: Page) -> None:
         expect(field).to_be_focused()
         becomes(lesson, lambda: field.get_attribute("aria-invalid") or "false", explanation)
         answer = stored_answer(lesson, NUMBER) or {}
-        stored = (answer["given"], answer["right"], answer["tries"])
-        assert stored == (entered, explanation == "false", tries)
+        record = (answer["given"], answer["right"], answer["tries"])
+        assert record == (entered, explanation == "false", tries)
     # It is mended beside what is wrong with it.
     field.fill("80")
     press(lesson, NUMBER)
@@ -293,11 +293,11 @@ def test_hints_come_one_by_one_and_the_answer_after_a_try(page: Page) -> None:
 
 
 def test_formulas_code_and_markup_in_options_choose_them(page: Page) -> None:
-    one = question(page, MCQ)
-    radios = one.get_by_role("radio")
-    for number, part in ((1, one.locator("math", has_text="2").first), (2, one.locator("code")),
-                         (3, one.locator(".options b"))):  # fmt: skip
+    mcq = question(page, MCQ)
+    radios = mcq.get_by_role("radio")
+    for number, part in ((1, mcq.locator("math", has_text="2").first), (2, mcq.locator("code")),
+                         (3, mcq.locator(".options b"))):  # fmt: skip
         part.first.click()
         expect(radios.nth(number)).to_be_checked()
-    one.get_by_role("link", name="factor").click()
+    mcq.get_by_role("link", name="factor").click()
     expect(page).to_have_url(re.compile("#hello$"))

@@ -124,8 +124,8 @@ def test_answers_points_and_status_reach_the_platform(visit: Visit) -> None:
     ]
     assert interactions[2][0] == "check.much" and interactions[2][3] == "correct"
     left(page)
-    stored = page.evaluate("JSON.parse(localStorage.getItem('platform'))")
-    assert stored["core"]["exit"] == "suspend"
+    platform_data = page.evaluate("JSON.parse(localStorage.getItem('platform'))")
+    assert platform_data["core"]["exit"] == "suspend"
 
 
 FORGET = (

@@ -69,7 +69,7 @@ def test_everything_can_be_read(sites: Mapping[str, Site], page: Page, name: str
         expect(page.locator("h1")).to_have_count(1)
         text = re.compile(SAID.get(site.kind(path), r"[\s\S]{40}"))
         expect(page.locator("main")).to_have_text(text, use_inner_text=True)
-    assert {path: found for path, found in unseen.items() if found} == {}
+    assert {path: texts_found for path, texts_found in unseen.items() if texts_found} == {}
 
 
 def test_line_is_reached_by_its_address(sites: Mapping[str, Site], page: Page) -> None:

@@ -24,13 +24,13 @@ _EXECUTED = re.compile(r"stat::number_of_executed_units: (\d+)")
 _COVERED = re.compile(r" cov: (\d+)")
 
 
-class Tried(NamedTuple):
+class Outcome(NamedTuple):
     """What became of a target."""
 
     inputs: int
     edges: int
     """Of the code that were reached."""
-    found: list[str]
+    findings: list[str]
 
 
 class Bench:
@@ -42,12 +42,12 @@ class Bench:
         shutil.rmtree(self.folder, ignore_errors=True)
         for part in ("seeds", "corpus"):
             (self.folder / part).mkdir(parents=True)
-        for number, seed in enumerate([*TARGETS[name].seeds(), *kept(name)]):
+        for number, seed in enumerate([*TARGETS[name].seeds(), *read_corpus(name)]):
             (self.folder / f"seeds/{number:04d}").write_bytes(seed)
         words = ("".join(f"\\x{byte:02x}" for byte in word) for word in WORDS)
         (self.folder / "words").write_text("".join(f'"{word}"\n' for word in words))
 
-    def attempt(self, seconds: int, runs: int, seed: int) -> Tried:
+    def attempt(self, seconds: int, runs: int, seed: int) -> Outcome:
         """Try inputs for so long, or so many; a worker that was ended is followed by another."""
         until = time.monotonic() + seconds
         inputs = edges = 0
@@ -61,7 +61,7 @@ class Bench:
             edges = max([edges, *map(int, _COVERED.findall(output))])
             if status == 0:
                 break
-        return Tried(inputs, edges, self.found())
+        return Outcome(inputs, edges, self.findings())
 
     def worker(self, *options: str) -> tuple[int, str]:
         command = [sys.executable, "-m", "fuzz.worker", self.name, ".", "-dict=words"]
@@ -73,7 +73,7 @@ class Bench:
         )
         return process.returncode, process.stderr
 
-    def found(self) -> list[str]:
+    def findings(self) -> list[str]:
         """What was found, a line each with where its input lies."""
         lines = []
         for path in sorted(self.folder.iterdir()):
@@ -87,13 +87,13 @@ class Bench:
     def keep(self) -> None:
         """Put the shortest inputs that reached new code into the corpus of the repository."""
         inputs = {path.read_bytes() for path in (self.folder / "corpus").iterdir()}
-        new_inputs = inputs.union(kept(self.name)).difference(TARGETS[self.name].seeds())
+        new_inputs = inputs.union(read_corpus(self.name)).difference(TARGETS[self.name].seeds())
         least = sorted(new_inputs, key=lambda data: (len(data), data))[:KEPT]
         text = json.dumps([data.decode("latin-1") for data in least], indent=0)
         (CORPUS / f"{self.name}.json").write_text(f"{text}\n")
 
 
-def kept(name: str) -> list[bytes]:
+def read_corpus(name: str) -> list[bytes]:
     """The corpus of a target."""
     path = CORPUS / f"{name}.json"
     return [text.encode("latin-1") for text in json.loads(path.read_text())]
@@ -117,10 +117,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         bench = Bench(name, options.out.resolve())
         seconds = 10**6 if options.runs else options.seconds // len(names)
         outcome = bench.attempt(seconds, options.runs, options.seed)
-        survived = outcome.inputs - len(outcome.found)
-        print(f"{name:14}{outcome.inputs:10}{survived:10}{len(outcome.found):7}{outcome.edges:8}")
+        survived = outcome.inputs - len(outcome.findings)
+        print(
+            f"{name:14}{outcome.inputs:10}{survived:10}{len(outcome.findings):7}{outcome.edges:8}"
+        )
         sys.stdout.flush()
-        findings += outcome.found
+        findings += outcome.findings
         if options.keep:
             bench.keep()
     print("\n".join(findings) or "nothing was found")

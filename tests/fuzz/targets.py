@@ -135,7 +135,7 @@ def declarations(text: str) -> None:
     describe(*parse_declarations(Source("models/a.toml", text)).diagnostics)
 
 
-def declared() -> Iterator[bytes]:
+def declaration_files() -> Iterator[bytes]:
     for path in sorted((ROOT / "models").glob("*.toml")):
         yield path.read_bytes()
 
@@ -224,7 +224,7 @@ TARGETS = {
     "info": Target(info_strings, _text(info_string)),
     "json": Target(json_bodies, _text(lesson)),
     "map": Target(course_maps, _text(course_map)),
-    "declarations": Target(declared, _text(declarations)),
+    "declarations": Target(declaration_files, _text(declarations)),
     "comparison": Target(outputs, _text(comparison), repeatable=False),
     "entry": Target(entries, entry, repeatable=False),
 }

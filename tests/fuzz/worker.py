@@ -32,7 +32,7 @@ class Attempts:
         self.target = target
         self.folder = folder
         self.count = 0
-        self.where: set[str] = set()
+        self.signatures: set[str] = set()
 
     def __call__(self, data: bytes) -> None:
         self.count += 1
@@ -69,8 +69,8 @@ class Attempts:
         if isinstance(error, SlownessError):
             place = str(error).split()[0]
         signature = f"{type(error).__name__} {place}"
-        if signature not in self.where:
-            self.where.add(signature)
+        if signature not in self.signatures:
+            self.signatures.add(signature)
             name = f"found-{hashlib.sha256(data).hexdigest()[:12]}"
             (self.folder / name).write_bytes(data)
             lines = traceback.format_exception(error)
@@ -83,7 +83,7 @@ def main() -> None:
         from fuzz.targets import TARGETS
     attempts = Attempts(TARGETS[name], Path(folder))
     for path in sorted(Path(folder).glob("found-*.json")):
-        attempts.where.add(json.loads(path.read_text())[0])
+        attempts.signatures.add(json.loads(path.read_text())[0])
     atheris.Setup([sys.argv[0], *options], attempts)
     atheris.Fuzz()
 

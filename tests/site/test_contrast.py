@@ -34,7 +34,7 @@ Colour = tuple[float, float, float, float]
 class Rule:
     file: str
     selector: str
-    around: str
+    at_rules: str
     """The at-rules that it stands in."""
     declarations: dict[str, str]
 
@@ -70,7 +70,7 @@ ALL = [rule for path in SHEETS for rule in rules(without_comments(path), path.na
 PROPERTIES: dict[str, list[str]] = {}
 for _rule in ALL:
     for _name, _value in _rule.declarations.items():
-        if _name.startswith("--") and "print" not in _rule.around:
+        if _name.startswith("--") and "print" not in _rule.at_rules:
             PROPERTIES.setdefault(_name, []).append(_value)
 
 
@@ -109,7 +109,7 @@ def arguments(text: str) -> list[str]:
     return parts
 
 
-def over(top: Colour, ground: Colour) -> Colour:
+def blend(top: Colour, ground: Colour) -> Colour:
     a = top[3]
     red, green, blue = (a * top[i] + (1 - a) * ground[i] for i in range(3))
     return red, green, blue, 1.0
@@ -119,7 +119,7 @@ def contrast(text: Colour, ground: Colour) -> float:
     """Of what a screen shows, whose channels have 256 values."""
     text_hex, ground_hex = (
         "#" + "".join(f"{round(255 * channel):02x}" for channel in colour[:3])
-        for colour in (over(text, ground), ground)
+        for colour in (blend(text, ground), ground)
     )
     return told_apart(text_hex, [ground_hex])
 
@@ -133,7 +133,7 @@ _NO_COLOUR = re.compile(
 )
 
 
-def named(rule: Rule, *names: str) -> str | None:
+def colour_of(rule: Rule, *names: str) -> str | None:
     """The colour that a rule gives; `None` for none, and for one of the system's."""
     for name in names:
         value = rule.declarations.get(name)
@@ -144,14 +144,14 @@ def named(rule: Rule, *names: str) -> str | None:
 
 def test_the_formulas() -> None:
     (white,) = colours("#fff", "light")
-    assert over((0, 0, 0, 0.5), white)[:3] == (0.5, 0.5, 0.5)
+    assert blend((0, 0, 0, 0.5), white)[:3] == (0.5, 0.5, 0.5)
     assert contrast((0, 0, 0, 1), white) == pytest.approx(21.0)
     mixed = colours("color-mix(in srgb, light-dark(#fff, #000) 25%, transparent)", "dark")
     assert mixed == [(0.0, 0.0, 0.0, 0.25)]
 
 
 def test_there_is_something_to_test() -> None:
-    assert sum(named(rule, "color") is not None for rule in ALL) > 60
+    assert sum(colour_of(rule, "color") is not None for rule in ALL) > 60
     assert {rule.file for rule in ALL} >= {"tokens.css", "code.css", "quiz.css", "lab-live.css"}
 
 
@@ -159,15 +159,13 @@ def test_there_is_something_to_test() -> None:
 def test_text(theme: str) -> None:
     failures = []
     for rule in ALL:
-        text = named(rule, "color")
-        if text is None or "print" in rule.around:
+        text = colour_of(rule, "color")
+        if text is None or "print" in rule.at_rules:
             continue
-        ground_value = named(rule, "background", "background-color")
+        ground_value = colour_of(rule, "background", "background-color")
         grounds = plain(theme)
         if ground_value is not None:
-            grounds = [
-                over(top, below) for top in colours(ground_value, theme) for below in grounds
-            ]
+            grounds = [blend(top, base) for top in colours(ground_value, theme) for base in grounds]
         least = min(
             contrast(colour, ground) for colour in colours(text, theme) for ground in grounds
         )
@@ -187,12 +185,12 @@ def test_text_on_tints(theme: str) -> None:
     """The text of a box that has a ground of its own and no colour of its own."""
     failures = []
     for rule in ALL:
-        tint = named(rule, "background", "background-color")
-        if tint is None or "color" in rule.declarations or "print" in rule.around:
+        tint = colour_of(rule, "background", "background-color")
+        if tint is None or "color" in rule.declarations or "print" in rule.at_rules:
             continue
         if any(part in rule.selector for part in WITHOUT_TEXT):
             continue
-        grounds = [over(top, ground) for top in colours(tint, theme) for ground in plain(theme)]
+        grounds = [blend(top, ground) for top in colours(tint, theme) for ground in plain(theme)]
         for name, limit in LEAST.items():
             least = min(contrast(a, b) for a in colours(name, theme) for b in grounds)
             if least < limit:
@@ -237,8 +235,8 @@ def test_print() -> None:
     """On white paper, in whatever is not black."""
     failures = []
     for rule in ALL:
-        text = named(rule, "color")
-        if text is not None and "print" in rule.around:
+        text = colour_of(rule, "color")
+        if text is not None and "print" in rule.at_rules:
             least = min(contrast(colour, (1, 1, 1, 1)) for colour in colours(text, "light"))
             if least < 7:
                 failures.append((rule.file, rule.selector, text, round(least, 2)))

@@ -35,7 +35,7 @@ class Package:
     """A package of a course, and the result of the command that wrote it."""
 
     folder: Folder
-    done: CommandResult
+    result: CommandResult
     files: dict[str, bytes]
 
 

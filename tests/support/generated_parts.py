@@ -67,13 +67,13 @@ def _fields(
     for field, field_schema in structure["properties"].items():
         if (field in other_fields) != (relation == "within") or (other_fields and field == "kind"):
             continue
-        meaning = field_schema.get("description") or _about(field_schema, definitions)
+        meaning = field_schema.get("description") or _describe(field_schema, definitions)
         required = ", required" * (field in structure.get("required", ()))
         rows.append((f"`{field}`{required}", _value(field_schema), meaning))
     return _table("field | value | meaning", rows)
 
 
-def _about(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
+def _describe(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
     """Return the description of the structure that a field holds."""
     match = re.search(r'"\$ref": "#/\$defs/(\w+)"', json.dumps(schema))
     meaning = definitions[match[1]]["description"].partition("\n")[0] if match else ""

@@ -13,9 +13,9 @@ from support.positioned_nodes import format_diagnostics
 def parse(body: str, kind: str = "simlab") -> Parsed[Lab | None]:
     """The lab whose JSON begins in the second line of a lesson."""
     source = Source("content/lessons/4.2-x.md", f"```lab {kind}\n{body}\n```\n")
-    parsed = parse_document(source, frozenset(), lesson=True)
-    labs = (block for block in document_blocks(parsed.value) if isinstance(block, Lab))
-    return Parsed(next(labs, None), parsed.diagnostics)
+    result = parse_document(source, frozenset(), lesson=True)
+    labs = (block for block in document_blocks(result.value) if isinstance(block, Lab))
+    return Parsed(next(labs, None), result.diagnostics)
 
 
 def messages(body: str, kind: str = "simlab") -> list[str]:

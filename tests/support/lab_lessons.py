@@ -28,9 +28,9 @@ def course(root: Path, stores: Path, *lessons: str) -> Folder:
 
 def run_check(folder: Folder, *names: str, status: int | None = None) -> dict[str, Any]:
     """A check's report, as JSON."""
-    done = folder.main("check", *names, "--format", "json")
-    assert status is None or done.status == status, done.out + done.err
-    return {"status": done.status, **json.loads(done.out)}
+    result = folder.main("check", *names, "--format", "json")
+    assert status is None or result.status == status, result.out + result.err
+    return {"status": result.status, **json.loads(result.out)}
 
 
 RIGHT = '''{

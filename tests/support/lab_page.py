@@ -38,13 +38,13 @@ def watch_page(context: BrowserContext) -> tuple[Page, list[str]]:
     """
     page, console = context.new_page(), list[str]()
 
-    def failed(request: Request) -> None:
+    def on_failure(request: Request) -> None:
         if request.failure != "net::ERR_ABORTED":
             console.append(f"failed: {request.url}")
 
     page.on("console", lambda message: console.append(message.text))
     page.on("pageerror", lambda error: console.append(str(error)))
-    page.on("requestfailed", failed)
+    page.on("requestfailed", on_failure)
     return page, console
 
 

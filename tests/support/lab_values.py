@@ -35,9 +35,9 @@ def make_lab(text: str | None = None, /, **fields: Any) -> Lab:
 def lab_of(text: str) -> Lab:
     """The one lab of a lesson."""
     source = Source("content/lessons/4.2-x.md", text)
-    parsed = parse_document(source, frozenset(), lesson=True)
-    assert parsed.diagnostics == (), [d.message for d in parsed.diagnostics]
-    (lab,) = labs_in((parsed.value,))
+    result = parse_document(source, frozenset(), lesson=True)
+    assert result.diagnostics == (), [d.message for d in result.diagnostics]
+    (lab,) = labs_in((result.value,))
     return lab
 
 

@@ -80,12 +80,12 @@ class Builds:
     """Clean builds of what a folder holds, each in a folder of its own."""
 
     def __init__(self, folder: Path, stores: Path) -> None:
-        self.where, self.stores, self.numbers = folder, stores, itertools.count()
+        self.folder, self.stores, self.numbers = folder, stores, itertools.count()
         self.trials = folder / "trials"
 
     def __call__(self, folder: Folder) -> dict[str, bytes] | None:
         """The published files, or nothing for a course with mistakes."""
-        fresh = Folder(self.where / f"clean {next(self.numbers)}")
+        fresh = Folder(self.folder / f"clean {next(self.numbers)}")
         fresh.copy(folder.root)
         fresh.borrow(self.stores)
         share(fresh, self.trials)

@@ -73,15 +73,15 @@ def make_course(
             for name, text in (models or {}).items()
         ),
         files=tuple(files),
-        declarations=tuple(parsed for parsed in declarations if parsed is not None),
+        declarations=tuple(declaration for declaration in declarations if declaration is not None),
     )
 
 
 def document(path: str, text: str) -> Document:
     """A text without mistakes of its own."""
-    parsed = parse_document(Source(path, text), KINDS, lesson="lessons" in path)
-    assert parsed.diagnostics == (), [d.message for d in parsed.diagnostics]
-    return parsed.value
+    result = parse_document(Source(path, text), KINDS, lesson="lessons" in path)
+    assert result.diagnostics == (), [d.message for d in result.diagnostics]
+    return result.value
 
 
 def rules_and_texts(diagnostics: Iterable[Diagnostic]) -> list[str]:
@@ -94,9 +94,9 @@ def messages(diagnostics: Iterable[Diagnostic]) -> list[str]:
     return [d.message + (f" [{d.help}]" if d.help else "") for d in diagnostics]
 
 
-def facts(**known: Any) -> ModelFacts:
+def facts(**fields: Any) -> ModelFacts:
     """What a compiled model holds; nothing, but for what is said."""
     empty: dict[str, Any] = dict.fromkeys(("bodies", "geoms", "joints", "nq", "nv", "nu"), 0)
     empty |= {"timestep": 0.002, "integrator": "Euler", "total_mass": 0.0}
     empty |= dict.fromkeys(("keyframes", "sites", "body_names"), ())
-    return ModelFacts(**(empty | known))
+    return ModelFacts(**(empty | fields))

@@ -56,12 +56,12 @@ def _tokens(path: Path) -> list[Token]:
 
 def fences(path: Path) -> list[Fence]:
     """The fences of a document, in order."""
-    found = []
+    matches = []
     for token in _tokens(path):
         if token.type == "fence" and token.map is not None:
             kind, *words = token.info.split() or [""]
-            found.append(Fence(path.stem, token.map[0] + 1, kind, tuple(words), token.content))
-    return found
+            matches.append(Fence(path.stem, token.map[0] + 1, kind, tuple(words), token.content))
+    return matches
 
 
 def code_spans(path: Path) -> list[str]:

@@ -34,12 +34,12 @@ class Fake:
     """Says what it was told to, and what it was asked."""
 
     def __init__(self, *outcomes: ScenarioReport | Diagnostic | BaseException) -> None:
-        self.found = list(outcomes) or [swing()]
+        self.outcomes = list(outcomes) or [swing()]
         self.calls: list[tuple[str, int, bool, bool]] = []
 
     def compile_scene(self, root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
         assert root.is_absolute()
-        scenes: Any = tuple(self.found)
+        scenes: Any = tuple(self.outcomes)
         return CompiledScene(scene, None, scenes)
 
     def add_card(self, root: Path, scene: CourseScene, report: SceneReport) -> SceneReport:
@@ -57,7 +57,7 @@ class Fake:
     ) -> ScenarioReport:
         tell("swing: Euler")
         self.calls.append((compiled.scene.name, number, quick, timed))
-        outcome = self.found[number]
+        outcome = self.outcomes[number]
         if isinstance(outcome, Diagnostic):
             raise CannotMeasureError(outcome)
         if isinstance(outcome, BaseException):

@@ -135,14 +135,14 @@ class Events:
     def wait_for_change(self) -> Events:
         """The page is another than it was."""
         before = self.state
-        return self.until(lambda told: told.state != before)
+        return self.until(lambda events: events.state != before)
 
     def rules(self) -> list[str]:
         return [problem["rule"] for problem in self.news["problems"]]
 
     def wait_until_settled(self, *rules: str) -> Events:
         """All is known, and this is what is wrong."""
-        return self.until(lambda told: told.news["busy"] == "" and told.rules() == [*rules])
+        return self.until(lambda events: events.news["busy"] == "" and events.rules() == [*rules])
 
 
 def _events(stream: Iterable[bytes]) -> Iterator[tuple[str, str]]:

@@ -13,9 +13,9 @@ def parse(body: str, prefix: str = "", newline: str = "\n") -> Parsed[Quiz | Non
     """A quiz from the third line of a lesson on, each line after a prefix."""
     rows = ["Before.", "```quiz", *(body.split("\n") if body else []), "```", "After."]
     text = newline.join(prefix + row for row in rows) + newline
-    parsed = parse_document(Source("content/lessons/4.2-x.md", text), frozenset(), lesson=True)
-    quizzes = (block for block in document_blocks(parsed.value) if isinstance(block, Quiz))
-    return Parsed(next(quizzes, None), parsed.diagnostics)
+    result = parse_document(Source("content/lessons/4.2-x.md", text), frozenset(), lesson=True)
+    quizzes = (block for block in document_blocks(result.value) if isinstance(block, Quiz))
+    return Parsed(next(quizzes, None), result.diagnostics)
 
 
 MCQ = '{"kind": "mcq", "q": "Q", "options": ["a", "b"], %s}'

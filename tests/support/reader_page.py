@@ -24,8 +24,8 @@ def choose(part: Locator, option: str) -> None:
 
 
 def stored_progress(page: Page) -> dict[str, object]:
-    stored = page.evaluate("key => localStorage.getItem(key)", KEY)
-    progress: dict[str, object] = json.loads(stored)
+    text = page.evaluate("key => localStorage.getItem(key)", KEY)
+    progress: dict[str, object] = json.loads(text)
     return progress
 
 

@@ -121,7 +121,7 @@ def read_assets() -> Assets:
     )
 
 
-class Made(Struct, frozen=True):
+class RenderedCourse(Struct, frozen=True):
     """A course, what running it is said to have found, and the tool's own files."""
 
     course: Course
@@ -153,7 +153,7 @@ class Made(Struct, frozen=True):
                 (root / path).write_bytes(data)
             course = replace(self.course, files=tuple(files))
             library = Library.of(course, self.results, self.assets, reports or Reports())
-            options = Options(root, 1, quiet=True, cache=Memo(Path(KEPT.name)))
+            options = Options(root, 1, quiet=True, cache=Memo(Path(CACHE.name)))
             with Documents(options.store, 1) as documents:
                 site = SiteMaker(library, self.assets, documents, options).make_site()
                 files_by_path = {file.path: file.make() for file in site.files}
@@ -167,7 +167,7 @@ class Made(Struct, frozen=True):
         )
 
 
-KEPT = TemporaryDirectory()
+CACHE = TemporaryDirectory()
 """Where fonts are kept that were cut, and all else that depends on no course."""
 
 
@@ -184,14 +184,14 @@ class Make(Struct, frozen=True):
         runs: Mapping[str, ScriptRun] | None = None,
         status: str = "verified",
         **texts: str,
-    ) -> Made:
+    ) -> RenderedCourse:
         """A course of one lesson's text (0.1); other texts by id."""
-        parsed = parse_course_map(Source("content/course.toml", course))
-        assert parsed.value is not None and not parsed.diagnostics, parsed.diagnostics
-        built = with_documents(
-            parsed.value, {"0.1": text, "1.1": "Text.", "about": "About it.", **texts}
+        map_result = parse_course_map(Source("content/course.toml", course))
+        assert map_result.value is not None and not map_result.diagnostics, map_result.diagnostics
+        rendered = with_documents(
+            map_result.value, {"0.1": text, "1.1": "Text.", "about": "About it.", **texts}
         )
-        return Made(built, results_of(built, runs or {}, status), self.assets)
+        return RenderedCourse(rendered, results_of(rendered, runs or {}, status), self.assets)
 
 
 def with_documents(course: Course, texts: Mapping[str, str]) -> Course:
@@ -200,9 +200,9 @@ def with_documents(course: Course, texts: Mapping[str, str]) -> Course:
     def document(id: str, path: str, lesson: bool) -> Document | None:
         if id not in texts:
             return None
-        parsed = parse_document(Source(path, texts[id]), kinds, lesson=lesson)
-        assert not parsed.diagnostics, parsed.diagnostics
-        return parsed.value
+        result = parse_document(Source(path, texts[id]), kinds, lesson=lesson)
+        assert not result.diagnostics, result.diagnostics
+        return result.value
 
     levels = tuple(
         replace(

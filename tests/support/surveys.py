@@ -58,17 +58,17 @@ def open_files(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:
     }
     assets = {name.rpartition("/")[2]: content for name, content in data.items() if name != path}
 
-    def compiled(text: bytes) -> mujoco.MjModel:
+    def compile_text(text: bytes) -> mujoco.MjModel:
         return mujoco.MjModel.from_xml_string(text.decode("utf-8-sig"), assets)
 
-    return open_model(path, data.get, compiled)
+    return open_model(path, data.get, compile_text)
 
 
 def parse_declared(text: str) -> Declarations:
     """What a file beside a model declares."""
-    parsed = parse_declarations(Source("models/a.toml", text))
-    assert parsed.value is not None, parsed.diagnostics
-    return parsed.value
+    result = parse_declarations(Source("models/a.toml", text))
+    assert result.value is not None, result.diagnostics
+    return result.value
 
 
 NOTHING = parse_declared("")

@@ -20,10 +20,12 @@ Reader = Callable[[str], tuple[object, tuple[Diagnostic, ...]]]
 
 
 def check_texts(name: str, read: Reader, *, rewriting: bool) -> None:
-    check_cases(FOLDER / f"{name}.md", lambda case: _told(case.input, read), rewriting=rewriting)
+    check_cases(
+        FOLDER / f"{name}.md", lambda case: _format_case(case.input, read), rewriting=rewriting
+    )
 
 
-def _told(texts: str, read: Reader) -> str:
+def _format_case(texts: str, read: Reader) -> str:
     lines = []
     for line in texts.splitlines():
         value, diagnostics = read(ast.literal_eval(line))

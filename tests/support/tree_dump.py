@@ -29,12 +29,12 @@ def format_span(span: Span) -> str:
     return f"{span.line}:{span.column}-{span.end_line}:{span.end_column}"
 
 
-def dump(parsed: Parsed[Document]) -> str:
-    lines = list(_nodes(parsed.value.blocks, 0))
-    for note in parsed.value.footnotes:
+def dump(result: Parsed[Document]) -> str:
+    lines = list(_nodes(result.value.blocks, 0))
+    for note in result.value.footnotes:
         head = f"Footnote {format_span(note.span)} {note.number} {note.label!r}"
         lines += [f"{head} references={note.references}", *_nodes(note.blocks, 1)]
-    return "".join(f"{line}\n" for line in lines) + format_diagnostics(parsed.diagnostics)
+    return "".join(f"{line}\n" for line in lines) + format_diagnostics(result.diagnostics)
 
 
 def format_diagnostics(diagnostics: tuple[Diagnostic, ...]) -> str:

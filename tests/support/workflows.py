@@ -88,15 +88,15 @@ class Runner:
         place = self.folder / "work" / name
         shutil.rmtree(place, ignore_errors=True)
         place.mkdir(parents=True)
-        finished: list[Step] = []
+        results: list[Step] = []
         cache_inputs: dict[str, Any] | None = None
         for step in steps:
-            if any(step_done.status for step_done in finished) and "cancelled" not in step.get(
+            if any(step_done.status for step_done in results) and "cancelled" not in step.get(
                 "if", ""
             ):
                 continue
             if "run" in step:
-                finished.append(self._command(place, step, values))
+                results.append(self._command(place, step, values))
                 continue
             uses, inputs = step["uses"].partition("@")[0], step.get("with", {})
             inputs = {key: _filled(str(value), values) for key, value in inputs.items()}
@@ -120,9 +120,9 @@ class Runner:
                         archive.extractall(self.folder / "pages", filter="data")
                 case _:
                     raise AssertionError(f"nobody knows what {uses} does")
-        if cache_inputs is not None and not any(step.status for step in finished):
+        if cache_inputs is not None and not any(step.status for step in results):
             self._save(place, cache_inputs)
-        return finished
+        return results
 
     def _command(self, place: Path, step: dict[str, Any], values: dict[str, str]) -> Step:
         step_environment = {

@@ -85,9 +85,9 @@ def right(item: etree._Element) -> list[str]:
 def test_package_of_every_kind_of_question_is_whole(
     qti: Package, zoo_items: dict[str, etree._Element]
 ) -> None:
-    assert qti.done.out.count("warning[package-reduced]") == 1
-    assert "its simulation is on its page alone, and left out" in qti.done.out
-    assert "wrote 14 files to quizzes-qti.zip, " in qti.done.out
+    assert qti.result.out.count("warning[package-reduced]") == 1
+    assert "its simulation is on its page alone, and left out" in qti.result.out
+    assert "wrote 14 files to quizzes-qti.zip, " in qti.result.out
     check(qti.files)
     bases = "//q:responseDeclaration/@baseType"
     assert {name: shape(item, bases) for name, item in zoo_items.items()} == {
