@@ -121,7 +121,7 @@ def measure_typing(root: Path, repeat: int) -> None:
     def read() -> None:
         text = session.open_texts.get(longest.path, longest.text + "\n")
         session.open_texts = {longest.path: f"{text}word "}
-        session.edit([longest.path], saved=False)
+        session.edit([longest.path], is_saved=False)
 
     candidates: dict[str, Callable[[], object]] = {
         "markdown-it-py, tokens only": lambda: bare.parse(longest.text),

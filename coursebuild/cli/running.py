@@ -52,9 +52,9 @@ def run(directory: str | None, words: Sequence[str], *, alone: bool) -> int:
 
 
 def _run_command(directory: str | None, words: Sequence[str]) -> int:
-    allowed = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
-    if allowed < _FILES_NEEDED:
-        message = f"only {allowed} files may be open at a time, and {_FILES_NEEDED} are needed"
+    limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    if limit < _FILES_NEEDED:
+        message = f"only {limit} files may be open at a time, and {_FILES_NEEDED} are needed"
         return fail(WRONG, message, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
     try:
         return run_command(directory, words)

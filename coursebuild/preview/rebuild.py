@@ -254,14 +254,14 @@ class BackgroundRebuild:
 
 
 def subtract_diagnostics(
-    diagnostics: Sequence[Diagnostic], known: Sequence[Diagnostic]
+    diagnostics: Sequence[Diagnostic], earlier: Sequence[Diagnostic]
 ) -> list[Diagnostic]:
-    """Return the diagnostics that are not among the known ones, wherever lines have moved."""
+    """Return the diagnostics that are not among the earlier ones, wherever lines have moved."""
 
     def identity(d: Diagnostic) -> tuple[str, ...]:
         return d.rule, d.span.path, d.message, d.label
 
-    counts = Counter(map(identity, known))
+    counts = Counter(map(identity, earlier))
     rest = []
     for diagnostic in diagnostics:
         counts[identity(diagnostic)] -= 1

@@ -65,8 +65,8 @@ class Session:
         """`site`: whether pages are drawn."""
         self.options, self.root = options, options.root
         self.open_texts: Mapping[str, str] = {}
-        """The texts of files that are open in an editor, which need not be saved, by path; another
-        mapping with each change."""
+        """The texts of files that are open in an editor, saved or not, by path. Each change
+        replaces the mapping."""
         self.condition = threading.Condition(threading.RLock())
         self.version = 0
         """Grows with each change of what an open page may show."""
@@ -172,10 +172,10 @@ class Session:
         """The path under which the published site will be, with a slash at both ends."""
         return "/" if self.course is None else urls.base_path(self.course)
 
-    def notify(self, *, saved: bool = False) -> None:
-        """Say that there is news; `saved`: files were saved, so everything is checked again."""
+    def notify(self, *, is_saved: bool = False) -> None:
+        """Say that there is news; `is_saved`: files were saved, so everything is checked again."""
         with self.condition:
-            if saved:
+            if is_saved:
                 self.edits += 1
                 self.busy = self.busy or "checking"
             self.version += 1
@@ -183,10 +183,10 @@ class Session:
 
     # --- the course
 
-    def edit(self, paths: Collection[str], *, saved: bool = True) -> bool | None:
+    def edit(self, paths: Collection[str], *, is_saved: bool = True) -> bool | None:
         """Take saves of documents; return whether anything has changed.
 
-        `None` where everything must be read to know. If not `saved`, they are being typed, and
+        `None` where everything must be read to know. If not `is_saved`, they are being typed, and
         nothing runs yet.
         """
         with self._reading_lock, self.condition:
@@ -194,14 +194,14 @@ class Session:
             if changed_owners is None or course is None:
                 return None
             if not changed_owners:
-                if saved and not self.open_texts.keys().isdisjoint(paths):
-                    self.notify(saved=True)  # its scripts may run
+                if is_saved and not self.open_texts.keys().isdisjoint(paths):
+                    self.notify(is_saved=True)  # its scripts may run
                 return False
             self._show(_replace_owners(course, [owner for owner, _ in changed_owners]))
             for owner, diagnostics in changed_owners:
                 assert owner.document is not None
                 self._diagnostics_by_file[owner.path] = (*diagnostics, *self._check(owner.document))
-            self.notify(saved=saved)
+            self.notify(is_saved=is_saved)
             for owner, _ in changed_owners if self._site else ():
                 self.find(urls.owner_path(owner))
             return True
@@ -241,13 +241,13 @@ class Session:
         """Take saves of files other than documents."""
         with self.condition:
             self.all_due = True
-            self.notify(saved=True)
+            self.notify(is_saved=True)
         self.read()
 
-    def read(self, documents: Documents | None = None, *, saved: bool = True) -> bool:
+    def read(self, documents: Documents | None = None, *, is_saved: bool = True) -> bool:
         """Read the whole course; return whether anything has changed.
 
-        `saved`: see `edit`.
+        `is_saved`: see `edit`.
         """
         documents = documents or self._documents
         while True:
@@ -264,7 +264,7 @@ class Session:
                     diagnostics = (*parsed_course.diagnostics, *reports.diagnostics)
                     has_changed = self._take_course(course, diagnostics, reports.value)
                     if has_changed:
-                        self.notify(saved=saved)
+                        self.notify(is_saved=is_saved)
                     return has_changed
 
     def read_saved_course(self) -> Course | None:

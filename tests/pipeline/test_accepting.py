@@ -70,7 +70,7 @@ def test_output_is_accepted(make: Make) -> None:
 def test_what_changed_since_is_not_written(make: Make) -> None:
     folder = make(GOOD.replace("hello 3.14159", "hello 3"))
     with serve_preview(folder) as preview, preview.events() as events:
-        events.until(lambda answer: any(o.get("offer") for o in answer.news["outputs"]))
+        events.until(lambda page: any(o.get("offer") for o in page.news["outputs"]))
         id = events.news["outputs"][0]["offer"]
         # A lesson is saved while the server is suspended, so that it has not noticed.
         preview.process.send_signal(signal.SIGSTOP)

@@ -56,9 +56,7 @@ class Course:
         course = load_course(self.folder.root)
         model = next(m for m in course.models if m.name == name)
         no_declarations = Declarations(name, model.source)
-        declarations = next(
-            (one for one in course.declarations if one.model == name), no_declarations
-        )
+        declarations = next((d for d in course.declarations if d.model == name), no_declarations)
         digest = scene_digest(self.folder.root, model, declarations)
         machine = replace(box().machine, engine=engine_version())
         return replace(box(), **{"model": name, "digest": digest, "machine": machine, **fields})

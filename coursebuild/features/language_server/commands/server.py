@@ -109,8 +109,8 @@ class Server:
                 paths, self._edited_paths = self._edited_paths, set()
             self.session.calm.clear()
             try:
-                if self.session.edit(paths, saved=False) is None:
-                    self.session.read(saved=False)
+                if self.session.edit(paths, is_saved=False) is None:
+                    self.session.read(is_saved=False)
             finally:
                 self.session.calm.set()
 
