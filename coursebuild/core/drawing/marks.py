@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from html import escape
 
-_REMEMBERED = 1024
+_CACHE_SIZE = 1024
 """How many texts are remembered: drawings share many, in several sizes."""
 _NO_MARKUP = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 """Includes lone surrogates, which stand for bytes that are not text."""
@@ -18,13 +18,13 @@ _NARROW = frozenset("ijl.,:;'|!()[] ·ft")
 _BROAD = frozenset("mwMW—%@")
 
 
-@functools.lru_cache(maxsize=_REMEMBERED)
+@functools.lru_cache(maxsize=_CACHE_SIZE)
 def markup_text(text: str) -> str:
     """Text escaped for markup, without characters that markup cannot hold."""
     return escape(_NO_MARKUP.sub("", text))
 
 
-@functools.lru_cache(maxsize=_REMEMBERED)
+@functools.lru_cache(maxsize=_CACHE_SIZE)
 def text_width(text: str, size: float) -> float:
     """About how wide a text is in a sans-serif face of this size, rather too wide."""
     letters = 0.0

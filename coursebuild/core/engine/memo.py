@@ -49,11 +49,11 @@ HASH = re.compile(r"[0-9a-f]{64}")
 TEMPORARY = ".new-"
 """What the names of files begin with while they are written."""
 _DIGEST = hashlib.sha256().digest_size
-_USED = 3600.0
+_USE_INTERVAL = 3600.0
 """Seconds after which the use of an entry is noted again, and a killed writer's file is removed."""
 _PRUNE_INTERVAL = 3600.0
 """Seconds between two prunings."""
-_SHARE = 16
+_PRUNE_SHARE = 16
 """A command that wrote this part of the limit, a sixteenth, prunes whatever the interval."""
 _GROUP_SIZE = 8
 """Entries that a group keeps, the newest."""
@@ -166,7 +166,7 @@ class Memo:
             if value is None:
                 os.unlink(path)  # noqa: PTH108
                 self._say(f"{_short(name)} in {FOLDER} is damaged: it is made again")
-            elif time.time() - modified > _USED:
+            elif time.time() - modified > _USE_INTERVAL:
                 os.utime(path)  # entries used lately are pruned last
         return value
 
@@ -217,7 +217,7 @@ class Memo:
         marker = self.folder / "pruned"
         with contextlib.suppress(FileNotFoundError):
             age = time.time() - marker.stat().st_mtime
-            if 0.0 <= age < _PRUNE_INTERVAL and self._bytes_written * _SHARE < self.size:
+            if 0.0 <= age < _PRUNE_INTERVAL and self._bytes_written * _PRUNE_SHARE < self.size:
                 return
         marker.touch()
         prune(self.folder, self.size)
@@ -286,7 +286,7 @@ def prune(folder: Path, limit: int) -> None:
     """
     with os.scandir(folder) as entries:
         kinds = [kind.path for kind in entries if kind.is_dir(follow_symlinks=False)]
-    files = sorted(file for kind in kinds for file in _entries(kind, time.time() - _USED))
+    files = sorted(file for kind in kinds for file in _entries(kind, time.time() - _USE_INTERVAL))
     total = sum(size for _, _, size in files)
     enough = limit if total <= limit else limit * _PRUNED_SHARE
     for _, path, size in files:

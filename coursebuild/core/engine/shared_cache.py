@@ -27,7 +27,7 @@ _SIGNED = "coursebuild-1-signed"
 """The folder of signed entries, which only those who have the key can make."""
 _TIMEOUT = 15.0
 """Seconds that a request may take."""
-_FLUSH = 60.0
+_FLUSH_TIMEOUT = 60.0
 """Seconds that a command waits at its end for entries still to be sent."""
 _PAUSE = 120.0
 """Seconds for which a place that failed is left alone."""
@@ -177,7 +177,7 @@ class SharedCache:
                 self._writers += 1
                 threading.Thread(target=self._send, name="shared cache", daemon=True).start()
 
-    def flush(self, seconds: float = _FLUSH) -> None:
+    def flush(self, seconds: float = _FLUSH_TIMEOUT) -> None:
         """Wait until everything is sent, but not for ever."""
         until = time.monotonic() + seconds
         with self._sent:

@@ -27,11 +27,11 @@ from coursebuild.core.model.results import FileFacts, FileList, OutputFile, Site
 
 _NO_PATH = re.compile(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
 """What no path may have: an empty part, `.` or `..`, a control character, a backslash."""
-_MANY = 128
+_MIN_FOR_COPIES = 128
 """How many files make it worth starting copies of this process."""
-_SHARE = 16
+_TASK_SIZE = 16
 """How many files a copy writes for one request."""
-_MOST = 4
+_MAX_COPIES = 4
 """The most copies: more would wait for the disk."""
 
 
@@ -131,11 +131,13 @@ def _write_files(
         return ManifestEntry.of(key, _write_file(target, file.make()), os.lstat(target))
 
     def share(start: int) -> list[ManifestEntry]:
-        return [write(*keyed_file) for keyed_file in files[start : start + _SHARE]]
+        return [write(*keyed_file) for keyed_file in files[start : start + _TASK_SIZE]]
 
-    count = min(jobs, _MOST) if jobs > 1 and len(files) >= _MANY and can_fork() else 0
+    count = (
+        min(jobs, _MAX_COPIES) if jobs > 1 and len(files) >= _MIN_FOR_COPIES and can_fork() else 0
+    )
     with Workers(share, count) as workers, stage():
-        parts = workers.map((None, start) for start in range(0, len(files), _SHARE))
+        parts = workers.map((None, start) for start in range(0, len(files), _TASK_SIZE))
         entries = (entry for part, _ in parts for entry in part)
         return {file.path: entry for (file, _), entry in zip(files, entries, strict=True)}
 

@@ -31,7 +31,7 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-_AHEAD = 32
+_MOST_WAITING = 32
 """How many tasks are made before a worker is idle."""
 
 
@@ -90,7 +90,7 @@ class Workers(Generic[Task, Result]):
         next_number = 0
         try:
             while there_are_more or unfinished or results:
-                if can_take_more := there_are_more and len(unassigned) < _AHEAD:
+                if can_take_more := there_are_more and len(unassigned) < _MOST_WAITING:
                     number, task = next(numbered_tasks, (-1, None))
                     there_are_more = task is not None
                     if task is not None:
@@ -132,7 +132,7 @@ class Workers(Generic[Task, Result]):
         other_numbers = self._workers.keys() - {worker.number}
         reserved = next((entry for entry in unassigned if entry[1] == worker.number), None)
         free = next((entry for entry in unassigned if entry[1] not in other_numbers), None)
-        entry = reserved or free or (unassigned[0] if len(unassigned) >= _AHEAD else None)
+        entry = reserved or free or (unassigned[0] if len(unassigned) >= _MOST_WAITING else None)
         if entry is not None:
             unassigned.remove(entry)
             worker.task = entry[0]

@@ -30,7 +30,7 @@ from coursebuild.core.text.source import Source
 
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 """Byte order marks."""
-_STRAY = 0.1
+_MAX_NUL_SHARE = 0.1
 """The share of NUL bytes that a text may have: a stray one is shown as U+FFFD, as in CommonMark."""
 _OUTSIDE = "is reached through a link that leads out of the project"
 
@@ -237,7 +237,7 @@ class _Reader:
 
     def _decode(self, path: str, data: bytes) -> Source | None:
         """Decode a file; `None` where it is not text."""
-        is_text = not data.startswith(_UTF16) and data.count(0) <= len(data) * _STRAY
+        is_text = not data.startswith(_UTF16) and data.count(0) <= len(data) * _MAX_NUL_SHARE
         # Text with many zeros is not text, even if it is UTF-8.
         position, problem = -1 if is_text else data.find(b"\0"), "is not text"
         try:

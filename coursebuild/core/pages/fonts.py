@@ -30,7 +30,7 @@ TEXT, CODE, MATH = "Source Serif 4 Variable", "Source Code Pro Variable", "STIX 
 """Families, by their names in the bundle."""
 COURSE = {"text": "Course Text", "interface": "Course Interface", "code": "Course Code"}
 """The families of a course's own fonts in the style sheet, by use."""
-_OWN = {TEXT: COURSE["text"], CODE: COURSE["code"]}
+_COURSE_FAMILIES = {TEXT: COURSE["text"], CODE: COURSE["code"]}
 """The course's families that come before families of the bundle."""
 
 BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·¹½×éöü–—‘’“”…•−")
@@ -97,7 +97,7 @@ def font_jobs(
         course_characters.setdefault(face.family, set()).update(used_characters)
     assigned: dict[tuple[str, str], set[str]] = {}
     for face, data in faces:
-        missing = letters - course_characters.get(_OWN.get(face.family, ""), set())
+        missing = letters - course_characters.get(_COURSE_FAMILIES.get(face.family, ""), set())
         needed_characters = missing if face.family != MATH else _mathematical(mathematics)
         assigned_characters = assigned.setdefault((face.family, face.style), set())
         characters = (needed_characters & characters_in(face.characters)) - assigned_characters
@@ -251,7 +251,7 @@ def face_rules(files: Iterable[tuple[FontJob, str]]) -> str:
 
 def _fallback_rules(fallback: Fallback, files: Iterable[tuple[FontJob, str]]) -> tuple[str, ...]:
     """The rule of a fallback, scaled to the face with the Latin letters, if that is used."""
-    families = fallback.family, _OWN[fallback.family]
+    families = fallback.family, _COURSE_FAMILIES[fallback.family]
     for job, _ in files:
         face = job.face
         if face.family in families and (face.style, face.subset) == (fallback.style, "latin"):

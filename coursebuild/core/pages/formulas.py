@@ -25,7 +25,7 @@ LONG = 20
 WIDE = 22
 """Characters; a shorter piece fits into the narrowest window."""
 
-_REMEMBERED = 256
+_CACHE_SIZE = 256
 """How many formulas are remembered: texts repeat them."""
 
 _ROW = re.compile(r"<(/?)mrow\b[^>]*>")
@@ -51,7 +51,7 @@ _END = re.compile(r"</math>(?=\s)")
 _OPEN, _CLOSE, _BAR = frozenset("([{⟨⌊⌈"), frozenset(")]}⟩⌋⌉"), frozenset("|‖∥∣")
 
 
-@functools.lru_cache(maxsize=_REMEMBERED)
+@functools.lru_cache(maxsize=_CACHE_SIZE)
 def inline_formula(mathml: str, label: str) -> str:
     """An inline formula, split and with wide pieces in boxes (steps 1 and 2)."""
     return wrap_wide_pieces(split_formula(mathml), label)

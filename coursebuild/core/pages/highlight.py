@@ -48,7 +48,7 @@ _CLASSES: tuple[tuple[_TokenType, str], ...] = (
 )
 """Kinds of tokens and their classes, the special before the general."""
 _PYTHON = ("python", "py", "python3", "py3")
-_LONGEST = 20_000
+_MAX_FOR_TREE_SITTER = 20_000
 """The most characters of Python that tree-sitter reads. For absurd texts, such as backslashes only,
 its time grows with the square of the length, unlike that of Pygments: a second at this length."""
 _ALIASES = {"mjcf": "xml", "urdf": "xml"}
@@ -69,7 +69,7 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
 
 
 def _runs_of(language: str, code: str) -> Iterable[Run]:
-    if language in _PYTHON and len(code) <= _LONGEST:
+    if language in _PYTHON and len(code) <= _MAX_FOR_TREE_SITTER:
         return python_runs(code)
     lexer = _lexer(_ALIASES.get(language, language))
     return [("", code)] if lexer is None else _lex(lexer, code)

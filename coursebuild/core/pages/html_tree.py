@@ -23,7 +23,7 @@ VOID = frozenset("area base br col embed hr img input link meta param source tra
 """Elements without content and end tag."""
 _RAW = frozenset("script style xmp iframe noembed noframes plaintext".split())
 """Elements whose text is not escaped."""
-_DEEPEST = 200
+_MAX_DEPTH = 200
 """The most levels of a tree, so that recursion is safe; deeper text is moved up."""
 _NAMESPACES = {
     "svg": "http://www.w3.org/2000/svg",
@@ -74,7 +74,7 @@ def parse_html(html: str) -> list[HtmlContent]:
     page = _parse(html)
     root = HtmlElement("body")
     if page.body is not None:
-        _copy_children(page.body, root, _DEEPEST)
+        _copy_children(page.body, root, _MAX_DEPTH)
     return root.children
 
 

@@ -56,7 +56,7 @@ from coursebuild.core.pages.templates import templates_of
 from coursebuild.core.registry import feature_trials, page_kinds, publish_trials, summarize
 from coursebuild.numerics.reports import Reports
 
-_OURS = {kind.name: kind for kind in CALLOUTS}
+_DEFAULT_CALLOUTS = {kind.name: kind for kind in CALLOUTS}
 
 BY_LAB, BY_SCRIPT, BY_LINK = WAYS = "model.by_lab", "model.by_script", "model.by_link"
 """How a document uses a model: keys of interface texts, in the order of pages."""
@@ -212,16 +212,16 @@ class Library(Struct, frozen=True, dict=True):
 
     def callout(self, name: str) -> CalloutKind:
         """A kind of callout, with the course's own label and promise if it has any."""
-        ours, theirs = _OURS.get(name), self.callouts.get(name)
+        default, custom = _DEFAULT_CALLOUTS.get(name), self.callouts.get(name)
         label, promise = name.capitalize(), ""
-        if ours is not None:
+        if default is not None:
             key = f"promise.{name}"
             label = self.words(f"callout.{name}")
-            promise = self.words(key) if self.words.has(key) else ours.promise
-        if theirs is not None and (ours is None or theirs.label != ours.label):
-            label = theirs.label
-        if theirs is not None and (ours is None or theirs.promise != ours.promise):
-            promise = theirs.promise
+            promise = self.words(key) if self.words.has(key) else default.promise
+        if custom is not None and (default is None or custom.label != default.label):
+            label = custom.label
+        if custom is not None and (default is None or custom.promise != default.promise):
+            promise = custom.promise
         return CalloutKind(name, label, promise)
 
 

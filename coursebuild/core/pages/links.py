@@ -43,7 +43,11 @@ _ADDRESSES = {
 }
 """Attributes that hold addresses, by element."""
 
-_NOTED = ("id", "name", *sorted({name for names in _ADDRESSES.values() for name in names}))
+_LINK_ATTRIBUTES = (
+    "id",
+    "name",
+    *sorted({name for names in _ADDRESSES.values() for name in names}),
+)
 """Attributes that may hold an id or an address."""
 
 _ORIGIN = "https://site.invalid"
@@ -89,7 +93,7 @@ def ids_and_addresses(html: str) -> tuple[frozenset[str], frozenset[str]]:
     """The ids in the text of a page, and the addresses in it."""
     ids: set[str] = set()
     addresses: set[str] = set()
-    for tag, attributes in elements_with(html, _NOTED):
+    for tag, attributes in elements_with(html, _LINK_ATTRIBUTES):
         for name, value in attributes.items():
             if name == "id" or (name == "name" and tag == "a"):
                 ids.add(value or "")

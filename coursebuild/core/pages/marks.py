@@ -78,12 +78,12 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]], align: Iterable[st
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 
-_APART = re.compile(r"[\s<>()\\]")
+_NEEDS_BRACKETS = re.compile(r"[\s<>()\\]")
 """Characters that an address may contain only in angle brackets."""
 
 
 def _destination(url: str) -> str:
-    if url and not _APART.search(url):
+    if url and not _NEEDS_BRACKETS.search(url):
         return url
     safe = url.replace("\\", "%5C").replace("<", "%3C").replace(">", "%3E")
     return f"<{''.join('%20' if c.isspace() else c for c in safe)}>"
@@ -97,7 +97,7 @@ def _title(title: str) -> str:
     return f' "{text}"'
 
 
-_BEGINS = re.compile(
+_BLOCK_START = re.compile(
     r"(?P<mark>\#{1,6}(?=\s|$)|>|[-+*](?=\s|$)|~~~|`{3,}[^`]*$|=+\s*$|-+\s*$|(?:-\s*){3,}$|(?:\*\s*){3,}$|(?:_\s*){3,}$"
     r"|[|:\s-]*-[|:\s-]*$)"
     r"|(?P<number>\d{1,9})(?P<after>[.)])(?=\s|$)"
@@ -112,7 +112,7 @@ def guard_lines(text: str) -> str:
 
 
 def _guard_line(line: str) -> str:
-    match = _BEGINS.match(line)
+    match = _BLOCK_START.match(line)
     if match is None:
         return line
     if match["number"]:
