@@ -18,7 +18,7 @@ from coursebuild.core.syntax.nodes import ArrayNode, Member, Node, ObjectNode
 def layout_json(node: Node, width: int, column: int = 0, indent: int = 0) -> str:
     """Return the text of a value that begins at a column, inside a parent with this indent."""
     line = to_one_line(node).text
-    parts = _parts(node)
+    parts = _child_nodes(node)
     if not parts or ("\n" not in node.raw and column + len(line) <= width):
         return line
     breaks = _count_breaks(node, parts)
@@ -39,7 +39,7 @@ def layout_json(node: Node, width: int, column: int = 0, indent: int = 0) -> str
     return text + line[-1]
 
 
-def _parts(node: Node) -> tuple[Member | Node, ...]:
+def _child_nodes(node: Node) -> tuple[Member | Node, ...]:
     if isinstance(node, ObjectNode):
         return node.members
     return node.items if isinstance(node, ArrayNode) else ()

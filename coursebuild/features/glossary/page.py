@@ -37,7 +37,7 @@ class TermEntry(Struct, frozen=True):
 def glossary_values(library: Library) -> dict[str, object]:
     """Return the values for the template: the entries, grouped by letters."""
     place = urls.Place("glossary/index.html")
-    entries = sorted(_entries(library, place), key=lambda entry: sort_key(entry.term.name))
+    entries = sorted(_term_entries(library, place), key=lambda entry: sort_key(entry.term.name))
     groups = groupby(entries, key=lambda entry: initial(entry.term.name))
     return {
         "letters": tuple((letter, tuple(group)) for letter, group in groups),
@@ -45,7 +45,7 @@ def glossary_values(library: Library) -> dict[str, object]:
     }
 
 
-def _entries(library: Library, place: urls.Place) -> Iterator[TermEntry]:
+def _term_entries(library: Library, place: urls.Place) -> Iterator[TermEntry]:
     """Yield an entry for each term of the course, for its first definition."""
     users: dict[str, list[Owner]] = {}
     for owner, document in library.course.owned_documents:
@@ -64,18 +64,19 @@ def _entries(library: Library, place: urls.Place) -> Iterator[TermEntry]:
 
 def sort_key(name: str) -> tuple[object, ...]:
     """Sort digits and signs before Latin letters and others; marks and case count last."""
-    plain = _plain(name)
+    plain = _without_accents(name)
     first = plain[:1]
     return (first.isalpha() + (first.isalpha() and not _is_latin(first)), plain, name)
 
 
 def initial(name: str) -> str:
     """Return the letter under which a name is listed; empty for digits and signs."""
-    first = _plain(name)[:1]
+    first = _without_accents(name)[:1]
     return first.upper()[:1] if first.isalpha() else ""
 
 
-def _plain(name: str) -> str:
+def _without_accents(name: str) -> str:
+    """Return a name in lower case, without accents and leading signs."""
     parts = unicodedata.normalize("NFKD", name.casefold())
     letters = "".join(char for char in parts if not unicodedata.combining(char))
     return letters.lstrip("$\\{[(\"'“‘ ")

@@ -61,7 +61,7 @@ class DocumentTerms(Struct, frozen=True):
 
 def document_terms(document: Document, mathml: Mathml) -> Parsed[DocumentTerms | None]:
     """Return the terms of a document; a formula that is not typeset remains TeX."""
-    terms = tuple(_terms(document, mathml)) if "]{" in document.source.text else ()
+    terms = tuple(_find_terms(document, mathml)) if "]{" in document.source.text else ()
     return Parsed(DocumentTerms(terms) if terms else None)
 
 
@@ -79,7 +79,7 @@ class _Excerpt(Context):
         return Markup(self._mathml(tex, True)) or super().display(tex, start)
 
 
-def _terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
+def _find_terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
     context = _Excerpt(mathml)
     equations = number_equations(document, mathml).values()
     names = {f"#{e.id}": f"({e.number})" for e in equations if e.number}
@@ -100,11 +100,11 @@ def _terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
                 following = siblings[number + 1] if number + 1 < len(siblings) else None
                 title = Markup.escape(term.name) if term.renamed else html(term.children)
                 definition = definition_of(block.children, term)
-                pieces = tuple(_pieces(definition, following, html, context))
+                pieces = tuple(_split_definition(definition, following, html, context))
                 yield DefinedTerm(term.id, term.name, title, pieces)
 
 
-def _pieces(
+def _split_definition(
     definition: tuple[Inline, ...],
     following: Block | None,
     html: Callable[[tuple[Inline, ...]], Markup],

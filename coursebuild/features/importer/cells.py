@@ -33,11 +33,11 @@ def build_script(
     script = f'"""{summary}."""\n'
     before = ""
     for number in numbers:
-        is_apart = before.split("\n")[-1].startswith((" ", "\t")) or _DEFINITION.match(
-            codes[number]
-        )
-        script += ("\n\n" if before and is_apart else "\n") + codes[number] + "\n"
-        before = codes[number]
+        code = codes[number]
+        ends_indented = before.split("\n")[-1].startswith((" ", "\t"))
+        is_apart = ends_indented or _DEFINITION.match(code)
+        script += ("\n\n" if before and is_apart else "\n") + code + "\n"
+        before = code
     return script, numbers
 
 

@@ -92,9 +92,8 @@ def _try_scripts(options: Options, progress: Progress) -> tuple[str, ...]:
     recordings = recorded_outputs(course)
     edits: dict[Source, list[Edit]] = {}
     remarks = []
-    for extraction, script_run in _run_scripts(
-        extract_scripts(course, options).runnable, options, progress
-    ):
+    scripts = extract_scripts(course, options).runnable
+    for extraction, script_run in _run_scripts(scripts, options, progress):
         script = extraction.script
         changes = edits.setdefault(script.span.source, [])
         keys = " ".join(_missing_keys(script, script_run))
@@ -127,19 +126,16 @@ def _run_scripts(
 
 def _missing_keys(script: Script, script_run: ScriptRun) -> Iterator[str]:
     """Yield the keys that a script's fence needs after this run, as `key=value`."""
-    missing = (
-        _MISSING_MODULE.search(script_run.stderr) if script_run.outcome is Outcome.FAILED else None
-    )
-    if missing is not None and not script.requires:
-        yield f"requires={missing[1].partition('.')[0]}"
-    is_slow = (
-        script_run.outcome is Outcome.OK and script_run.seconds * _TIME_FACTOR > script.timeout
-    )
+    if script_run.outcome is Outcome.FAILED and not script.requires:
+        missing = _MISSING_MODULE.search(script_run.stderr)
+        if missing is not None:
+            yield f"requires={missing[1].partition('.')[0]}"
+    limit = script_run.seconds * _TIME_FACTOR
+    is_slow = script_run.outcome is Outcome.OK and limit > script.timeout
     if is_slow and "timeout=" not in script.span.first_line().text:
-        yield f"timeout={math.ceil(script_run.seconds * _TIME_FACTOR / 10) * 10}"
-    signs = (
-        {d.sign for d in script_run.trace.divergences} if script_run.trace is not None else set()
-    )
+        yield f"timeout={math.ceil(limit / 10) * 10}"
+    trace = script_run.trace
+    signs = {d.sign for d in trace.divergences} if trace is not None else set()
     if signs - {Sign.CONTACT} and not script.diverges:
         yield "diverges"
     if Sign.CONTACT in signs and not script.deep:

@@ -64,17 +64,18 @@ def read_course_json(path: str, files: Files) -> ImportedCourse:
         data |= data.pop("course")
     reader = _Reader(files)
     course = reader.fields(data, _COURSE_FIELDS)
-    loose = [reader.fields(item, _LESSON_FIELDS) for item in _items(course, "lessons")]
-    levels = tuple(reader.level(item, loose) for item in _items(course, "levels"))
+    loose = [reader.fields(item, _LESSON_FIELDS) for item in _read_items(course, "lessons")]
+    levels = tuple(reader.level(item, loose) for item in _read_items(course, "levels"))
     if not levels:
         raise UsageError(f"{path} has no `levels`")
     return ImportedCourse(
-        title=_text(course, "title") or "Course",
-        summary=_text(course, "summary"),
-        language=_text(course, "language"),
+        title=_read_text(course, "title") or "Course",
+        summary=_read_text(course, "summary"),
+        language=_read_text(course, "language"),
         levels=levels,
         pages=tuple(
-            reader.lesson(reader.fields(item, _LESSON_FIELDS)) for item in _items(course, "pages")
+            reader.lesson(reader.fields(item, _LESSON_FIELDS))
+            for item in _read_items(course, "pages")
         ),
         camera_is_position=True,
         leftovers=tuple(
@@ -102,33 +103,35 @@ class _Reader:
     def level(self, value: object, loose: list[dict[str, Any]]) -> ImportedLevel:
         """Read a level with its lessons; `loose` are those listed elsewhere, which name theirs."""
         level = self.fields(value, _LEVEL_FIELDS)
-        lessons = [self.fields(item, _LESSON_FIELDS) for item in _items(level, "lessons")]
-        lessons += [lesson for lesson in loose if _text(lesson, "level") == _text(level, "id")]
+        lessons = [self.fields(item, _LESSON_FIELDS) for item in _read_items(level, "lessons")]
+        lessons += [
+            lesson for lesson in loose if _read_text(lesson, "level") == _read_text(level, "id")
+        ]
         return ImportedLevel(
-            id=_text(level, "id"),
-            title=_text(level, "title"),
-            summary=_summary(level),
+            id=_read_text(level, "id"),
+            title=_read_text(level, "title"),
+            summary=_read_summary(level),
             lessons=tuple(map(self.lesson, lessons)),
         )
 
     def lesson(self, lesson: dict[str, Any]) -> ImportedText:
         """Read a lesson or a page."""
-        minutes = re.search(r"\d+", _text(lesson, "minutes"))
+        minutes = re.search(r"\d+", _read_text(lesson, "minutes"))
         return ImportedText(
-            old_id=_text(lesson, "id"),
-            file=self.file(lesson),
-            title=_text(lesson, "title"),
-            slug=_text(lesson, "slug"),
-            summary=_summary(lesson),
-            status=_text(lesson, "status"),
-            objectives=_texts(lesson, "objectives"),
-            prerequisites=_texts(lesson, "prerequisites"),
+            old_id=_read_text(lesson, "id"),
+            file=self.find_file(lesson),
+            title=_read_text(lesson, "title"),
+            slug=_read_text(lesson, "slug"),
+            summary=_read_summary(lesson),
+            status=_read_text(lesson, "status"),
+            objectives=_read_texts(lesson, "objectives"),
+            prerequisites=_read_texts(lesson, "prerequisites"),
             minutes=int(minutes[0]) if minutes and 1 <= int(minutes[0]) <= 100_000 else None,
         )
 
-    def file(self, lesson: dict[str, Any]) -> str:
+    def find_file(self, lesson: dict[str, Any]) -> str:
         """Return the file of a lesson: the one it names, or one whose name begins with its id."""
-        file, id, slug = (_text(lesson, key) for key in ("file", "id", "slug"))
+        file, id, slug = (_read_text(lesson, key) for key in ("file", "id", "slug"))
         paths = [path for path in self.files if path.endswith((".md", ".qmd", ".ipynb"))]
         suffix = "/" + file.lstrip("./")
         matches = [path for path in paths if file and f"/{path}".endswith(suffix)]
@@ -143,7 +146,7 @@ def _field_name(key: str) -> str:
     return _FIELD_NAMES.get(key, key)
 
 
-def _texts(fields: dict[str, Any], name: str) -> tuple[str, ...]:
+def _read_texts(fields: dict[str, Any], name: str) -> tuple[str, ...]:
     """Return the texts of a field, each on one line: the items of a list, or its value."""
     value = fields.get(name)
     items = value if isinstance(value, list) else [value]
@@ -151,18 +154,18 @@ def _texts(fields: dict[str, Any], name: str) -> tuple[str, ...]:
     return tuple(text for text in texts if text)
 
 
-def _text(fields: dict[str, Any], name: str) -> str:
-    return "; ".join(_texts(fields, name))
+def _read_text(fields: dict[str, Any], name: str) -> str:
+    return "; ".join(_read_texts(fields, name))
 
 
-def _items(fields: dict[str, Any], name: str) -> list[Any]:
+def _read_items(fields: dict[str, Any], name: str) -> list[Any]:
     value = fields.get(name)
     if isinstance(value, dict):  # items by their ids
         return [{"id": key, **item} for key, item in value.items() if isinstance(item, dict)]
     return value if isinstance(value, list) else []
 
 
-def _summary(fields: dict[str, Any]) -> str:
+def _read_summary(fields: dict[str, Any]) -> str:
     """Return the summary, with what a learner should be able to do by then."""
-    checkpoint = _text(fields, "checkpoint")
-    return f"{_text(fields, 'summary')} {checkpoint and f'Checkpoint: {checkpoint}'}".strip()
+    checkpoint = _read_text(fields, "checkpoint")
+    return f"{_read_text(fields, 'summary')} {checkpoint and f'Checkpoint: {checkpoint}'}".strip()

@@ -30,14 +30,14 @@ from coursebuild.features.markdown.llms import write_llms
 from coursebuild.features.markdown.writer import DocumentWriter
 
 Locate: TypeAlias = Callable[[str], str]
-_ENDING = ".md"
+_EXTENSION = ".md"
 
 
 def markdown_files(site: SiteContext) -> Iterator[SiteFile]:
     """Yield the copies of all pages, unless the author has a file of that name, and their list."""
     author_paths = {urls.file_path(path) for path in site.library.course.files}
     for page in site.pages:
-        path = urls.copy_path(page.path, _ENDING)
+        path = urls.copy_path(page.path, _EXTENSION)
         if path not in author_paths:
             yield CachedFile(path, page.digest, functools.partial(site.note, page.path))
     yield OutputFile(LLMS, write_llms(site.library))
@@ -67,7 +67,7 @@ def markdown_href(place: urls.Place, href: str) -> str:
     target = posixpath.normpath(posixpath.join(folder, unquote(parts.path)))
     if target.startswith(("files/", "../")) or not urls.has_copies(target):
         return href
-    return parts._replace(path=urls.copy_path(parts.path, _ENDING)).geturl()
+    return parts._replace(path=urls.copy_path(parts.path, _EXTENSION)).geturl()
 
 
 def _document_copy(inputs: PageInputs, page: PageContext) -> str:
@@ -78,7 +78,7 @@ def _document_copy(inputs: PageInputs, page: PageContext) -> str:
         *head(inputs, words, writer.locate),
         writer.blocks(document.blocks),
         writer.footnotes(document.footnotes),
-        *_foot(inputs, words, writer.locate),
+        *_footer(inputs, words, writer.locate),
     )
     return "\n\n".join(filter(None, parts))
 
@@ -125,7 +125,7 @@ def lesson_links(value: object, locate: Locate) -> list[str]:
     ]
 
 
-def _foot(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
+def _footer(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     """Return links to scripts and further lessons."""
     rows = []
     scripts = inputs.values.get("scripts")

@@ -77,7 +77,7 @@ class SymbolView(Struct, frozen=True):
 def symbols_values(library: Library) -> dict[str, object]:
     """Return the values for the template of the index."""
     place = urls.Place("symbols/index.html")
-    rows = [_view(library, place, row) for row in _course_symbols(library)]
+    rows = [_symbol_view(library, place, row) for row in _course_symbols(library)]
     return {
         "declared": tuple(row for row in rows if row.meanings),
         "undeclared": tuple(row for row in rows if not row.meanings),
@@ -85,7 +85,7 @@ def symbols_values(library: Library) -> dict[str, object]:
     }
 
 
-def _view(library: Library, place: urls.Place, row: CourseSymbol) -> SymbolView:
+def _symbol_view(library: Library, place: urls.Place, row: CourseSymbol) -> SymbolView:
     anchor, section = row.first.section
     is_ambiguous = len(row.meanings) > 1
     return SymbolView(

@@ -37,13 +37,13 @@ def document_symbols(document: model.Document, mathml: Mathml) -> Parsed[Documen
     """Return the symbols of a document; diagnostics are about its declarations."""
     if "$" not in document.source.text:
         return Parsed(None)
-    uses = _uses(document, mathml)
+    uses = _find_uses(document, mathml)
     has_declarations = "${" in document.source.text
     diagnostics = tuple(_check_declarations(document, mathml)) if has_declarations else ()
     return Parsed(DocumentSymbols(uses) if uses else None, diagnostics)
 
 
-def _uses(document: model.Document, mathml: Mathml) -> tuple[SymbolUse, ...]:
+def _find_uses(document: model.Document, mathml: Mathml) -> tuple[SymbolUse, ...]:
     uses: dict[str, SymbolUse] = {}
     section = "", ""
     for block in _blocks(document):

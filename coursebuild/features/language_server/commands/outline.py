@@ -1,6 +1,6 @@
 """The headings of a text, its foldable ranges, and its formatting.
 
-Entry points: `headings`, as a tree; `folds`; `layout`.
+Entry points: `headings`, as a tree; `folds`; `format_text`.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def folds(
     return [types.FoldingRange(first, last) for first, last in lines if first < last]
 
 
-def layout(
+def format_text(
     texts: OpenTexts, source: Source, params: types.DocumentFormattingParams
 ) -> list[types.TextEdit]:
     """Return the edits that `coursebuild fmt` would make."""

@@ -22,7 +22,7 @@ from coursebuild.features.language_server.commands.actions import actions
 from coursebuild.features.language_server.commands.completion import completions
 from coursebuild.features.language_server.commands.diagnosis import current_diagnostics, to_lsp
 from coursebuild.features.language_server.commands.lookup import definition, hover
-from coursebuild.features.language_server.commands.outline import folds, headings, layout
+from coursebuild.features.language_server.commands.outline import folds, format_text, headings
 from coursebuild.features.language_server.commands.places import Places
 from coursebuild.features.language_server.commands.renaming import name_at, rename
 from coursebuild.features.language_server.commands.texts import OpenTexts
@@ -38,7 +38,7 @@ _ANSWERS: dict[str, Callable[[OpenTexts, Source, Any], Any]] = {
     types.TEXT_DOCUMENT_DEFINITION: definition,
     types.TEXT_DOCUMENT_COMPLETION: completions,
     types.TEXT_DOCUMENT_CODE_ACTION: actions,
-    types.TEXT_DOCUMENT_FORMATTING: layout,
+    types.TEXT_DOCUMENT_FORMATTING: format_text,
     types.TEXT_DOCUMENT_PREPARE_RENAME: name_at,
     types.TEXT_DOCUMENT_RENAME: rename,
     types.TEXT_DOCUMENT_DOCUMENT_SYMBOL: headings,
