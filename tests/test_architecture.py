@@ -104,15 +104,15 @@ def part(names: tuple[str, ...]) -> str:
     return ".".join(names[: 2 if names[0] == "core" else 1])
 
 
-def is_allowed(own: str, name: str) -> bool:
+def is_allowed(importer: str, name: str) -> bool:
     """Whether a part may import a module; `mjcourse` is for lesson scripts and for numerics."""
     package, _, rest = name.partition(".")
     if package != "coursebuild":
-        return package != "" and (package != "mjcourse" or own == "numerics")
-    other = part(tuple(rest.split(".")))
-    if own == "numerics":
-        return other in NUMERICS_NEEDS
-    return other in ("", own, "__version__") or LEVEL[other] < LEVEL[own]
+        return package != "" and (package != "mjcourse" or importer == "numerics")
+    imported_part = part(tuple(rest.split(".")))
+    if importer == "numerics":
+        return imported_part in NUMERICS_NEEDS
+    return imported_part in ("", importer, "__version__") or LEVEL[imported_part] < LEVEL[importer]
 
 
 def test_every_part_has_a_layer() -> None:
@@ -120,18 +120,18 @@ def test_every_part_has_a_layer() -> None:
 
 
 def test_imports_go_down_and_never_sideways() -> None:
-    wrong = [
+    violations = [
         f"{path.relative_to(ROOT)} imports {name}"
         for path in FILES
         if part_of(path) not in OUTSIDE
         for name in sorted(read(path).imports)
         if not is_allowed(part_of(path), name)
     ]
-    assert not wrong, "\n".join(wrong)
+    assert not violations, "\n".join(violations)
 
 
 def test_features_import_those_alone_that_they_need() -> None:
-    wrong = [
+    violations = [
         f"{path.relative_to(ROOT)} imports {name}"
         for feature in installed_features()
         for path in (PACKAGE / "features" / feature.name).rglob("*.py")
@@ -139,36 +139,36 @@ def test_features_import_those_alone_that_they_need() -> None:
         if name.startswith("coursebuild.features.")
         and name.split(".")[2] not in (feature.name, *feature.needs)
     ]
-    assert not wrong, "\n".join(wrong)
+    assert not violations, "\n".join(violations)
 
 
 def test_mjcourse_never_imports_coursebuild() -> None:
-    wrong = [
+    violations = [
         f"{path.relative_to(ROOT)} imports {name}"
         for path in sorted((ROOT / "mjcourse").rglob("*.py"))
         for name in sorted(read(path).imports)
         if name.split(".")[0] == "coursebuild"
     ]
-    assert not wrong, "\n".join(wrong)
+    assert not violations, "\n".join(violations)
 
 
 def test_pure_parts_do_no_input_or_output() -> None:
-    wrong = [
+    violations = [
         f"{path.relative_to(ROOT)} uses {name}"
         for path in FILES
         if part_of(path) in PURE
         for name in sorted((read(path).imports & IO_MODULES) | (read(path).calls & IO_CALLS))
     ]
-    assert not wrong, "\n".join(wrong)
+    assert not violations, "\n".join(violations)
 
 
 def test_files_stay_small_and_say_what_they_are_for() -> None:
-    wrong = [
+    violations = [
         f"{path.relative_to(ROOT)} has {module.lines} lines and a docstring: {module.has_docstring}"
         for path, module in ((path, read(path)) for path in FILES)
         if module.lines > 450 or not module.has_docstring
     ]
-    assert not wrong, "\n".join(wrong)
+    assert not violations, "\n".join(violations)
 
 
 @pytest.mark.site

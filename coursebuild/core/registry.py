@@ -96,10 +96,10 @@ def features_digest() -> str:
     return hashlib.sha256("\0".join((_digest, *_package_lines())).encode()).hexdigest()
 
 
-def find_clash(candidate: Feature, others: Iterable[Feature]) -> str:
+def find_clash(candidate: Feature, installed: Iterable[Feature]) -> str:
     """Why a feature cannot be used together with others; empty if it can."""
-    others = tuple(others)
-    if any(feature.name == candidate.name for feature in others):
+    installed = tuple(installed)
+    if any(feature.name == candidate.name for feature in installed):
         return f"two features are called `{candidate.name}`"
     rules = {rule.name for rule in candidate.rules} & (RULES.keys() - _rules_of(_of_course))
     if rules:
@@ -109,23 +109,27 @@ def find_clash(candidate: Feature, others: Iterable[Feature]) -> str:
         candidate.check or candidate.check_runs or candidate.pages or candidate.exporters
     ):
         return f"it would see no `{invisible[0].name}` of the course: its block has no `summary`"
-    read = {*CORE_FENCES, *(kind.name for feature in others for kind in feature.fences)}
+    read = {*CORE_FENCES, *(kind.name for feature in installed for kind in feature.fences)}
     twice = [kind.name for kind in candidate.fences if kind.name in read]
     if twice:
         return f"the fence `{twice[0]}` is read already"
-    pages = {*CORE_PAGES, *_FOLDERS, *(kind.name for feature in others for kind in feature.pages)}
+    pages = {
+        *CORE_PAGES,
+        *_FOLDERS,
+        *(kind.name for feature in installed for kind in feature.pages),
+    }
     twice = [kind.name for kind in candidate.pages if kind.name in pages]
     if twice:
         return f"there is a page `{twice[0]}` already"
     odd = [kind.name for kind in candidate.pages if not _PAGE_NAME.fullmatch(kind.name)]
     if odd:
         return f"a page cannot be called `{odd[0]}`: use small letters, digits and `-`"
-    exporters = _exporter_names((candidate,)) & _exporter_names(others)
+    exporters = _exporter_names((candidate,)) & _exporter_names(installed)
     if exporters:
         return f"there is an export `{min(exporters)}` already"
     commands = {
         *CORE_COMMANDS,
-        *(command.name for feature in others for command in feature.commands),
+        *(command.name for feature in installed for command in feature.commands),
     }
     twice = [command.name for command in candidate.commands if command.name in commands]
     return f"there is a command `{twice[0]}` already" if twice else ""
@@ -152,7 +156,7 @@ def find_exporter(name: str) -> Exporter | str:
     for feature in available:
         for exporter in feature.exporters:
             if exporter.name == name:
-                missing = sorted(set(feature.needs) - {needed.name for needed in available})
+                missing = sorted(set(feature.needs) - {installed.name for installed in available})
                 if not missing:
                     return exporter
                 source = _INSTALLED_BY.get(missing[0], f"the feature `{missing[0]}`")
@@ -200,9 +204,11 @@ def unproven(course: Course) -> tuple[Diagnostic | str, ...]:
 def summarize(document: Document, mathml: Mathml) -> Parsed[dict[str, Struct]]:
     """The summaries of a document that features make, by feature, with their diagnostics."""
     makers = {f.name: f.summary for f in features() if f.summary is not None}
-    parsed = {name: make(document, mathml) for name, make in makers.items()}
-    values = {name: summary.value for name, summary in parsed.items() if summary.value is not None}
-    return Parsed(values, tuple(d for summary in parsed.values() for d in summary.diagnostics))
+    summaries = {name: make(document, mathml) for name, make in makers.items()}
+    values = {
+        name: summary.value for name, summary in summaries.items() if summary.value is not None
+    }
+    return Parsed(values, tuple(d for summary in summaries.values() for d in summary.diagnostics))
 
 
 def check_runs(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic, ...]:
@@ -237,17 +243,17 @@ def installed_features() -> tuple[Feature, ...]:
     # Not by `pkgutil`, which takes an unreadable folder for an empty one.
     folders = Path(package.__path__[0]).iterdir()
     modules = sorted(path.name for path in folders if (path / "__init__.py").is_file())
-    loaded = [importlib.import_module(f"{package.__name__}.{name}").FEATURE for name in modules]
+    available = [importlib.import_module(f"{package.__name__}.{name}").FEATURE for name in modules]
     for point in _entry_points():
         feature = point.load()
         if not isinstance(feature, Feature):
             raise RuntimeError(
                 f"the entry point {point.value} is no feature: write `{point.module}:FEATURE`"
             )
-        if reason := find_clash(feature, loaded):
+        if reason := find_clash(feature, available):
             raise RuntimeError(f"the entry point {point.value} cannot be used: {reason}")
-        loaded.append(feature)
-    return _register(loaded)
+        available.append(feature)
+    return _register(available)
 
 
 @functools.cache

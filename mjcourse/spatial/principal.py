@@ -115,12 +115,12 @@ def is_physical_inertia(inertia: ArrayLike, *, rtol: float = 1e-12) -> BoolArray
 
 def _diagonalize(matrix: FloatArray) -> _State:
     """Jacobi's method: turn in the three planes in turn until nothing is left off the diagonal."""
-    ones = np.where(np.isnan(matrix[..., 0, 0]), np.nan, 1.0)
-    zero = np.zeros_like(ones)
+    unit = np.where(np.isnan(matrix[..., 0, 0]), np.nan, 1.0)
+    zero = np.zeros_like(unit)
     state = _State(
         diagonal=tuple(matrix[..., k, k] for k in range(3)),
         off_diagonal=tuple(matrix[..., (k + 1) % 3, (k + 2) % 3] for k in range(3)),
-        quat=(ones, zero, zero, zero),
+        quat=(unit, zero, zero, zero),
     )
     for _ in range(_SWEEPS):
         if not any(np.any(np.abs(entry) > 0) for entry in state.off_diagonal):

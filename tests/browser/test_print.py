@@ -70,8 +70,8 @@ def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
         assert f"{address}#4.2-lab-{lab}" in text.replace(" ", "")
     for removed_text in ("On this page", "Course map", "Copy", "Download", "Mark as read"):
         assert removed_text not in text, removed_text
-    for there in ("The centre of mass is at", "if __name__", "IEEE Robotics and Automation"):
-        assert there in text, "what is folded on a screen"
+    for visible_text in ("The centre of mass is at", "if __name__", "IEEE Robotics and Automation"):
+        assert visible_text in text, "what is folded on a screen"
 
 
 def test_what_is_folded_is_open_and_links_say_where_they_lead(nasty: str, page: Page) -> None:
@@ -79,8 +79,13 @@ def test_what_is_folded_is_open_and_links_say_where_they_lead(nasty: str, page: 
     page.goto(nasty)
     wait_until_settled(page)
     text = words(" ".join(printed(page)))
-    for there in ("Hidden at first.", "return one(x) + 13", "So.", "A note whose mark is folded"):
-        assert there in text, there
+    for visible_text in (
+        "Hidden at first.",
+        "return one(x) + 13",
+        "So.",
+        "A note whose mark is folded",
+    ):
+        assert visible_text in text, visible_text
     solid = text.replace(" ", "")
     assert f"Anaddress:{URL},andone({URL})withatext" in solid, "told once"
     assert "https://example.org/c/lessons/1.1-one.html" in solid, "where the page itself is"

@@ -51,10 +51,10 @@ VALUES = st.recursive(
 
 @given(VALUES)
 def test_decoding_gives_the_encoded_value(value: object) -> None:
-    decoded = decode(encode(value), object)
-    assert decoded == value or value is None
-    assert type(decoded) is type(value)
-    assert fingerprint(value) == fingerprint(decoded)
+    value_again = decode(encode(value), object)
+    assert value_again == value or value is None
+    assert type(value_again) is type(value)
+    assert fingerprint(value) == fingerprint(value_again)
 
 
 def test_decoded_places_are_in_the_given_source() -> None:

@@ -180,7 +180,7 @@ def _kinds(action: Any) -> Iterator[list[tuple[str, str]]]:
     helps = {choice.dest: choice.help for choice in action._choices_actions}
     for name, parser in action.choices.items():
         yield [(f"`{name}`", helps[name])]
-        rows = [_row(one) for one in parser._actions if one.dest not in ("help", "root")]
+        rows = [_row(option) for option in parser._actions if option.dest not in ("help", "root")]
         yield [(f"`{name}` {argument}", meaning) for argument, meaning in rows]
 
 

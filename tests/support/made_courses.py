@@ -43,12 +43,13 @@ def make_course(
     page_text: str = "Text.\n",
     *,
     models: Mapping[str, str] | None = None,
-    declared: Mapping[str, str] | None = None,
+    declaration_texts: Mapping[str, str] | None = None,
     files: Iterable[str] = (),
 ) -> Course:
     """A course of two lessons, a planned one and a page.
 
-    `models` and `declared` are the texts of `models/NAME.xml` and `models/NAME.toml` by name.
+    `models` and `declaration_texts` are the texts of `models/NAME.xml` and `models/NAME.toml`, by
+    name.
     """
     course = parse_course_map(Source("content/course.toml", MAP)).value
     assert course is not None
@@ -62,7 +63,7 @@ def make_course(
     (page,) = course.pages
     declarations = [
         parse_declarations(Source(f"models/{name}.toml", text)).value
-        for name, text in (declared or {}).items()
+        for name, text in (declaration_texts or {}).items()
     ]
     return replace(
         course,

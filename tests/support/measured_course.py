@@ -48,7 +48,7 @@ class Fake:
 
     def run_scenario(
         self,
-        compiled: CompiledScene,
+        compiled_scene: CompiledScene,
         number: int,
         *,
         quick: bool,
@@ -56,7 +56,7 @@ class Fake:
         tell: Callable[[str], None],
     ) -> ScenarioReport:
         tell("swing: Euler")
-        self.calls.append((compiled.scene.name, number, quick, timed))
+        self.calls.append((compiled_scene.scene.name, number, quick, timed))
         outcome = self.outcomes[number]
         if isinstance(outcome, Diagnostic):
             raise CannotMeasureError(outcome)

@@ -75,23 +75,23 @@ class Watcher:
         Returns:
             Whether the state was recorded.
         """
-        further = sorted({os.path.join(self.root, path) for path in files})
-        written = sorted(os.path.join(self.root, path) for path in outputs)
-        if any("\n" in path for path in (*further, *written)):
+        input_paths = sorted({os.path.join(self.root, path) for path in files})
+        output_paths = sorted(os.path.join(self.root, path) for path in outputs)
+        if any("\n" in path for path in (*input_paths, *output_paths)):
             return False
-        if self.before is None or self._look(()) != self.before or self._look(further) is None:
+        if self.before is None or self._look(()) != self.before or self._look(input_paths) is None:
             return False
         try:
-            state = _state(self.root, [*further, *written])
+            state = _state(self.root, [*input_paths, *output_paths])
         except (OSError, _UnclearError):
             return False
-        body = "\n".join((_HEADER, state, *further, *written, "", message))
+        body = "\n".join((_HEADER, state, *input_paths, *output_paths, "", message))
         return _write(_path(self.root, self.command), body.encode("utf-8", "surrogateescape"))
 
-    def _look(self, further: Sequence[str]) -> str | None:
+    def _look(self, input_paths: Sequence[str]) -> str | None:
         """The state of the inputs; `None` where it is not reliable."""
         try:
-            return _state(self.root, further, self.began)
+            return _state(self.root, input_paths, self.began)
         except (OSError, _UnclearError):
             return None
 
@@ -110,7 +110,7 @@ def unchanged(root: str, command: Sequence[str]) -> str | None:
         return None
 
 
-def _state(root: str, further: Sequence[str], began: int | None = None) -> str:
+def _state(root: str, input_paths: Sequence[str], began: int | None = None) -> str:
     """A hash over the stat of all that the command depends on.
 
     Raises:
@@ -126,7 +126,7 @@ def _state(root: str, further: Sequence[str], began: int | None = None) -> str:
     add(sys.version, sys.executable, *(os.environ.get(name, "") for name in _VARIABLES))
     installed = (folder for folder in sys.path if folder.endswith(_PACKAGES))
     course = (os.path.join(root, name) for name in FOLDERS)
-    for path in (*installed, *course, *_tool(), *further):
+    for path in (*installed, *course, *_tool(), *input_paths):
         for parts in _rows(path, began):
             add(*parts)
     return digest.hexdigest()

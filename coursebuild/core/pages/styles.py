@@ -40,8 +40,8 @@ def hoist_styles(html: str) -> tuple[str, frozenset[str]]:
     parts: list[str] = []
     position = 0
     while position < len(html):
-        skipped = _WITHOUT_STYLE.match(html, position)
-        end = position if skipped is None else skipped.end()
+        gap = _WITHOUT_STYLE.match(html, position)
+        end = position if gap is None else gap.end()
         piece = _PIECE.match(html, end)
         if piece is None:
             parts.append(html[position : end + 1])

@@ -98,21 +98,21 @@ def judge_comparability(standing: RunStanding) -> Judgement | None:
 
 
 def judge(
-    other: RunStanding, control: RunStanding | None, repeated: RunStanding, engine: str
+    standing: RunStanding, control: RunStanding | None, repeated: RunStanding, engine: str
 ) -> Judgement:
     """Judge a script that prints what is recorded here, but not with the other MuJoCo.
 
     Args:
-        other: its run with the other version of MuJoCo.
+        standing: its run with the other version of MuJoCo.
         control: with this version, in a fresh environment; `None` where there is none.
         repeated: with the other version once more.
         engine: this version.
     """
-    if (other.run.outcome, other.run.stdout) != (repeated.run.outcome, repeated.run.stdout):
+    if (standing.run.outcome, standing.run.stdout) != (repeated.run.outcome, repeated.run.stdout):
         return Judgement("unclear", "two runs of it there did not do the same")
     if control is None:
         return Judgement("unclear", f"no fresh environment with MuJoCo {engine} could be made")
     if not control.holds:
         fresh = f"a fresh environment with MuJoCo {engine}"
         return Judgement("unclear", f"it does not do in {fresh} what it does here either")
-    return Judgement("changed" if other.run.outcome is Outcome.OK else "fails")
+    return Judgement("changed" if standing.run.outcome is Outcome.OK else "fails")

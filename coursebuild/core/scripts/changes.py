@@ -152,9 +152,9 @@ def _merge_differences(
         )
 
     visible = [d for d in differences if not is_blank(d)] or differences
-    joined: list[Difference] = []
+    merged_differences: list[Difference] = []
     for d in visible:
-        last = joined[-1] if joined else None
+        last = merged_differences[-1] if merged_differences else None
         if (
             last is not None
             and last.numbers is None
@@ -162,7 +162,9 @@ def _merge_differences(
             and not recorded[last.end : d.start].strip()
             and not printed[last.printed_end : d.printed_start].strip()
         ):
-            joined[-1] = Difference(last.start, d.end, last.printed_start, d.printed_end)
+            merged_differences[-1] = Difference(
+                last.start, d.end, last.printed_start, d.printed_end
+            )
         else:
-            joined.append(d)
-    return tuple(joined)
+            merged_differences.append(d)
+    return tuple(merged_differences)

@@ -91,8 +91,10 @@ def sum_claims(claims: Iterable[Claims]) -> Claims:
     """Return the claims of several documents."""
     terms = tuple(claims)
     places = tuple(place for term in terms for place in term.open)
-    bound, computed, given = (sum(getattr(term, kind) for term in terms) for kind in KINDS)
-    return Claims(bound, computed, given, places)
+    bound_count, computed_count, given_count = (
+        sum(getattr(term, kind) for term in terms) for kind in KINDS
+    )
+    return Claims(bound_count, computed_count, given_count, places)
 
 
 def document_claims(document: model.Document) -> Claims:
@@ -108,8 +110,8 @@ def document_claims(document: model.Document) -> Claims:
             counter.inlines(model.block_inlines(block))
     for span, numbers in counter.alternatives:
         counter.add("bound" if numbers <= counter.marked else "", span)
-    bound, computed, given = map(counter.kinds.count, KINDS)
-    return Claims(bound, computed, given, tuple(counter.open))
+    bound_count, computed_count, given_count = map(counter.kinds.count, KINDS)
+    return Claims(bound_count, computed_count, given_count, tuple(counter.open))
 
 
 class _Counter:

@@ -55,17 +55,17 @@ def apply_edits(data: bytes, edits: Iterable[ModelEdit]) -> bytes:
 
 def merge_edits(edits: Iterable[ModelEdit]) -> tuple[ModelEdit, ...]:
     """The same changes in order; adjoining removals are joined, those inside another dropped."""
-    merged: list[ModelEdit] = []
+    joined_edits: list[ModelEdit] = []
     for edit in sorted(set(edits), key=lambda e: (e.path, e.start, -e.end, e.new)):
-        last = merged[-1] if merged else None
+        last = joined_edits[-1] if joined_edits else None
         follows_removal = last is not None and last.path == edit.path and not last.new
         if last is not None and follows_removal and edit.start < last.end and edit.end <= last.end:
             continue
         if last is not None and follows_removal and edit.start == last.end and not edit.new:
-            merged[-1] = replace(last, end=edit.end)
+            joined_edits[-1] = replace(last, end=edit.end)
         else:
-            merged.append(edit)
-    return tuple(merged)
+            joined_edits.append(edit)
+    return tuple(joined_edits)
 
 
 def remove_elements(elements: Iterable[Element]) -> tuple[ModelEdit, ...]:

@@ -94,9 +94,12 @@ def test_a_file_that_others_include_need_not_compile(
 
 
 def test_names_that_a_lab_uses_are_in_its_own_model() -> None:
-    right = CompileResult("", None, facts(keyframes=("home", "", "up"), sites=("tip",)))
-    wrong = CompileResult("", None, facts(sites=("top",)))
-    for source, of_text, box in (('"model": "box"', wrong, right), ('"xml": "<x/>"', right, wrong)):
+    with_names = CompileResult("", None, facts(keyframes=("home", "", "up"), sites=("tip",)))
+    without_names = CompileResult("", None, facts(sites=("top",)))
+    for source, of_text, box in (
+        ('"model": "box"', without_names, with_names),
+        ('"xml": "<x/>"', with_names, without_names),
+    ):
         for fields, expected in (
             ('"key": "up", "trail": "tip"', []),
             ('"key": 2', []),
@@ -120,7 +123,7 @@ def test_scenarios_are_compared_with_the_compiled_model() -> None:
     assert rules_and_texts(check(undeclared, box=home)) == ["bench-scenario: fall"]
     assert rules_and_texts(check(undeclared, box=failure())) == ["model-error: "]
     scenarios = '[[scenario]]\nname = "swing"\nkeyframe = 1\n'
-    course = make_course(report, models={"box": BOX}, declared={"box": scenarios})
+    course = make_course(report, models={"box": BOX}, declaration_texts={"box": scenarios})
     # That the scenario is none of those declared is known before anything is compiled.
     assert rules_and_texts(check(course, box=home)) == ["scenario-model: 1"]
     assert rules_and_texts(check(course, box=failure())) == ["model-error: "]

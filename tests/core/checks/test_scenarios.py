@@ -27,7 +27,7 @@ GOOD = (
 
 def messages_of(*scenarios: str) -> list[str]:
     texts = (f'[[scenario]]\nname = "s{n}"\n{text}\n' for n, text in enumerate(scenarios))
-    (declarations,) = make_course(models={}, declared={"box": "".join(texts)}).declarations
+    (declarations,) = make_course(models={}, declaration_texts={"box": "".join(texts)}).declarations
     diagnostics = tuple(check_scenarios(declarations, MODEL))
     return [
         f"{a}; {b}"

@@ -30,10 +30,14 @@ def fill(root: Path, files: Mapping[str, bytes | str]) -> None:
 
 def unreadable(root: Path) -> dict[str, str]:
     """The message for each path that cannot be read."""
-    parsed = read_course(root)
-    assert all(d.rule == "file-unreadable" for d in parsed.diagnostics)
-    assert sorted(parsed.value.unreadable) == sorted(d.span.path for d in parsed.diagnostics)
-    return {d.span.path: d.message.removeprefix(f"{d.span.path} ") for d in parsed.diagnostics}
+    parsed_course = read_course(root)
+    assert all(d.rule == "file-unreadable" for d in parsed_course.diagnostics)
+    assert sorted(parsed_course.value.unreadable) == sorted(
+        d.span.path for d in parsed_course.diagnostics
+    )
+    return {
+        d.span.path: d.message.removeprefix(f"{d.span.path} ") for d in parsed_course.diagnostics
+    }
 
 
 # --- what there is
@@ -49,32 +53,36 @@ def test_everything_in_its_place_and_sorted(root: Path, tmp_path: Path) -> None:
     fill(root, files | {"content/lessons/pictures/p.png": "p", "models/robots/arm.stl": b"\xff"})
     (tmp_path / "link").symlink_to("course")
     for folder in (root, tmp_path / "link"):
-        parsed = read_course(folder)
-        assert parsed.diagnostics == () and parsed.value.map is not None
-        assert [s.path for s in parsed.value.lessons] == [f"content/lessons/{n}" for n in lessons]
-        assert [s.path for s in parsed.value.pages] == [f"content/pages/{name}" for name in pages]
-        assert [(m.name, m.source.path) for m in parsed.value.models] == [
+        parsed_course = read_course(folder)
+        assert parsed_course.diagnostics == () and parsed_course.value.map is not None
+        assert [s.path for s in parsed_course.value.lessons] == [
+            f"content/lessons/{n}" for n in lessons
+        ]
+        assert [s.path for s in parsed_course.value.pages] == [
+            f"content/pages/{name}" for name in pages
+        ]
+        assert [(m.name, m.source.path) for m in parsed_course.value.models] == [
             (name, f"models/{name}.xml") for name in models
         ]
-        assert "content/lessons/pictures/p.png" in parsed.value.files
-        assert list(parsed.value.files) == sorted(parsed.value.files)
+        assert "content/lessons/pictures/p.png" in parsed_course.value.files
+        assert list(parsed_course.value.files) == sorted(parsed_course.value.files)
 
 
 def test_editors_droppings_are_no_files(root: Path) -> None:
     names = "1.1-a.md~", ".1.1-a.md.swp", "#1.1-a.md#", ".hidden.md", "4913~", "__pycache__/a.pyc"
     fill(root, {f"content/lessons/{name}": b"\xff" for name in names})
     (root / "content/lessons/.#1.1-a.md").symlink_to("author@host.1234:5678")
-    parsed = read_course(root)
-    assert (parsed.diagnostics, parsed.value.lessons) == ((), ())
-    assert parsed.value.files == ("content/course.toml",)
+    parsed_course = read_course(root)
+    assert (parsed_course.diagnostics, parsed_course.value.lessons) == ((), ())
+    assert parsed_course.value.files == ("content/course.toml",)
 
 
 def test_odd_names(root: Path) -> None:
     names = ["1 a b", "ünï-日本", "a\nb", "a'\"`$", "-rf", "a\\b", "a" * 250]
     fill(root, {f"content/lessons/{name}.md": name for name in names})
-    parsed = read_course(root)
-    assert parsed.diagnostics == ()
-    assert {(s.path, s.text) for s in parsed.value.lessons} == {
+    parsed_course = read_course(root)
+    assert parsed_course.diagnostics == ()
+    assert {(s.path, s.text) for s in parsed_course.value.lessons} == {
         (f"content/lessons/{name}.md", name) for name in names
     }
     Path(os.fsdecode(os.fsencode(root) + b"/content/lessons/b\xff.md")).write_bytes(b"x")
@@ -83,9 +91,9 @@ def test_odd_names(root: Path) -> None:
 
 
 def test_missing_map(tmp_path: Path) -> None:
-    parsed = read_course(tmp_path)
-    assert parsed.value.map is None
-    assert [(d.rule, d.span.path, d.message) for d in parsed.diagnostics] == [
+    parsed_course = read_course(tmp_path)
+    assert parsed_course.value.map is None
+    assert [(d.rule, d.span.path, d.message) for d in parsed_course.diagnostics] == [
         ("map-missing", "content/course.toml", "there is no content/course.toml")
     ]
 
@@ -127,18 +135,21 @@ def test_bytes_that_are_not_utf8_are_shown_and_what_is_no_text_is_read_no_furthe
 ) -> None:
     for data, line, column, message, guess in WRONG:
         fill(root, {LESSON: data})
-        parsed = read_course(root)
-        [diagnostic] = parsed.diagnostics
+        parsed_course = read_course(root)
+        [diagnostic] = parsed_course.diagnostics
         assert diagnostic.rule == "file-encoding"
         assert (diagnostic.span.line, diagnostic.span.column) == (line, column), data
         assert diagnostic.message == message, data
         assert diagnostic.help == f"save the file as UTF-8; it {guess}", data
         if guess != LATIN:
-            assert (parsed.value.lessons, parsed.value.unreadable) == ((), (LESSON,)), data
+            assert (parsed_course.value.lessons, parsed_course.value.unreadable) == (
+                (),
+                (LESSON,),
+            ), data
             continue
         # The rest of the file is there for other stages, and can never be written back as it is.
         assert diagnostic.span.text == "\ufffd"
-        (source,) = parsed.value.lessons
+        (source,) = parsed_course.value.lessons
         assert source.text.encode() != data
 
 
@@ -165,10 +176,10 @@ def test_links_lead_nowhere_but_into_the_project(root: Path, tmp_path: Path) -> 
     (root / "models").mkdir()
     (root / "models/m").symlink_to("../shared/m")
     (root / "models/m/loop").symlink_to("..")
-    parsed = read_course(root)
-    assert parsed.diagnostics == ()
-    assert [s.text for s in parsed.value.lessons] == ["shared"]
-    assert [m.name for m in parsed.value.models] == ["m/a"]
+    parsed_course = read_course(root)
+    assert parsed_course.diagnostics == ()
+    assert [s.text for s in parsed_course.value.lessons] == ["shared"]
+    assert [m.name for m in parsed_course.value.models] == ["m/a"]
 
 
 def test_things_that_are_no_files(root: Path) -> None:

@@ -76,6 +76,6 @@ def test_templates_are_up_to_date(tmp_path: Path) -> None:
     texts = template_texts()
     compile_templates(texts, tmp_path)
     name = compiled_name(texts)
-    compiled = {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()}
+    modules = {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()}
     bundled = (assets_dir() / FOLDER / name).glob("*.py")
-    assert {path.name: path.read_bytes() for path in bundled} == compiled
+    assert {path.name: path.read_bytes() for path in bundled} == modules

@@ -45,8 +45,8 @@ def report(course: Path, exact: str, toml: str = TOML) -> ScenarioReport:
     write(course / "models" / "ball.exact.py", exact)
     write(course / "models" / "ball.toml", toml)
     (scene,) = find_scenes(course, ("ball",)).value
-    compiled = compile_scene(course, scene, quick=True)
-    return run_scenario(compiled, 0, quick=True, timed=False, tell=lambda _: None)
+    compiled_scene = compile_scene(course, scene, quick=True)
+    return run_scenario(compiled_scene, 0, quick=True, timed=False, tell=lambda _: None)
 
 
 def test_errors_are_taken_from_the_exact_motion(course: Path) -> None:
