@@ -32,8 +32,11 @@ RIDDLES = frozenset(f"{PARTICIPLES} {OTHERS}".split())
 
 def bound_names(tree: ast.AST) -> Iterator[tuple[str, int]]:
     """The names that a module gives to functions, parameters and variables, with their lines."""
+    fields = [s for node in ast.walk(tree) if isinstance(node, ast.ClassDef) for s in node.body]
     for node in ast.walk(tree):
         match node:
+            case ast.AnnAssign(target=ast.Name(id=name)) if node not in fields:
+                yield name, node.lineno
             case ast.FunctionDef(name=name) | ast.arg(arg=name):
                 yield name, node.lineno
             case ast.Assign() | ast.For() | ast.comprehension() | ast.NamedExpr() | ast.withitem():
