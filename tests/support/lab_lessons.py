@@ -19,7 +19,7 @@ def fence(body: str) -> str:
 
 
 def course(root: Path, stores: Path, *lessons: str) -> Folder:
-    """A course of a good lesson and these, with the ball as a model."""
+    """A course of one valid lesson and these lessons, with the ball as a model."""
     folder = Folder(root)
     folder.fill([GOOD, *lessons], stores)
     folder.write("models/ball.xml", BALL)
@@ -27,7 +27,7 @@ def course(root: Path, stores: Path, *lessons: str) -> Folder:
 
 
 def run_check(folder: Folder, *names: str, status: int | None = None) -> dict[str, Any]:
-    """A check's report, as JSON."""
+    """The JSON report of `check`, with its exit status."""
     result = folder.main("check", *names, "--format", "json")
     assert status is None or result.status == status, result.out + result.err
     return {"status": result.status, **json.loads(result.out)}

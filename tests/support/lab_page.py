@@ -1,4 +1,4 @@
-"""What the tests of labs in a browser share: to find a lab, to wait, to read what it shows."""
+"""Helpers of the browser tests of labs: finding a lab, waiting, reading what it shows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from playwright.sync_api import BrowserContext, Locator, Page, Request, Route, e
 from support.chromium import SLOW
 
 SWING, AUTO, ALL, TWINS, EDITED = 0, 1, 2, 3, 4
-"""The labs of the page, by number."""
+"""The index of each lab on the page."""
 
 MOUNT = """async (number) => {
   const place = document.querySelectorAll('.lab')[number]
@@ -27,14 +27,14 @@ MOUNT = """async (number) => {
   window.made = await mountLab(copy, (key) => key)
   copy.querySelector('.lab-view').scrollIntoView({ block: 'center' })
 }"""
-"""Mounts a lab by hand, in a copy of its place that the page's own script does not know: so that a
-test sees more of it, as `made`, than its picture."""
+"""Mounts a lab in a copy of its element that the page's own script does not know, and stores it as
+`window.made`, so that a test can inspect more than its picture."""
 
 
 def watch_page(context: BrowserContext) -> tuple[Page, list[str]]:
-    """A page, and what it says to the console.
+    """Open a page; also returns the list that collects its console messages and errors.
 
-    What was still on its way when the next page was opened is no failure.
+    A request aborted because the next page was opened is not a failure.
     """
     page, console = context.new_page(), list[str]()
 
@@ -49,13 +49,13 @@ def watch_page(context: BrowserContext) -> tuple[Page, list[str]]:
 
 
 def fetch_text(route: Route) -> str:
-    """What the server has where a request goes to; also when its page is closed meanwhile."""
+    """Fetch the text at a request's URL; works also if its page has been closed meanwhile."""
     with urllib.request.urlopen(route.request.url, timeout=SLOW / 1000) as answer:
         return bytes(answer.read()).decode()
 
 
 def until(page: Page, true: str, argument: object = None) -> None:
-    """Wait for something on a page; Playwright's own way needs `eval`, which the pages forbid."""
+    """Wait until a script returns a true value; Playwright's own needs the forbidden `eval`."""
     for _ in range(SLOW // 25):
         if page.evaluate(true, argument):
             return
@@ -64,7 +64,7 @@ def until(page: Page, true: str, argument: object = None) -> None:
 
 
 def becomes(page: Page, value: Callable[[], object], expected: object) -> None:
-    """Wait until a value is what is wanted; the last one is told if it never is."""
+    """Wait until a value equals the expected one; on failure, report the last value."""
     for _ in range(SLOW // 25):
         last = value()
         if last == expected:
@@ -74,14 +74,14 @@ def becomes(page: Page, value: Callable[[], object], expected: object) -> None:
 
 
 def wait_until_settled(page: Page) -> None:
-    """Wait until the page's script has run, its fonts are there, and it has nothing left to do."""
+    """Wait until the page's script has run, its fonts are loaded, and the browser is idle."""
     expect(page.locator("[data-tools] select").first).to_be_attached()
     until(page, "document.fonts.status === 'loaded'")
     page.evaluate("() => new Promise((done) => requestIdleCallback(done))")
 
 
 def lab(page: Page, number: int = SWING, state: str | None = "paused") -> Locator:
-    """A lab of the page, in the window and started."""
+    """A lab of the page, scrolled into view and, unless `state` is None, in that state."""
     locator = page.locator(".lab").nth(number)
     locator.scroll_into_view_if_needed()
     if state is not None:
@@ -107,21 +107,21 @@ def readout(lab: Locator, label: str) -> str:
 
 
 def shows(lab: Locator, label: str, text: str) -> None:
-    """A readout comes to show a text; a page draws when it gets to it."""
+    """Wait until a readout shows a text."""
     wait_for_condition(lab.page, lambda: readout(lab, label) == text)
 
 
 def wait_for_condition(page: Page, true: Callable[[], bool]) -> None:
-    """Wait for something; how long it takes on a machine is no matter."""
+    """Wait until a condition holds, with a limit that is generous enough for a slow machine."""
     for _ in range(SLOW // 50):
         if true():
             return
         page.wait_for_timeout(50)
-    raise AssertionError("it never comes")
+    raise AssertionError("the condition never held")
 
 
 def wait_for_change(page: Page, view: Locator, before: bytes) -> bytes:
-    """The picture once it is another one."""
+    """Wait until the picture differs from `before`; returns the new one."""
     for _ in range(SLOW // 100):
         now = view.screenshot()
         if now != before:
@@ -131,7 +131,7 @@ def wait_for_change(page: Page, view: Locator, before: bytes) -> bytes:
 
 
 def wait_until_still(page: Page, view: Locator) -> bytes:
-    """The picture once it changes no more."""
+    """Wait until the picture stops changing; returns it."""
     before = view.screenshot()
     for _ in range(SLOW // 300):
         page.wait_for_timeout(300)
@@ -147,7 +147,7 @@ def time_of(lab: Locator) -> float:
 
 
 def state_of(page: Page, lab: Locator) -> dict[str, object]:
-    """What the link of a lab's state holds."""
+    """The content of the link that a lab makes of its state."""
     page.evaluate("() => history.replaceState(null, '', location.pathname)")  # so that it is news
     before = page.evaluate("() => location.href")
     lab.get_by_role("button", name="Copy link").click()
@@ -156,7 +156,7 @@ def state_of(page: Page, lab: Locator) -> dict[str, object]:
 
 
 def parse_link(address: str) -> dict[str, object]:
-    """The content of a link: its JSON, and the physics as `physics`."""
+    """The content of a link: the fields of its JSON, and the physics state as `physics`."""
     packed = parse_qs(urlsplit(address).fragment)["z"][0]
     content = zlib.decompress(base64.urlsafe_b64decode(packed + "==="), wbits=-15)
     head, _, physics = content.partition(b"\n")

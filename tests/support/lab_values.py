@@ -1,4 +1,4 @@
-"""Labs for tests: from JSON to a `Lab`, to a request, to what the engine replies."""
+"""Labs for tests: makes a `Lab` from JSON, its request, and the engine's reply."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ BALL = (
 
 
 def make_lab(text: str | None = None, /, **fields: Any) -> Lab:
-    """The lab of a fence with this JSON, in the third line of a lesson."""
+    """The lab of a fence with this JSON, which starts on the third line of a lesson."""
     body = text if text is not None else json.dumps({"xml": BALL, **fields}, ensure_ascii=False)
     return lab_of(f"Text.\n\n```lab simlab\n{body}\n```\n")
 
 
 def lab_of(text: str) -> Lab:
-    """The one lab of a lesson."""
+    """The only lab of a lesson with this text."""
     source = Source("content/lessons/4.2-x.md", text)
     result = parse_document(source, frozenset(), lesson=True)
     assert result.diagnostics == (), [d.message for d in result.diagnostics]
@@ -42,7 +42,7 @@ def lab_of(text: str) -> Lab:
 
 
 def request(lab: Lab) -> dict[str, Any]:
-    """What the trial is asked."""
+    """The request that the trial of a lab gets."""
     module = compile_lab(lab, "4.2-lab-1")
     seconds = lab.verify.seconds
     config = json.loads(module.config)
@@ -58,7 +58,7 @@ def try_labs(
     documents: frozenset[str] | None = None,
     seconds: float = SECONDS,
 ) -> TrialOutcome:
-    """What comes of the labs of a course, or of some of its documents, without static forms."""
+    """Run the trials of a course's labs, or of those in some documents, without static forms."""
     memory = Memory(options.root, options.store)
     context = TrialContext(options.root, course, models or {}, memory, diagnostics)
     trials = [t for t in lab_trials(course) if documents is None or t.block.span.path in documents]
@@ -66,13 +66,13 @@ def try_labs(
 
 
 class Bench(Engines):
-    """Both engines, and what they are asked for a lab."""
+    """Both engines, with methods that send the requests for a lab."""
 
     def trial(self, lab: Lab, seconds: float = 30.0) -> dict[str, Any]:
         return self.browser.trial(request(lab), self.save_model(lab), seconds)
 
     def parity(self, lab: Lab) -> dict[str, Any]:
-        """The comparison of the main run."""
+        """Compare the main run of a lab in both engines."""
         reply, mjb = self.trial(lab), self.save_model(lab)
         assert not reply["failures"], reply["failures"]
         run = reply["main"]["parity"]
@@ -80,17 +80,17 @@ class Bench(Engines):
         return {**self.native.parity(mjb, run, horizon), "run": run, "mjb": mjb}
 
     def save_model(self, lab: Lab) -> bytes:
-        """The lab's own model."""
+        """The bytes of the lab's compiled model."""
         assert lab.xml is not None
         return self.native.save("models/x.xml", lab.xml.text)
 
 
 class OpenEngines(Engines):
-    """Both engines of labs, which stay for the next course."""
+    """Both engines of labs, which stay open for the next course."""
 
     def __exit__(self, *_: object) -> None:
-        """Leave them open."""
+        """Keep the engines open."""
 
     def close(self) -> None:
-        """End them."""
+        """Stop the engines."""
         super().__exit__()

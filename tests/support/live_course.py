@@ -1,4 +1,4 @@
-"""A course in memory, and clean builds to hold it against."""
+"""A course in memory, and clean builds to compare it with."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from support.scratch_course import Folder
 
 COPIES = (".br", ".gz")
 OURS = (".coursebuild-site", "files.json", "service-worker.js")
-"""By which a folder is known for a site of the tool; what keeps it without a network."""
+"""Files that only a published site has: the marker of the tool, and those for use offline."""
 TRIALS = ("labs", "mjb", "pictures")
-"""Stores of what takes long, and which live courses and clean builds share in these tests."""
+"""Stores of slow results, which live courses and clean builds share in these tests."""
 
 
 class Live:
@@ -33,7 +33,7 @@ class Live:
         self.session.start(quiet)
 
     def save(self, *paths: str) -> bool:
-        """Take a save; whether the fast way was taken."""
+        """Apply saved files; returns whether the fast path handled them."""
         if self.session.edit(paths) is not None:
             return True
         self.session.take_other_saves()
@@ -43,7 +43,7 @@ class Live:
         return self.session.find(path)
 
     def site(self) -> dict[str, bytes]:
-        """Everything, once all is known."""
+        """All compared files of the site, after the background rebuild has finished."""
         self.rebuild.run_once()
         files = {path: self.find(path) for path in self.session.files.paths}
         return {p: d for p, d in files.items() if d is not None and _is_compared(p)}
@@ -70,21 +70,21 @@ def live() -> Iterator[Callable[[Folder], Live]]:
 
 
 def share(folder: Folder, trials: Path) -> None:
-    """Keep trials of labs with other courses."""
+    """Share the stores of lab trials with other courses."""
     for name in TRIALS:
         (trials / name).mkdir(parents=True, exist_ok=True)
         (folder.root / ".coursebuild" / name).symlink_to(trials / name)
 
 
 class Builds:
-    """Clean builds of what a folder holds, each in a folder of its own."""
+    """Makes clean builds of a course, each in a new folder."""
 
     def __init__(self, folder: Path, stores: Path) -> None:
         self.folder, self.stores, self.numbers = folder, stores, itertools.count()
         self.trials = folder / "trials"
 
     def __call__(self, folder: Folder) -> dict[str, bytes] | None:
-        """The published files, or nothing for a course with mistakes."""
+        """The published files, or None if the course has errors."""
         fresh = Folder(self.folder / f"clean {next(self.numbers)}")
         fresh.copy(folder.root)
         fresh.borrow(self.stores)

@@ -1,6 +1,6 @@
-"""Courses made of texts, without files, and what checks say of them.
+"""Courses made from texts, without files, and the diagnostics of checks as short lines.
 
-Entry points: `make_course`; `told`, a diagnostic in a line: its rule and what it points at.
+Entry points: `make_course`; `rules_and_texts`, the rule of each diagnostic and its source text.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def make_course(
     declaration_texts: Mapping[str, str] | None = None,
     files: Iterable[str] = (),
 ) -> Course:
-    """A course of two lessons, a planned one and a page.
+    """A course of two written lessons, a planned lesson and a page.
 
     `models` and `declaration_texts` are the texts of `models/NAME.xml` and `models/NAME.toml`, by
     name.
@@ -79,24 +79,24 @@ def make_course(
 
 
 def document(path: str, text: str) -> Document:
-    """A text without mistakes of its own."""
+    """Parse a document, which must give no diagnostics."""
     result = parse_document(Source(path, text), KINDS, lesson="lessons" in path)
     assert result.diagnostics == (), [d.message for d in result.diagnostics]
     return result.value
 
 
 def rules_and_texts(diagnostics: Iterable[Diagnostic]) -> list[str]:
-    """The rule of each, and the text that it points at."""
+    """The rule of each diagnostic, and the source text that it points at."""
     return [f"{d.rule}: {d.span.text}" for d in diagnostics]
 
 
 def messages(diagnostics: Iterable[Diagnostic]) -> list[str]:
-    """The message of each, with its help."""
+    """The message of each diagnostic, with its help."""
     return [d.message + (f" [{d.help}]" if d.help else "") for d in diagnostics]
 
 
 def facts(**fields: Any) -> ModelFacts:
-    """What a compiled model holds; nothing, but for what is said."""
+    """The facts of a compiled model: those of an empty one, except for the given fields."""
     empty: dict[str, Any] = dict.fromkeys(("bodies", "geoms", "joints", "nq", "nv", "nu"), 0)
     empty |= {"timestep": 0.002, "integrator": "Euler", "total_mass": 0.0}
     empty |= dict.fromkeys(("keyframes", "sites", "body_names"), ())

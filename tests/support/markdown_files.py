@@ -20,7 +20,7 @@ from markdown_it.token import Token
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(path for path in DOCS.rglob("*.md") if path.name != "rules.md")
-"""The written pages; that of the rules is generated."""
+"""The pages written by hand; the page of the rules is generated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,17 +30,17 @@ class Fence:
     page: str
     """The name of the document's file, without its suffix."""
     line: int
-    """Of its first line, from 1."""
+    """The number of its first line, from 1."""
     kind: str
     words: tuple[str, ...]
-    """Of the info string, after the kind."""
+    """The words of the info string after the kind."""
     text: str
 
     def __str__(self) -> str:
         return f"{self.page}-{self.line}"
 
     def is_(self, flag: str) -> bool:
-        """Whether the info string has a word."""
+        """Whether the info string has a flag."""
         return flag in self.words
 
     def value(self, key: str) -> str | None:
@@ -65,7 +65,7 @@ def fences(path: Path) -> list[Fence]:
 
 
 def code_spans(path: Path) -> list[str]:
-    """What stands between backticks in the prose of a document."""
+    """The inline code (between backticks) in the prose of a document."""
     inlines = (child for token in _tokens(path) for child in token.children or ())
     return [child.content for child in inlines if child.type == "code_inline"]
 
@@ -81,7 +81,7 @@ def links(path: Path) -> Iterator[str]:
 
 
 def anchors(path: Path) -> set[str]:
-    """The anchors of a document's headings where the repository is read, by GitHub's rule."""
+    """The anchors of a document's headings on GitHub."""
     tokens = _tokens(path)
     titles = (b.content for a, b in pairwise(tokens) if a.type == "heading_open")
     plain = (re.sub(r"`|\]\([^)]*\)", "", title).strip().lower() for title in titles)

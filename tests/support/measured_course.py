@@ -1,4 +1,4 @@
-"""A course with a model, and something that says what it was told to in the place of measuring."""
+"""A course with a model, and a fake bench that gives prepared outcomes instead of measuring."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TOML = '[[scenario]]\nname = "swing"\nduration = 0.2\nsample = 0.02\nqvel = [1.0
 
 
 class Fake:
-    """Says what it was told to, and what it was asked."""
+    """A bench that returns the outcomes it was given, and records its calls."""
 
     def __init__(self, *outcomes: ScenarioReport | Diagnostic | BaseException) -> None:
         self.outcomes = list(outcomes) or [swing()]
@@ -43,7 +43,7 @@ class Fake:
         return CompiledScene(scene, None, scenes)
 
     def add_card(self, root: Path, scene: CourseScene, report: SceneReport) -> SceneReport:
-        """What a model is made of is told elsewhere."""
+        """Add nothing: the card of a model has tests of its own."""
         return report
 
     def run_scenario(

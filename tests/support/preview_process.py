@@ -1,4 +1,4 @@
-"""A preview in a process of its own: asked over HTTP, and listened to."""
+"""A preview in its own process: HTTP requests to it, and its event stream."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ saves.QUIET_MANY = saves.QUIET_GONE = 3.0
 saves.LONGEST = 120.0
 sys.exit(main(sys.argv[1:]))
 """
-"""The command, which waits so long for the rest of a save that this comes in time on any machine.
+"""The command with longer waits for the rest of a save, so that it arrives in time on any machine.
 
-Its own patience is for what a program does in a few milliseconds while nothing else runs.
+The usual waits suit a program that saves within a few milliseconds on an idle machine.
 """
 
 
@@ -48,7 +48,7 @@ class Preview:
                 self.lines.append(line.decode().rstrip("\n"))
 
     def wait_for_line(self, text: str, after: int = 0, seconds: float = 300.0) -> str:
-        """The first line said that holds a text."""
+        """Wait for a line of the process's output that contains a text; returns it."""
         until = time.monotonic() + seconds
         while True:
             for line in self.lines[after:]:
@@ -59,7 +59,7 @@ class Preview:
             time.sleep(0.02)
 
     def check_interrupted(self) -> None:
-        """It comes to its end, in good order."""
+        """Check that the process ends as interrupted, without a traceback."""
         assert self.process.wait(600) == 130
         self._reader.join(600)
         assert self.lines[-1] == "interrupted"
@@ -80,18 +80,18 @@ class Preview:
             return response.status, dict(response.getheaders()), response.read()
 
     def accept(self, body: bytes, **headers: str) -> tuple[int, Any]:
-        """What the server says to an acceptance; as JSON, or as text."""
+        """The server's answer to an acceptance: its status, and its body as JSON or text."""
         status, _, data = self.get(f"{PREFIX}accept", "POST", body, **headers)
         return status, json.loads(data) if data.startswith(b"{") else data.decode()
 
     def accept_offer(self, id: str) -> tuple[int, Any]:
-        """What the server says when the first lesson's page accepts an offer."""
+        """The server's answer when the first lesson's page accepts an offer."""
         body = json.dumps({"page": "lessons/1.1-one.html", "id": id}).encode()
         return self.accept(body, Origin=f"http://127.0.0.1:{self.port}")
 
     @contextlib.contextmanager
     def events(self, page: str = "lessons/1.1-one.html") -> Iterator[Events]:
-        """What an open page is told."""
+        """The events that the server sends to an open page."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=120) as link:
             request = f"GET {PREFIX}events?page={page} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}"
             link.sendall(f"{request}\r\n\r\n".encode())
@@ -105,7 +105,7 @@ class Preview:
 
 
 class Events:
-    """The stream of one page, and what was told last."""
+    """The event stream of one page, and the last event of each kind."""
 
     def __init__(self, stream: Iterator[tuple[str, str]]) -> None:
         self.stream = stream
@@ -115,10 +115,10 @@ class Events:
         self.news: dict[str, Any] = {}
 
     def until(self, good: Callable[[Events], bool]) -> Events:
-        """Read on until something holds."""
+        """Read events until a condition holds."""
         while not (self.hello and self.news and good(self)):
             name, data = next(self.stream, ("", ""))
-            assert name, f"nothing is told any more; the last was {self.state} {self.news}"
+            assert name, f"the stream ended; the last events were {self.state} {self.news}"
             match name:
                 case "hello":
                     self.hello = json.loads(data)
@@ -133,7 +133,7 @@ class Events:
         return self
 
     def wait_for_change(self) -> Events:
-        """The page is another than it was."""
+        """Wait until the page has changed."""
         before = self.state
         return self.until(lambda events: events.state != before)
 
@@ -141,7 +141,7 @@ class Events:
         return [problem["rule"] for problem in self.news["problems"]]
 
     def wait_until_settled(self, *rules: str) -> Events:
-        """All is known, and this is what is wrong."""
+        """Wait until the preview is no longer busy and reports exactly these rules."""
         return self.until(lambda events: events.news["busy"] == "" and events.rules() == [*rules])
 
 
@@ -149,9 +149,9 @@ def _events(stream: Iterable[bytes]) -> Iterator[tuple[str, str]]:
     name, silent = "", 0
     for raw in stream:
         line = raw.decode().rstrip("\r\n")
-        if line == ": still here":  # nothing was told for some seconds
+        if line == ": still here":  # nothing was sent for some seconds
             silent += 1
-            assert silent < 20, "nothing was told for minutes"
+            assert silent < 20, "nothing was sent for minutes"
         elif line.startswith("event: "):
             name = line.removeprefix("event: ")
         elif line.startswith("data: "):

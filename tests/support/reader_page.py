@@ -1,4 +1,4 @@
-"""What the tests of a reader's progress share: to answer, and to read what is kept and shown."""
+"""Helpers of the tests of a reader's progress: answering, and reading what is stored and shown."""
 
 from __future__ import annotations
 

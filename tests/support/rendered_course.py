@@ -1,4 +1,4 @@
-"""Small courses made without files: a map, texts, and what running them is said to have found."""
+"""Small courses made without files: a map, texts, and prepared results of running them."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ BOX = '<mujoco model="box">\n  <worldbody/>\n</mujoco>\n'
 
 
 def read_assets() -> Assets:
-    """The templates of this checkout and the bundle that was made from it."""
+    """The templates of this checkout and its bundle."""
     templates, dist = ROOT / "templates", ROOT / "site" / "dist"
     assert (dist / "fonts" / "fonts.json").is_file(), "no bundle: run `python site/bundle.py`"
     return Assets(
@@ -122,7 +122,7 @@ def read_assets() -> Assets:
 
 
 class RenderedCourse(Struct, frozen=True):
-    """A course, what running it is said to have found, and the tool's own files."""
+    """A course, prepared results of running it, and the tool's own files."""
 
     course: Course
     results: Results
@@ -168,11 +168,11 @@ class RenderedCourse(Struct, frozen=True):
 
 
 CACHE = TemporaryDirectory()
-"""Where fonts are kept that were cut, and all else that depends on no course."""
+"""The cache of subset fonts and of other results that depend on no course."""
 
 
 class Make(Struct, frozen=True):
-    """Makes courses of texts."""
+    """Makes courses from texts."""
 
     assets: Assets
 
@@ -185,7 +185,7 @@ class Make(Struct, frozen=True):
         status: str = "verified",
         **texts: str,
     ) -> RenderedCourse:
-        """A course of one lesson's text (0.1); other texts by id."""
+        """A course with the text of lesson 0.1; `texts` are those of other documents by id."""
         map_result = parse_course_map(Source("content/course.toml", course))
         assert map_result.value is not None and not map_result.diagnostics, map_result.diagnostics
         rendered = with_documents(
@@ -219,7 +219,7 @@ def with_documents(course: Course, texts: Mapping[str, str]) -> Course:
 
 
 def results_of(course: Course, runs: Mapping[str, ScriptRun], status: str) -> Results:
-    """Every script printed `one`, `two` unless `runs` says otherwise; every formula is its TeX."""
+    """Scripts that are not in `runs` printed `one`, `two`; a formula is rendered as its TeX."""
     script_runs: list[ScriptRun] = []
     verdicts: list[Verdict] = []
     formulas: dict[Formula, str] = {}

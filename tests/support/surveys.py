@@ -1,4 +1,4 @@
-"""Surveys of models given as texts; nothing is timed but where a test gives a clock."""
+"""Surveys of models given as texts; timed only where a test gives a clock."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PENDULUM = """<body name="bob" pos="0 0 1"><joint name="pivot" axis="0 1 0"/>
 
 
 def scene(world: str = PENDULUM, *, head: str = "", rest: str = "") -> str:
-    """A model, laid out over lines."""
+    """The MJCF text of a model, over several lines."""
     return f"<mujoco>\n  {head}\n  <worldbody>\n    {world}\n  </worldbody>\n  {rest}\n</mujoco>\n"
 
 
@@ -51,7 +51,7 @@ def field(links: int, pieces: int) -> str:
 
 
 def open_files(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:
-    """A model whose files are given; assets are found by their names."""
+    """Open a model from the given files; its assets are found by file name."""
     data = {
         name: content.encode() if isinstance(content, str) else content
         for name, content in files.items()
@@ -65,7 +65,7 @@ def open_files(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:
 
 
 def parse_declared(text: str) -> Declarations:
-    """What a file beside a model declares."""
+    """The declarations of a TOML text."""
     result = parse_declarations(Source("models/a.toml", text))
     assert result.value is not None, result.diagnostics
     return result.value
@@ -84,7 +84,7 @@ def run_survey(
     quick: bool = True,
     clock: Clock | None = None,
 ) -> Survey:
-    """What was found in a model; `lesson` is a script that uses it."""
+    """Survey a model; `lesson` is a script that uses it."""
     model = open_files(text if isinstance(text, Mapping) else {PATH: text})
     place = Source("models/a.toml", "").span(0, 0)
     order = Order(
@@ -105,7 +105,7 @@ def run_survey(
 
 
 def findings_by_kind(survey: Survey) -> dict[str, Finding]:
-    """Findings that are no settings, by kind; where nothing is timed, all that there is."""
+    """The findings that are not about settings, by kind; without timing these are all findings."""
     things = [content for content in survey.report.findings if content.kind not in SETTINGS]
     kinds = [content.kind for content in things]
     assert len(set(kinds)) == len(kinds)
@@ -113,11 +113,11 @@ def findings_by_kind(survey: Survey) -> dict[str, Finding]:
 
 
 def names(finding: Finding) -> list[str]:
-    """What a finding is about."""
+    """The names of the elements that a finding is about."""
     return [place.name for place in finding.places]
 
 
 def fixed_text(survey: Survey, path: str = PATH) -> str:
-    """The file after all that is proved was changed."""
+    """The file after all proved edits."""
     files = {content.path: content.data for content in survey.text.documents}
     return (files | survey.text.files(survey.edits))[path].decode()

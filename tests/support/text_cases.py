@@ -1,6 +1,6 @@
-"""Fixtures of texts that are wrong: each line of an input is one text, as a string of Python.
+"""Fixtures of invalid texts: each line of an input is one text, as a Python string literal.
 
-Entry point: `check_texts`. In the expected part stands below each text what its author is told.
+Entry point: `check_texts`. The expected part has the diagnostics of each text below it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from support.positioned_nodes import format_diagnostics
 FOLDER = Path(__file__).parents[1] / "fixtures" / "texts"
 
 Reader = Callable[[str], tuple[object, tuple[Diagnostic, ...]]]
-"""From a text to what is made of it all the same, if anything, and what its author is told."""
+"""Reads a text: returns its value, or None if it has none, and its diagnostics."""
 
 
 def check_texts(name: str, read: Reader, *, rewriting: bool) -> None:

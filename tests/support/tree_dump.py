@@ -1,4 +1,4 @@
-"""A document as text: a node a line with its place, then what the author is told.
+"""A document as text: one line per node with its span, then the diagnostics.
 
 Spans are `line:column-line:column`, from 1, the end exclusive.
 """
@@ -78,7 +78,7 @@ def _node(node: Block | Inline | ListItem, depth: int) -> Iterator[str]:
 
 
 def _value(name: str, value: object) -> str:
-    """What a field adds to its node's line."""
+    """The text that a field adds to its node's line."""
     if isinstance(value, Span):
         return f"{name}={format_span(value)}"
     if isinstance(value, Excerpt):

@@ -44,7 +44,7 @@ class Runner:
     environment: dict[str, str] = field(default_factory=dict)
     caches: dict[str, Path] = field(default_factory=dict)
     summary: str = ""
-    """What the last run told reviewers."""
+    """The job summary of the last run."""
 
     def __post_init__(self) -> None:
         for name in ("bin", "home", "tmp", "sent", "artifacts", "pages"):
@@ -58,11 +58,11 @@ class Runner:
 
     @property
     def notes(self) -> list[str]:
-        """The calls of programs that reach other machines."""
+        """The recorded calls of programs that would reach other machines."""
         return (self.folder / "notes").read_text().splitlines()
 
     def run(self, workflow: dict[str, Any], ref: str, **github: str) -> dict[str, list[Step]]:
-        """Run the jobs that the event asks for; gives the commands of each, as far as they came."""
+        """Run the jobs that the event triggers; returns the commands that ran, by job."""
         values = {f"github.{name}": value for name, value in github.items()}
         values |= {f"secrets.{name}": value for name, value in self.secrets.items()}
         values["github.sha"] = git(self.repository, "rev-parse", ref)
@@ -91,9 +91,8 @@ class Runner:
         results: list[Step] = []
         cache_inputs: dict[str, Any] | None = None
         for step in steps:
-            if any(step_done.status for step_done in results) and "cancelled" not in step.get(
-                "if", ""
-            ):
+            failed = any(result.status for result in results)
+            if failed and "cancelled" not in step.get("if", ""):
                 continue
             if "run" in step:
                 results.append(self._command(place, step, values))
@@ -150,7 +149,7 @@ class Runner:
         return Step(step["run"], process.returncode, process.stdout, process.stderr)
 
     def _restore(self, place: Path, inputs: dict[str, str]) -> None:
-        """The cache of the key, else the newest whose key begins as one of the others does."""
+        """Copy the cache of the key, else the newest that matches one of the restore keys."""
         newest = list(reversed(self.caches))
         applies = [key for key in newest if key == inputs["key"]]
         for start in inputs.get("restore-keys", "").split():
@@ -174,7 +173,7 @@ class Runner:
 
 
 def git(place: Path, *arguments: str) -> str:
-    """What git prints, where nobody's settings count."""
+    """Run git without anyone's settings; returns its output."""
     names = {
         f"GIT_{role}_{part}": "a@b"
         for role in ("AUTHOR", "COMMITTER")
@@ -193,7 +192,7 @@ def git(place: Path, *arguments: str) -> str:
 
 
 def commit(place: Path) -> None:
-    """All that changed."""
+    """Commit all changes."""
     git(place, "add", "-A")
     git(place, "commit", "-q", "-m", "a change")
 
@@ -203,7 +202,7 @@ def _filled(text: str, values: dict[str, str]) -> str:
 
 
 def _holds(condition: str | None, values: dict[str, str]) -> bool:
-    """Whether a job runs, by the only kind of condition that jobs have here."""
+    """Whether a job's `if` holds; knows only the kind of condition used here, `NAME == VALUE`."""
     if condition is None:
         return True
     name, _, value = condition.partition(" == ")
