@@ -66,7 +66,7 @@ QUIET = """async () => {
 
 
 @pytest.fixture(scope="module")
-def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
+def offline_course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     """A course, built once; tests that change it copy its site."""
     folder = Folder(tmp_path_factory.mktemp("offline") / "course")
     folder.fill(TEXTS, stores)
@@ -77,9 +77,9 @@ def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
 
 
 @pytest.fixture
-def host(course: Folder, tmp_path: Path) -> Iterator[Host]:
+def host(offline_course: Folder, tmp_path: Path) -> Iterator[Host]:
     """Serves a copy of the site, in a folder of its host."""
-    shutil.copytree(course.root / "first", tmp_path / "site")
+    shutil.copytree(offline_course.root / "first", tmp_path / "site")
     with Host(tmp_path / "site", "/course/") as host:
         yield host
 
@@ -114,24 +114,26 @@ def see(page: Page, text: str) -> None:
     expect(page.get_by_text(text)).to_be_visible()
 
 
-def build_edited(course: Folder, site: Path, *edits: tuple[str, str, str]) -> None:
+def build_edited(offline_course: Folder, site: Path, *edits: tuple[str, str, str]) -> None:
     """Another build of the course in the place of the one that is served."""
     for path, old, new in edits:
-        course.replace(path, old, new)
+        offline_course.replace(path, old, new)
     try:
-        assert course.main("build").status == 0
+        assert offline_course.main("build").status == 0
         shutil.rmtree(site)
-        shutil.copytree(course.root / "public", site)
+        shutil.copytree(offline_course.root / "public", site)
     finally:
         for path, old, new in edits:
-            course.replace(path, new, old)
+            offline_course.replace(path, new, old)
 
 
 @pytest.fixture(scope="module")
-def stored_page(browsers: Mapping[str, Browser], course: Folder) -> Iterator[tuple[Page, Host]]:
+def stored_page(
+    browsers: Mapping[str, Browser], offline_course: Folder
+) -> Iterator[tuple[Page, Host]]:
     """A page of a site that was visited once, and that the tests leave as it is."""
     with (
-        Host(course.root / "first", "/course/") as host,
+        Host(offline_course.root / "first", "/course/") as host,
         browsers["plain"].new_context() as context,
     ):
         page, console = settled_page(context, host)
@@ -199,13 +201,15 @@ def test_nothing_is_asked_for_before_the_page_has_loaded_and_only_once(
 
 
 def test_page_that_was_kept_says_when_there_is_a_newer_one(
-    context: BrowserContext, host: Host, course: Folder
+    context: BrowserContext, host: Host, offline_course: Folder
 ) -> None:
     page, _ = settled_page(context, host)
     with host.away():
         visited(page, host, FIRST)  # which hears of no newer list
         build_edited(
-            course, host.folder, ("content/lessons/1.1-one.md", "Text of one.", "Other text.")
+            offline_course,
+            host.folder,
+            ("content/lessons/1.1-one.md", "Text of one.", "Other text."),
         )
         see(page, "Text of one.")
     page.evaluate("window.dispatchEvent(new Event('online'))")
@@ -216,10 +220,10 @@ def test_page_that_was_kept_says_when_there_is_a_newer_one(
 
 
 def test_several_courses_on_one_origin(
-    context: BrowserContext, course: Folder, tmp_path: Path
+    context: BrowserContext, offline_course: Folder, tmp_path: Path
 ) -> None:
-    shutil.copytree(course.root / "first", tmp_path / "both")
-    shutil.copytree(course.root / "first", tmp_path / "both" / "inner")
+    shutil.copytree(offline_course.root / "first", tmp_path / "both")
+    shutil.copytree(offline_course.root / "first", tmp_path / "both" / "inner")
     with Host(tmp_path / "both") as host:
         settled_page(context, host)
         page, _ = settled_page(context, host, "inner/")
@@ -352,10 +356,10 @@ class OneScript(Answers):
 
 @pytest.mark.parametrize("script", ["preview.js", "worker.js"])
 def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
-    context: BrowserContext, course: Folder, tmp_path: Path, script: str
+    context: BrowserContext, offline_course: Folder, tmp_path: Path, script: str
 ) -> None:
     """Either of two things sees the worker off: the page's script, and the worker in its place."""
-    shutil.copytree(course.root / "first", tmp_path / "site")
+    shutil.copytree(offline_course.root / "first", tmp_path / "site")
     host = Host(tmp_path / "site")
     page, _ = settled_page(context, host)
     host.stop()
