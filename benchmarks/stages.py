@@ -148,7 +148,7 @@ def measure_scripts(root: Path, repeat: int) -> None:
     candidates: dict[str, Callable[[], object]] = {
         "python, one after the other": bare,
         f"coursebuild, {options.jobs} at a time": lambda: run(
-            runnable, options, Progress(quiet=True)
+            runnable, options, Progress(quiet=True), memory=options.memory(fresh=True)
         ),
     }
     seconds = time_candidates(candidates, max(2, repeat // 3))
