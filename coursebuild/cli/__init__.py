@@ -19,7 +19,7 @@ import atexit
 import os
 import sys
 
-from coursebuild.cli.output import CLEAN, INTERRUPTED, USAGE, WRONG, say, write
+from coursebuild.cli.output import CLEAN, FAILURE, INTERRUPTED, USAGE, say, write
 from coursebuild.cli.unchanged import previous_output, split_directory
 
 TYPE_CHECKING = False
@@ -47,9 +47,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return say(INTERRUPTED, "interrupted")
     except MemoryError:
-        return say(WRONG, "coursebuild: there is not enough memory to begin")
+        return say(FAILURE, "coursebuild: there is not enough memory to begin")
     except OSError as error:
-        return say(WRONG, f"coursebuild: it cannot be loaded: {error}")
+        return say(FAILURE, f"coursebuild: it cannot be loaded: {error}")
     return _end(run(directory, words, alone=arguments is None), alone=arguments is None)
 
 

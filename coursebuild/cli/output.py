@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from coursebuild.pipeline.options import Options
     from coursebuild.report import Report, Style
 
-CLEAN, WRONG, USAGE, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
+CLEAN, FAILURE, USAGE, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 
 
 def fail(status: int, message: str, help: str = "") -> int:
@@ -46,7 +46,7 @@ def write(text: str, status: int) -> int:
         from coursebuild.core.files.errors import reason
 
         _discard_stdout()
-        return fail(WRONG, f"standard output cannot be written: {reason(error)}")
+        return fail(FAILURE, f"standard output cannot be written: {reason(error)}")
     return status
 
 
@@ -60,7 +60,7 @@ def _discard_stdout() -> None:
 def print_report(report: Report, form: str, options: Options) -> int:
     """Write a report in one of its formats; return the status of the command."""
     options.store.close()
-    return write(report_text(report, form, options), CLEAN if report.ok else WRONG)
+    return write(report_text(report, form, options), CLEAN if report.ok else FAILURE)
 
 
 def report_text(report: Report, form: str, options: Options) -> str:

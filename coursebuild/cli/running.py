@@ -11,7 +11,7 @@ import resource
 
 from coursebuild.cli.commands import run_command
 from coursebuild.cli.interrupts import Terminated, signals_as_exceptions
-from coursebuild.cli.output import INTERRUPTED, TERMINATED, USAGE, WRONG, fail, say
+from coursebuild.cli.output import FAILURE, INTERRUPTED, TERMINATED, USAGE, fail, say
 from coursebuild.core.files.errors import (
     EffectError,
     PublishRefusedError,
@@ -55,7 +55,7 @@ def _run_command(directory: str | None, words: Sequence[str]) -> int:
     limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
     if limit < _FILES_NEEDED:
         message = f"only {limit} files may be open at a time, and {_FILES_NEEDED} are needed"
-        return fail(WRONG, message, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
+        return fail(FAILURE, message, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
     try:
         return run_command(directory, words)
     except UsageError as error:
@@ -63,9 +63,9 @@ def _run_command(directory: str | None, words: Sequence[str]) -> int:
     except PublishRefusedError as error:
         return fail(USAGE, error.message, error.help)
     except EffectError as error:
-        return fail(WRONG, error.message, error.help)
+        return fail(FAILURE, error.message, error.help)
     except (MemoryError, OSError, RuntimeError) as error:
         lack = lacking(error)
         if lack is None:
             raise
-        return fail(WRONG, lack.message, lack.help)
+        return fail(FAILURE, lack.message, lack.help)

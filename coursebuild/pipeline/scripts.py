@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from msgspec import Struct
 
 from coursebuild.core.files.errors import OutsideProjectError
-from coursebuild.core.files.examples import Blocked, Obstacle, write_examples
+from coursebuild.core.files.examples import BlockedFile, Obstacle, write_examples
 from coursebuild.core.files.write import remove_leftovers
 from coursebuild.core.model import Course, Recording, document_blocks
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
@@ -37,7 +37,7 @@ class ExtractedScripts(Struct, frozen=True):
     diagnostics: tuple[Diagnostic, ...]
     written_paths: tuple[str, ...]
     removed_paths: tuple[str, ...]
-    blocked: tuple[Blocked, ...]
+    blocked: tuple[BlockedFile, ...]
 
 
 def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
@@ -87,7 +87,7 @@ _OBSTACLES = {
 
 
 def _diagnose_blocked(
-    blocked_file: Blocked, extraction: Extraction | None, course: Course
+    blocked_file: BlockedFile, extraction: Extraction | None, course: Course
 ) -> Diagnostic:
     """Why a file in `examples/` was left alone, and how to go on."""
     message = _OBSTACLES[blocked_file.obstacle].format(path=blocked_file.path)

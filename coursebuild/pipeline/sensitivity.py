@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.model.sensitivity import HALVED, RUNS, Sensitivity
+from coursebuild.core.model.sensitivity import HALVED_RUN, RUNS, Sensitivity
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.sensitivity import is_worth_moving, sensitivity
@@ -55,7 +55,7 @@ def measure(
         for script, base in pairs
         if is_worth_moving(course, recordings.get(script.path, ()), base)
     ]
-    numbers = (*range(1, RUNS + 1), *((HALVED,) if halve else ()))
+    numbers = (*range(1, RUNS + 1), *((HALVED_RUN,) if halve else ()))
     perturbed_runs = _run_perturbed(moved_scripts, options, progress, numbers)
     return tuple(
         sensitivity(
@@ -82,7 +82,7 @@ def _run_perturbed(
     with ScriptServer(sandbox=options.sandbox) as server:
         server_options = replace(options, run_all=server.run)
         for number in numbers:
-            halving = number == HALVED
+            halving = number == HALVED_RUN
             stage = "halving timesteps" if halving else f"moving initial states, {number} of {RUNS}"
             for script_run in run(
                 scripts, server_options, progress, stage, memory, perturbation=number

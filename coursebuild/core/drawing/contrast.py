@@ -9,7 +9,7 @@ from collections.abc import Collection
 
 GROUNDS_LIGHT, GROUNDS_DARK = ("#fcfbf8", "#f4f2ec"), ("#17191c", "#1f2226")
 """The backgrounds of text, `--paper` and `--sheet` of the style sheet."""
-LEAST, ENOUGH = 4.5, 7.0
+REQUIRED_CONTRAST, RECOMMENDED_CONTRAST = 4.5, 7.0
 """The contrast that text must have, and should have (success criteria 1.4.3 and 1.4.6)."""
 
 
@@ -20,7 +20,7 @@ def contrast(colour: str, grounds: Collection[str]) -> float:
     return min((bright + 0.05) / (dim + 0.05) for dim, bright in pairs)
 
 
-def legible(colour: str, grounds: Collection[str], least: float = LEAST) -> str:
+def legible(colour: str, grounds: Collection[str], least: float = REQUIRED_CONTRAST) -> str:
     """The colour, mixed with as little black or white as it needs on these backgrounds."""
     end = 0 if _luminance(next(iter(grounds))) > 0.5 else 255
     mixes = (

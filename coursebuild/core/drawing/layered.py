@@ -29,9 +29,9 @@ _Point: TypeAlias = str | tuple[str, str, int]
 """A node, or an edge where it crosses a layer."""
 
 _SWEEPS = 12
-_PLACINGS = 40
+_PASSES = 40
 _BOTH_SIDES = 32
-"""The last placings, which use the layers above and below at once."""
+"""The last passes, which use the layers above and below at once."""
 _STRAIGHT = 20.0
 """The weight of an edge that is the only one of both its ends on that side."""
 
@@ -220,11 +220,9 @@ def _place_points(
         steps.append(places)
         x |= {point: place - middle for point, place in zip(row, places, strict=True)}
     weights = _weigh_neighbours(parents, children), _weigh_neighbours(children, parents)
-    for placing in range(_PLACINGS):
-        down = placing % 2 == 0
-        sides = (
-            weights if placing >= _PLACINGS - _BOTH_SIDES else weights[:1] if down else weights[1:]
-        )
+    for number in range(_PASSES):
+        down = number % 2 == 0
+        sides = weights if number >= _PASSES - _BOTH_SIDES else weights[:1] if down else weights[1:]
         for level in range(len(rows)) if down else reversed(range(len(rows))):
             row, places = rows[level], steps[level]
             offsets = [

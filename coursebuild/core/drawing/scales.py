@@ -92,7 +92,7 @@ def _digits(values: Sequence[float], form: str, tolerance: float) -> list[str] |
     return None
 
 
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def _readable(text: str) -> str:
@@ -100,7 +100,7 @@ def _readable(text: str) -> str:
     mantissa = mantissa.replace("-", "\u2212")
     if float(text) == 0:
         return "0" if exponent else mantissa.lstrip("\u2212")
-    return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}" if exponent else mantissa
+    return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}" if exponent else mantissa
 
 
 def log_ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
@@ -160,5 +160,5 @@ def _scaled(mantissa: int, exponent: int) -> str:
     """A small whole number times a power of ten, as text; without the power if that is short."""
     if -3 <= exponent <= 3:
         return f"{mantissa * 10**exponent if exponent >= 0 else mantissa / 10**-exponent:g}"
-    power = "10" + str(exponent).translate(_RAISED)
+    power = "10" + str(exponent).translate(_SUPERSCRIPTS)
     return power if mantissa == 1 else f"{mantissa}·{power}"

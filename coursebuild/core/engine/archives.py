@@ -22,10 +22,10 @@ from coursebuild.core.model.results import SiteFile
 
 _DATE = (1980, 1, 1, 0, 0, 0)
 _LEVEL = 6
-_FIRST = "mimetype"
+_MIMETYPE = "mimetype"
 """The file that an e-book must begin with, uncompressed."""
-_STORED = (".gz", ".jpeg", ".jpg", ".png", ".webp", ".woff2", ".zip", _FIRST)
-_AUTHORED = ("features", "models", "examples", ".coursebuild", ".git")
+_UNCOMPRESSED_SUFFIXES = (".gz", ".jpeg", ".jpg", ".png", ".webp", ".woff2", ".zip", _MIMETYPE)
+_AUTHOR_FOLDERS = ("features", "models", "examples", ".coursebuild", ".git")
 
 
 def check_target(root: Path, out: Path, mark: str, *, archive: bool) -> None:
@@ -37,7 +37,7 @@ def check_target(root: Path, out: Path, mark: str, *, archive: bool) -> None:
         PublishRefusedError: the file must not go there.
     """
     place = Path(os.path.realpath(out))
-    for name in _AUTHORED:
+    for name in _AUTHOR_FOLDERS:
         if place.is_relative_to(os.path.realpath(root / name)):
             raise PublishRefusedError(f"{out} lies in {name}/ of the project, where no export goes")
     if any((folder / MARKER).is_file() for folder in place.parents):
@@ -100,9 +100,9 @@ def write_export(out: Path, files: Iterable[SiteFile], *, archive: bool) -> int:
 
 def _pack(target: BinaryIO, files: Iterable[SiteFile]) -> None:
     with zipfile.ZipFile(target, "w") as archive:
-        for file in sorted(files, key=lambda file: (file.path != _FIRST, file.path)):
+        for file in sorted(files, key=lambda file: (file.path != _MIMETYPE, file.path)):
             entry = zipfile.ZipInfo(file.path, _DATE)
-            is_stored = file.path.lower().endswith(_STORED)
+            is_stored = file.path.lower().endswith(_UNCOMPRESSED_SUFFIXES)
             entry.compress_type = zipfile.ZIP_STORED if is_stored else zipfile.ZIP_DEFLATED
             entry.create_system = 3
             entry.external_attr = 0o100644 << 16

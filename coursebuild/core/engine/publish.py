@@ -44,7 +44,7 @@ _EXCHANGE = {"linux": "renameat2", "darwin": "renameatx_np"}
 _AT_FDCWD = {"linux": -100, "darwin": -2}
 _RENAME_EXCHANGE = 2  # linux/fs.h; RENAME_SWAP in sys/stdio.h of macOS
 _UNSUPPORTED = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EPERM)
-_AUTHORED = ("content", "features", "models", "examples", ".coursebuild", ".git")
+_AUTHOR_FOLDERS = ("content", "features", "models", "examples", ".coursebuild", ".git")
 
 
 def check_output_folder(root: Path, out: Path) -> Path:
@@ -133,7 +133,7 @@ def _check_place(root: Path, out: Path, place: Path) -> None:
         raise PublishRefusedError(
             f"{out} {relation}", help="publish to a folder of its own, such as `public`"
         )
-    for name in _AUTHORED:
+    for name in _AUTHOR_FOLDERS:
         if place.is_relative_to(os.path.realpath(root / name)):
             raise PublishRefusedError(f"{out} lies in {name}/ of the project, where no site may go")
     _recover(place)

@@ -23,7 +23,7 @@ from coursebuild.core.files.errors import EffectError, reason
 
 _VERSION = "coursebuild-1"
 """The folder of entries in the shared place; change it when the format of entries changes."""
-_SIGNED = "coursebuild-1-signed"
+_SIGNED_VERSION = "coursebuild-1-signed"
 """The folder of signed entries, which only those who have the key can make."""
 _TIMEOUT = 15.0
 """Seconds that a request may take."""
@@ -145,7 +145,7 @@ class SharedCache:
         self.place = place
         self.key = key
         """The key that entries are signed with; empty where they are not signed."""
-        self._folder = _SIGNED if key else _VERSION
+        self._folder = _SIGNED_VERSION if key else _VERSION
         self.timeout = timeout
         self.tell: Callable[[str], None] = lambda line: None
         """Called once, with a message, when the place cannot be used."""

@@ -54,7 +54,7 @@ class Obstacle(enum.Enum):
     """A folder stands at its path, or a file where its folder should be."""
 
 
-class Blocked(Struct, frozen=True):
+class BlockedFile(Struct, frozen=True):
     """A path that was left alone."""
 
     path: str
@@ -73,7 +73,7 @@ class ExamplesReport(Struct, frozen=True):
     written: tuple[str, ...]
     unchanged: tuple[str, ...]
     removed: tuple[str, ...]
-    blocked: tuple[Blocked, ...]
+    blocked: tuple[BlockedFile, ...]
 
 
 def write_examples(root: Path, scripts: Mapping[str, bytes]) -> ExamplesReport:
@@ -120,7 +120,7 @@ class _Update:
         self.written: list[str] = []
         self.unchanged: list[str] = []
         self.removed: list[str] = []
-        self.blocked: list[Blocked] = []
+        self.blocked: list[BlockedFile] = []
 
     def run(self) -> ExamplesReport:
         for path in sorted(self.scripts.keys() | self.known_hashes.keys()):
@@ -226,7 +226,7 @@ class _Update:
         diverged = (
             obstacle is Obstacle.EDITED and new is not None and _hash(new) not in known_hashes
         )
-        self.blocked.append(Blocked(path, obstacle, text, diff, diverged))
+        self.blocked.append(BlockedFile(path, obstacle, text, diff, diverged))
 
 
 def unified_diff(old: str, new: str, old_name: str, new_name: str) -> str:

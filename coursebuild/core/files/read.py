@@ -32,7 +32,7 @@ _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 """Byte order marks."""
 _MAX_NUL_SHARE = 0.1
 """The share of NUL bytes that a text may have: a stray one is shown as U+FFFD, as in CommonMark."""
-_OUTSIDE = "is reached through a link that leads out of the project"
+_OUTSIDE_REASON = "is reached through a link that leads out of the project"
 
 
 class CourseFiles(Struct, frozen=True):
@@ -117,7 +117,7 @@ def _read_inside(root: Path, path: str) -> bytes:
     if "\0" in path:
         raise EffectError("a path holds a null character")
     if not Path(os.path.realpath(root / path)).is_relative_to(root):
-        raise OutsideProjectError(f"{path} {_OUTSIDE}")
+        raise OutsideProjectError(f"{path} {_OUTSIDE_REASON}")
     try:
         return _read_regular(root / path)
     except OSError as error:
@@ -168,7 +168,7 @@ class _Reader:
         if not folder.exists() and not folder.is_symlink():
             return
         if not Path(os.path.realpath(folder)).is_relative_to(self.root):
-            self._refuse(top, _OUTSIDE)
+            self._refuse(top, _OUTSIDE_REASON)
         elif not folder.is_dir():
             self._refuse(top, "is not a folder")
         else:
@@ -197,7 +197,7 @@ class _Reader:
             return
         full = f"{self.root}/{path}"
         if is_link and not Path(os.path.realpath(full)).is_relative_to(self.root):
-            self._refuse(path, _OUTSIDE)
+            self._refuse(path, _OUTSIDE_REASON)
             return
         try:
             mode = os.stat(full).st_mode  # noqa: PTH116
@@ -227,7 +227,7 @@ class _Reader:
             try:
                 data = _read_inside(self.root, path)
             except OutsideProjectError:
-                self._refuse(path, _OUTSIDE)
+                self._refuse(path, _OUTSIDE_REASON)
             except EffectError as error:
                 self._refuse(path, error.message.removeprefix(f"{path} "))
             else:

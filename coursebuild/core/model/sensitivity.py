@@ -16,7 +16,7 @@ PERTURBATION = 1e-12
 RUNS = 4
 """Runs with moved states of each script: two pairs in opposite directions, the second pair half as
 far away."""
-HALVED = -1
+HALVED_RUN = -1
 """The number of the run whose timesteps are halved."""
 CHAOTIC = 1e8
 """A simulation is chaotic if its states are more than this many times as far apart at the end as at

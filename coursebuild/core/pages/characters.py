@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-_FORBIDDEN = re.compile(
+_FORBIDDEN_CHARACTER = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff\U0001fffe-\U0010ffff]"
 )
 """Past U+1FFFF also allowed ones: listing only the last two of each plane would be slow."""
@@ -15,7 +15,7 @@ _FORBIDDEN = re.compile(
 
 def visible(text: str) -> str:
     """The text without what HTML forbids: a symbol for each control, U+FFFD for the rest."""
-    return _FORBIDDEN.sub(_picture, str(text))  # `str`, as `Markup` would escape
+    return _FORBIDDEN_CHARACTER.sub(_picture, str(text))  # `str`, as `Markup` would escape
 
 
 def _picture(match: re.Match[str]) -> str:

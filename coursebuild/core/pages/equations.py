@@ -15,8 +15,8 @@ from coursebuild.core.features import Mathml
 from coursebuild.core.model import Document, Equation
 from coursebuild.core.model.equations import display_formulas
 
-_COUNTED = 'class="tml-eqn"'
-_TAGGED = 'class="tml-tag"'
+_COUNTER_CLASS = 'class="tml-eqn"'
+_TAG_CLASS = 'class="tml-tag"'
 _TAG = re.compile(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
 
 
@@ -26,8 +26,8 @@ def number_equations(document: Document, mathml: Mathml) -> dict[int, Equation]:
     count = 0
     for formula in display_formulas(document):
         html = mathml(formula.tex, True)
-        styled_count = html.count(_COUNTED)
-        tag = _TAG.search(html) if _TAGGED in html else None
+        styled_count = html.count(_COUNTER_CLASS)
+        tag = _TAG.search(html) if _TAG_CLASS in html else None
         number, has_margin_number = "", False
         if formula.label is not None and formula.id:
             has_margin_number = not styled_count and tag is None

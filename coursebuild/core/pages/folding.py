@@ -5,8 +5,8 @@ Entry points: `fold(code)`; `find_imports(code)`, the modules that it imports.
 1. A fold begins and ends between top-level statements.
 2. The head (docstring, imports, constants) is folded if it is long: the page around the script has
    said what it is for.
-3. The rest is shown up to `SHOWN` lines and then folded, except for the `__main__` guard at the
-   end, which says what the script does.
+3. The rest is shown up to `SHOWN_LINES` lines and then folded, except for the `__main__` guard at
+   the end, which says what the script does.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ LONG = 48
 """Lines; a script up to this length is not folded."""
 HEAD = 8
 """Lines; a head shorter than this is not worth folding."""
-SHOWN = 44
+SHOWN_LINES = 44
 """About how many lines of the rest are shown."""
 TAIL = 12
 """Lines; a `__main__` guard up to this length is not folded, and no fold is shorter than this."""
@@ -113,7 +113,7 @@ def _fold_rest(body: list[ast.stmt], cuts: list[int], lines: list[str]) -> tuple
     """
     first, total = cuts[0], len(lines)
     shown_count = 1
-    while shown_count < len(body) and cuts[shown_count + 1] - first <= SHOWN:
+    while shown_count < len(body) and cuts[shown_count + 1] - first <= SHOWN_LINES:
         shown_count += 1
     has_guard = shown_count < len(body) and _is_guard(body[-1]) and total - cuts[-2] < TAIL
     stop = len(body) - 1 if has_guard else len(body)

@@ -35,7 +35,7 @@ _TAG = re.compile(r"<[^>]*>")
 _PIECE = re.compile(r"<math>.*?</math>", re.DOTALL)
 _OPENING = frozenset("([“‘\"'")
 _GLUE_START, _GLUE_END = '<span class="held">', "</span>"
-_TOUCHING = re.compile(
+_FORMULAS_WITH_PUNCTUATION = re.compile(
     r"""((?:<math>.*?</math>)+)((?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*)""", re.DOTALL
 )
 
@@ -139,7 +139,7 @@ def glue_formulas(html: str) -> str:
     position = 0
     start = html.find("<math>")
     while start >= 0:
-        match = _TOUCHING.match(html, start)
+        match = _FORMULAS_WITH_PUNCTUATION.match(html, start)
         if match is None:
             break
         before = start

@@ -49,7 +49,7 @@ _NARROW = _Look(50, 30, 5, 58, False)
 _SIZE = 12.0
 """The font size."""
 _LINE = 15.0
-_PASSING = 0.2
+_CROSSING_WIDTH = 0.2
 """Room for an arrow that crosses a layer, in widths of nodes."""
 _EDGE = 2.0
 """Room for the lines around nodes at the edge of a drawing."""
@@ -123,7 +123,9 @@ def drawings(graph: LessonGraph, words: Strings) -> tuple[Markup, Markup]:
 @functools.lru_cache(maxsize=256)
 def _layout(count: int, edges: tuple[tuple[str, str], ...]) -> Layout:
     """The layout of a graph with numbered nodes, kept because many graphs are alike."""
-    return layered_layout([str(number) for number in range(count)], edges, 1.0, 0.0, _PASSING)
+    return layered_layout(
+        [str(number) for number in range(count)], edges, 1.0, 0.0, _CROSSING_WIDTH
+    )
 
 
 def _drawing(graph: LessonGraph, layout: Layout, words: Strings, look: _Look) -> Markup:

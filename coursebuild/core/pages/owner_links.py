@@ -13,7 +13,7 @@ from coursebuild.core.model import Lesson, Owner
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
 
-MOST = 12
+MAX_LINKS = 12
 """The most links that a list shows; it says how many more there are."""
 
 
@@ -43,10 +43,10 @@ def owner_links(library: Library, place: urls.Place, owners: Sequence[Owner]) ->
     """The links to lessons and pages, with the titles in the current map."""
     current = (
         library.lessons[owner.id] if isinstance(owner, Lesson) else library.pages[owner.id]
-        for owner in owners[:MOST]
+        for owner in owners[:MAX_LINKS]
     )
     visible = tuple(owner_link(place, owner) for owner in current)
-    return OwnerLinks(visible, max(0, len(owners) - MOST))
+    return OwnerLinks(visible, max(0, len(owners) - MAX_LINKS))
 
 
 def added_page(library: Library, place: urls.Place, name: str) -> str:

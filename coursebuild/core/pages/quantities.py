@@ -19,12 +19,12 @@ from typing import Literal
 
 from markupsafe import Markup, escape
 
-_PREFIXED = (
+_SI_UNIT = (
     "(?:[YZEPTGMkhcdm\u00b5\u03bcunpf]|da)?"
     "(?:bar|cd|eV|Gy|Hz|kat|lm|lx|mol|Pa|rad|sr|Sv|Wb|[ACFgHJKLlmNSsTtVW\u03a9\u2126])"
 )
 _UNIT = (
-    rf"(?:{_PREFIXED}|min|kgf?|rpm|rev|fps|px|pt|arcmin|arcsec|[kMGT]i?B|B|bit|[hd]|°[CF]?|[%‰′″])"
+    rf"(?:{_SI_UNIT}|min|kgf?|rpm|rev|fps|px|pt|arcmin|arcsec|[kMGT]i?B|B|bit|[hd]|°[CF]?|[%‰′″])"
     r"(?:[²³⁻¹⁴⁶0-9]|\^-?[0-9])*"
 )
 _SPACES = "[ \u00a0\u202f]"

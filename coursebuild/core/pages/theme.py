@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from coursebuild.core.drawing.contrast import ENOUGH, GROUNDS_DARK, legible
+from coursebuild.core.drawing.contrast import GROUNDS_DARK, RECOMMENDED_CONTRAST, legible
 from coursebuild.core.model.theme import Theme, ThemeFile
 from coursebuild.core.pages.font_files import course_face
 from coursebuild.core.pages.fonts import Face
@@ -38,7 +38,7 @@ def accents(theme: Theme) -> tuple[str, str]:
     if not theme.accent and not theme.accent_dark:
         return _ACCENT
     light = theme.accent or _ACCENT[0]
-    return light, theme.accent_dark or legible(light, GROUNDS_DARK, ENOUGH)
+    return light, theme.accent_dark or legible(light, GROUNDS_DARK, RECOMMENDED_CONTRAST)
 
 
 def _accent(theme: Theme) -> str:

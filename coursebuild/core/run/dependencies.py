@@ -30,9 +30,9 @@ VERSION = "6"
 _MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)
 _PERTURBATION = "moved states"
 """Change it when the results of such runs mean something else: they then run again."""
-_SHOWN = 6
+_MAX_MODULES = 6
 """The most modules of a list that are shown."""
-_CHANGING = ("/proc/", "/sys/", "/dev/")
+_VOLATILE_FOLDERS = ("/proc/", "/sys/", "/dev/")
 
 
 class Kind(enum.Enum):
@@ -193,7 +193,7 @@ def reason_forgotten(run: ScriptRun) -> str:
             assert_never(run.outcome)
     if run.trace is None:
         return "nobody could watch what it looks at"
-    changing = next((p for p in run.trace.outside if p.startswith(_CHANGING)), None)
+    changing = next((p for p in run.trace.outside if p.startswith(_VOLATILE_FOLDERS)), None)
     if changing is not None and changing != "/dev/null":
         return f"it reads {changing}"
     return run.trace.opaque
@@ -281,8 +281,8 @@ def describe(dependency: Dependency) -> str:
             return f"the list of files in {dependency.name or '.'}"
         case Kind.SOUGHT:
             folder, modules = parse_sought(dependency.name)
-            names = ", ".join(modules[:_SHOWN])
-            rest = f" and {len(modules) - _SHOWN} more" if len(modules) > _SHOWN else ""
+            names = ", ".join(modules[:_MAX_MODULES])
+            rest = f" and {len(modules) - _MAX_MODULES} more" if len(modules) > _MAX_MODULES else ""
             return f"no file of {folder or 'the course'} has the name of a module ({names}{rest})"
         case Kind.MODULE:
             if not dependency.state:

@@ -37,7 +37,7 @@ from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.versions import engine_version, python_version
 
 _FOLDER = "environments"
-_KEPT = 4
+_MAX_ENVIRONMENTS = 4
 """Environments that are kept."""
 _VERSION = re.compile(
     r"\d+(\.\d+){0,3}((a|b|rc)\d+)?(\.post\d+)?(\.dev\d+)?(\+[a-z0-9.]+)?", re.ASCII
@@ -226,5 +226,5 @@ def _remove_unused(folder: Path, current: Path) -> None:
     """Remove all environments except those that were used last."""
     rest = [path for path in folder.iterdir() if path != current]
     rest.sort(key=lambda path: path.stat().st_mtime, reverse=True)
-    for path in rest[_KEPT - 1 :]:
+    for path in rest[_MAX_ENVIRONMENTS - 1 :]:
         shutil.rmtree(path, ignore_errors=True)

@@ -34,7 +34,7 @@ SIZE = 1e-12
 """Relative; for a state of zeros absolute, in the unit of the coordinate (rad, m)."""
 _CORRECTION = 1e-9
 """Changes below this part of the largest number of a field only correct a rounding."""
-_COMPUTING = (
+_COMPUTING_FUNCTIONS = (
     "mj_step",
     "mj_step1",
     "mj_forward",
@@ -87,7 +87,7 @@ class _Perturbation:
         self._count = 0
         self._numbers = 0
         wrap = mujoco_tracing.wrap_functions
-        wrap(mujoco, _COMPUTING, self._before, self._after)
+        wrap(mujoco, _COMPUTING_FUNCTIONS, self._before, self._after)
         wrap(mujoco, _INTEGRATING, None, self._after)
         mujoco_tracing.replace_rollout(mujoco, self._rollout)
 

@@ -48,7 +48,13 @@ from coursebuild.core.run.dependencies import (
     state_changes,
 )
 from coursebuild.core.run.packages import InstalledPackages
-from coursebuild.core.run.run_record import REMEMBERED, RunRecord, from_bytes, record_of, to_bytes
+from coursebuild.core.run.run_record import (
+    STORABLE_OUTCOMES,
+    RunRecord,
+    from_bytes,
+    record_of,
+    to_bytes,
+)
 from coursebuild.core.run.script_environment import Interpreter, conditions, places
 
 _RESULTS, _LAST = "scripts", "last"
@@ -220,7 +226,7 @@ class Memory:
         record = record_of(inputs, dependencies, int(time.time()), reason, run)
         key = ""
         if not reason:
-            assert run.outcome in REMEMBERED
+            assert run.outcome in STORABLE_OUTCOMES
             if self.fresh:
                 self._compare(record, run)
             key = f"{group_key(inputs)}/{result_key(dependencies)}"
@@ -311,7 +317,7 @@ def _fits(record: RunRecord, inputs: Inputs) -> bool:
     return (
         record.inputs == inputs
         and record.stored_run.path == inputs.path
-        and record.stored_run.outcome in REMEMBERED
+        and record.stored_run.outcome in STORABLE_OUTCOMES
         and not record.reason_forgotten
     )
 

@@ -113,7 +113,7 @@ def existing_files(root: Path, path: str, text: str) -> tuple[str, ...]:
 
 
 _LINE = re.compile(r"\bline (\d+)|Line number=(\d+)", re.IGNORECASE)
-_NAMED = re.compile(r"Element name '([^']*)', id -?\d+, line \d+$")
+_ELEMENT_AND_LINE = re.compile(r"Element name '([^']*)', id -?\d+, line \d+$")
 
 
 def error_line(message: str, text: str) -> int | None:
@@ -129,7 +129,7 @@ def error_line(message: str, text: str) -> int | None:
     if not numbers or not 1 <= numbers[-1] <= max(len(lines), 1):
         return None
     line = numbers[-1]
-    match = _NAMED.search(message)
+    match = _ELEMENT_AND_LINE.search(message)
     if match and "<attach" in text:
         name = match.group(1)
         if not name or name not in "\n".join(lines[line - 1 : line + 3]):

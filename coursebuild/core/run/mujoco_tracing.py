@@ -17,8 +17,8 @@ from typing import Any
 from coursebuild.core.run.mujoco_files import ModelFiles
 from coursebuild.core.run.tracing import Tracer
 
-Before = Callable[[tuple[Any, ...], Mapping[str, Any]], None]
-After = Callable[[tuple[Any, ...], Mapping[str, Any], Any], None]
+CallHook = Callable[[tuple[Any, ...], Mapping[str, Any]], None]
+ReturnHook = Callable[[tuple[Any, ...], Mapping[str, Any], Any], None]
 
 tracer: Tracer | None = None
 """The tracer that takes the notes; there are none before it is set."""
@@ -40,7 +40,7 @@ def wrap(mujoco: ModuleType) -> None:
     """Wrap the functions of an imported MuJoCo."""
     model, spec = getattr(mujoco, "MjModel", None), getattr(mujoco, "MjSpec", None)
 
-    def reader(scan: Callable[[ModelFiles, Any], None], *, assets: bool = True) -> Before:
+    def reader(scan: Callable[[ModelFiles, Any], None], *, assets: bool = True) -> CallHook:
         """Notes the files of a model whose path or text is the first argument."""
 
         def note_files(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
@@ -54,7 +54,7 @@ def wrap(mujoco: ModuleType) -> None:
         if name not in _given_names(args, keywords):
             _note_read(name)
 
-    class_readers: tuple[tuple[Any, str, Before], ...] = (
+    class_readers: tuple[tuple[Any, str, CallHook], ...] = (
         (model, "from_xml_path", reader(ModelFiles.scan_path)),
         (model, "from_xml_string", reader(ModelFiles.scan_text)),
         (model, "from_binary_path", note_binary),
@@ -73,7 +73,7 @@ def wrap(mujoco: ModuleType) -> None:
         wrap_functions(mujoco, (name,), _writer(position))
 
 
-def _spec_reader(position: int) -> Before:
+def _spec_reader(position: int) -> CallHook:
     """Notes the files of the specification that is the argument at `position`."""
     return lambda args, keywords: ModelFiles(_note_read).scan_spec(
         _get_argument(args, keywords, position, "child")
@@ -86,7 +86,7 @@ def _note_library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         tracer.note_library(path)
 
 
-def _writer(position: int) -> Before:
+def _writer(position: int) -> CallHook:
     """Notes a file that is written, whose name is the argument at `position`."""
 
     def note_write(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
@@ -99,8 +99,8 @@ def _writer(position: int) -> Before:
 
 def wrap_function(
     real: Callable[..., Any],
-    before: Before | None = None,
-    after: After | None = None,
+    before: CallHook | None = None,
+    after: ReturnHook | None = None,
     *,
     like: Callable[..., Any] | None = None,
 ) -> Callable[..., Any]:
@@ -132,8 +132,8 @@ def wrap_function(
 def wrap_functions(
     mujoco: ModuleType,
     names: Iterable[str],
-    before: Before | None = None,
-    after: After | None = None,
+    before: CallHook | None = None,
+    after: ReturnHook | None = None,
 ) -> None:
     """Wrap those of these functions that MuJoCo has, in every module that holds them."""
     for name in names:
@@ -142,7 +142,9 @@ def wrap_functions(
             replace_function(mujoco, name, wrap_function(real, before, after))
 
 
-def wrap_method(owner: Any, name: str, before: Before | None, after: After | None = None) -> None:
+def wrap_method(
+    owner: Any, name: str, before: CallHook | None, after: ReturnHook | None = None
+) -> None:
     """Wrap a method of one of MuJoCo's classes, if it has this method."""
     real = getattr(owner, "__dict__", {}).get(name)
     if real is not None:

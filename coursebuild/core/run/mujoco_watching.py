@@ -35,8 +35,8 @@ _KINDS = (
     (" in QACC ", "mjWARN_BADQACC", "accelerations"),
 )
 """A part of MuJoCo's message, the counter, and our name for the sign."""
-_NEEDED = ("MjData", "_functions", "mjtGeom", "mjtWarning")
-_UNNAMED = "MuJoCo Model"
+_REQUIRED_ATTRIBUTES = ("MjData", "_functions", "mjtGeom", "mjtWarning")
+_DEFAULT_MODEL_NAME = "MuJoCo Model"
 """MuJoCo's name for a model that its author has not named."""
 _MOST_NOTES = 16
 _MOST_CHECKS = 5000
@@ -48,7 +48,9 @@ _MOST_HELD = 1 << 26
 def watch(mujoco: ModuleType) -> None:
     """Watch the simulations of an imported MuJoCo, if its version has what this needs."""
     global _watch
-    if "numpy" not in sys.modules or not all(hasattr(mujoco, name) for name in _NEEDED):
+    if "numpy" not in sys.modules or not all(
+        hasattr(mujoco, name) for name in _REQUIRED_ATTRIBUTES
+    ):
         return
     _watch = _Watch(mujoco)
 
@@ -206,7 +208,7 @@ def _name(data: Any) -> str:
     if not hasattr(data, "model"):  # before MuJoCo 3.1
         return ""
     name = str(data.model.names.partition(b"\0")[0], "utf-8", "replace")
-    return "" if name == _UNNAMED else name
+    return "" if name == _DEFAULT_MODEL_NAME else name
 
 
 def _describe_geom(model: Any, index: int) -> str:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from importlib.metadata import Distribution
 
 ABSENT = ""
-_OURS = "coursebuild"
+_TOOL_PACKAGE = "coursebuild"
 _LIBRARY = Path(__file__).resolve().parents[3]
 _TICK = 2_000_000_000
 """The coarsest clock of a file system, ns."""
@@ -154,7 +154,7 @@ def _scan(folders: Sequence[str]) -> dict[str, str]:
     seen_names: set[str] = set()
     for distribution in importlib.metadata.distributions(path=list(folders)):
         name = distribution.metadata["Name"] or ""
-        if name in seen_names or name == _OURS:  # the first on the path counts
+        if name in seen_names or name == _TOOL_PACKAGE:  # the first on the path counts
             continue
         seen_names.add(name)
         for module in _modules(distribution):

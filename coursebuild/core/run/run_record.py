@@ -22,7 +22,7 @@ from coursebuild.core.run.dependencies import Dependency, Inputs, Kind
 
 Moment: TypeAlias = Annotated[int, Meta(ge=0, lt=1 << 37)]
 """Seconds since 1970, in a year that has a name."""
-REMEMBERED = (Outcome.OK, Outcome.FAILED, Outcome.OUTPUT_LIMIT, Outcome.ENCODING)
+STORABLE_OUTCOMES = (Outcome.OK, Outcome.FAILED, Outcome.OUTPUT_LIMIT, Outcome.ENCODING)
 _MARK = "\0"
 _EMPTY_TRACE = Trace((), (), (), (), "")
 

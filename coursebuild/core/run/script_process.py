@@ -1,7 +1,7 @@
 """Turn a process into a script that finds what a bare `python examples/x.py` finds, and is traced.
 
-Entry points: `Preloaded`, the packages that are imported once for all scripts; `ScriptProcess`,
-which sets up this process; `worker_main` then executes the script.
+Entry points: `PreloadedPackages`, the packages that are imported once for all scripts;
+`ScriptProcess`, which sets up this process; `worker_main` then executes the script.
 
 Only two things differ from a bare Python: there is one more frame below the script's own, and
 `sys.modules` holds modules of the standard library that the script has not imported.
@@ -71,7 +71,7 @@ class Job(TypedDict):
     −1: steps are halved (`half_steps`)."""
 
 
-class Preloaded:
+class PreloadedPackages:
     """Packages that were imported before a script, and the finder that gives them to it.
 
     They are hidden from the script until it imports them, so that the trace shows what it imports.
@@ -173,7 +173,7 @@ class ScriptProcess:
         job: Job,
         environment: Mapping[str, str],
         shared: mmap.mmap | None,
-        preloaded: Preloaded,
+        preloaded: PreloadedPackages,
     ) -> None:
         self.job = job
         self.path = f"{job['root']}/{job['path']}"

@@ -41,7 +41,7 @@ from pathlib import Path
 
 from coursebuild.core.run.script_process import (
     Job,
-    Preloaded,
+    PreloadedPackages,
     ScriptProcess,
     figure_path,
     notes_folder,
@@ -100,7 +100,7 @@ def main(arguments: Sequence[str], initial_modules: Collection[str]) -> ScriptPr
 
 def _make_script(job: Job, initial_modules: Collection[str]) -> ScriptProcess:
     """The script that this process was started for."""
-    preloaded = Preloaded()
+    preloaded = PreloadedPackages()
     shadowed = _sibling_names(job) & preloaded.names()
     if not shadowed:
         preloaded.load(job["packages"])
@@ -117,7 +117,7 @@ class _Supervisor:
         self.jobs = jobs
         self.reports = reports
         self.may_fork = may_fork
-        self.preloaded = Preloaded()
+        self.preloaded = PreloadedPackages()
         self.has_library = not missing_modules(["mjcourse"], [], "")
         """Whether scripts find `mjcourse` without being told where."""
         self.awake, wake = os.pipe()

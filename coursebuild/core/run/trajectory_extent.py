@@ -14,7 +14,7 @@ from __future__ import annotations
 import weakref
 from typing import Any
 
-_LOST = 1e10
+_DIVERGENCE_SIZE = 1e10
 """Larger numbers are those of a simulation that is lost."""
 
 
@@ -45,7 +45,7 @@ class TrajectoryExtent:
         for i, array in enumerate((data.qpos, data.qvel)):
             if len(array):
                 largest = float(max(array.max(), -array.min()))
-                if self.largest[i] < largest < _LOST:
+                if self.largest[i] < largest < _DIVERGENCE_SIZE:
                     self.largest[i] = largest
 
     def sizes(self) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
-_EXITING = 0x4
+_EXITING_FLAG = 0x4
 """A flag of a process, see proc_pid_stat(5): `PF_EXITING`."""
 STDOUT_LIMIT = 1 << 20
 """Bytes that a script may print."""
@@ -40,7 +40,7 @@ def has_ended(parent: int) -> bool:
     try:
         with open(f"/proc/{parent}/stat", "rb") as file:  # noqa: PTH123 (as cheap as can be)
             state, *fields = file.read().rpartition(b")")[2].split()
-        return state in (b"Z", b"X") or bool(int(fields[5]) & _EXITING)
+        return state in (b"Z", b"X") or bool(int(fields[5]) & _EXITING_FLAG)
     except (OSError, ValueError, IndexError):
         return False
 

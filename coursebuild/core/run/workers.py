@@ -20,7 +20,7 @@ from coursebuild.core.run import supervisor
 
 Enclose: TypeAlias = Callable[[Sequence[str], Mapping[str, str]], list[str]]
 """Makes, of a command and an environment, the command that runs it in a sandbox."""
-_MOST = 256 << 20
+_MAX_REPORT_SIZE = 256 << 20
 """Bytes that a report may have."""
 
 
@@ -123,7 +123,7 @@ class Worker:
         if len(self._buffer) < size:
             return None
         (length,) = supervisor.LENGTH.unpack(self._buffer[:size])
-        if length > _MOST:
+        if length > _MAX_REPORT_SIZE:
             raise ValueError("too long")
         if len(self._buffer) < size + length:
             return None

@@ -30,7 +30,7 @@ from coursebuild.core.model import Comparison
 from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
 
-_ALIKE = 6
+_ALIKE_WEIGHT = 6
 _WORD = re.compile(r"[^\W\d]+")
 
 
@@ -119,7 +119,7 @@ def _line_pairs(
         if matcher.matches(lines[i], texts[j]):
             return MATCH
         if matcher.alike(lines[i], texts[j]):
-            return _ALIKE
+            return _ALIKE_WEIGHT
         return _likeness(words[lines[i]], words[texts[j]])
 
     return pair(lines, texts, weight, is_free)

@@ -45,7 +45,7 @@ from coursebuild.core.scripts.mismatch import mismatch
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
 
-_FAILED = (
+_FAILED_OUTCOMES = (
     Outcome.FAILED,
     Outcome.TIMEOUT,
     Outcome.KILLED,
@@ -186,7 +186,7 @@ def _check(
     run = outputs.runs.get(path)
     ran_well = run is not None and run.outcome is Outcome.OK
     if run is not None and (
-        run.outcome in _FAILED or (verdicts and ran_well and not run.stdout.strip())
+        run.outcome in _FAILED_OUTCOMES or (verdicts and ran_well and not run.stdout.strip())
     ):
         return ()
     if not verdicts and not ran_well:

@@ -217,7 +217,7 @@ def _stderr_notes(outcome: Outcome, text: str) -> list[Note]:
 
 # --- simulations
 
-_SHOWN = 4
+_MAX_INCIDENTS = 4
 """The most further incidents that notes name."""
 _DIVERGES = (
     "try a smaller timestep or another integrator; if it is to diverge, say so by `diverges` on "
@@ -315,7 +315,8 @@ def _incident_diagnostic(
     """A diagnostic at the first incident, with some more in notes."""
     by_path = {extraction.path: extraction for extraction in extractions}
     fence = extraction.script.span.first_line()
-    named_incidents, rest_count = incidents[1 : _SHOWN + 1], len(incidents) - 1 - _SHOWN
+    named_incidents = incidents[1 : _MAX_INCIDENTS + 1]
+    rest_count = len(incidents) - 1 - _MAX_INCIDENTS
     notes = [Note(_describe_incident(i), _place(i, by_path)) for i in named_incidents]
     if incidents[0].path not in ("", extraction.path):
         notes.insert(0, Note(f"`{extraction.path}` was running", fence))

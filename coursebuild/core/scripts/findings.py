@@ -34,7 +34,7 @@ from coursebuild.core.scripts.repeat import instability_diagnostic
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Excerpt
 
-_NAMED = 3
+_MAX_NOTES = 3
 _WIDTH = 60
 
 
@@ -152,9 +152,9 @@ def drift_diagnostic(
             help=f"run {update}",
         )
     first, *rest = sorted(verdict.changes, key=lambda change: change.span.start)
-    notes = [Note(_describe_difference(change), change.span) for change in rest[:_NAMED]]
-    if len(rest) > _NAMED:
-        rest_count = len(rest) - _NAMED
+    notes = [Note(_describe_difference(change), change.span) for change in rest[:_MAX_NOTES]]
+    if len(rest) > _MAX_NOTES:
+        rest_count = len(rest) - _MAX_NOTES
         noun = "difference" if rest_count == 1 else "differences"
         notes.append(Note(f"and {rest_count} more {noun}"))
     notes += (Note(_describe_dependence(d), d.binding.text_span) for d in dependents)

@@ -21,7 +21,7 @@ from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 
-_NAMED, _QUOTED = 10, 80
+_MAX_NOTES, _WIDTH = 10, 80
 
 
 def repeat_findings(
@@ -87,8 +87,10 @@ def instability_diagnostic(
     """
     steps = align(first, second, LineMatcher(comparison))
     different_steps = [step for step in steps if step.kind in _DIFFERENT]
-    notes = [Note(_describe_difference(step, first, second)) for step in different_steps[:_NAMED]]
-    if (rest := len(different_steps) - _NAMED) > 0:
+    notes = [
+        Note(_describe_difference(step, first, second)) for step in different_steps[:_MAX_NOTES]
+    ]
+    if (rest := len(different_steps) - _MAX_NOTES) > 0:
         notes.append(Note(f"and {rest} more {'line' if rest == 1 else 'lines'}"))
     return diagnose(
         "output-unstable",
@@ -99,11 +101,11 @@ def instability_diagnostic(
     )
 
 
-_REPEATABLE = "make the script print the same each time (a fixed seed, no clock)"
+_REPEAT_HELP = "make the script print the same each time (a fixed seed, no clock)"
 _HELP = (
-    f'{_REPEATABLE}, or say what varies by `volatile="…"` on the fence, or by `ellipsis` and `...`'
+    f'{_REPEAT_HELP}, or say what varies by `volatile="…"` on the fence, or by `ellipsis` and `...`'
 )
-_TABLE_HELP = f"{_REPEATABLE}, or record the output in a `text` fence with `volatile`"
+_TABLE_HELP = f"{_REPEAT_HELP}, or record the output in a `text` fence with `volatile`"
 
 
 _DIFFERENT = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
@@ -111,9 +113,9 @@ _DIFFERENT = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
 
 def _describe_difference(step: Step, first: Side, second: Side) -> str:
     if step.kind is StepKind.MISSING:
-        return f"{quote(first.lines[step.recorded], _QUOTED)} was printed in the first run only"
+        return f"{quote(first.lines[step.recorded], _WIDTH)} was printed in the first run only"
     if step.kind is StepKind.EXTRA:
-        return f"{quote(second.lines[step.printed], _QUOTED)} was printed in the second run only"
+        return f"{quote(second.lines[step.printed], _WIDTH)} was printed in the second run only"
     a, b = first.lines[step.recorded], second.lines[step.printed]
     number = second.raw_line(step.printed)
-    return f"line {number}: {quote(a, _QUOTED)} in one run, {quote(b, _QUOTED)} in the next"
+    return f"line {number}: {quote(a, _WIDTH)} in one run, {quote(b, _WIDTH)} in the next"

@@ -47,10 +47,10 @@ from coursebuild.core.scripts.numbers import Number, difference, round_like, sca
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 
-_NAMED = 20
+_MAX_NOTES = 20
 _AS_MOVED = 11
 """Digits that repeat of a number that moves at most ten times as far as the initial states."""
-_HELD = sys.float_info.dig
+_EXACT_DIGITS = sys.float_info.dig
 _WIDTH = 40
 
 
@@ -319,16 +319,16 @@ def noise_warnings(sensitivity: Sensitivity) -> Iterator[Diagnostic]:
     warnings = [
         (doubt.span, _describe_doubt(doubt))
         for doubt in sensitivity.doubts
-        if doubt.compared and (doubt.repeat < _AS_MOVED or doubt.digits > _HELD)
+        if doubt.compared and (doubt.repeat < _AS_MOVED or doubt.digits > _EXACT_DIGITS)
     ]
     warnings += [(flip.span, _describe_flip(flip)) for flip in sensitivity.flips if flip.compared]
     warnings.sort(key=lambda warning: (warning[0].path, warning[0].start))
     if not warnings:
         return
     (span, label), *rest = warnings
-    notes = [Note(text, place) for place, text in rest[:_NAMED]]
-    if len(rest) > _NAMED:
-        notes.append(Note(f"and {len(rest) - _NAMED} more"))
+    notes = [Note(text, place) for place, text in rest[:_MAX_NOTES]]
+    if len(rest) > _MAX_NOTES:
+        notes.append(Note(f"and {len(rest) - _MAX_NOTES} more"))
     if sensitivity.chaotic:
         notes.append(Note(f"its simulation is chaotic: {describe_growth(sensitivity)}"))
     yield diagnose(

@@ -41,7 +41,7 @@ from coursebuild.core.scripts.mapped_text import (
 from coursebuild.core.scripts.numbers import Number, relative_error
 from coursebuild.core.text.source import Span
 
-_ALIKE = 6
+_ALIKE_WEIGHT = 6
 _PLACES = 64
 
 
@@ -158,7 +158,8 @@ class TableMatcher:
     def _weight(self, row: int, line: int) -> int:
         if self._matches(self.rows[row], line):
             return MATCH
-        return _ALIKE if _stands_in(self.rows[row], self._canonical_line(line), always_match) else 0
+        is_alike = _stands_in(self.rows[row], self._canonical_line(line), always_match)
+        return _ALIKE_WEIGHT if is_alike else 0
 
     def _match_row(self, row: tuple[RowCell, ...], line: int) -> RowMatch:
         if line < 0 or self._matches(row, line):

@@ -48,7 +48,7 @@ S = TypeVar("S", bound=Struct)
 T = TypeVar("T", bound=Struct)
 
 _NO_REMARKS: Mapping[str, str] = {}
-_FAILED = object()
+_INVALID = object()
 """Stands for the value of a node that is wrong."""
 
 
@@ -89,7 +89,7 @@ def _inspect_type(type: type[Struct]) -> inspect.Type:
 class _Decoder:
     """Collects the results of one walk.
 
-    A method returns the value of a node, or reports a diagnostic and returns `_FAILED`. `name` is
+    A method returns the value of a node, or reports a diagnostic and returns `_INVALID`. `name` is
     what messages call the node.
     """
 
@@ -101,13 +101,13 @@ class _Decoder:
 
     def report(self, rule: str, span: Span, message: str, help: str = "") -> object:
         self.diagnostics.append(diagnose(rule, span, message, help=help))
-        return _FAILED
+        return _INVALID
 
     def report_wrong_type(
         self, node: Node, type: inspect.Type, name: str, help: str = ""
     ) -> object:
         if isinstance(node, ErrorNode):  # the parser has reported it
-            return _FAILED
+            return _INVALID
         message = wrong_type_message(node, name, type, self.format)
         help = help or type_help(node, type) or _field_help(name, type)
         return self.report("field-type", node.mark, message, help)
@@ -199,7 +199,7 @@ class _Decoder:
             self.decode_value(item, type, f"{name}[{i}]")
             for i, (item, type) in enumerate(zip(node.items, types, strict=True))
         ]
-        return _FAILED if _FAILED in values else tuple(values)
+        return _INVALID if _INVALID in values else tuple(values)
 
     def decode_map(self, node: ObjectNode, type: inspect.DictType) -> object:
         values: dict[str, object] = {}
@@ -207,7 +207,7 @@ class _Decoder:
             key = member.key.value
             if key not in values:
                 values[key] = self.decode_value(member.value, type.value_type, key)
-        return _FAILED if _FAILED in values.values() else values
+        return _INVALID if _INVALID in values.values() else values
 
     # ---------------------------------------------------------------------------------- structs
 
@@ -236,8 +236,8 @@ class _Decoder:
             if absent.name not in misspelt:  # a misspelt field is one mistake
                 help = _field_help(absent.name, absent.type)
                 self.report("field-missing", node.mark, f"`{absent.name}` is missing", help)
-        if missing or _FAILED in values.values():
-            return _FAILED
+        if missing or _INVALID in values.values():
+            return _INVALID
         struct: Struct = type.cls(**values)
         self.structs[node] = struct
         return struct

@@ -23,7 +23,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
-_IMPLIED = frozenset("body colgroup head html tbody tfoot thead".split())
+_IMPLIED_ELEMENTS = frozenset("body colgroup head html tbody tfoot thead".split())
 """Elements that exist without any tag."""
 _OPTIONAL = frozenset("caption dd dt li optgroup option p rp rt td th tr".split())
 """Elements whose end tag may be left out."""
@@ -127,7 +127,7 @@ class Balance:
             message, help = "this comment is never closed", "close it with `-->`"
             opening = html.span(tag.start, tag.start + 4)
             self._report(diagnose("html-unbalanced", opening, message, help=help))
-        if not name or tag.is_complete or name in VOID or name in _IMPLIED:
+        if not name or tag.is_complete or name in VOID or name in _IMPLIED_ELEMENTS:
             return
         if name in _OPTIONAL:
             if not tag.is_end_tag:

@@ -19,7 +19,9 @@ from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 _WORD = re.compile(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
-_SPACED = re.compile(r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)""")
+_SPACED_OPTION = re.compile(
+    r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)"""
+)
 _KIND = re.compile(r"\s*(\S*)")
 _NOT_SPACE = re.compile(r"\S")
 _REST = re.compile(r"\S*")
@@ -127,7 +129,7 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
         match = _WORD.match(text, at)
         assert match is not None
         end = match.end()
-        if spaced_word := _SPACED.match(text, at):
+        if spaced_word := _SPACED_OPTION.match(text, at):
             equals, end = spaced_word.start(spaced_word.lastindex or 0), spaced_word.end()
             message = "no space may stand beside the `=` of a key"
             diagnostics.append(diagnose("fence-info", info.span(equals, equals + 1), message))

@@ -36,12 +36,12 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Span
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
-_FORBIDDEN = frozenset({"data", "file", "javascript", "vbscript"})
+_FORBIDDEN_SCHEMES = frozenset({"data", "file", "javascript", "vbscript"})
 _PICTURE = re.compile(r"data:image/(?:avif|gif|jpeg|png|svg\+xml|webp)[;,]", re.IGNORECASE)
 _BLANK = "".join(map(chr, range(33)))
-_UNSEEN = re.compile("[\t\n\r]")
+_IGNORED_CHARACTER = re.compile("[\t\n\r]")
 """Characters that browsers ignore in an address, as they do those of `_BLANK` at its ends."""
-_OURS = ("lesson", "model", "page", "term")
+_COURSE_SCHEMES = ("lesson", "model", "page", "term")
 
 
 def classify(url: str) -> Target:
@@ -65,16 +65,16 @@ def classify(url: str) -> Target:
 def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | None:
     """The diagnostic of a wrong scheme in a normalised destination, if it has one."""
     match = _SCHEME.match(url.strip())
-    if match is None or match[1] in _OURS:
+    if match is None or match[1] in _COURSE_SCHEMES:
         return None
     scheme = match[1].lower()
-    if scheme in _FORBIDDEN:
+    if scheme in _FORBIDDEN_SCHEMES:
         if image and _PICTURE.match(url.strip()):
             return None
         help = "link to an address with `https:`, to a file, or by "
         help += "`lesson:`, `page:`, `model:`, `term:`"
         return diagnose("link-scheme", span, f"`{scheme}:` must not stand in a page", help=help)
-    likely = nearest(scheme, _OURS, cutoff=0.75)
+    likely = nearest(scheme, _COURSE_SCHEMES, cutoff=0.75)
     if likely is None:
         return None
     message, help = f"no link scheme `{match[1]}:`", f"did you mean `{likely}:`?"
@@ -83,9 +83,9 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
 
 def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
     """The diagnostic of a wrong scheme in raw HTML, whose addresses are published unchanged."""
-    url = _UNSEEN.sub("", url.strip(_BLANK))
+    url = _IGNORED_CHARACTER.sub("", url.strip(_BLANK))
     match = _SCHEME.match(url)
-    if match is not None and match[1].lower() in _OURS:
+    if match is not None and match[1].lower() in _COURSE_SCHEMES:
         message = f"`{match[1]}:` means nothing in raw HTML"
         help = f"write the link in Markdown: `[…]({url})`"
         return diagnose("link-scheme", span, message, help=help)

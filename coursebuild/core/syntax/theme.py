@@ -10,7 +10,13 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.drawing.contrast import GROUNDS_DARK, GROUNDS_LIGHT, LEAST, contrast, legible
+from coursebuild.core.drawing.contrast import (
+    GROUNDS_DARK,
+    GROUNDS_LIGHT,
+    REQUIRED_CONTRAST,
+    contrast,
+    legible,
+)
 from coursebuild.core.model.fields import matching
 from coursebuild.core.model.theme import PICTURES, FontFamily, Theme, ThemeFile
 from coursebuild.core.syntax.nodes import ObjectNode
@@ -86,11 +92,13 @@ def check_contrast(node: ObjectNode, theme: Theme) -> Iterator[Diagnostic]:
         ("accent", theme.accent, GROUNDS_LIGHT),
         ("accent_dark", theme.accent_dark, GROUNDS_DARK),
     ):
-        if colour and (ratio := contrast(colour, grounds)) < LEAST:
+        if colour and (ratio := contrast(colour, grounds)) < REQUIRED_CONTRAST:
             scheme = "light" if grounds is GROUNDS_LIGHT else "dark"
             message = f"on {scheme} pages `{colour}` has a contrast of {ratio:.2f} : 1"
             nearest = legible(colour, grounds)
-            help = f"text needs {LEAST} : 1; the nearest colour that has it is `{nearest}`"
+            help = (
+                f"text needs {REQUIRED_CONTRAST} : 1; the nearest colour that has it is `{nearest}`"
+            )
             yield diagnose("theme-contrast", node.place(name), message, help=help)
 
 

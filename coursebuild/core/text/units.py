@@ -24,7 +24,7 @@ Dimension: TypeAlias = tuple[tuple[str, Fraction], ...]
 _PREFIXES = {"": 0, "k": 3, "M": 6, "G": 9, "c": -2, "m": -3, "µ": -6, "μ": -6, "n": -9}
 _BASES = {"m": ("length", 0), "g": ("mass", -3), "s": ("time", 0)}
 """The quantity that each measures, and its size as a power of ten of the base unit."""
-_DERIVED = {"N": "kg*m/s^2", "J": "N*m", "W": "J/s", "Pa": "N/m^2", "Hz": "1/s", "rad": "1"}
+_DERIVED_UNITS = {"N": "kg*m/s^2", "J": "N*m", "W": "J/s", "Pa": "N/m^2", "Hz": "1/s", "rad": "1"}
 _FACTOR = re.compile(r"(^|[*/])(1|[^\W\d_]+)(?:\^\(?(-?\d)\)?)?")
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−", "0123456789--")
 
@@ -101,7 +101,7 @@ def _find_known_unit(name: str) -> Unit | None:
         if rest in _BASES:
             measures, shift = _BASES[rest]
             return Unit(Fraction(10) ** (power + shift), ((measures, Fraction(1)),))
-        if rest in _DERIVED and (unit := _parse_product(_DERIVED[rest])):
+        if rest in _DERIVED_UNITS and (unit := _parse_product(_DERIVED_UNITS[rest])):
             return Unit(unit.size * Fraction(10) ** power, unit.dimension)
     return None
 

@@ -14,7 +14,7 @@ import pytest
 from coursebuild.core.files.errors import EffectError, OutsideProjectError
 from coursebuild.core.files.examples import (
     MANIFEST,
-    Blocked,
+    BlockedFile,
     ExamplesReport,
     Obstacle,
     unified_diff,
@@ -92,7 +92,7 @@ def test_the_authors_own_files_are_left_alone(tmp_path: Path) -> None:
         "--- examples/a.py (in the lesson)\n+++ examples/a.py (on the disk)\n"
         "@@ -1 +1 @@\n-print(1)\n+own too\n"
     )
-    assert report.blocked == (Blocked(A[0], Obstacle.FOREIGN, "own too\n", diff),)
+    assert report.blocked == (BlockedFile(A[0], Obstacle.FOREIGN, "own too\n", diff),)
     assert (tmp_path / "examples/own.py").read_bytes() == b"own\n"
     assert (tmp_path / A[0]).read_bytes() == b"own too\n"
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.cli.output import CLEAN, WRONG, style_of, write
+from coursebuild.cli.output import CLEAN, FAILURE, style_of, write
 from coursebuild.core.engine.memo import SIZE
 from coursebuild.core.files.course_root import find_course_root
 from coursebuild.core.files.errors import EffectError, UsageError
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         for probe in make_probes(folder):
             write(_format_line(probe, style), CLEAN)
             if probe.is_required and not probe.ok:
-                status = WRONG
+                status = FAILURE
     return status
 
 

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 
 from coursebuild.cli.arguments import add_lessons, options_of
-from coursebuild.cli.output import CLEAN, WRONG, fail, write
+from coursebuild.cli.output import CLEAN, FAILURE, fail, write
 from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model import Course, Lesson, Owner
@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
             mistakes = [f"{source.path} is not UTF-8"]
         if mistakes:
             message = f"{source.path} has mistakes, and is left as it is"
-            status = fail(WRONG, message, f"mend this first: {mistakes[0]}")
+            status = fail(FAILURE, message, f"mend this first: {mistakes[0]}")
         elif new.value != source.text:
             new_texts[source] = new.value
     if arguments.diff:
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         changes = [FileChange(s.path, s.text.encode(), t.encode()) for s, t in new_texts.items()]
         return max(status, apply_changes(root, changes))
-    return write("".join(f"{line}\n" for line in lines), WRONG if lines else status)
+    return write("".join(f"{line}\n" for line in lines), FAILURE if lines else status)
 
 
 def _format_documents(course: Course, selection: Selection) -> Iterator[tuple[Source, Parsed[str]]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from coursebuild.cli.arguments import options_of
-from coursebuild.cli.output import WRONG, fail
+from coursebuild.cli.output import FAILURE, fail
 from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.course_root import FOLDERS
 from coursebuild.core.files.errors import UsageError
@@ -95,4 +95,4 @@ def _refuse(doubtful: Sequence[Span], lesson: Lesson) -> int:
         text = visible(span.source.line_text(span.line).strip())
         lines.append(f"  {location(span)}: {text}")
     help = "edit them first, or leave them as they are with --leave; nothing was changed"
-    return fail(WRONG, "\n".join(lines), help)
+    return fail(FAILURE, "\n".join(lines), help)

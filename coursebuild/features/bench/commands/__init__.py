@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from coursebuild.cli.arguments import options_of
-from coursebuild.cli.output import CLEAN, WRONG, style_of, write
+from coursebuild.cli.output import CLEAN, FAILURE, style_of, write
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
     measurement_json,
@@ -56,7 +56,7 @@ def write_measurement(
     empty: str = "",
 ) -> int:
     """Print a measurement as text or as JSON, and return the exit status."""
-    status = CLEAN if measurement.ok else WRONG
+    status = CLEAN if measurement.ok else FAILURE
     if arguments.format == "json":
         return write(measurement_json(values, measurement), status)
     style = style_of(sys.stdout)
