@@ -36,7 +36,7 @@ _CODE = {
 }
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that the next step depends on."""
-_WATCHED = 8
+_LOOK_INTERVAL = 8
 """Steps from one look at the state to the next, as a rule."""
 
 
@@ -103,7 +103,7 @@ def advance_watching(
     peaks: Peaks,
     thickness: Array | None = None,
     *,
-    interval: int = _WATCHED,
+    interval: int = _LOOK_INTERVAL,
     setup: Setup | None = None,
 ) -> tuple[Peaks, int]:
     """Make so many steps; stop once the state is not finite, or out of the bounds of a setup.

@@ -31,7 +31,7 @@ from coursebuild.numerics.integrate import NoConvergenceError, Rate, State, dop8
 from coursebuild.numerics.pilot import position_distances
 from coursebuild.numerics.problem import Array, Integrator, Motion, Scenario, Setup
 
-AGREED = 1e-6
+AGREEMENT = 1e-6
 """How near the engine must come, in rad or relative to the extent, unless smaller steps bring it
 nearer."""
 NEARER = 0.75
@@ -105,7 +105,7 @@ def _rate(model: Any, data: Any, evaluations: float) -> Rate:
     """d(qpos, qvel, act)/dt of a state (nq + nv + na,), for so many evaluations at most."""
     nq, end = int(model.nq), int(model.nq + model.nv)
     places, turns = coordinates(model)
-    turning = np.isin(model.jnt_type, _TURNING)
+    turning = np.isin(model.jnt_type, _TURNING_JOINTS)
     # A free joint has three velocities of its place before those that turn it.
     is_free = model.jnt_type[turning] == mujoco.mjtJoint.mjJNT_FREE
     first = (model.jnt_dofadr[turning] + 3 * is_free).tolist()
@@ -136,7 +136,7 @@ def _rate(model: Any, data: Any, evaluations: float) -> Rate:
     return rate
 
 
-_TURNING = (int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL))
+_TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL))
 
 
 def tends_to(model: Any, setup: Setup, states: EngineStates, step: float, parting: float) -> bool:
@@ -154,13 +154,13 @@ def tends_to(model: Any, setup: Setup, states: EngineStates, step: float, partin
             have nothing in common, however small the steps.
     """
     before = _gaps(model, setup, states, step)
-    if before.max() <= AGREED:
+    if before.max() <= AGREEMENT:
         return True
     for part in _PARTS:
         now = _gaps(model, setup, states, step / part)
         parted = np.flatnonzero(before > parting)
         at = int(parted[0]) if parted.size else int(np.argmax(before))
-        if now[at] <= max(NEARER * before[at], AGREED):
+        if now[at] <= max(NEARER * before[at], AGREEMENT):
             return True
         before = now
     return False

@@ -30,7 +30,7 @@ _FEWEST = 4
 _UNCERTAIN, _BENT = 0.25, 0.25
 """The widest half interval of an order, and the largest bend, with which it is given."""
 
-_ZEROS, _ONES = Sizes(0.0, 0.0, 0.0), Sizes(1.0, 1.0, 1.0)
+_ZERO_SIZES, _UNIT_SIZES = Sizes(0.0, 0.0, 0.0), Sizes(1.0, 1.0, 1.0)
 
 
 @lru_cache(maxsize=64)
@@ -39,7 +39,7 @@ def reference_motion(reference: Reference, times: tuple[float, ...]) -> Motion:
     return reference.solution.motion(np.array(times))
 
 
-def errors(motion: Motion, exact: Motion, floor: Sizes = _ZEROS) -> Errors:
+def errors(motion: Motion, exact: Motion, floor: Sizes = _ZERO_SIZES) -> Errors:
     """The errors of a motion against an exact one at the same times; none is below ten floors."""
     displacements, speed_differences = (
         motion.position - exact.position,
@@ -105,7 +105,7 @@ def fit_orders(
     integrator: str,
     runs: Sequence[tuple[float, Errors]],
     floor: Sizes,
-    extent: Sizes = _ONES,
+    extent: Sizes = _UNIT_SIZES,
 ) -> OrderRow:
     """Orders of an integrator, from its timesteps (s) and errors there; lost runs do not count.
 

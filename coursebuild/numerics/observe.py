@@ -116,7 +116,7 @@ Sticks: TypeAlias = tuple[frozenset[Pair], ...]
 _SLOW = 0.01
 """A point that sticks moves slower than this part of the speed of a fall through the model's
 extent."""
-_STILL = 1e-3
+_MIN_SLOW_SPEED = 1e-3
 """m/s, where nothing falls."""
 
 
@@ -124,7 +124,9 @@ def find_sticks(model: Any, scene: Scene, states: EngineStates) -> Sticks:
     """The pairs of geoms that stick in a motion, from sample to sample."""
     fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * float(model.stat.extent))
     slow_pairs = [
-        frozenset(pair for pair, speed in speeds.items() if speed < max(_SLOW * fall, _STILL))
+        frozenset(
+            pair for pair, speed in speeds.items() if speed < max(_SLOW * fall, _MIN_SLOW_SPEED)
+        )
         for speeds in surface_speeds(model, scene, states)
     ]
     return tuple(slow_pairs[max(0, i - 1)] & slow_pairs[i] for i in range(len(slow_pairs)))

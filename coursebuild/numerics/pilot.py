@@ -29,12 +29,12 @@ NUDGE = 1e-10
 """How far a twin's beginning is off: rad, or relative to the model's extent; velocities per s."""
 _DIRECTIONS = 4
 """How many directions beginnings are nudged in, each to both sides."""
-APART = 0.1
+PARTING_DISTANCE = 0.1
 """The distance at which two motions have nothing in common any more: rad, or relative to the
 model's extent."""
-_RESTING = 0.01
+_REST_SPEED = 0.01
 """A body is at rest below this part of the speed of a fall through the model's extent."""
-_SELDOM = 8
+_PEAK_INTERVAL = 8
 """Steps from one look at how large the state is to the next."""
 
 
@@ -88,12 +88,12 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
         for number in range(steps_per_sample):
             advance(variant, data)
             look(data)
-            if number % _SELDOM == 0 or number == steps_per_sample - 1:
+            if number % _PEAK_INTERVAL == 0 or number == steps_per_sample - 1:
                 peaks = update_peaks(data, peaks)
         if not peaks.finite:
             raise SceneError(f"it diverges within {times[index]:.6g} s even at {step:g} s a step")
         for twin, gap in zip(twins, gaps, strict=True):
-            if index == 0 or gap[index - 1] < APART:
+            if index == 0 or gap[index - 1] < PARTING_DISTANCE:
                 advance(variant, twin, steps_per_sample)
                 gap[index] = position_distance(variant, data.qpos, twin.qpos)
     horizons, rates = zip(*(_horizon(times, gap) for gap in gaps), strict=True)
@@ -196,7 +196,7 @@ def _twins(model: Any, scenario: Scenario) -> list[Any]:
 
 
 def _horizon(times: Array, gaps: Array) -> tuple[float, float | None]:
-    parted = np.flatnonzero(gaps >= APART)
+    parted = np.flatnonzero(gaps >= PARTING_DISTANCE)
     if not parted.size:
         return float(times[-1]), None
     end = int(parted[0])
@@ -211,7 +211,7 @@ def _bounds(model: Any, scenario: Scenario, peaks: Peaks) -> Setup:
     has_hinges = bool(np.any(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE))
     round_and_round = 2 * peaks.velocity * scenario.duration if has_hinges else 0.0
     is_driven = bool(driving_force(model, scenario))
-    rest_energy = float(model.body_mass.sum()) * max(_RESTING * fall, 1e-3) ** 2
+    rest_energy = float(model.body_mass.sum()) * max(_REST_SPEED * fall, 1e-3) ** 2
     return Setup(
         scenario=scenario,
         position_bound=2 * peaks.position + ROOM * max(extent, 1.0) + round_and_round,

@@ -63,7 +63,7 @@ EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
 """Accelerations that a reference may take."""
 FINER, QUICK_FINER = 16, 8
 """How many times shorter the steps of a `self` reference are than the shortest measured."""
-PARTED = 0.01
+PARTING_DISTANCE = 0.01
 """The difference from which on two runs of the engine are no reference: rad, or relative to the
 extent."""
 FOREIGN = 1e-3
@@ -72,7 +72,7 @@ CONSERVED = 1e-8
 """The relative change, over the reference, below which a quantity counts as conserved."""
 _STEP = 1e-6
 """s, of the model whose accelerations are integrated: `refsafe` softens nothing then."""
-_ELSEWHERE = "the engine in small steps tends elsewhere"
+_TENDS_ELSEWHERE = "the engine in small steps tends elsewhere"
 
 
 class KnownMotion(Struct, frozen=True):
@@ -111,9 +111,9 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         except NoConvergenceError as error:
             note = f"no integration: {error}"
         if reference is not None and not _engine_agrees(model, pilot, reference):
-            reference, note = None, f"no integration: {_ELSEWHERE}"
+            reference, note = None, f"no integration: {_TENDS_ELSEWHERE}"
             if declaration.reference == "ode":
-                raise _no_integration(_ELSEWHERE, declaration)
+                raise _no_integration(_TENDS_ELSEWHERE, declaration)
     elif declaration.reference == "ode":
         raise _no_integration(f"there is {' and '.join(pilot.jumps)}", declaration)
     if reference is None:
@@ -174,7 +174,7 @@ def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:
 
 def _engine_agrees(model: Any, pilot: Pilot, reference: KnownMotion) -> bool:
     setup = _with_duration(pilot.setup, float(reference.states.times[-1]))
-    return tends_to(model, setup, reference.states, min(pilot.scene.timesteps), PARTED)
+    return tends_to(model, setup, reference.states, min(pilot.scene.timesteps), PARTING_DISTANCE)
 
 
 def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMotion:
@@ -190,7 +190,9 @@ def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         if not np.isfinite(run.states.qpos).all():
             raise SceneError(f"it diverges even at {step:g} s a step")
         runs.append(run.states)
-    parted = np.flatnonzero(position_distances(model, runs[0].qpos, runs[1].qpos) > PARTED)
+    parted = np.flatnonzero(
+        position_distances(model, runs[0].qpos, runs[1].qpos) > PARTING_DISTANCE
+    )
     good = max(1, int(parted[0])) if parted.size else len(runs[0].times)
     states, second_states = (motion.head(good) for motion in runs)
     source = f"the engine itself: implicitfast at {step:g} s, Newton's solver"

@@ -34,7 +34,7 @@ from mjcourse import exact
 
 LOOKS = 100
 """About how many samples a scenario has by default."""
-FEWEST = 25
+MIN_SAMPLES = 25
 """The fewest samples by default."""
 LADDER, QUICK_LADDER = (-3, -2, -1, 0, 1, 2, 3), (-2, -1, 0, 1)
 """Powers of 2 by which timesteps differ from the model's own."""
@@ -189,7 +189,7 @@ def _scenario_times(step: float, declaration: DeclaredScenario) -> Scenario:
             _sample_steps(basis, total) if basis else max(8, 8 * round(total / LOOKS / 8))
         )
     total = whole.get("duration") or sample_steps * max(
-        FEWEST, math.ceil(max(last, total) / sample_steps)
+        MIN_SAMPLES, math.ceil(max(last, total) / sample_steps)
     )
     if hold_steps is not None and "duration" not in whole:
         total = hold_steps * math.ceil(total / hold_steps)

@@ -38,11 +38,11 @@ Clock: TypeAlias = Callable[[], int]
 Job: TypeAlias = Callable[[], None]
 """Does what is timed, always the same amount."""
 
-FEWEST, MOST = 8, 60
+MIN_ROUNDS, MAX_ROUNDS = 8, 60
 """Rounds."""
 _BUDGET, _QUICK_BUDGET = 20e9, 2e9
 """ns after which no round begins that is not among the fewest."""
-_ENOUGH = 0.01
+_TARGET_WIDTH = 0.01
 """Relative half width of the widest interval at which rounds end."""
 _SHORTEST = 1_000_000
 """ns that a job takes at least."""
@@ -68,21 +68,21 @@ def time_jobs(
     jobs: Sequence[Job], baseline: int, clock: Clock, *, quick: bool = False
 ) -> tuple[Timing, ...]:
     """Time jobs, of which number `baseline` is what the others are compared with."""
-    times = np.zeros((MOST, len(jobs)))
+    times = np.zeros((MAX_ROUNDS, len(jobs)))
     budget, began = _QUICK_BUDGET if quick else _BUDGET, clock()
     gc_was_enabled = gc.isenabled()
     gc.disable()
     try:
         repeats = [_count_repeats(job, clock) for job in jobs]
-        for turn in range(MOST):
+        for turn in range(MAX_ROUNDS):
             order = range(len(jobs))
             for index in order if turn % 2 else reversed(order):
                 times[turn, index] = _time_job(jobs[index], repeats[index], clock)
-            if turn + 1 < FEWEST:
+            if turn + 1 < MIN_ROUNDS:
                 continue
             timings = _timings(times[: turn + 1] / repeats, baseline)
             widest = max((timing.ratio.half_width for timing in timings), default=0.0)
-            if widest <= _ENOUGH or clock() - began > budget:
+            if widest <= _TARGET_WIDTH or clock() - began > budget:
                 break
     finally:
         if gc_was_enabled:

@@ -50,9 +50,9 @@ def _no_stage(name: str) -> AbstractContextManager[None]:
     return nullcontext()
 
 
-_MAPS, _DECLARATIONS, _CHECKED = "maps", "declarations", "checked"
+_MAPS, _DECLARATIONS, _CLEAN_COURSES = "maps", "declarations", "checked"
 """Kinds of entries in the store; the last is for courses in which nothing was wrong."""
-_MANY = 8
+_MIN_PARALLEL = 8
 """Texts or pages for which worker processes are worth their start."""
 
 
@@ -123,18 +123,18 @@ class Documents(Parser):
         """What `check_course` finds; a course that was found clean is not checked again."""
         key = step_key("checked course")
         state = (self.fingerprint(course) or "").encode()
-        if state and self._store.get(_CHECKED, key, bytes) == state:
+        if state and self._store.get(_CLEAN_COURSES, key, bytes) == state:
             return ()
         diagnostics = super().check(course)
         if state and not diagnostics:
-            self._store.put(_CHECKED, key, state)
+            self._store.put(_CLEAN_COURSES, key, state)
         return diagnostics
 
     def prefetch(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
         """Get the summaries of sources, each given with whether it is a lesson."""
         texts = [SourceText.of(source, callouts, lesson=lesson) for source, lesson in sources]
         missing = [text for text in texts if not self._has_summary(text)]
-        if len(missing) >= _MANY:
+        if len(missing) >= _MIN_PARALLEL:
             prepare_to_read(missing[0])
         answers = self._answer_requests("reading lessons and pages", iter(missing))
         for text, (data, reader) in zip(missing, answers, strict=True):
@@ -234,14 +234,14 @@ class Documents(Parser):
         self, name: str, requests: Iterator[Request]
     ) -> Iterator[tuple[bytes, int | None]]:
         """Answer requests, by workers where there are many; name the worker of each answer."""
-        first = tuple(islice(requests, max(_MANY, self._jobs * _MANY // 2)))
+        first = tuple(islice(requests, max(_MIN_PARALLEL, self._jobs * _MIN_PARALLEL // 2)))
         requests = chain(first, requests)
-        if self._workers is None and len(first) >= _MANY and self._jobs > 1:
+        if self._workers is None and len(first) >= _MIN_PARALLEL and self._jobs > 1:
             from coursebuild.core.engine.workers import Workers, can_fork
 
             # Before the stage begins, which may start a thread: a fork does not copy threads.
             if can_fork():
-                count = min(self._jobs, -(-2 * len(first) // _MANY))
+                count = min(self._jobs, -(-2 * len(first) // _MIN_PARALLEL))
                 self._workers = Workers(self._reader.answer, count)
         if not first:
             return

@@ -69,7 +69,7 @@ def site_files(
     return SiteMaker(library, assets, documents, options).make_site()
 
 
-_ANYTHING = PageFacts(
+_FACTS_OF_ANY_PAGE = PageFacts(
     frozenset(map(chr, range(0x20, 0x3000))),
     frozenset(map(chr, (*range(0x20, 0x3000), *range(0x1D400, 0x1D800)))),
     frozenset(),
@@ -129,7 +129,7 @@ class SiteMaker:
     def _make_shared_files(self, facts: PageFacts | None) -> tuple[Names, list[SiteFile]]:
         """Make the shared files; with whole fonts where there are no facts."""
         cut_font = None if facts is None else functools.partial(_cut_font, self.store)
-        facts = facts or _ANYTHING
+        facts = facts or _FACTS_OF_ANY_PAGE
         facts = replace(facts, text=facts.text | common_characters(self.library))
         shared_files, names = common_files(self.assets, cut_font, facts, self.course.theme)
         return names, [*shared_files, *self._copies(shared_files)]

@@ -39,7 +39,7 @@ from coursebuild.preview.session import Session
 from coursebuild.report import Report
 from coursebuild.report.text import location
 
-_MOST = 60
+_MAX_DIAGNOSTICS = 60
 """The most mistakes that are sent to a page."""
 _IN_PLACE = ("output-drift", "binding-mismatch", "figure-drift")
 """Rules whose mistakes a page shows where they are."""
@@ -109,12 +109,12 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
     def rank(d: Diagnostic) -> tuple[bool, ...]:
         return d not in blocking, not d.is_error, d.span.path != document_path
 
-    diagnostics = sorted(report.diagnostics, key=rank)[:_MOST]
+    diagnostics = sorted(report.diagnostics, key=rank)[:_MAX_DIAGNOSTICS]
     news: dict[str, Any] = {
         "problems": [
             {**_describe_mistake(d, document_path), "blocks": d in blocking} for d in diagnostics
         ],
-        "more": max(0, len(report.diagnostics) - _MOST),
+        "more": max(0, len(report.diagnostics) - _MAX_DIAGNOSTICS),
         "kept": session.files.is_outdated(path),
         "busy": session.busy,
         "trouble": session.trouble,

@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from coursebuild.pipeline.progress import Progress
-from coursebuild.preview.session import MOST, Session
+from coursebuild.preview.session import MAX_SINGLE_READS, Session
 from coursebuild.preview.watcher import FolderWatcher
 
 QUIET = 0.008
@@ -59,7 +59,7 @@ def _wait_until_complete(
     """Wait until a save is complete; return all its paths."""
     began = now = time.monotonic()
     while True:
-        many = len(paths) > MOST
+        many = len(paths) > MAX_SINGLE_READS
         quiet = QUIET_MANY if many else QUIET_GONE if _is_any_empty(root, paths) else QUIET
         remaining = began + LONGEST * (4 if many else 1) - now
         later = watcher.get(min(quiet, remaining)) if remaining > 0 else frozenset()

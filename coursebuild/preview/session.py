@@ -50,7 +50,7 @@ from coursebuild.preview.files import Files
 
 ScriptKey: TypeAlias = tuple[str, ScriptJob]
 """A script's text, and how it is run."""
-MOST = 8
+MAX_SINGLE_READS = 8
 """Documents saved at once that are read one by one; for more, the whole course is read."""
 _GARBAGE = 200_000
 """Objects after which Python looks for cycles: a session lives long."""
@@ -213,7 +213,7 @@ class Session:
 
         `None` where everything must be read.
         """
-        if self.library is None or len(paths) > MOST:
+        if self.library is None or len(paths) > MAX_SINGLE_READS:
             return None
         course = self.library.course
         owners = {owner.path: owner for owner in course.owners}

@@ -11,7 +11,7 @@ import pytest
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import MeasuredSetting
 from coursebuild.numerics.scene import scenes
-from coursebuild.numerics.timing import FEWEST, Job, costs, time_jobs
+from coursebuild.numerics.timing import MIN_ROUNDS, Job, costs, time_jobs
 from support.surveys import NOTHING
 
 
@@ -62,7 +62,7 @@ def test_a_quiet_machine_is_asked_as_seldom_as_can_be() -> None:
     timings = time_jobs([machine.job(c) for c in (2e6, 1e6, 5e6)], 1, machine.clock)
     assert [timing.ratio for timing in timings] == [Interval(c, c, c) for c in (2.0, 1.0, 5.0)]
     assert [timing.nanoseconds.value for timing in timings] == [2e6, 1e6, 5e6]
-    assert len(machine.done) == 3 * (FEWEST + 1), "and once before, to warm up"
+    assert len(machine.done) == 3 * (MIN_ROUNDS + 1), "and once before, to warm up"
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -83,7 +83,7 @@ def test_ratios_on_a_noisy_machine_lie_in_their_intervals(seed: int) -> None:
 def test_a_slow_model_is_not_timed_for_ever() -> None:
     machine = Machine(Neighbours(3))
     time_jobs([machine.job(c) for c in (2e9, 4e9)], 0, machine.clock)
-    assert len(machine.done) == 2 * (FEWEST + 1)
+    assert len(machine.done) == 2 * (MIN_ROUNDS + 1)
 
 
 SPRING = """\

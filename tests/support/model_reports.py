@@ -15,8 +15,8 @@ from coursebuild.numerics.reports.cases import (
     StepCost,
 )
 from coursebuild.numerics.reports.diet import (
-    PROVED,
-    SAME,
+    MEASURED_LABEL,
+    PROVED_LABEL,
     DietReport,
     DietScenario,
     Finding,
@@ -42,7 +42,7 @@ def finding(kind: str = "sensor-unread", **overrides: object) -> Finding:
         "kind": kind,
         "message": "nobody reads <this> sensor",
         "places": (ModelPlace("tip", "mujoco/sensor/framepos", "models/box.xml", 3, 5),),
-        "label": PROVED,
+        "label": PROVED_LABEL,
         "difference": 0.0,
         "scenarios": ("swing",),
         "proof": "its value goes nowhere",
@@ -131,7 +131,7 @@ def reports() -> Reports:
     kept_finding = finding(
         "geom-far", kept="it is the horizon", proof="", label="equal within tolerance"
     )
-    fields = {"label": SAME, "doubt": "examples/a.py names <it>"}
+    fields = {"label": MEASURED_LABEL, "doubt": "examples/a.py names <it>"}
     doubted = finding("site-unused", **fields)
     return Reports(
         {"box": box()},

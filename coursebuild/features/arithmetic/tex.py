@@ -35,7 +35,7 @@ _ACCENTS = frozenset("dot ddot hat bar tilde".split())
 _FRACTIONS = frozenset((r"\frac", r"\tfrac", r"\dfrac"))
 _BRACKETS = {"(": ")", "[": "]", "{": "}", "|": "|", r"\lvert": r"\rvert"}
 _NO_FACTOR = frozenset(")]}|+-−=<>,;:.!'_^/*") | {r"\rvert", r"\cdot", r"\times", r"\div", "⋅", "×"}
-_ONE, _TWO = (Expression("number", 0, 0, text=digit) for digit in "12")
+_NUMBER_ONE, _NUMBER_TWO = (Expression("number", 0, 0, text=digit) for digit in "12")
 _REASONS = {
     ",": "a comma between digits may part two numbers",
     r"\pm": "`\\pm` has two values",
@@ -247,8 +247,8 @@ class _Reader:
         if sign in _FRACTIONS:
             return self.fraction(start)
         if sign == r"\sqrt":
-            index = self.bracket("]") if self.take("[") else _TWO
-            root = Expression("/", start, start, (_ONE, index))
+            index = self.bracket("]") if self.take("[") else _NUMBER_TWO
+            root = Expression("/", start, start, (_NUMBER_ONE, index))
             return Expression("^", start, self.at, (self.group(), root))
         if sign in (r"\underbrace", r"\overbrace"):
             inner = self.group()

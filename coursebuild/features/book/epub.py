@@ -46,7 +46,7 @@ from coursebuild.features.book.lessons import (
 )
 from coursebuild.features.book.rewrite import RewriteRules
 
-_MODIFIED = "2000-01-01T00:00:00Z"
+_MODIFICATION_TIME = "2000-01-01T00:00:00Z"
 """A constant, see the module."""
 _CONTAINER = """\
 <?xml version="1.0" encoding="utf-8"?>
@@ -218,7 +218,7 @@ class _Epub:
             summary=course.summary,
             licence=course.licence,
             address=course.base_url,
-            modified=_MODIFIED,
+            modified=_MODIFICATION_TIME,
             visual=bool(self._pictures),
             features=features,
             items=items,

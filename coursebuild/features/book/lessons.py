@@ -24,7 +24,7 @@ PICTURES = {
     "webp": "image/webp",
 }
 """Media types of the pictures that every reading system shows, by extension."""
-_BEFORE, _AFTER = '<div class="prose">\n', '\n</div>\n<div class="lesson-end"'
+_TEXT_START, _TEXT_END = '<div class="prose">\n', '\n</div>\n<div class="lesson-end"'
 """What surrounds the text of a lesson, see `templates/lesson.html`."""
 
 
@@ -54,7 +54,7 @@ def render_lesson(
 ) -> Markup:
     """Render a lesson for use elsewhere; `write` writes its tree, `top` is its own id there."""
     page = context.site()[rules.path].make().decode()
-    text = page.partition(_BEFORE)[2].rpartition(_AFTER)[0]
+    text = page.partition(_TEXT_START)[2].rpartition(_TEXT_END)[0]
     return context.library.render(
         "book/lesson.html",
         lesson=lesson,

@@ -15,7 +15,7 @@ from msgspec import Struct
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement
 
-_DROPPED = frozenset(
+_DROPPED_ELEMENTS = frozenset(
     "button form template script style dialog iframe object embed audio video source track"
     " noembed noframes".split()
 )
@@ -27,7 +27,7 @@ the drawings of a plot for large screens or dark pages."""
 _FOR_SCRIPTS = frozenset(
     "style download loading srcset sizes tabindex xmlns usemap autofocus".split()
 )
-_REFERRING = frozenset(
+_ID_ATTRIBUTES = frozenset(
     "aria-activedescendant aria-controls aria-describedby aria-details aria-errormessage"
     " aria-flowto aria-labelledby aria-owns for headers list".split()
 )
@@ -60,7 +60,7 @@ def rewrite(content: Iterable[HtmlContent], rules: RewriteRules) -> Iterator[Htm
     for child in content:
         if isinstance(child, str):
             yield child
-        elif child.name not in _DROPPED and not child.classes & _NOT_PRINTED:
+        elif child.name not in _DROPPED_ELEMENTS and not child.classes & _NOT_PRINTED:
             yield _rewrite_element(child, rules)
 
 
@@ -94,7 +94,7 @@ def _rewrite_attribute(
         return None
     if name == "id" or (name == "name" and element.name == "a"):
         return rules.id(value)
-    if name in _REFERRING:
+    if name in _ID_ATTRIBUTES:
         return " ".join(map(rules.id, value.split()))
     if name == "aria-label" and element.name == "section" and rules.section:
         return f"{value}, {rules.section}"

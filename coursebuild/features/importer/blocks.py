@@ -29,7 +29,7 @@ _CALLOUTS = {
     **dict.fromkeys(("exercise", "question"), "try"),
     **dict.fromkeys(("answer", "success"), "solution"),
 }
-_TITLED = ("admonition", "dropdown", "sidebar", "topic", "exercise", "example", "margin")
+_TITLED_DIRECTIVES = ("admonition", "dropdown", "sidebar", "topic", "exercise", "example", "margin")
 """Directives whose argument is a title; that of others is their first line."""
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
 _TITLE = re.compile(r"title=(?:\"([^\"]*)\"|'([^']*)')")
@@ -136,7 +136,7 @@ def _convert_directive(name: str, argument: str, segment: Segment, context: Less
             return _convert_nested(text, segment, context)
         case _ if name in _CALLOUTS:
             fold_mark = "-" if "dropdown" in options.get("class", name) else ""
-            title = argument if name in _TITLED else ""
+            title = argument if name in _TITLED_DIRECTIVES else ""
             text = text if title else f"{argument}\n{text}"
             return _write_callout(name, title, text, segment, context, fold_mark=fold_mark)
         case _ if name in _highlighted_languages():

@@ -15,7 +15,15 @@ from coursebuild.core.files.errors import UsageError
 
 TEXTS = (".md", ".qmd", ".ipynb", ".myst")
 """Extensions of the files that can be lessons."""
-SKIPPED = ("_build", "_site", "_book", "node_modules", "site-packages", "__pycache__", "public")
+SKIPPED_FOLDERS = (
+    "_build",
+    "_site",
+    "_book",
+    "node_modules",
+    "site-packages",
+    "__pycache__",
+    "public",
+)
 """Folders that are not read: tools write them."""
 
 
@@ -114,7 +122,9 @@ def list_files(folder: Path) -> Files:
     files = {}
     for path in sorted(folder.rglob("*")):
         parts = path.relative_to(folder).parts
-        if path.is_file() and not any(part.startswith(".") or part in SKIPPED for part in parts):
+        if path.is_file() and not any(
+            part.startswith(".") or part in SKIPPED_FOLDERS for part in parts
+        ):
             files["/".join(parts)] = path
     return files
 

@@ -31,7 +31,7 @@ def refusal(node: Node, kind: str = "") -> UntranslatableError:
 _ESCAPE = re.compile(
     r"\\(?:u\{([0-9a-fA-F]+)\}|u([0-9a-fA-F]{4})|x([0-9a-fA-F]{2})|([^ux1-9\r\n\u2028\u2029]))"
 )
-_ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "v": "\v", "0": "\0"}
+_ESCAPED_CHARACTERS = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "v": "\v", "0": "\0"}
 
 
 @functools.cache
@@ -163,7 +163,7 @@ def _fragment(node: Node) -> str:
         raise UntranslatableError(f"the escape `{text}`")
     digits = match[1] or match[2] or match[3]
     if digits is None:
-        return _ESCAPED.get(match[4], match[4])
+        return _ESCAPED_CHARACTERS.get(match[4], match[4])
     number = int(digits, 16)
     if 0xD800 <= number < 0xE000 or number > 0x10FFFF:
         raise UntranslatableError(f"the escape `{text}`")

@@ -100,7 +100,7 @@ def _check_failures(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 
     MuJoCo warns of the main run again in every attempt; to report it once is enough.
     """
-    failures = [f for f in trial.failures if f.kind != _DEEP and not _is_claimed(lab, f)]
+    failures = [f for f in trial.failures if f.kind != _DEPTH_KIND and not _is_claimed(lab, f)]
     of_main_run = {f.kind for f in failures if f.entry == () and f.kind in _OF_MUJOCO}
     for failure in failures:
         if failure.entry == () or failure.kind not in of_main_run:
@@ -109,7 +109,7 @@ def _check_failures(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 
 def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
     """Whether the simulation diverges there, and the lab claims that it does."""
-    if failure.kind != _DIVERGED:
+    if failure.kind != _DIVERGENCE_KIND:
         return False
     claims = [claim for claim in lab.fields.expect if claim.diverges]
     from_start = any(not claim.steps for claim in claims)
@@ -123,21 +123,21 @@ def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
             return from_start
 
 
-_DEEP, _DIVERGED = "deep", "diverged"
-_OF_MUJOCO = ("warning", _DIVERGED)
+_DEPTH_KIND, _DIVERGENCE_KIND = "deep", "diverged"
+_OF_MUJOCO = ("warning", _DIVERGENCE_KIND)
 
 
 def _check_depth(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report bodies that lie deep in each other; only once if the main run has some."""
     if not lab.verify.deep:
-        failures = [f for f in trial.failures if f.kind == _DEEP]
+        failures = [f for f in trial.failures if f.kind == _DEPTH_KIND]
         of_main_run = [f for f in failures if f.entry == ()]
         yield from (_make_diagnostic(lab, failure) for failure in of_main_run or failures)
 
 
 def _check_depth_claim(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report a lab that says `deep` without need."""
-    if lab.verify.deep and not any(failure.kind == _DEEP for failure in trial.failures):
+    if lab.verify.deep and not any(failure.kind == _DEPTH_KIND for failure in trial.failures):
         message = "the lab says `deep`, and no bodies lay deep in each other"
         span = lab.place(("verify", "deep"))
         yield diagnose("lab-shallow", span, message, help="take `deep` away")

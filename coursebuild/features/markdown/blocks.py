@@ -31,7 +31,7 @@ from coursebuild.core.pages.marks import (
 )
 from coursebuild.core.pages.markup import escape, is_tight, raw_html
 
-_APART = (
+_SPACED_BLOCKS = (
     *(model.Callout, model.PlainCode, model.Script, model.Recording, model.Mjcf),
     *(model.FeatureBlock, model.HtmlBlock, model.Table, model.MathBlock),
 )
@@ -90,7 +90,11 @@ class BlockWriter(ABC):
         for block in blocks:
             block_text = self._block(block, previous)
             if block_text and text:
-                is_apart = not tight or isinstance(previous, _APART) or isinstance(block, _APART)
+                is_apart = (
+                    not tight
+                    or isinstance(previous, _SPACED_BLOCKS)
+                    or isinstance(block, _SPACED_BLOCKS)
+                )
                 text += "\n\n" if is_apart else "\n"
             if block_text:
                 text += block_text

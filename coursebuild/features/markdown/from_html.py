@@ -26,7 +26,9 @@ from coursebuild.core.pages.marks import (
     table,
 )
 
-_SKIPPED = frozenset("nav script style svg template button form input select label dialog".split())
+_SKIPPED_ELEMENTS = frozenset(
+    "nav script style svg template button form input select label dialog".split()
+)
 _BLOCKS = frozenset(
     "address article aside blockquote caption dd details div dl dt fieldset figcaption figure"
     " footer h1 h2 h3 h4 h5 h6 header hr li main ol p pre section summary table tbody td tfoot th"
@@ -50,7 +52,7 @@ class _Converter:
         line: list[HtmlContent] = []
         for child in (*content, None):
             if child is not None and (isinstance(child, str) or child.name not in _BLOCKS):
-                if isinstance(child, str) or child.name not in _SKIPPED:
+                if isinstance(child, str) or child.name not in _SKIPPED_ELEMENTS:
                     line.append(child)
                 continue
             text = guard_lines(self._line(line))
@@ -130,7 +132,7 @@ class _Converter:
             return escape_marks(node)
         inner = "".join(map(self._inline, node.children))
         match node.name:
-            case name if name in _SKIPPED:
+            case name if name in _SKIPPED_ELEMENTS:
                 return ""
             case "a":
                 href = node.attributes.get("href")

@@ -19,7 +19,7 @@ from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_htm
 from coursebuild.core.pages.xml import Element, add, element
 from coursebuild.features.qti.mathml import mathml
 
-STRUCK = "struck"
+STRIKE_CLASS = "struck"
 """A class of the package's style sheet."""
 _BLOCKS = frozenset(
     "address article aside blockquote center details dialog div dl fieldset figcaption figure"
@@ -32,8 +32,8 @@ _INLINE = frozenset(
 _NEVER_IN_PRE = frozenset("big small sub sup".split())
 _HEADINGS = frozenset("h1 h2 h3 h4 h5 h6 address".split())
 _EMPHASIS = frozenset("ins mark u".split())
-_STRUCK = frozenset("del s strike".split())
-_HIDDEN = frozenset(
+_STRIKE_ELEMENTS = frozenset("del s strike".split())
+_HIDDEN_ELEMENTS = frozenset(
     "area base col dialog link meta param script source style template title".split()
 )
 """Elements that show nothing by themselves."""
@@ -182,7 +182,7 @@ class Flow:
 
     def _inline(self, node: HtmlElement, pre: bool) -> Iterator[Element | str]:
         name, inner = node.name, node.children
-        if name in _HIDDEN or _ANCHOR in node.classes:
+        if name in _HIDDEN_ELEMENTS or _ANCHOR in node.classes:
             return
         if name == "math":
             yield mathml(node)
@@ -197,9 +197,9 @@ class Flow:
             yield self._picture(node)
         elif name == "a":
             yield from self._link(node, pre)
-        elif name in _STRUCK:
+        elif name in _STRIKE_ELEMENTS:
             self.lose("crossed-out text is marked by a class, which some platforms do not show")
-            yield element("span", {"class": STRUCK}, *self._line(inner, pre=pre))
+            yield element("span", {"class": STRIKE_CLASS}, *self._line(inner, pre=pre))
         elif name in _EMPHASIS:
             yield element("em", {}, *self._line(inner, pre=pre))
         elif name == "input" and node.attributes.get("type", "").lower() == "checkbox":
@@ -250,7 +250,7 @@ def _trim_line_ends(code: Element) -> None:
 
 def _is_block(node: HtmlElement) -> bool:
     """Whether an element is, or holds, a block."""
-    if node.name == "math" or node.name in _ACTIVE or node.name in _HIDDEN:
+    if node.name == "math" or node.name in _ACTIVE or node.name in _HIDDEN_ELEMENTS:
         return False
     return node.name in _BLOCKS or any(map(_is_block, node.elements))
 

@@ -47,7 +47,7 @@ _ATTRIBUTES = {
     "mtr": "rowalign columnalign",
     "mtd": "rowspan columnspan rowalign columnalign",
 }
-_ALIGNED = {"tml-left": "left", "tml-right": "right"}
+_ALIGNMENTS = {"tml-left": "left", "tml-right": "right"}
 """Classes of columns that the site's style sheet aligns."""
 _EMPTY = frozenset({"mspace", "mprescripts", "none"})
 _WORDS = frozenset({"mi", "mn", "mo", "mtext", "ms"})
@@ -92,8 +92,8 @@ def _attributes(node: HtmlElement, name: str) -> dict[str, str]:
     names = _ATTRIBUTES[name].split()
     attributes = {key: value for key, value in node.attributes.items() if key in names}
     if name == "mtd":
-        for mark in sorted(node.classes & _ALIGNED.keys()):
-            attributes["columnalign"] = _ALIGNED[mark]
+        for mark in sorted(node.classes & _ALIGNMENTS.keys()):
+            attributes["columnalign"] = _ALIGNMENTS[mark]
     colour = _COLOUR.search(node.attributes.get("style", ""))
     if colour is not None and "mathcolor" in names:
         attributes["mathcolor"] = colour[1]

@@ -16,13 +16,13 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.xml import identifier, render_xml
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.features.qti.flow import STRUCK
+from coursebuild.features.qti.flow import STRIKE_CLASS
 from coursebuild.features.qti.items import STYLE, QuizItems, quiz_items
 from coursebuild.features.quiz.model import Quiz
 
 _FOLDER = Path(__file__).parent
 _STYLE_SHEET = f"""\
-.{STRUCK} {{ text-decoration: line-through; }}
+.{STRIKE_CLASS} {{ text-decoration: line-through; }}
 .align-center {{ text-align: center; }}
 .align-right {{ text-align: right; }}
 """

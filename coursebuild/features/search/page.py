@@ -22,7 +22,7 @@ from coursebuild.features.search.sections import (
 )
 from coursebuild.features.search.words import count_terms
 
-_EXCLUDED = frozenset({"home", "notfound"})
+_EXCLUDED_KINDS = frozenset({"home", "notfound"})
 """Kinds of pages that nobody looks for: other pages have all of their content."""
 _LEAD_ONLY = frozenset({"level", "stub"})
 """Kinds of pages that are found by title and summary only: other pages have the rest."""
@@ -44,7 +44,9 @@ def note_page(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
         page: the document on it, where it has one.
         body: its HTML.
     """
-    if inputs.head.kind in _EXCLUDED or not (inputs.head.indexed or inputs.head.kind in _LEAD_ONLY):
+    if inputs.head.kind in _EXCLUDED_KINDS or not (
+        inputs.head.indexed or inputs.head.kind in _LEAD_ONLY
+    ):
         return b""
     head = inputs.values.get("lesson")
     name = head.id if isinstance(head, LessonLink) else ""

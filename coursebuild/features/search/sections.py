@@ -182,7 +182,9 @@ def _line(text: str) -> str:
 
 
 _HEADINGS = {f"h{level}": level for level in range(1, 7)}
-_HIDDEN = frozenset(("script", "style", "nav", "svg", "pre", "template", "button", "select"))
+_SKIPPED_ELEMENTS = frozenset(
+    ("script", "style", "nav", "svg", "pre", "template", "button", "select")
+)
 """Elements that are not searched; code comes from the page's inputs."""
 _LINES = frozenset(
     "p li dt dd td th tr table ul ol dl div section article figure figcaption summary main".split()
@@ -210,7 +212,7 @@ class _HtmlReader:
         for child in content:
             if isinstance(child, str):
                 self._text += child
-            elif child.name in _HIDDEN:
+            elif child.name in _SKIPPED_ELEMENTS:
                 continue
             elif child.name in _HEADINGS:
                 self.end_line()

@@ -42,7 +42,9 @@ _STYLE = frozenset(
     " mathstrut strut phantom hphantom vphantom color textcolor mathop mathrel mathbin".split()
 )
 """Commands for the look of a formula: nobody searches by their names."""
-_SKIPPED = frozenset("begin end label tag color hspace vspace phantom hphantom vphantom".split())
+_SKIPPED_COMMANDS = frozenset(
+    "begin end label tag color hspace vspace phantom hphantom vphantom".split()
+)
 """Commands whose argument is not part of the formula's text."""
 _LETTERS = {
     **{name: letter for letter, name in reversed(GREEK.items())},
@@ -138,7 +140,7 @@ class _Reader:
             return f" {top}/{_add_brackets(self._argument())} "
         if name == "sqrt":
             return f"√{_add_brackets(self._argument())}"
-        if name in _SKIPPED:
+        if name in _SKIPPED_COMMANDS:
             self._argument()
             return " "
         return ""

@@ -23,18 +23,18 @@ Element = ElementTree.Element
 
 _PRIMES = frozenset("′″‴*∗⋆★†‡+−±∓∥⟂⊥∘°")
 """Superscripts that are a part of the symbol."""
-_RAISED = frozenset("′″‴")
+_PRIME_GLYPHS = frozenset("′″‴")
 """Primes, whose glyphs are raised already; see `formulas.css`."""
 _SIGNS = frozenset("+−±∓∗*")
 """Signs that are operators unless they are alone."""
 _NO_SYMBOLS = frozenset("∂∇∞⊤⊥ℝℂℕℤℚ∅…⋯⋮⋱")
 """Letters in MathML that are no quantities."""
-_TRANSPOSED = frozenset("T𝖳𝐓")
+_TRANSPOSE_SIGNS = frozenset("T𝖳𝐓")
 _ACCENTS = frozenset("˙¨⃛⃜ˆ^~˜¯‾ˉ→⃗´`˘ˇ˚")
-_ACCENTED = ("mover", "munder")
+_ACCENT_ELEMENTS = ("mover", "munder")
 _SCRIPTS = ("msub", "msup", "msubsup")
 _LEAVES = frozenset(("mo", "mn", "mspace", "mtext", "annotation"))
-_SYMBOLS = frozenset(("mi", *_ACCENTED, *_SCRIPTS))
+_SYMBOLS = frozenset(("mi", *_ACCENT_ELEMENTS, *_SCRIPTS))
 _WRAPPERS = frozenset(("mrow", "mpadded", "mstyle", "semantics", "math", "mphantom"))
 
 
@@ -87,7 +87,7 @@ def _collect(element: Element, symbols: dict[str, None]) -> None:
     bare = _unwrap(element)
     if bare.tag not in ("msup", "msubsup") or _mark(bare[-1]) is not None:
         return
-    if "".join(bare[-1].itertext()) not in _TRANSPOSED:  # an operation, and no symbol
+    if "".join(bare[-1].itertext()) not in _TRANSPOSE_SIGNS:  # an operation, and no symbol
         _collect(bare[-1], symbols)
 
 
@@ -96,7 +96,7 @@ def _symbol(element: Element, *, is_declared: bool = False) -> str | None:
     bare = _unwrap(element)
     if bare.tag == "mi":
         return _letter(bare.text or "", bare.get("mathvariant") == "normal", is_declared)
-    if bare.tag in _ACCENTED:
+    if bare.tag in _ACCENT_ELEMENTS:
         return _accented_symbol(bare, is_declared=is_declared)
     if bare.tag not in _SCRIPTS:
         return None
@@ -159,7 +159,7 @@ def _index_parts(element: Element) -> Iterator[str | None]:
         return
     elif bare.tag == "mo" and (text in ",;/|" or set(text) <= _PRIMES):
         yield f"<mo>{escape(text)}</mo>"
-    elif bare.tag in (*_SCRIPTS, *_ACCENTED):
+    elif bare.tag in (*_SCRIPTS, *_ACCENT_ELEMENTS):
         yield _symbol(bare, is_declared=True)
     else:
         yield None
@@ -173,7 +173,7 @@ def _mark(element: Element) -> str | None:
         return f"<mtext>{escape(text)}</mtext>"
     parts = _children(bare) if bare.tag == "mrow" else [bare]
     if text and set(text) <= _PRIMES and all(part.tag == "mo" for part in parts):
-        prime = ' class="tml-prime"' if set(text) <= _RAISED else ""
+        prime = ' class="tml-prime"' if set(text) <= _PRIME_GLYPHS else ""
         return f"<mo{prime}>{escape(text)}</mo>"
     return None
 

@@ -40,7 +40,7 @@ from coursebuild.numerics.problems.common import (
     motion_without_attitude,
 )
 
-_PARTING = 0.1
+_PARTING_ERROR = 0.1
 """rad: the error at which a motion has nothing in common with the exact one."""
 _MEMBERS, _RADIUS = 12, 1e-3
 """The size of the ensemble, and how far it begins from the case, rad."""
@@ -120,7 +120,7 @@ def horizons(integrator: Integrator) -> list[float]:
         run = simulate(replace(problem(), scenario=scenario), model).states
         truth = reference_motion(replace(REFERENCE, solution=member), tuple(run.times.tolist()))
         error = np.linalg.norm(run.qpos - truth.position, axis=1)
-        parted = np.flatnonzero(~(error < _PARTING))
+        parted = np.flatnonzero(~(error < _PARTING_ERROR))
         times.append(float(run.times[parted[0]]) if len(parted) else math.inf)
     return times
 

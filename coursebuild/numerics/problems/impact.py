@@ -65,7 +65,7 @@ BOUNCE = model_text(
     _OPTION,
 )
 CRADLE = model_text("\n".join(map(_ball, ("0", "0.25", "0.5"))), _OPTION)
-TOUCHING = model_text("\n".join(map(_ball, ("0", "0.25", "0.45"))), _OPTION)
+TOUCHING_BALLS = model_text("\n".join(map(_ball, ("0", "0.25", "0.45"))), _OPTION)
 _BOUNCE_SCENARIO = Scenario(0.1, 0.01, (0.0,), (1.0,))
 _CRADLE_SCENARIO = Scenario(0.13, 0.01, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 _TOUCHING_SCENARIO = Scenario(0.06, 0.002, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
@@ -242,7 +242,7 @@ def problems() -> tuple[Problem, ...]:
         impact,
         name="newtons-cradle-touching",
         title="Newton's cradle, two balls of which touch",
-        mjcf=TOUCHING,
+        mjcf=TOUCHING_BALLS,
         scenario=_TOUCHING_SCENARIO,
         reference=Reference("ode", source, TouchingCradle()),
         precision=Sizes(1e-10, 0.0, 1e-8),
@@ -260,6 +260,6 @@ def _touching_check(ball: int, name: str) -> ScalarCheck:
         f"velocity of the {name} ball, 80 steps in a contact",
         "m/s",
         lambda _: float(TouchingCradle().motion(np.array([0.06])).velocity[0, ball]),
-        lambda integrator: last_velocity(TOUCHING, _TOUCHING_SCENARIO, integrator, ball, 80),
+        lambda integrator: last_velocity(TOUCHING_BALLS, _TOUCHING_SCENARIO, integrator, ball, 80),
         "the soft contacts of MuJoCo, integrated",
     )

@@ -36,7 +36,10 @@ from mjcourse.spatial import axis_angle_to_quat
 
 Cone = Literal["pyramidal", "elliptic"]
 _CONES: tuple[Cone, ...] = ("elliptic", "pyramidal")
-SLIDING, ACROSS = "6.936717523440031 0 -6.936717523440032", "4.905 4.905 -6.936717523440032"
+SLIDING, DIAGONAL_SLIDING = (
+    "6.936717523440031 0 -6.936717523440032",
+    "4.905 4.905 -6.936717523440032",
+)
 STICKING = "2.5390148324557287 0 -9.47573235589576"
 ROLLING = "3.3552176060248105 0 -9.218384609909762"
 """Gravity on slopes of 45°, 15° and 20°, m/s²; in the second half-way between the axes."""
@@ -138,7 +141,7 @@ def problems() -> tuple[Problem, ...]:
 
 def _sliding_problem(cone: Cone, is_diagonal: bool) -> Problem:
     slide = Incline(math.radians(45), 0.5, is_diagonal)
-    text = mjcf("box", ACROSS if is_diagonal else SLIDING, cone, "0.5")
+    text = mjcf("box", DIAGONAL_SLIDING if is_diagonal else SLIDING, cone, "0.5")
     name = "acceleration when sliding, from 0.5 s to 1 s at 1 ms"
     checks = [_acceleration(name, text, slide.acceleration, "Coulomb's law")]
     if (

@@ -43,7 +43,7 @@ from coursebuild.numerics.problems.common import (
 
 START = (1.0,), (5.0,)
 """m and m/s: from rest the semi-implicit method would seem to be of second order in velocity."""
-BOUND = 1e4
+POSITION_BOUND = 1e4
 """m: with a double root a stable state may grow a few hundred times before it decays."""
 _SPAN = 5000.0
 """Radians over which stability is judged: just beyond its boundary an oscillator grows slowly."""
@@ -167,15 +167,15 @@ def _spring_problem(ratio: float) -> Problem:
         case=5,
         mjcf=model_text(_ball(joint), NO_GRAVITY, NO_CONTACT),
         scenario=Scenario(1.0, 0.1, *START),
-        position_bound=BOUND,
-        velocity_bound=BOUND * rate * (1 + 4 * ratio),
+        position_bound=POSITION_BOUND,
+        velocity_bound=POSITION_BOUND * rate * (1 + 4 * ratio),
         reference=Reference("closed", "the linear oscillator", Oscillation(ratio, rate)),
         timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160, 320, 640),
         limit=lambda integrator: limit_of(ratio, rate, integrator, explicit),
         energy_conserved=ratio == 0,
         search=(1e-2 / rate, 1e2 / rate),
         span=_SPAN * max(1.0, 0.2 * ratio) / rate,
-        room=BOUND**2,
+        room=POSITION_BOUND**2,
     )
 
 
@@ -184,7 +184,7 @@ def _servo_problem(ratio: float) -> Problem:
     gains = f'kp="10000" kv="{_KV[ratio]}"'
     motor = f'  <actuator><position joint="slide" {gains}/></actuator>\n'
     source = "the linear oscillator about each target"
-    limit = BOUND / 10
+    limit = POSITION_BOUND / 10
     return Problem(
         name=f"stiff-servo-{ratio:g}",
         title=f"Stiff servo, ζ = {ratio:g}",
@@ -198,7 +198,7 @@ def _servo_problem(ratio: float) -> Problem:
         limit=lambda integrator: limit_of(ratio, rate, integrator, *explicit),
         search=(1e-2 / rate, 1e2 / rate),
         span=_SPAN * max(1.0, 0.2 * ratio) / rate,
-        room=BOUND**2,
+        room=POSITION_BOUND**2,
     )
 
 
@@ -215,14 +215,14 @@ def _equality_problem(ratio: float) -> Problem:
         case=12,
         mjcf=model_text(_ball(_SLIDE), f'{NO_GRAVITY} tolerance="0"', flags, equality),
         scenario=Scenario(0.2, 0.02, *START),
-        position_bound=BOUND,
-        velocity_bound=BOUND * rate * (1 + 4 * ratio),
+        position_bound=POSITION_BOUND,
+        velocity_bound=POSITION_BOUND * rate * (1 + 4 * ratio),
         reference=Reference("closed", source, Oscillation(ratio, rate)),
         timesteps=divisions(0.02, 4, 8, 16, 32, 64, 128, 256),
         limit=lambda integrator: limit_of(ratio, rate, integrator, *explicit),
         search=(1e-2 / rate, 1e1 / rate),
         span=_SPAN / rate,
-        room=BOUND**2,
+        room=POSITION_BOUND**2,
     )
 
 

@@ -37,7 +37,7 @@ _FAR_AWAY = Scenario(1.0, 0.1, (1e9,), (1e-3,))
 
 _CUBE = '<geom type="box" size="0.0005 0.0005 0.0005" density="1000"/>'
 CUBE = model_text(f"    <body><freejoint/>{_CUBE}</body>", NO_GRAVITY, NO_CONTACT)
-RESTING = model_text(
+RESTING_CUBE = model_text(
     f'    <geom type="plane" size="1 1 1"/>\n    <body pos="0 0 0.0005"><freejoint/>{_CUBE}</body>',
     'gravity="0 0 -9.81"',
 )
@@ -60,7 +60,7 @@ def _axial_moment(_: Integrator) -> float:
 
 def relative_depth(integrator: Integrator) -> float:
     """The depth of the resting cube in the floor, relative to its edge, after 1 s at 1 ms."""
-    data = run_steps(RESTING, Scenario(1.0, 0.1), integrator, 1e-3, 1000)
+    data = run_steps(RESTING_CUBE, Scenario(1.0, 0.1), integrator, 1e-3, 1000)
     return float((0.0005 - data.qpos[2]) / 0.001)
 
 

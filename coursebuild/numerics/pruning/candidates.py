@@ -71,7 +71,7 @@ _PROOFS = {
 
 def message_of(kind: str, names: str, count: int) -> str:
     """The message of a finding about so many things with these names."""
-    noun = kind.removeprefix("unused-") if kind.startswith("unused-") else _WHAT.get(kind, "")
+    noun = kind.removeprefix("unused-") if kind.startswith("unused-") else _NOUNS.get(kind, "")
     if noun == "default":
         noun = "class"
     for (_, name, value), words in _SETTINGS.items():
@@ -83,7 +83,7 @@ def message_of(kind: str, names: str, count: int) -> str:
     )
 
 
-_WHAT = {
+_NOUNS = {
     "sensor-unread": "sensor",
     "actuator-idle": "actuator",
     "tendon-idle": "tendon",

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 _PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 _HFIELD = int(mujoco.mjtGeom.mjGEOM_HFIELD)
-_FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+_FREE_JOINT, _SLIDE_JOINT = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 _SLACK = 1e-6
 """m and relative: rounding, and the engine's own margins."""
 
@@ -185,7 +185,7 @@ class Reach:
                 return None
             start = int(model.body_jntadr[body])
             for joint in range(start, start + int(model.body_jntnum[body])):
-                if model.jnt_type[joint] in (_FREE, _SLIDE):
+                if model.jnt_type[joint] in (_FREE_JOINT, _SLIDE_JOINT):
                     return None
                 anchors.append(np.asarray(data.xanchor[joint], dtype=np.float64))
         if not anchors:

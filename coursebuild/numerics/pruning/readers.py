@@ -55,7 +55,7 @@ _PROSE = {
     False: re.compile(rf"{_LITERAL}|//[^\n]*|/\*[\s\S]*?\*/"),
 }
 """Texts and comments, in which no code stands: of Python, and of JavaScript."""
-_FILLED = re.compile(r"([\"'])\s*\.format\(")
+_FORMAT_CALL = re.compile(r"([\"'])\s*\.format\(")
 """A text that may read attributes of its arguments."""
 _FUNCTION = re.compile(r"mj[dsprv]?_")
 _WORD = re.compile(r"[^\W\d]\w*")
@@ -122,7 +122,7 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Rea
     `course_modules`: modules that are readers themselves, so that importing one is harmless.
     """
     names = frozenset(next(filter(None, match), "") for match in _TEXT.findall(text))
-    rest, filled = _FILLED.subn(r"\1(", _RESET.sub("", text))
+    rest, filled = _FORMAT_CALL.subn(r"\1(", _RESET.sub("", text))
     parts = {(VIEWS[view], part) for view, part in _THING.findall(rest) if view in VIEWS}
     rest = _THING.sub(lambda match: "named" if match[1] in VIEWS else match[0], rest)
     code = _PROSE[path.endswith(".py")].sub('""', rest)

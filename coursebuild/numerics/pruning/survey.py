@@ -43,8 +43,8 @@ from coursebuild.numerics.pruning.reachability import PREMISES
 from coursebuild.numerics.pruning.readers import Reader
 from coursebuild.numerics.pruning.trials import PrunedModel, PruningTrials, largest_subset
 from coursebuild.numerics.reports.diet import (
-    PROVED,
-    SAME,
+    MEASURED_LABEL,
+    PROVED_LABEL,
     DietReport,
     DietScenario,
     Finding,
@@ -58,7 +58,7 @@ from coursebuild.numerics.reports.diet import (
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.timing import Clock
 
-LEAST = 1.05
+MIN_SPEEDUP = 1.05
 """The speedup from which on a finding that is not proved is worth a word."""
 _OWN_FIELDS = {
     kind: frozenset(fields.split(" "))
@@ -225,7 +225,7 @@ class _Surveyor:
             if not item.element or elements.isdisjoint(item.element.ancestors())
         ]
         groups = self._group_items([*outer, *kept_items])
-        return [self._make_group(similar, reason, PROVED, 0.0) for reason, similar in groups]
+        return [self._make_group(similar, reason, PROVED_LABEL, 0.0) for reason, similar in groups]
 
     def _is_unread(self, item: Item) -> bool:
         names = {item.name} | {node.get("class") or "" for e in item.removals for node in e.walk()}
@@ -305,9 +305,9 @@ class _Surveyor:
             return None
         if not moves_alike(removable):
             return None
-        group = self._make_group(removable, reason, SAME, results[-1].difference)
+        group = self._make_group(removable, reason, MEASURED_LABEL, results[-1].difference)
         saving = group.finding.saving
-        is_slow = saving.time is None or not (saving.certain and saving.time >= LEAST)
+        is_slow = saving.time is None or not (saving.certain and saving.time >= MIN_SPEEDUP)
         if self.order.clock is not None and is_slow and not reason:
             self._reject(removable, results[-1].difference, "it saves no time")
             return None
@@ -346,7 +346,7 @@ class _Surveyor:
             label=label,
             difference=gap,
             scenarios=tuple(run.scene.name for run in self.good_runs),
-            proof=proof_of(kind) if label == PROVED else "",
+            proof=proof_of(kind) if label == PROVED_LABEL else "",
             saving=saving,
             edits=self._text_edits(edits),
             fixable=False,
@@ -361,8 +361,8 @@ class _Surveyor:
         """Why `--fix` does not act on a finding; empty where it does."""
         if finding.kept:
             return "it is kept"
-        if finding.label != PROVED:
-            return f"only what is {PROVED} is changed"
+        if finding.label != PROVED_LABEL:
+            return f"only what is {PROVED_LABEL} is changed"
         if finding.kind == "actuator-idle" and self.order.has_commands:
             return "scenarios give commands by number: their rows would have to be shortened"
         locked = (self.order.locked.get(edit.path, "") for edit in finding.edits)

@@ -50,7 +50,7 @@ from coursebuild.numerics.reports.strokes import (
     symbols,
 )
 
-WIDE, NARROW, BESIDE = (620.0, 320.0), (350.0, 260.0), (430.0, 236.0)
+WIDE, NARROW, PAIRED = (620.0, 320.0), (350.0, 260.0), (430.0, 236.0)
 """The width of a chart and the height between its axes: for wide screens, for narrow ones, and for
 charts beside each other."""
 _TOP = 16.0

@@ -38,7 +38,7 @@ _ROUNDING = 1e-9
 """The absolute difference that drifts and depths may have: rounding differs between processors."""
 _INVISIBLE = 1e-6
 """The absolute difference that visible errors may have, where 1 is just visible."""
-_SAME = 1e-9
+_TIGHT_BAND = 1e-9
 _BENCH = BenchTable()
 """The bands of hard cases."""
 _PARTS = ("position", "attitude", "velocity")
@@ -208,11 +208,11 @@ def _largest(row: StableRow) -> _Figures:
 def _scenario(report: ScenarioReport, bench: BenchTable) -> _Table:
     share = bench.band
     place, speed = FLOORS * report.floor, FLOORS * report.velocity_floor
-    predictable = report.horizon >= report.duration * (1 - _SAME)
+    predictable = report.horizon >= report.duration * (1 - _TIGHT_BAND)
     table: _Table = {
         ("", "scenario"): {
-            "duration": _Figure(report.duration, _SAME),
-            "hold": _Figure(report.hold, _SAME),
+            "duration": _Figure(report.duration, _TIGHT_BAND),
+            "hold": _Figure(report.hold, _TIGHT_BAND),
             "horizon": _Figure(report.horizon, share),
             "reference": _Figure(report.reference),
             "figure": _Figure(report.figure),
@@ -265,7 +265,7 @@ def _case(case: CaseReport) -> _Table:
 
 def _figure(line: FigureLine, share: float, least: float) -> _Figures:
     """A quantity that theory gives is compared by its error, another by its size."""
-    figures = {f"exact {line.name}": _Figure(line.exact, _SAME)}
+    figures = {f"exact {line.name}": _Figure(line.exact, _TIGHT_BAND)}
     if line.exact is None:
         return figures | {line.name: _Figure(line.measured, share, _ROUNDING)}
     error = None if line.measured is None else line.measured - line.exact

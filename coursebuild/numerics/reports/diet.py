@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Record
 
-PROVED = "proved"
+PROVED_LABEL = "proved"
 """The label of a finding without which every bit is the same in every state, by a stated proof."""
-SAME = "the same in what was run"
+MEASURED_LABEL = "the same in what was run"
 """The label of a finding without which scenarios, scripts and labs gave the same, unproved."""
 
 
@@ -78,7 +78,7 @@ class Finding(Record, frozen=True):
     places: tuple[ModelPlace, ...]
     """Empty where it is about the model as a whole."""
     label: str
-    """`PROVED` or `SAME`."""
+    """`PROVED_LABEL` or `MEASURED_LABEL`."""
     difference: float
     """The largest within 50 ms, relative to a number's size where that is over 1; 0 where all bits
     are the same."""
@@ -100,7 +100,7 @@ class Finding(Record, frozen=True):
     @property
     def is_fault(self) -> bool:
         """Whether it is a fault of the model: proved, and not kept by the author."""
-        return self.label == PROVED and not self.kept
+        return self.label == PROVED_LABEL and not self.kept
 
 
 class RejectedTrial(Record, frozen=True):

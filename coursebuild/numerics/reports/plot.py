@@ -19,7 +19,7 @@ from collections.abc import Iterator, Sequence
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import FLOORS, ScenarioReport, WorkPrecisionRow
 from coursebuild.numerics.reports.cases import CaseReport
-from coursebuild.numerics.reports.chart import BESIDE, NARROW, WIDE, Chart, Line, Point, chart_svg
+from coursebuild.numerics.reports.chart import NARROW, PAIRED, WIDE, Chart, Line, Point, chart_svg
 from coursebuild.numerics.reports.strokes import Entry
 from coursebuild.numerics.reports.text import (
     INTEGRATORS,
@@ -205,7 +205,7 @@ def case_svg(report: CaseReport, quantity: Quantity, name: str) -> str:
         lines=lines,
         least=quantity.least,
     )
-    return chart_svg(chart, name, BESIDE)
+    return chart_svg(chart, name, PAIRED)
 
 
 def _case_points(report: CaseReport, quantity: Quantity, integrator: str) -> Iterator[Point]:

@@ -15,15 +15,15 @@ from coursebuild.core.drawing.marks import markup_text, shorten_to_width, text_w
 _DASHES = ("", "7 3", "2 3", "10 3 2 3", "1 4", "5 2 1 2 1 2", "12 4")
 _LIGHT = ("#0072b2", "#b34d00", "#00795a", "#a8467f", "#7a6a00", "#2b6f9e", "#1e1e1c")
 """Okabe and Ito's, darker on paper."""
-_CORNERS = (0, 4, 4, 3, 3, 5, 6)
-_TURNED = (0.0, 45.0, 0.0, -90.0, 90.0, -90.0, 0.0)
+_MARK_CORNERS = (0, 4, 4, 3, 3, 5, 6)
+_MARK_ANGLES = (0.0, 45.0, 0.0, -90.0, 90.0, -90.0, 0.0)
 SIZE, TICK_SIZE = 12.0, 11.0
 """Of letters, in the units of the drawing."""
 MARK, SMALL = 4.2, 2.9
 RING = 8.5
 ROW = 18.0
 """From one line of a key to the next."""
-OWN = "var(--rust, #86340c)"
+OWN_COLOUR = "var(--rust, #86340c)"
 INK = "var(--ink, currentColor)"
 PAPER = "var(--paper, Canvas)"
 FINE = 'font-size="11"'
@@ -76,13 +76,13 @@ def mark(number: int, x: float, y: float, size: float) -> str:
 
     All of about the same area; `size` is the radius of the circle.
     """
-    n = number % len(_CORNERS)
-    corners = _CORNERS[n]
+    n = number % len(_MARK_CORNERS)
+    corners = _MARK_CORNERS[n]
     if not corners:
         r = f"{size:g} {size:g} 0 1 0"
         return f"M{x - size:.1f} {y:.1f}a{r} {2 * size:g} 0a{r} {-2 * size:g} 0Z"
     radius = size * math.sqrt(2 * math.pi / (corners * math.sin(2 * math.pi / corners)))
-    angles = [math.radians(_TURNED[n] + 360 * k / corners) for k in range(corners)]
+    angles = [math.radians(_MARK_ANGLES[n] + 360 * k / corners) for k in range(corners)]
     places = (f"{x + radius * math.cos(a):.1f} {y + radius * math.sin(a):.1f}" for a in angles)
     return "M" + "L".join(places) + "Z"
 
@@ -117,7 +117,7 @@ def bar(low: float, high: float, y: float) -> str:
 
 def ring(x: float, y: float, radius: float) -> str:
     """The ring around the scene's own setting."""
-    look = f'fill="none" stroke="{OWN}" stroke-width="1.8"'
+    look = f'fill="none" stroke="{OWN_COLOUR}" stroke-width="1.8"'
     return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}" {look}/>'
 
 

@@ -43,7 +43,7 @@ from coursebuild.numerics.reports.sweep import (
 
 _SPREAD = 20.0
 """A scale is logarithmic where its figures differ by more than this factor."""
-_MOST = 3
+_MAX_FIGURES = 3
 """The most figures that are drawn; all are in the table."""
 _GAP = 18.0
 """Between two scales."""
@@ -57,7 +57,7 @@ def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
         name: unique among the plots on the page, as ids are made from it.
         narrow: for narrow screens: the scales stand below each other.
     """
-    figures = shown_figures(sweep)[:_MOST]
+    figures = shown_figures(sweep)[:_MAX_FIGURES]
     width, _ = NARROW if narrow else WIDE
     if not figures:
         return ""

@@ -11,7 +11,7 @@ import pytest
 
 from coursebuild.numerics.pruning.model_text import ModelTextError
 from coursebuild.numerics.pruning.survey import Survey
-from coursebuild.numerics.reports.diet import PROVED
+from coursebuild.numerics.reports.diet import PROVED_LABEL
 from support.surveys import PATH, findings_by_kind, fixed_text, names, open_files, run_survey
 
 pytestmark = pytest.mark.site
@@ -290,4 +290,4 @@ def test_random_models_move_as_before() -> None:
         else:
             assert left == text, seed
         for finding in survey.report.findings:
-            assert finding.label == PROVED or not finding.fixable, seed
+            assert finding.label == PROVED_LABEL or not finding.fixable, seed

@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from coursebuild.numerics.reports.diet import PROVED, SAME
+from coursebuild.numerics.reports.diet import MEASURED_LABEL, PROVED_LABEL
 from support.surveys import PENDULUM, field, findings_by_kind, fixed_text, names, run_survey, scene
 
 
@@ -20,7 +20,7 @@ def test_actuators_that_nobody_commands() -> None:
     clock = itertools.count(step=10**6).__next__
     survey = run_survey(scene(rest=rest), clock=clock)
     finding = findings_by_kind(survey)["actuator-idle"]
-    assert names(finding) == ["push"] and finding.label == PROVED
+    assert names(finding) == ["push"] and finding.label == PROVED_LABEL
     assert finding.saving.time == 1.0
     assert '<key name="up" qpos="1" ctrl="0 0"/>' in fixed_text(survey)
 
@@ -56,7 +56,7 @@ def test_contact_is_off_where_nothing_can_touch() -> None:
     world = PENDULUM + '<geom name="far" size=".1" pos="0 0 2"/>'
     survey = run_survey(scene(world))
     finding = findings_by_kind(survey)["contact-off"]
-    assert finding.label == PROVED and finding.proof.startswith("no two geoms can meet")
+    assert finding.label == PROVED_LABEL and finding.proof.startswith("no two geoms can meet")
     left = fixed_text(survey)
     assert '<option><flag contact="disable"/></option>' in left
     assert run_survey(left).edits == ()
@@ -66,14 +66,14 @@ def test_what_only_did_not_touch_is_told_and_left() -> None:
     world = PENDULUM + '<geom name="near" size=".1" pos="0 0 1.35"/>'
     survey = run_survey(scene(world))
     finding = findings_by_kind(survey)["contact-idle"]
-    assert finding.label == SAME and not finding.fixable and not finding.is_fault
+    assert finding.label == MEASURED_LABEL and not finding.fixable and not finding.is_fault
     assert fixed_text(survey) == scene(world)
 
 
 def test_a_lesson_that_moves_geoms_takes_the_proof_away() -> None:
     world = PENDULUM + '<geom name="far" size=".1" pos="0 0 2"/>'
     survey = run_survey(scene(world), lesson="model.geom_pos[1] = 0")
-    assert findings_by_kind(survey)["contact-idle"].label == SAME
+    assert findings_by_kind(survey)["contact-idle"].label == MEASURED_LABEL
 
 
 def test_geoms_that_can_touch_nothing_need_no_contact() -> None:
@@ -85,7 +85,7 @@ def test_geoms_that_can_touch_nothing_need_no_contact() -> None:
       <geom name="n" size=".1" pos=".2 0 0"/></body>"""
     survey = run_survey(scene(world))
     finding = findings_by_kind(survey)["collision-unreachable"]
-    assert names(finding) == ["lamp", "s"] and finding.label == PROVED
+    assert names(finding) == ["lamp", "s"] and finding.label == PROVED_LABEL
     left = fixed_text(survey)
     assert '<geom name="lamp" size=".1" pos="0 0 9" contype="0" conaffinity="0"/>' in left
     assert '<geom name="n" size=".1" pos=".2 0 0"/>' in left
@@ -100,7 +100,7 @@ def test_all_of_a_field_of_rubble_goes_and_the_arm_stays() -> None:
     )
     survey = run_survey(field(3, 40).replace("</worldbody>", posts + "</worldbody>"))
     far = findings_by_kind(survey)["far-body"]
-    assert len(names(far)) == 40 and far.label == SAME and far.difference < 1e-9
+    assert len(names(far)) == 40 and far.label == MEASURED_LABEL and far.difference < 1e-9
     assert not far.fixable and not far.is_fault and far.doubt == ""
     posts = {f"mujoco/worldbody/geom[{number}]" for number in range(2, 62)}
     assert set(names(findings_by_kind(survey)["collision-idle"])) >= posts

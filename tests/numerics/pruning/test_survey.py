@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from coursebuild.numerics.reports.diet import PROVED
+from coursebuild.numerics.reports.diet import PROVED_LABEL
 from support.surveys import (
     PATH,
     PENDULUM,
@@ -51,7 +51,7 @@ def test_assets_that_nothing_uses_with_those_that_only_they_use() -> None:
         "unused-mesh": ["ünüsed"],
         "unused-hfield": ["hill"],
     }
-    assert all(finding.label == PROVED and finding.fixable for finding in findings.values())
+    assert all(finding.label == PROVED_LABEL and finding.fixable for finding in findings.values())
     assert (
         findings["unused-texture"].saving.text > 50 and findings["unused-mesh"].saving.memory > 100
     )

@@ -22,7 +22,7 @@ examples:
 """
 
 _COURSE = Path(__file__).parents[1] / "course"
-_RENAMED = {
+_PATHS_BY_FILE = {
     "gitignore": ".gitignore",
     "settings.json": ".vscode/settings.json",
     "extensions.json": ".vscode/extensions.json",
@@ -69,5 +69,5 @@ def _read_files() -> dict[str, bytes]:
         if file.is_file() and "__pycache__" not in file.parts:
             path = file.relative_to(_COURSE).as_posix()
             data = file.read_bytes().replace(b"VERSION", __version__.encode())
-            files[_RENAMED.get(path, path)] = data
+            files[_PATHS_BY_FILE.get(path, path)] = data
     return files

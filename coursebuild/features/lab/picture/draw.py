@@ -28,9 +28,9 @@ from coursebuild.features.lab.picture.studio import Floor, draw_edges
 from coursebuild.features.lab.picture.textures import Texture, TextureMapping, sharpness, sky
 
 _SAMPLES = 2
-_NEAR = 0.01
+_NEAR_SHARE = 0.01
 """Nearest distance that is drawn, as a part of the camera's distance from its target."""
-_OPAQUE, _CLEAR = 0.999, 0.001
+_OPAQUE_ALPHA, _CLEAR_ALPHA = 0.999, 0.001
 _FROM_BELOW = 0.5
 """Factor of the opacity of a plane seen from below, as in MuJoCo."""
 _TOP = 0.5
@@ -74,7 +74,7 @@ class Solid(Struct, frozen=True):
     @property
     def opaque(self) -> bool:
         """Whether nothing shows through it."""
-        return self.rgba[3] >= _OPAQUE
+        return self.rgba[3] >= _OPAQUE_ALPHA
 
 
 class FreeCamera(Struct, frozen=True):
@@ -103,7 +103,7 @@ class FreeCamera(Struct, frozen=True):
         right = np.array((np.sin(azimuth), -np.cos(azimuth), 0.0))
         axes = np.stack((right, np.cross(right, self.forward), self.forward))
         focal = height / 2 / np.tan(np.radians(self.fovy) / 2)
-        near = max(_NEAR * self.distance, 1e-6)
+        near = max(_NEAR_SHARE * self.distance, 1e-6)
         position = np.array(self.target) - self.distance * self.forward
         return Eye((width, height), focal, near, position, axes)
 
@@ -125,7 +125,7 @@ def draw(
     light = studio(camera.forward) if light is None else light
     canvas = _Canvas(camera.eye(width * _SAMPLES, height * _SAMPLES), light)
     # A diverged simulation throws things out of the world.
-    visible = (s for s in solids if s.rgba[3] > _CLEAR and np.isfinite(s.position).all())
+    visible = (s for s in solids if s.rgba[3] > _CLEAR_ALPHA and np.isfinite(s.position).all())
     scene = [_seen_from(solid, canvas.eye) for solid in visible]
     mirror = next((solid for solid in scene if _reflects(solid, canvas.eye)), None)
     reflection = None

@@ -22,7 +22,7 @@ _GOLDEN = np.pi * (3 - np.sqrt(5))
 _LAMP = (0.25, -0.35, 0.9)
 """Direction of the light that throws the shadows."""
 _EDGE_SAMPLES = 2
-_NEAR = 1e-3
+_DEPTH_TOLERANCE = 1e-3
 
 
 class Floor(Struct, frozen=True):
@@ -45,7 +45,11 @@ class Floor(Struct, frozen=True):
             far = (height - eye.position[2]) / rays[..., 2]
             place = eye.position[:2] + far[..., None] * rays[..., :2]
         depth = far * eye.focal
-        visible = (far > 0) & (depth < buffer.depth * (1 + _NEAR)) & np.isfinite(place).all(axis=2)
+        visible = (
+            (far > 0)
+            & (depth < buffer.depth * (1 + _DEPTH_TOLERANCE))
+            & np.isfinite(place).all(axis=2)
+        )
         place = np.where(visible[..., None], place, 0.0)
         offset = np.linalg.norm((place - self.target[:2]) / (_REACH * self.distance), axis=2)
         fade = np.clip(1 - offset, 0, None) ** 2
@@ -73,7 +77,7 @@ class Floor(Struct, frozen=True):
             film = GBuffer(eye)
             shadow = Surface(vertices, joined_surface.normals, joined_surface.faces)
             film.add(0, shadow, np.zeros(3), np.eye(3), front=False)
-            shade += (film.solid >= 0) & (film.depth < depth * (1 + _NEAR))
+            shade += (film.solid >= 0) & (film.depth < depth * (1 + _DEPTH_TOLERANCE))
         return shade / _POINTS
 
 

@@ -14,7 +14,7 @@ from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport, Work
 from coursebuild.numerics.reports.sweep import SweepReport
 from coursebuild.report.terminal import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 
-_OWN, _FRONT = ">", "*"
+_OWN_MARK, _FRONT_MARK = ">", "*"
 _INDENT = "  "
 
 
@@ -42,7 +42,7 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
     lines = [_title(report.name, report.title, style)]
     for text in (*map(plain_text, view.description), *_plot_remarks(report), *report.notes):
         lines += style.wrap(text, 2 * _INDENT)
-    legend = f"{_OWN} the scene's own   {_FRONT} on the Pareto front"
+    legend = f"{_OWN_MARK} the scene's own   {_FRONT_MARK} on the Pareto front"
     lines += _table(view.settings, map(_mark, report.rows), legend, style)
     colour = GREEN if report.verdict.on_front and not report.verdict.noticeable else YELLOW
     if report.verdict.text:
@@ -55,11 +55,11 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
 
 def _sweep(sweep: SweepReport, style: Style) -> list[str]:
     view = scenario_view(english(), sweep)
-    marks = (((_OWN, BOLD) if row.own else (" ", "")) for row in sweep.rows)
+    marks = (((_OWN_MARK, BOLD) if row.own else (" ", "")) for row in sweep.rows)
     head = _title(sweep.name, sweep.title, style)
     return [
         head,
-        *_table(view.settings, marks, f"{_OWN} as the model is", style),
+        *_table(view.settings, marks, f"{_OWN_MARK} as the model is", style),
         *_notes(view.notes, style),
     ]
 
@@ -92,7 +92,7 @@ def _table(
 def _mark(row: WorkPrecisionRow) -> tuple[str, str]:
     code = BOLD if row.own else RED if row.status in ("diverged", "reset") else ""
     code = code or (YELLOW if row.status != "ok" else GREEN if row.front else "")
-    return (_OWN if row.own else " ") + (_FRONT if row.front else " "), code
+    return (_OWN_MARK if row.own else " ") + (_FRONT_MARK if row.front else " "), code
 
 
 def _notes(notes: Sequence[str], style: Style) -> list[str]:

@@ -37,7 +37,7 @@ from coursebuild.pipeline.verify import verify
 _CODE = (".py", ".js", ".mjs", ".ts")
 _NOT_DRAWN = frozenset(("Sensor", "Actuator", "Keyframe", "Numeric", "Tuple"))
 """Kinds that the picture of a lab does not show."""
-_COPIED = ("content", "models")
+_COPIED_FOLDERS = ("content", "models")
 
 
 def readers_of(
@@ -170,7 +170,7 @@ class Reruns:
     def _copy_course(self, root: Path) -> None:
         """Copy the course to another folder, and link what no change concerns."""
         for entry in sorted(self.options.root.iterdir()):
-            if entry.name in _COPIED and entry.is_dir():
+            if entry.name in _COPIED_FOLDERS and entry.is_dir():
                 shutil.copytree(entry, root / entry.name)
             elif entry.name not in ("examples", "public") and not entry.name.startswith("."):
                 (root / entry.name).symlink_to(entry)
