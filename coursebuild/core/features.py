@@ -14,7 +14,7 @@ course can be used without loading its features.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, NewType, Protocol, TypeAlias, TypeVar
 
@@ -338,7 +338,7 @@ class Feature(Struct, frozen=True, kw_only=True):
     model_part: ModelPart | None = None
     rules: tuple[Rule, ...] = ()
     """Rules of its own, in addition to the catalogue (`coursebuild.core.text.rules`)."""
-    check: Callable[[Course, Iterable[Document]], Iterable[Diagnostic]] | None = None
+    check: Callable[[Course, Collection[Document]], Iterable[Diagnostic]] | None = None
     """The diagnostics about some documents of the course that parsing did not find."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None
     """The diagnostics about finished runs of scripts."""

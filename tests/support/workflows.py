@@ -91,8 +91,8 @@ class Runner:
         results: list[Step] = []
         cache_inputs: dict[str, Any] | None = None
         for step in steps:
-            failed = any(result.status for result in results)
-            if failed and "cancelled" not in step.get("if", ""):
+            has_failure = any(result.status for result in results)
+            if has_failure and "cancelled" not in step.get("if", ""):
                 continue
             if "run" in step:
                 results.append(self._command(place, step, values))

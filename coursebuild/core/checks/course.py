@@ -5,7 +5,7 @@ Entry points: `check_course`; `check_document`, the same for one document.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from coursebuild.core.checks.links import LinkTargets, check_links, link_targets
 from coursebuild.core.model import (
@@ -53,7 +53,7 @@ def _check_core_rules(
     yield from _check_terms(blocks, targets.terms)
 
 
-def _check_features(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
+def _check_features(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:
     """Yield what features find wrong in some documents of a course."""
     for feature in features():
         if feature.check is not None:

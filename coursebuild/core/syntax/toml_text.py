@@ -1,6 +1,6 @@
 """TOML, every value with its place.
 
-Entry points: `parse_toml(source)`; `toml_string`, which writes a string.
+Entry points: `parse_toml(text)`; `toml_string`, which writes a string.
 
 1. `tomllib` decides whether the text is TOML. If it is not, `toml_mistakes` makes the diagnostic.
 2. tree-sitter finds the places of keys, values and headers, which become the same nodes as those of
@@ -39,15 +39,16 @@ _ESCAPE = re.compile(r"\\(?:[ \t]*\n[ \t\n]*|u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|x[0
 _ESCAPES = {"b": "\b", "t": "\t", "n": "\n", "f": "\f", "r": "\r", "e": "\x1b"}
 
 
-def parse_toml(source: Source, *, rule: str = "map-syntax") -> Parsed[ObjectNode | None]:
-    """The file as a table; no value, and one diagnostic, if it is not TOML. Never raises.
+def parse_toml(text: Source | Excerpt, *, rule: str = "map-syntax") -> Parsed[ObjectNode | None]:
+    """A file or the body of a fence as a table; no value, and one diagnostic, if it is not TOML.
 
     `rule` is that of this diagnostic. There may be a value and diagnostics; a caller that finds any
-    must not publish it.
+    must not publish it. Never raises.
     """
-    body = source.excerpt("\r\n")  # as `tomllib` reads it; a lone CR stays, since TOML refuses it
+    # As `tomllib` reads a file; a lone CR stays, since TOML refuses it.
+    body = text.excerpt("\r\n") if isinstance(text, Source) else text
     try:
-        tomllib.loads(source.text)
+        tomllib.loads(text.text)
         reader = _Reader(body)
         root = _build_node(body, reader.read_document())
         assert isinstance(root, ObjectNode)

@@ -16,7 +16,7 @@ from coursebuild.core.syntax.nodes import (
     StringNode,
 )
 from coursebuild.core.syntax.toml_text import parse_toml
-from coursebuild.core.text.source import Source
+from coursebuild.core.text.source import Excerpt, Source
 from support.positioned_nodes import plain
 
 DATES = (datetime.date, datetime.time)
@@ -178,3 +178,15 @@ def check_places(node: Node, text: str) -> None:
         assert 0 <= child.span.start <= child.span.end <= len(text)
         assert node.span.contains(child.span) or "[" in text or node.span.start == 0
         check_places(child, text)
+
+
+def test_toml_of_a_fence_has_its_places_in_the_lesson() -> None:
+    lesson = Source("lesson.md", "> ```toml\n> a = 1\n> b = 'x'\n> ```\n")
+    lines = (Excerpt.of_span(lesson.span(start, end)) for start, end in ((12, 17), (20, 27)))
+    body = Excerpt.join([*lines], "\n")
+    root = parse_toml(body).value
+    assert root is not None
+    assert [member.value.span.text for member in root.members] == ["1", "'x'"]
+    (diagnostic,) = parse_toml(body.slice(0, 3), rule="toml-syntax").diagnostics
+    assert (diagnostic.rule, diagnostic.span.source) == ("toml-syntax", lesson)
+    assert (diagnostic.span.line, diagnostic.span.column) == (2, 6)
