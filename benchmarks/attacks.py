@@ -31,12 +31,12 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 import msgspec  # noqa: E402
 
 from coursebuild.core.engine.memo import HASH, sealed, unsealed  # noqa: E402
-from support.mortal_commands import DIED, Mortals, mortal_commands  # noqa: E402
+from support.mortal_commands import KILLED_STATUS, Mortals, mortal_commands  # noqa: E402
 from support.poisoned_values import mutate  # noqa: E402
 from support.scratch_course import Folder, block, command, wait_until_alone  # noqa: E402
 
 LESSON = "## One\n\n$a_{1}$\n\n" + block("a.py", "print(1)", "1") + block("b.py", "print(2)", "2")
-CHANGED = LESSON.replace("print(2)", "print(1 + 1)") + "Now $a_{2}$ as well.\n"
+EDITED_LESSON = LESSON.replace("print(2)", "print(1 + 1)") + "Now $a_{2}$ as well.\n"
 MACHINES: dict[str, str] = {
     **{f"{count} open files": f"ulimit -n {count}" for count in (12, 24, 48, 64, 80)},
     **{f"{size} MiB of addresses": f"ulimit -v {size << 10}" for size in (256, 512, 2048, 8192)},
@@ -83,7 +83,7 @@ class Attack:
         self.template.fill([LESSON], top / "stores")
         self.build(self.template)
         self.old = site(self.template)
-        self.template.write(self.template.lesson(), CHANGED)
+        self.template.write(self.template.lesson(), EDITED_LESSON)
         self.folder = Folder(top / "victim")
         self.outcome = ""
         self.deaths = 0
@@ -114,7 +114,7 @@ class Attack:
         self.outcome = "built" if status == 0 else f"told: {first[:70]}"
         if "Traceback" in output or status not in (0, 1):
             return f"status {status}: {output[-400:]}"
-        if self.folder.text(self.folder.lesson()) != CHANGED:
+        if self.folder.text(self.folder.lesson()) != EDITED_LESSON:
             return "the lesson changed"
         if trusted:
             return ""
@@ -172,8 +172,8 @@ class Attack:
         mortals.exchanges = exchanges
         status, _ = mortals.run(self.folder, "build", "-q", fatal=fatal)
         wait_until_alone(self.folder)
-        self.deaths += status == DIED
-        return 0 if status == DIED else status, mortals.output
+        self.deaths += status == KILLED_STATUS
+        return 0 if status == KILLED_STATUS else status, mortals.output
 
     def entries(self, count: int, seed: int) -> Iterator[tuple[str, bytes, bool]]:
         """Entries of each kind in turn: with a bit wrong, cut, or with a seal and wrong data.

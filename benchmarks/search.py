@@ -44,7 +44,7 @@ sys.path.insert(0, str(HERE))
 from benchmarks.generate.wordy import vocabulary, write_wordy  # noqa: E402
 
 QUERIES = ("inertia tensor", "gyroscope", "energy drift", "model", "quaternion rotation")
-WITHOUT = """
+WITHOUT_SEARCH = """
 from coursebuild.core.features import Feature
 import coursebuild.features.search as search
 search.FEATURE = Feature(name="search")
@@ -85,7 +85,7 @@ def build_course(folder: Path, patch: str = "") -> float:
 
 def measure_builds(work: Path, lessons: int, rounds: int) -> dict[str, Any]:
     """Processor time of builds with the search and without."""
-    ways = {"with": "", "without": WITHOUT}
+    ways = {"with": "", "without": WITHOUT_SEARCH}
     cold: dict[str, float] = {}
     for way, patch in ways.items():
         write_wordy(work / way, lessons)

@@ -32,7 +32,7 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"features.commands"}),
     frozenset({"__main__"}),
 )
-OUTSIDE = {"__init__", "core.__init__"}
+UNLAYERED_MODULES = {"__init__", "core.__init__"}
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 FILES = sorted(PACKAGE.rglob("*.py"))
 
@@ -116,14 +116,14 @@ def is_allowed(importer: str, name: str) -> bool:
 
 
 def test_every_part_has_a_layer() -> None:
-    assert {part_of(path) for path in FILES} - OUTSIDE == set(LEVEL)
+    assert {part_of(path) for path in FILES} - UNLAYERED_MODULES == set(LEVEL)
 
 
 def test_imports_go_down_and_never_sideways() -> None:
     violations = [
         f"{path.relative_to(ROOT)} imports {name}"
         for path in FILES
-        if part_of(path) not in OUTSIDE
+        if part_of(path) not in UNLAYERED_MODULES
         for name in sorted(read(path).imports)
         if not is_allowed(part_of(path), name)
     ]

@@ -20,14 +20,14 @@ PARTICIPLES = (
     "published quoted raised ran reached removed said saved seen settled shown skipped "
     "started stated stopped stored taken told tried turned updated used waiting wanted written"
 )
-OTHERS = (
+FUNCTION_WORDS = (
     "one ones other others own same this that these those it its them they there here each every "
     "both either neither more nothing something anything everything "
     "what where when why how who which "
     "about across against ahead along around behind beside between beyond into over under "
     "within without wrong"
 )
-RIDDLES = frozenset(f"{PARTICIPLES} {OTHERS}".split())
+RIDDLES = frozenset(f"{PARTICIPLES} {FUNCTION_WORDS}".split())
 
 
 def bound_names(tree: ast.AST) -> Iterator[tuple[str, int]]:

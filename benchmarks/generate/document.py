@@ -89,7 +89,7 @@ class Open:
 
 
 @dataclass(frozen=True, slots=True)
-class Printed:
+class OutputQuestion:
     """A question about one line of the output of the lesson's script."""
 
     text: str
@@ -98,7 +98,7 @@ class Printed:
     answer: str
 
 
-Question: TypeAlias = Choice | Number | Open | Printed
+Question: TypeAlias = Choice | Number | Open | OutputQuestion
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,8 +23,8 @@ from benchmarks.generate.document import (
     Lesson,
     Number,
     Open,
+    OutputQuestion,
     Piece,
-    Printed,
     Prose,
     Question,
     Quiz,
@@ -237,7 +237,7 @@ def questions(writer: Writer, first_line: str) -> tuple[Question, ...]:
             topic.text("quiz", "number_explain"),
         ),
         Open(topic.text("quiz", "open"), topic.text("quiz", "reference")),
-        Printed(
+        OutputQuestion(
             "The script is run again without any change. What is its first line?", 1, first_line
         ),
     )

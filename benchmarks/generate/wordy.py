@@ -21,7 +21,7 @@ _STARTS = (
 ).split()
 _MIDDLES = "a e i o u ai ea ee ia io oa ou".split()
 _ENDS = "l m n r s t ck ct nd ng nt rd rm rt st".split()
-_KNOWN = (
+_PHYSICS_WORDS = (
     "inertia tensor momentum rotation quaternion gradient friction contact damping energy drift "
     "integrator timestep constraint pendulum oscillator velocity acceleration torque gyroscope"
 ).split()
@@ -54,7 +54,7 @@ class _Writer:
     def lesson(self, number: int) -> str:
         """The text of a lesson."""
         chance = random.Random(number)
-        topic = [chance.choice(self.words) for _ in range(46)] + chance.sample(_KNOWN, 4)
+        topic = [chance.choice(self.words) for _ in range(46)] + chance.sample(_PHYSICS_WORDS, 4)
 
         def phrase(count: int) -> str:
             return " ".join(

@@ -20,7 +20,12 @@ from benchmarks.courses import write_course
 from benchmarks.measure.process import CommandError, peak_memory, time_command
 from benchmarks.measure.tools import Places, Tool, environment
 
-COLD, UNCHANGED, EDITED, MEMORY = "cold build", "nothing changed", "one lesson edited", "memory"
+COLD_BUILD, UNCHANGED_BUILD, EDIT_BUILD, PEAK_MEMORY = (
+    "cold build",
+    "nothing changed",
+    "one lesson edited",
+    "memory",
+)
 
 
 @dataclass(slots=True)
@@ -135,14 +140,14 @@ def measure_builds(
     sites = [make_site(tool, lessons, work, places) for tool in tools if tool.build is not None]
     for site in sites:
         say(f"{lessons} lessons, first build: {site.tool.title}")
-        attempt(site, COLD, first_build, say)
+        attempt(site, COLD_BUILD, first_build, say)
     for turn in range(rounds):
         for site in sites:
             say(f"{lessons} lessons, round {turn + 1} of {rounds}: {site.tool.title}")
             attempt(site, "builds", one_round, say)
     for site in sites:
         if not site.tool.only_incremental:
-            attempt(site, MEMORY, memory, say)
+            attempt(site, PEAK_MEMORY, memory, say)
     for site in sites:
         remove(site.earlier)
     return sites
@@ -171,17 +176,17 @@ def first_build(site: Site) -> None:
 def memory(site: Site) -> None:
     """Record the peak memory of a cold build."""
     site.clear()
-    site.note(MEMORY, peak_memory(site.command, site.folder, environment(site.places)))
+    site.note(PEAK_MEMORY, peak_memory(site.command, site.folder, environment(site.places)))
 
 
 def one_round(site: Site) -> None:
     """A cold build, one with nothing changed, one with a lesson edited."""
     if not site.tool.only_incremental:
         site.clear()
-        site.note(COLD, site.build())
-    site.note(UNCHANGED, site.build())
+        site.note(COLD_BUILD, site.build())
+    site.note(UNCHANGED_BUILD, site.build())
     word = site.edit()
     seconds = site.build()
     if word not in site.page():
         raise CommandError("what was edited is not in the built page")
-    site.note(EDITED, seconds)
+    site.note(EDIT_BUILD, seconds)

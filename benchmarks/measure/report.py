@@ -14,13 +14,13 @@ import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from benchmarks.measure.building import COLD, EDITED, MEMORY, UNCHANGED, Site
+from benchmarks.measure.building import COLD_BUILD, EDIT_BUILD, PEAK_MEMORY, UNCHANGED_BUILD, Site
 from benchmarks.measure.running import Scripts
-from benchmarks.measure.serving import SERVED
+from benchmarks.measure.serving import EDIT_TO_SERVED
 from benchmarks.measure.tools import Tool
 
 BASE = "coursebuild"
-ROWS = (COLD, UNCHANGED, EDITED, SERVED, MEMORY)
+ROWS = (COLD_BUILD, UNCHANGED_BUILD, EDIT_BUILD, EDIT_TO_SERVED, PEAK_MEMORY)
 BEGIN, END = "<!-- benchmarks: begin -->", "<!-- benchmarks: end -->"
 
 
@@ -144,7 +144,7 @@ def sizes_table(report: Report, lessons: int) -> list[str]:
     """A row for each tool, a column for each build; the ratio to coursebuild in brackets."""
     figures = {(f.tool, f.row): f for f in report.figures if f.lessons == lessons}
     rows = [row for row in ROWS if any(key[1] == row for key in figures)]
-    heads = [row + (" (MB)" if row == MEMORY else " (s)") for row in rows]
+    heads = [row + (" (MB)" if row == PEAK_MEMORY else " (s)") for row in rows]
     lines = ["| | " + " | ".join(heads) + " |", "| --- |" + " --- |" * len(rows)]
     for tool in dict.fromkeys(tool for tool, _ in figures):
         cells = [cell(figures.get((tool, row)), figures.get((BASE, row))) for row in rows]

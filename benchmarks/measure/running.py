@@ -54,7 +54,7 @@ with ScriptServer() as server:
 """
 """The second time the modules that scripts import are loaded already, as in the live preview and
 when `update` runs scripts again."""
-CACHED = ("jupyter-cache, parallel", "jupyter-cache, nothing changed")
+NOTEBOOK_WAYS = ("jupyter-cache, parallel", "jupyter-cache, nothing changed")
 CONSENT = """
 import subprocess, sys
 sys.exit(subprocess.run(sys.argv[1:], input=b"y\\n").returncode)
@@ -121,11 +121,11 @@ def one_round(scripts: Scripts) -> None:
     program = scripts.places.python_tool("jcache")
     if program is not None and not scripts.failure:
         try:
-            for way, seconds in zip(CACHED, run_notebooks(scripts, program), strict=True):
+            for way, seconds in zip(NOTEBOOK_WAYS, run_notebooks(scripts, program), strict=True):
                 note(scripts, way, seconds)
         except CommandError as error:
             scripts.failure = str(error)
-            for way in CACHED:
+            for way in NOTEBOOK_WAYS:
                 scripts.figures.pop(way, None)
 
 

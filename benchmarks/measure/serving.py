@@ -19,7 +19,7 @@ from benchmarks.measure.building import Site, attempt
 from benchmarks.measure.process import CommandError, stop
 from benchmarks.measure.tools import environment
 
-SERVED = "edit to served"
+EDIT_TO_SERVED = "edit to served"
 START_LIMIT = 120.0
 EDIT_LIMIT = 40.0
 
@@ -30,7 +30,7 @@ def measure_serving(sites: list[Site], rounds: int, edits: int, say: Callable[[s
         for site in sites:
             if site.tool.serve is not None:
                 say(f"preview, round {turn + 1} of {rounds}: {site.tool.title}")
-                attempt(site, SERVED, functools.partial(one_server, edits=edits), say)
+                attempt(site, EDIT_TO_SERVED, functools.partial(one_server, edits=edits), say)
 
 
 def one_server(site: Site, edits: int) -> None:
@@ -55,7 +55,7 @@ def one_server(site: Site, edits: int) -> None:
                 word = site.edit()
                 seconds = reader.until(word, EDIT_LIMIT)
                 if i:
-                    site.note(SERVED, seconds)
+                    site.note(EDIT_TO_SERVED, seconds)
                 time.sleep(0.5 + seconds)
         except TimeoutError as error:
             output.seek(0)

@@ -71,7 +71,7 @@ def calm(browsers: Mapping[str, Browser]) -> Iterator[BrowserContext]:
         yield context
 
 
-OURS = ("blocked by Playwright", "/assets/icon.")
+TEST_ARTEFACTS = ("blocked by Playwright", "/assets/icon.")
 """What tests bring about themselves: there is no service worker, and an icon may still be loading
 when the next page is opened.
 """
@@ -90,4 +90,4 @@ def open_address(calm: BrowserContext) -> Iterator[Callable[[str], Page]]:
 
     yield open_address
     all_lines = [line for lines in consoles for line in lines]
-    assert [line for line in all_lines if not any(part in line for part in OURS)] == []
+    assert [line for line in all_lines if not any(part in line for part in TEST_ARTEFACTS)] == []

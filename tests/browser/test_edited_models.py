@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.axe import violations
 from support.lab_course import PAGE
-from support.lab_page import EDITED, lab, press, until, watch_page
+from support.lab_page import EDITED_LAB, lab, press, until, watch_page
 
 pytestmark = pytest.mark.browser
 
@@ -24,14 +24,14 @@ def page(browsers: Mapping[str, Browser], base: str) -> Iterator[Page]:
     with browsers["webgl"].new_context(viewport={"width": 390, "height": 800}) as context:
         page, console = watch_page(context)
         page.goto(base + PAGE)
-        lab(page, EDITED)
+        lab(page, EDITED_LAB)
         yield page
         assert console == []
 
 
 def editor_of(page: Page) -> tuple[Locator, Locator]:
     """The lab with the lesson's model, and its text."""
-    lab_element = page.locator(".lab").nth(EDITED)
+    lab_element = page.locator(".lab").nth(EDITED_LAB)
     return lab_element, lab_element.get_by_label("The model, as MJCF")
 
 

@@ -18,9 +18,9 @@ pytestmark = pytest.mark.browser
 
 NAMES = ("full", pytest.param("real", marks=pytest.mark.slow))
 """Courses; what is tried is the largest lesson of one."""
-MOST = 1000
+MAX_STOPS = 1000
 
-WHERE = """() => {
+FOCUSED_ELEMENT = """() => {
   const at = document.activeElement
   if (!at || at === document.body || at === document.documentElement) return null
   window.stops ??= []
@@ -40,7 +40,7 @@ WHERE = """() => {
   }
 }"""
 """Where the focus is; `null` where it has left the page."""
-COME = """(() => {
+FOCUS_IS_VISIBLE = """(() => {
   const at = document.activeElement
   if (!at || at === document.body || at === document.documentElement) return true
   if (at.closest('.lab:not(.lab-on, :has(.lab-is-wrong))')) return false
@@ -82,10 +82,10 @@ def test_every_stop_is_seen_and_none_is_a_trap(
     open_site(page, sites[name])
     stops: list[dict[str, Any]] = []
     looked: set[str] = set()
-    for _ in range(MOST):
+    for _ in range(MAX_STOPS):
         page.keyboard.press("Tab")
-        until(page, COME)
-        stop = page.evaluate(WHERE)
+        until(page, FOCUS_IS_VISIBLE)
+        stop = page.evaluate(FOCUSED_ELEMENT)
         if stop is None:
             break
         assert stop["follows"], f"out of order: {stop}"
@@ -101,7 +101,7 @@ def test_every_stop_is_seen_and_none_is_a_trap(
     assert len(stops) > 30 and len(looked) > 8
     page.evaluate("window.stops = []")
     page.keyboard.press("Shift+Tab")
-    becomes(page, lambda: (page.evaluate(WHERE) or {}).get("name"), stops[-1]["name"])
+    becomes(page, lambda: (page.evaluate(FOCUSED_ELEMENT) or {}).get("name"), stops[-1]["name"])
 
 
 def has_a_ring(page: Page, stop: dict[str, Any]) -> None:

@@ -65,7 +65,7 @@ DRAW = """(n) => new Promise((done) => {
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class MemoryUse:
     """What there is; least values, for a browser frees some things late."""
 
     listeners: int
@@ -76,7 +76,7 @@ class Kept:
     """Address of the end of what is in use there."""
 
 
-def memory_in_use(page: Page, session: CDPSession) -> Kept:
+def memory_in_use(page: Page, session: CDPSession) -> MemoryUse:
     (worker,) = page.workers
     samples = []
     for _ in range(8):
@@ -86,7 +86,7 @@ def memory_in_use(page: Page, session: CDPSession) -> Kept:
         values = {metric["name"]: int(metric["value"]) for metric in metrics}
         memory, end = worker.evaluate("() => self.engineMemory()")
         samples.append((values["JSEventListeners"], values["Nodes"], memory, end))
-    return Kept(*map(min, zip(*samples, strict=True)))
+    return MemoryUse(*map(min, zip(*samples, strict=True)))
 
 
 def reveal(route: Route) -> None:

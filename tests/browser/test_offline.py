@@ -28,7 +28,7 @@ PICTURE = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M0
 TEXTS = ("## One\n\nText of one.\n\n![a sketch](s.svg)\n", "## Two\n\nText of two.\n")
 FIRST, SECOND = "lessons/1.1-one.html", "lessons/1.2-two.html"
 
-TOLD = """
+COUNT_VISIT_MESSAGES = """
 window.toldOfVisits = 0
 const post = ServiceWorker.prototype.postMessage
 ServiceWorker.prototype.postMessage = function (...message) {
@@ -104,7 +104,7 @@ def settled_page(context: BrowserContext, host: Host, path: str = "") -> tuple[P
 
 def visited(page: Page, host: Host, path: str) -> None:
     """Open a page and wait until it has told the worker of its visit by itself."""
-    page.add_init_script(TOLD)
+    page.add_init_script(COUNT_VISIT_MESSAGES)
     page.goto(host.url + path)
     until(page, "window.toldOfVisits > 0")
     settle(page)
@@ -334,8 +334,8 @@ def test_lab_that_was_used_runs_without_a_network(
             lab(page)
 
 
-class Previewed(Session):
-    """What a preview serves: the files of a folder."""
+class FolderSession(Session):
+    """Serves the files of a folder."""
 
     def find(self, path: str) -> bytes | None:
         file = self.root / path
@@ -363,7 +363,7 @@ def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
     host = Host(tmp_path / "site")
     page, _ = settled_page(context, host)
     host.stop()
-    session = Previewed(Options(host.folder, 1, True))
+    session = FolderSession(Options(host.folder, 1, True))
     preview = PreviewServer("127.0.0.1", int(host.url.split(":")[2].strip("/")), session)
     preview.answers = OneScript(session, script)
     preview.start()

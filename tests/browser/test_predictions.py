@@ -13,7 +13,7 @@ from support.quiz_page import press, question
 
 pytestmark = pytest.mark.browser
 COMMIT = "Commit to this answer"
-HIDDEN = "[hidden=until-found]"
+HIDDEN_ELEMENTS = "[hidden=until-found]"
 
 
 @pytest.fixture
@@ -45,12 +45,12 @@ def test_text_below_opens_when_all_is_predicted_and_stays_open(page: Page, lesso
     expect(page.get_by_text("It swings down")).to_be_hidden()
     answer(page, 1)
     expect(page.get_by_text("It swings down")).to_be_visible()
-    expect(page.locator(f"{HIDDEN}, .gate")).to_have_count(0)
+    expect(page.locator(f"{HIDDEN_ELEMENTS}, .gate")).to_have_count(0)
     expect(question(page, 1).get_by_role("button", name=COMMIT)).to_be_focused()
     page.goto("about:blank")
     page.goto(lesson)
     expect(page.get_by_text("It swings down")).to_be_visible()
-    expect(page.locator(f"{HIDDEN}, .gate")).to_have_count(0)
+    expect(page.locator(f"{HIDDEN_ELEMENTS}, .gate")).to_have_count(0)
 
 
 def test_lab_runs_as_it_was_asked_about(page: Page, lesson: str) -> None:
@@ -68,7 +68,7 @@ def test_reader_can_open_the_text_without_an_answer(page: Page, lesson: str) -> 
     page.goto(lesson)
     page.get_by_role("button", name="Show it now").press("Enter")
     expect(page.get_by_text("It swings down")).to_be_focused()
-    expect(page.locator(f"{HIDDEN}, .gate")).to_have_count(0)
+    expect(page.locator(f"{HIDDEN_ELEMENTS}, .gate")).to_have_count(0)
     expect(page.locator(".question.is-live [aria-disabled=true]")).to_have_count(0)
 
 
@@ -88,7 +88,7 @@ def test_all_is_on_paper_and_in_narrow_windows_only_what_is_open(page: Page, les
     page.set_viewport_size({"width": 390, "height": 800})
     page.goto(lesson)
     heights = "es => es.map((e) => e.getBoundingClientRect().height > 0)"
-    becomes(page, lambda: set(page.locator(HIDDEN).evaluate_all(heights)), {False})
+    becomes(page, lambda: set(page.locator(HIDDEN_ELEMENTS).evaluate_all(heights)), {False})
     page.emulate_media(media="print")
     expect(page.locator(".gate")).to_be_hidden()
-    becomes(page, lambda: set(page.locator(HIDDEN).evaluate_all(heights)), {True})
+    becomes(page, lambda: set(page.locator(HIDDEN_ELEMENTS).evaluate_all(heights)), {True})

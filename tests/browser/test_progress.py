@@ -23,7 +23,7 @@ from support.reader_page import (
 
 pytestmark = pytest.mark.browser
 
-Opened = Callable[[str], Page]
+OpenAddress = Callable[[str], Page]
 
 
 def expect_mark(page: Page, id: str, text: str) -> None:
@@ -39,7 +39,7 @@ def lesson_end(page: Page) -> Locator:
 
 
 def test_answers_and_lessons_show_on_the_map_at_once_in_another_tab(
-    open_address: Opened, site: str
+    open_address: OpenAddress, site: str
 ) -> None:
     home, lesson = open_address(site), open_address(site + PUSH_PAGE)
     expect(home.locator(".start a")).to_have_text("Start with 1.1 Push & <em>pull</em>")
@@ -111,13 +111,13 @@ window.moved = () => {
   return shifts.map((node) => node.outerHTML ?? node.textContent)
 }
 """
-MARKED = """() => new Promise((done) => {
+MOVED_AFTER_DRAWING = """() => new Promise((done) => {
   const drawn = (then) => requestAnimationFrame(() => requestAnimationFrame(then))
   drawn(() => drawn(() => done(window.moved())))
 })"""
 
 
-def test_marks_move_nothing(open_address: Opened, site: str) -> None:
+def test_marks_move_nothing(open_address: OpenAddress, site: str) -> None:
     """Neither on a wide screen nor on a narrow one, and not when they come after the text.
 
     The fonts are left out: what they move is another matter, measured in `test_lighthouse.py`.
@@ -134,15 +134,15 @@ def test_marks_move_nothing(open_address: Opened, site: str) -> None:
         for path in ("", "levels/1.html", "progress/", "review/"):
             quiet.goto(site + path, wait_until="commit")
             wait_for_condition(quiet, lambda: len(held_routes) > 0)
-            quiet.evaluate(MARKED)  # the page is drawn before its script comes
+            quiet.evaluate(MOVED_AFTER_DRAWING)  # the page is drawn before its script comes
             held_routes.pop().continue_()
             quiet.wait_for_load_state()
             expect(quiet.locator("[data-tools] select")).to_have_count(1)
-            becomes(quiet, lambda: (path, quiet.evaluate(MARKED)), (path, []))  # noqa: B023
+            becomes(quiet, lambda: (path, quiet.evaluate(MOVED_AFTER_DRAWING)), (path, []))  # noqa: B023
             until(quiet, "document.documentElement.scrollWidth <= innerWidth")
 
 
-CLOSED = """
+CLOSED_STORAGE = """
 const closed = () => { throw new DOMException('no', 'SecurityError') }
 Object.defineProperty(window, 'localStorage', { get: closed })
 """
@@ -153,11 +153,11 @@ Storage.prototype.setItem = () => { throw new DOMException('full', 'QuotaExceede
 
 @pytest.mark.parametrize(
     ("script", "message"),
-    [(CLOSED, "This browser keeps nothing"), (FULL, "This browser has no room left")],
+    [(CLOSED_STORAGE, "This browser keeps nothing"), (FULL, "This browser has no room left")],
     ids=["closed", "full"],
 )
 def test_without_storage_every_page_works_and_says_so(
-    calm: BrowserContext, open_address: Opened, site: str, script: str, message: str
+    calm: BrowserContext, open_address: OpenAddress, site: str, script: str, message: str
 ) -> None:
     calm.add_init_script(script)
     page = open_address(site + PUSH_PAGE)
@@ -179,7 +179,7 @@ def test_without_storage_every_page_works_and_says_so(
 
 
 def test_damaged_storage_is_put_aside_and_can_be_saved(
-    open_address: Opened, site: str, tmp_path: Path
+    open_address: OpenAddress, site: str, tmp_path: Path
 ) -> None:
     page = open_address(site)
     page.evaluate("key => localStorage.setItem(key, '{\"coursebuild\"')", KEY)
@@ -200,7 +200,7 @@ def test_damaged_storage_is_put_aside_and_can_be_saved(
     expect(part).to_have_count(0)
 
 
-def test_newer_version_is_left_alone(open_address: Opened, site: str) -> None:
+def test_newer_version_is_left_alone(open_address: OpenAddress, site: str) -> None:
     page = open_address(site)
     newer = '{"coursebuild":"progress","version":2,"course":"motion"}'
     page.evaluate("([key, text]) => localStorage.setItem(key, text)", [KEY, newer])

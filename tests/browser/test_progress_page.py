@@ -23,8 +23,8 @@ from support.reader_page import (
 
 pytestmark = pytest.mark.browser
 
-Opened = Callable[[str], Page]
-TOLD = '[data-control="import"] [role=status]'
+OpenAddress = Callable[[str], Page]
+IMPORT_STATUS = '[data-control="import"] [role=status]'
 """What the page says of a file that was brought in."""
 
 
@@ -33,7 +33,7 @@ def focus_on(page: Page, text: str) -> None:
 
 
 def test_saving_forgetting_and_bringing_in(
-    open_address: Opened, browsers: Mapping[str, Browser], site: str, tmp_path: Path
+    open_address: OpenAddress, browsers: Mapping[str, Browser], site: str, tmp_path: Path
 ) -> None:
     lesson = open_address(site + FALL_PAGE)
     choose(question(lesson, "way"), "Up")
@@ -61,7 +61,7 @@ def test_saving_forgetting_and_bringing_in(
     expect(question(lesson, "way").get_by_label("Up", exact=False)).not_to_be_checked()
 
     page.locator("input[type=file]").set_input_files(file)
-    status = page.locator(TOLD)
+    status = page.locator(IMPORT_STATUS)
     expect(status).to_contain_text("2 things in the file are not here")
     expect(overall).to_contain_text("Nothing yet.")  # what was forgotten stays so
     status.get_by_role("button", name="Bring back what was forgotten").click()
@@ -76,7 +76,7 @@ def test_saving_forgetting_and_bringing_in(
         phone.get_by_role("button", name="Mark as read").click()
         phone.goto(site + "progress/")
         phone.locator("input[type=file]").set_input_files(file)
-        expect(phone.locator(TOLD)).to_contain_text("Imported: 1 answer and 1 lesson ")
+        expect(phone.locator(IMPORT_STATUS)).to_contain_text("Imported: 1 answer and 1 lesson ")
         expect(phone.locator(OVERALL)).to_contain_text("2 of 3 lessons read")
 
 
@@ -97,7 +97,7 @@ WRONG_FILES = (
 )
 
 
-def test_wrong_files_change_nothing(open_address: Opened, site: str, tmp_path: Path) -> None:
+def test_wrong_files_change_nothing(open_address: OpenAddress, site: str, tmp_path: Path) -> None:
     page = open_address(site)
     store_answers(page, WAY)
     page.goto(site + "progress/")
@@ -105,12 +105,12 @@ def test_wrong_files_change_nothing(open_address: Opened, site: str, tmp_path: P
     for data, message in WRONG_FILES:
         (tmp_path / "wrong.json").write_bytes(data)
         page.locator("input[type=file]").set_input_files(tmp_path / "wrong.json")
-        expect(page.locator(TOLD)).to_contain_text(message)
+        expect(page.locator(IMPORT_STATUS)).to_contain_text(message)
         becomes(page, lambda: stored_progress(page), before)
 
 
 def test_what_is_no_longer_in_the_course_is_shown_and_can_be_forgotten(
-    open_address: Opened, site: str
+    open_address: OpenAddress, site: str
 ) -> None:
     page = open_address(site)
     store_answers(
@@ -134,7 +134,7 @@ def test_what_is_no_longer_in_the_course_is_shown_and_can_be_forgotten(
     expect(orphans).to_be_hidden()
 
 
-def test_everything_works_from_the_keyboard(open_address: Opened, site: str) -> None:
+def test_everything_works_from_the_keyboard(open_address: OpenAddress, site: str) -> None:
     page = open_address(site)
     store_answers(page, WAY)
     page.goto(site + "review/")
@@ -179,7 +179,7 @@ SMALLEST = """(part) => Math.min(...[...part.querySelectorAll('button, input[typ
   .map(({ width, height }) => Math.min(width, height)))"""
 
 
-def test_what_can_be_pressed_is_large_enough(open_address: Opened, site: str) -> None:
+def test_what_can_be_pressed_is_large_enough(open_address: OpenAddress, site: str) -> None:
     page = open_address(site)
     store_answers(page, {**WAY, "quiz": "gone"})
     page.set_viewport_size({"width": 320, "height": 640})

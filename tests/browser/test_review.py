@@ -16,7 +16,7 @@ from support.static_host import Host
 
 pytestmark = pytest.mark.browser
 
-Opened = Callable[[str], Page]
+OpenAddress = Callable[[str], Page]
 
 
 def review_of(page: Page) -> Locator:
@@ -28,7 +28,7 @@ def is_chosen(part: Locator, option: str) -> None:
     expect(part.get_by_label(option)).to_be_checked()
 
 
-def test_missed_questions_come_back(open_address: Opened, site: str) -> None:
+def test_missed_questions_come_back(open_address: OpenAddress, site: str) -> None:
     page = open_address(site)
     store_answers(
         page,
@@ -71,7 +71,7 @@ def test_missed_questions_come_back(open_address: Opened, site: str) -> None:
     is_chosen(question(page, "way"), "Up")
 
 
-def test_question_that_cannot_be_fetched_is_linked(open_address: Opened, site: str) -> None:
+def test_question_that_cannot_be_fetched_is_linked(open_address: OpenAddress, site: str) -> None:
     page = open_address(site + "about.html")
     store_answers(page, WAY)
     page = page.context.new_page()
@@ -85,7 +85,7 @@ def test_question_that_cannot_be_fetched_is_linked(open_address: Opened, site: s
 
 
 def test_review_opened_from_disk_links_to_questions(
-    open_address: Opened, sites: Mapping[str, Site]
+    open_address: OpenAddress, sites: Mapping[str, Site]
 ) -> None:
     page = open_address((sites["reader"].public / "review/index.html").as_uri())
     store_answers(page, WAY)
@@ -96,7 +96,7 @@ def test_review_opened_from_disk_links_to_questions(
 
 
 def test_reworded_question_keeps_its_answer_and_its_turn(
-    open_address: Opened, sites: Mapping[str, Site], tmp_path: Path
+    open_address: OpenAddress, sites: Mapping[str, Site], tmp_path: Path
 ) -> None:
     folder = Folder(tmp_path / "course")
     shutil.copytree(sites["reader"].root, folder.root, symlinks=True)

@@ -16,10 +16,10 @@ from support.lab_page import becomes, until, wait_until_settled
 pytestmark = pytest.mark.browser
 
 HOSTILE = '<img src=x onerror="alert(1)"> & <b>bold'
-ONE, TWO = "lessons/1.1-one.html", "lessons/1.2-two.html"
-SHOWN = "(q) => document.querySelector('.search-dialog').dataset.shown === q"
+FIRST_LESSON, SECOND_LESSON = "lessons/1.1-one.html", "lessons/1.2-two.html"
+SHOWS_QUERY = "(q) => document.querySelector('.search-dialog').dataset.shown === q"
 
-Opened = Callable[[str], Page]
+OpenAddress = Callable[[str], Page]
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def open_by_key(page: Page, key: str = "/") -> None:
 def ask(page: Page, query: str) -> list[str]:
     """Type a query into the open dialog; what is found, as it is read."""
     page.locator("#_search-field").fill(query)
-    until(page, SHOWN, query)
+    until(page, SHOWS_QUERY, query)
     return [text.replace("\n", " / ") for text in page.locator(".search-option").all_inner_texts()]
 
 
@@ -49,17 +49,17 @@ def status(page: Page) -> Locator:
     return page.locator(".search-dialog .search-status")
 
 
-LOADED = """() => performance.getEntriesByType('resource').map((entry) => entry.name)
+LOADED_FILES = """() => performance.getEntriesByType('resource').map((entry) => entry.name)
   .filter((name) => name.includes('search')).map((name) => name.split('/').at(-1))"""
 
 
-def test_nothing_is_loaded_before_it_is_asked_for(open_address: Opened, site: str) -> None:
-    page = open_address(site + ONE)
+def test_nothing_is_loaded_before_it_is_asked_for(open_address: OpenAddress, site: str) -> None:
+    page = open_address(site + FIRST_LESSON)
     wait_until_settled(page)
-    assert page.evaluate(LOADED) == []
+    assert page.evaluate(LOADED_FILES) == []
     open_by_key(page)
-    becomes(page, lambda: len(page.evaluate(LOADED)), 2)
-    assert page.evaluate(LOADED)[1] == "index.js", "its script, and the list of pages"
+    becomes(page, lambda: len(page.evaluate(LOADED_FILES)), 2)
+    assert page.evaluate(LOADED_FILES)[1] == "index.js", "its script, and the list of pages"
 
 
 QUERIES = {
@@ -74,7 +74,7 @@ QUERIES = {
 
 
 def test_what_a_learner_types_is_found_and_what_authors_wrote_is_text(
-    open_address: Opened, site: str
+    open_address: OpenAddress, site: str
 ) -> None:
     page = open_address(site + "lessons/1.5-more5.html")
     page.on("dialog", lambda dialog: pytest.fail(dialog.message))
@@ -91,14 +91,14 @@ def test_what_a_learner_types_is_found_and_what_authors_wrote_is_text(
     expect(status(page)).to_have_text(re.compile("^Nothing found for “qzxwv”. "))
 
 
-def test_arrows_choose_and_enter_goes_there(open_address: Opened, site: str) -> None:
+def test_arrows_choose_and_enter_goes_there(open_address: OpenAddress, site: str) -> None:
     page = open_address(site + "lessons/1.5-more5.html")
     page.locator(".search-open").focus()
     page.keyboard.press("Enter")
     until(page, "() => document.querySelectorAll('.search-option').length > 0")
     expect(page.locator("#_search-field")).to_have_attribute("role", "combobox")
     page.keyboard.type("inertia tensor")
-    until(page, SHOWN, "inertia tensor")
+    until(page, SHOWS_QUERY, "inertia tensor")
     active = page.locator(".search-option[aria-selected=true]")
     for key, title in (("ArrowDown", "The inertia tensor"), ("ArrowUp", "1.1 Lesson one")):
         page.keyboard.press(key)
@@ -114,8 +114,8 @@ def test_arrows_choose_and_enter_goes_there(open_address: Opened, site: str) -> 
     page.wait_for_url("**/lessons/1.1-one.html#tensor")
 
 
-def test_escape_closes_and_the_focus_goes_back(open_address: Opened, site: str) -> None:
-    page = open_address(site + ONE)
+def test_escape_closes_and_the_focus_goes_back(open_address: OpenAddress, site: str) -> None:
+    page = open_address(site + FIRST_LESSON)
     page.locator(".search-open").click()
     until(page, "() => document.querySelectorAll('.search-option').length > 0")
     expect(page.locator(".search-input")).to_be_focused()
@@ -126,7 +126,7 @@ def test_escape_closes_and_the_focus_goes_back(open_address: Opened, site: str) 
     expect(page.locator(".search-open")).to_be_focused()
 
 
-AGAIN = """async (query) => {
+SEARCH_AGAIN = """async (query) => {
   const dialog = document.querySelector('.search-dialog')
   dialog.close()
   document.querySelector('.search-open').click()
@@ -139,22 +139,22 @@ AGAIN = """async (query) => {
 
 
 def test_what_is_typed_at_once_after_opening_is_searched_and_enter_waits(
-    open_address: Opened, site: str
+    open_address: OpenAddress, site: str
 ) -> None:
     """The event that a dialog was closed can come after the next opening and the first keys."""
-    page = open_address(site + ONE)
+    page = open_address(site + FIRST_LESSON)
     open_by_key(page)
     for query in ("mj_forward 1", "mj_forward 2", "mj_forward 3"):
-        page.evaluate(AGAIN, query)
-        until(page, SHOWN, query)
+        page.evaluate(SEARCH_AGAIN, query)
+        until(page, SHOWS_QUERY, query)
     page.locator("#_search-field").fill("")
     page.keyboard.type("mj_forward")
     page.keyboard.press("Enter")
     page.wait_for_url("**/lessons/1.2-two.html")
 
 
-def test_single_keys_can_be_switched_off(open_address: Opened, site: str) -> None:
-    page = open_address(site + ONE)
+def test_single_keys_can_be_switched_off(open_address: OpenAddress, site: str) -> None:
+    page = open_address(site + FIRST_LESSON)
     open_by_key(page)
     page.locator(".search-keys input").uncheck()
     page.keyboard.press("Escape")
@@ -175,7 +175,7 @@ NOTE_WHAT_IS_SAID = """() => {
 """It is shown for three seconds, in which a busy machine may not get to look."""
 
 
-def test_commands(open_address: Opened, calm: BrowserContext, site: str) -> None:
+def test_commands(open_address: OpenAddress, calm: BrowserContext, site: str) -> None:
     calm.grant_permissions(["clipboard-read", "clipboard-write"])
     page = open_address(site + "lessons/1.1-one.html#tensor")
     open_by_key(page)
@@ -199,9 +199,9 @@ def test_commands(open_address: Opened, calm: BrowserContext, site: str) -> None
 
 
 def test_what_was_searched_before_is_offered_and_can_be_forgotten(
-    open_address: Opened, site: str
+    open_address: OpenAddress, site: str
 ) -> None:
-    page = open_address(site + ONE)
+    page = open_address(site + FIRST_LESSON)
     open_by_key(page)
     ask(page, "mj_forward")
     page.keyboard.press("Enter")
@@ -210,7 +210,7 @@ def test_what_was_searched_before_is_offered_and_can_be_forgotten(
     options = page.locator(".search-option")
     becomes(page, lambda: options.all_inner_texts()[:2], ["mj_forward", "Clear these"])
     options.first.click()
-    until(page, SHOWN, "mj_forward")
+    until(page, SHOWS_QUERY, "mj_forward")
     expect(page.locator(".search-input")).to_be_focused()
     ask(page, "")
     options.nth(1).click()
@@ -218,9 +218,9 @@ def test_what_was_searched_before_is_offered_and_can_be_forgotten(
     until(page, "!Object.keys(localStorage).some((key) => /search/.test(key))")
 
 
-def test_from_a_disk(sites: Mapping[str, Site], open_address: Opened) -> None:
+def test_from_a_disk(sites: Mapping[str, Site], open_address: OpenAddress) -> None:
     folder = f"{sites['search'].public.as_uri()}/"
-    page = open_address(folder + ONE)
+    page = open_address(folder + FIRST_LESSON)
     open_by_key(page)
     assert ask(page, "mj_forwrad")[0].startswith("1.2 Lesson two")
     page.keyboard.press("Enter")
@@ -229,8 +229,8 @@ def test_from_a_disk(sites: Mapping[str, Site], open_address: Opened) -> None:
     expect(page.locator(".found-pages a").first).to_have_text("1.1 Lesson one")
 
 
-def test_all_results_are_on_a_page_of_their_own(open_address: Opened, site: str) -> None:
-    page = open_address(site + ONE)
+def test_all_results_are_on_a_page_of_their_own(open_address: OpenAddress, site: str) -> None:
+    page = open_address(site + FIRST_LESSON)
     open_by_key(page)
     assert ask(page, "pendulum")[-1] == "All results"
     page.keyboard.press("ArrowUp")
@@ -257,7 +257,7 @@ def test_all_results_are_on_a_page_of_their_own(open_address: Opened, site: str)
 def test_an_index_that_does_not_come_is_told(calm: BrowserContext, site: str) -> None:
     calm.route("**/assets/search/*.js", lambda route: route.abort())
     page = calm.new_page()
-    page.goto(site + ONE)
+    page.goto(site + FIRST_LESSON)
     open_by_key(page)
     page.locator("#_search-field").fill("inertia")
     expect(status(page)).to_have_text(re.compile("^The search cannot be loaded."))
@@ -274,7 +274,7 @@ def test_a_list_of_pages_from_before_is_loaded_anew(
         "**/search/index.js", lambda route: route.fulfill(body=old, content_type="text/javascript")
     )
     page = calm.new_page()
-    page.goto(sites["search"].url(ONE))
+    page.goto(sites["search"].url(FIRST_LESSON))
     open_by_key(page)
     assert ask(page, "inertia tensor")[0].startswith("1.1 Lesson one")
 
@@ -284,9 +284,9 @@ SMALL = """[...document.querySelectorAll('dialog[open] :is(button, label, [role=
   .filter((box) => box.height < 24 || box.width < 24).map((box) => [box.width, box.height])"""
 
 
-def test_dialog_is_accessible_and_within_the_window(open_address: Opened, site: str) -> None:
+def test_dialog_is_accessible_and_within_the_window(open_address: OpenAddress, site: str) -> None:
     """Axe finds nothing, nothing is wider than a window, or too small for a finger."""
-    page = open_address(site + ONE)
+    page = open_address(site + FIRST_LESSON)
     open_by_key(page)
     for query in ("inertia tensor", ">", "qzxwv"):
         ask(page, query)

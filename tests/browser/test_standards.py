@@ -25,7 +25,7 @@ pytestmark = pytest.mark.browser
 
 VNU = ROOT / "site" / "node_modules" / "vnu-jar" / "build" / "dist" / "vnu.jar"
 NAMES = ("real", "full")
-KNOWN = {"home", "lesson", "stub", "level", "model", "page", "notfound", "offline"}
+COMMON_KINDS = {"home", "lesson", "stub", "level", "model", "page", "notfound", "offline"}
 """Kinds of pages that both courses have, whatever others there are."""
 WINDOW: Any = {"width": 1440, "height": 900}
 NARROW = (320, 360)
@@ -33,7 +33,7 @@ NARROW = (320, 360)
 
 def test_every_kind_of_page_is_found(sites: Mapping[str, Site]) -> None:
     for site in (sites[name] for name in NAMES):
-        assert site.kinds().keys() >= KNOWN
+        assert site.kinds().keys() >= COMMON_KINDS
         assert len(site.pages()) > len(site.kinds())
 
 
@@ -77,7 +77,7 @@ def test_nu_checker_finds_nothing(
 # -------------------------------------------------------------------------------- requests
 
 
-class Fetched(HTMLParser):
+class FetchedAddresses(HTMLParser):
     """What a page has its browser fetch, as addresses."""
 
     SOURCES = frozenset("script img iframe source video audio embed track input".split())
@@ -107,7 +107,7 @@ def test_no_page_names_anything_to_fetch_elsewhere(sites: Mapping[str, Site], na
     host = urlsplit(site.host.url).netloc
     elsewhere = []
     for path in site.pages():
-        parser = Fetched()
+        parser = FetchedAddresses()
         parser.feed((site.public / path).read_text(encoding="utf-8"))
         assert len(parser.found) >= 4, "style, scripts, icons"
         for address in parser.found:
@@ -119,7 +119,7 @@ def test_no_page_names_anything_to_fetch_elsewhere(sites: Mapping[str, Site], na
 
 # ------------------------------------------------------------------------- in the browser
 
-STARTED = """n => {
+LAB_HAS_STARTED = """n => {
   const lab = document.querySelectorAll('main [data-lab][data-config]')[n]
   return lab.querySelector('.lab-live') !== null && lab.dataset.state !== 'loading'
 }"""
@@ -136,7 +136,7 @@ def run_labs(page: Page) -> None:
     for number in range(labs.count()):
         if labs.nth(number).is_visible():
             labs.nth(number).scroll_into_view_if_needed()
-            until(page, STARTED, number)
+            until(page, LAB_HAS_STARTED, number)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -24,7 +24,7 @@ def page(browsers: Mapping[str, Browser]) -> Iterator[Page]:
         yield context.new_page()
 
 
-UNSEEN = """async () => {
+HIDDEN_CONTENT = """async () => {
   // What a window of another width shows, what is for paper or for screen readers, a form that
   // needs a script, and the contents of a document that only a code host shows.
   const ELSEWHERE =
@@ -47,7 +47,7 @@ UNSEEN = """async () => {
     .map((one) => one.outerHTML.slice(0, 99))
 }"""
 """Texts, pictures and labs that nobody sees."""
-SAID = {
+EXPECTED_TEXTS = {
     "progress": "Progress is kept by a script",
     "review": "scripts are switched off here",
     "search": "needs JavaScript",
@@ -63,11 +63,11 @@ def test_everything_can_be_read(sites: Mapping[str, Site], page: Page, name: str
     unseen: dict[str, Any] = {}
     for path in site.unlike_pages():
         page.goto(site.url(path))
-        unseen[path] = page.evaluate(UNSEEN)
+        unseen[path] = page.evaluate(HIDDEN_CONTENT)
         dead = page.locator("main :is(button, select, textarea, input:not([disabled])):visible")
         expect(dead).to_have_count(0)
         expect(page.locator("h1")).to_have_count(1)
-        text = re.compile(SAID.get(site.kind(path), r"[\s\S]{40}"))
+        text = re.compile(EXPECTED_TEXTS.get(site.kind(path), r"[\s\S]{40}"))
         expect(page.locator("main")).to_have_text(text, use_inner_text=True)
     assert {path: texts_found for path, texts_found in unseen.items() if texts_found} == {}
 

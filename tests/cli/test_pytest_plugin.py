@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from support.markdown_files import DOCS, fences
-from support.scratch_course import DRIFTED, GOOD, ROOT, Folder, block
+from support.scratch_course import DRIFTED_LESSON, GOOD, ROOT, Folder, block
 
 pytestmark = pytest.mark.site
 
@@ -22,8 +22,8 @@ QUIZ = """
 {"id": "1.2-quiz", "questions": [{"kind": "numeric", "q": "How much?", "answer": 2}]}
 ```
 """
-WRONG = (
-    DRIFTED
+FAULTY_LESSON = (
+    DRIFTED_LESSON
     + block("broken.py", "import one\nraise SystemExit(3)")
     + block("absent.py", "import nowhere", info="requires=nowhere")
     + "See lesson [four](lesson:4.4).\n\n#### Skipped\n"
@@ -72,7 +72,7 @@ def test_each_part_of_a_course_is_a_test(course: Folder) -> None:
 
 
 def test_a_test_fails_with_the_mistakes_in_its_text(course: Folder) -> None:
-    course.write(course.lesson(2), WRONG)
+    course.write(course.lesson(2), FAULTY_LESSON)
     course.write("content/lessons/9.9-stray.md", "## Stray\n")
     status, printed = run(course, "--coursebuild", "-v", "content")
     assert status == 1

@@ -75,7 +75,7 @@ raise SystemExit
 
 [^n]: A note with $y$.
 """
-OTHER = """## More {#more}
+NEXT_LESSON = """## More {#more}
 
 Back to [it](lesson:0.1#part).
 
@@ -91,7 +91,7 @@ Back to [it](lesson:0.1#part).
 
 def site(make: Make, text: str = LESSON, **texts: str) -> dict[str, bytes]:
     runs = {"examples/never.py": ScriptRun("examples/never.py", Outcome.NORUN, 0, "", "", 0.0)}
-    texts.setdefault("1.1", OTHER)
+    texts.setdefault("1.1", NEXT_LESSON)
     files: dict[str, bytes] = make(text, runs=runs, **texts).site()
     return files
 

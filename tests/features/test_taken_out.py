@@ -18,11 +18,11 @@ QUIZ = """
 """
 
 
-TAKEN = {"bench": ("numerics",), "markdown": ("notebook",), "quiz": (), "search": ()}
+DEPENDENT_FEATURES = {"bench": ("numerics",), "markdown": ("notebook",), "quiz": (), "search": ()}
 """Features, and those that need them."""
 
 
-@pytest.mark.parametrize("feature", TAKEN)
+@pytest.mark.parametrize("feature", DEPENDENT_FEATURES)
 def test_a_course_is_built_without_a_feature(feature: str, tmp_path: Path, stores: Path) -> None:
     course, installed = Folder(tmp_path / "a course"), tmp_path / "installed"
     course.fill([GOOD, "## Two\n"], stores)
@@ -30,7 +30,7 @@ def test_a_course_is_built_without_a_feature(feature: str, tmp_path: Path, store
         shutil.copytree(ROOT / name, installed / name)
     (installed / "site").mkdir()
     (installed / "site" / "dist").symlink_to(ROOT / "site" / "dist")
-    for name in (feature, *TAKEN[feature]):
+    for name in (feature, *DEPENDENT_FEATURES[feature]):
         shutil.rmtree(installed / "coursebuild" / "features" / name)
 
     def run(*arguments: str) -> CommandResult:

@@ -16,12 +16,12 @@ from typing import NamedTuple
 from fuzz.targets import ROOT, TARGETS, WORDS
 
 CORPUS = Path(__file__).parent / "corpus"
-KEPT = 40
+MAX_INPUTS = 40
 """Inputs that the corpus of a target may have."""
 HANGS, MEMORY = 60, 2048
 """Seconds and MiB of an input that ends its worker."""
-_EXECUTED = re.compile(r"stat::number_of_executed_units: (\d+)")
-_COVERED = re.compile(r" cov: (\d+)")
+_EXECUTION_COUNT = re.compile(r"stat::number_of_executed_units: (\d+)")
+_COVERED_EDGES = re.compile(r" cov: (\d+)")
 
 
 class Outcome(NamedTuple):
@@ -54,11 +54,11 @@ class Bench:
         while (left := until - time.monotonic()) > 0 and (not runs or inputs < runs):
             budget = f"-runs={runs - inputs}" if runs else f"-max_total_time={left:.0f}"
             status, output = self.worker(budget, f"-seed={seed + inputs}", "corpus", "seeds")
-            executed = _EXECUTED.findall(output)
+            executed = _EXECUTION_COUNT.findall(output)
             if not executed:
                 raise SystemExit(f"{output[-3000:]}\nthe worker of `{self.name}` ended: {status}")
             inputs += max(int(executed[-1]), 1)
-            edges = max([edges, *map(int, _COVERED.findall(output))])
+            edges = max([edges, *map(int, _COVERED_EDGES.findall(output))])
             if status == 0:
                 break
         return Outcome(inputs, edges, self.findings())
@@ -88,7 +88,7 @@ class Bench:
         """Put the shortest inputs that reached new code into the corpus of the repository."""
         inputs = {path.read_bytes() for path in (self.folder / "corpus").iterdir()}
         new_inputs = inputs.union(read_corpus(self.name)).difference(TARGETS[self.name].seeds())
-        least = sorted(new_inputs, key=lambda data: (len(data), data))[:KEPT]
+        least = sorted(new_inputs, key=lambda data: (len(data), data))[:MAX_INPUTS]
         text = json.dumps([data.decode("latin-1") for data in least], indent=0)
         (CORPUS / f"{self.name}.json").write_text(f"{text}\n")
 

@@ -15,7 +15,7 @@ import atheris
 PACKAGES = ["coursebuild", "markdown_it", "mdit_py_plugins"]
 SECONDS, PER_CHARACTER = 1.0, 0.002
 """Processor time that an input may take; instrumented code is some four times as slow."""
-EVERY = 150
+REPEAT_INTERVAL = 150
 """Of so many inputs one is repeated."""
 SIZE, GROWTH = 4000, 24
 """Characters of a repeated input, and how often the time of eight times them may be theirs."""
@@ -40,7 +40,7 @@ class Attempts:
             seconds = self.seconds(data)
             if seconds > SECONDS + PER_CHARACTER * len(data):
                 raise SlownessError(f"{len(data)} bytes take {seconds:.1f} s")
-            if self.target.repeatable and data and self.count % EVERY == 0:
+            if self.target.repeatable and data and self.count % REPEAT_INTERVAL == 0:
                 self.repeat(data)
         except Exception as error:
             self.note(data, error)

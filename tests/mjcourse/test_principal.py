@@ -35,8 +35,8 @@ def thin_and_scaled() -> list[np.ndarray]:
     return [*thin, *(base * size for base, size in zip(random_tensors(), sizes, strict=False))]
 
 
-GRADED = [np.outer(d, d) * (np.eye(3) + 0.5) for d in ([1, 1e-4, 1e-8], [1e-70, 1, 1e70])]
-ROUND = [
+GRADED_TENSORS = [np.outer(d, d) * (np.eye(3) + 0.5) for d in ([1, 1e-4, 1e-8], [1e-70, 1, 1e70])]
+ROUND_TENSORS = [
     np.eye(3),
     np.zeros((3, 3)),
     np.diag([3.0, 1.0, 2.0]),
@@ -52,7 +52,13 @@ def table_of(tensor: np.ndarray) -> mpmath.matrix:
 
 def test_moments_and_axes() -> None:
     moment_errors, bends, differences = {}, {}, {}
-    for tensor in (*random_tensors(), *nearly_equal(), *thin_and_scaled(), *GRADED, *ROUND):
+    for tensor in (
+        *random_tensors(),
+        *nearly_equal(),
+        *thin_and_scaled(),
+        *GRADED_TENSORS,
+        *ROUND_TENSORS,
+    ):
         case = repr(tensor.tolist())
         moments, axes = spatial.principal_axes(tensor)
         entries, columns, values = hp.exact(tensor), hp.exact(axes), hp.exact(moments)
@@ -76,7 +82,7 @@ def test_moments_and_axes() -> None:
 
 def test_graded_tensors_keep_their_small_moments() -> None:
     errors = {}
-    for tensor in GRADED:
+    for tensor in GRADED_TENSORS:
         with mpmath.workdps(700):
             expected = sorted(mpmath.eigsy(table_of(tensor), eigvals_only=True))
         moments, _ = spatial.principal_axes(tensor)

@@ -65,11 +65,11 @@ def test_principal_moments_do_not_depend_on_the_frame(tensor: np.ndarray, quat: 
     )
 
 
-LEADING = npst.mutually_broadcastable_shapes(num_shapes=2, max_dims=2, max_side=3)
+LEADING_SHAPES = npst.mutually_broadcastable_shapes(num_shapes=2, max_dims=2, max_side=3)
 
 
 @QUICK
-@given(LEADING, st.integers(0, 2**32 - 1))
+@given(LEADING_SHAPES, st.integers(0, 2**32 - 1))
 def test_broadcasting_equals_a_loop(shapes: npst.BroadcastableShapes, seed: int) -> None:
     rng = np.random.default_rng(seed)
     quat_lead, vector_lead = shapes.input_shapes

@@ -7,7 +7,7 @@ import pytest
 from mjcourse import spatial
 from support import high_precision as hp
 
-ONE = mpmath.mpf(1)
+UNIT = mpmath.mpf(1)
 IDENTITY = [mpmath.mpf(i == j) for i in range(3) for j in range(3)]
 
 
@@ -29,7 +29,7 @@ def test_matrix_of_a_quaternion() -> None:
     errors, bends = {}, {}
     for quat in quats:
         actual, case = spatial.quat_to_mat(quat), tuple(quat.tolist())
-        errors[case] = hp.ulps_of(ONE, actual, hp.matrix(hp.exact(quat)))
+        errors[case] = hp.ulps_of(UNIT, actual, hp.matrix(hp.exact(quat)))
         bends[case] = orthonormality(actual)
     assert hp.errors_over(4, errors) == []
     assert hp.errors_over(5, bends) == []
@@ -43,7 +43,7 @@ def test_quaternion_of_a_matrix_at_any_angle() -> None:
         mat = spatial.exp_so3(np.array(axis) / np.linalg.norm(axis) * angle)
         actual = spatial.mat_to_quat(mat)
         expected = hp.same_up_to_sign(actual, exact_quat(mat))
-        errors[axis, angle] = hp.ulps_of(ONE, actual, expected)
+        errors[axis, angle] = hp.ulps_of(UNIT, actual, expected)
         assert actual[0] >= 0, (axis, angle)
     assert hp.errors_over(3, errors) == []
 

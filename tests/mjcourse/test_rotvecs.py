@@ -7,7 +7,7 @@ import pytest
 from mjcourse import spatial
 from support import high_precision as hp
 
-ONE = mpmath.mpf(1)
+UNIT = mpmath.mpf(1)
 
 
 def rotvec_of(axis: tuple[float, ...], angle: float) -> np.ndarray:
@@ -112,7 +112,7 @@ def test_slerp_to_four_ulp() -> None:
             rotvec = hp.log(hp.mul(hp.conj(hp.exact(a)), hp.exact(b)))
             for t in parts:
                 expected = hp.mul(begin, hp.exp([mpmath.mpf(t) * entry for entry in rotvec]))
-                errors[apart, k, t] = hp.ulps_of(ONE, spatial.quat_slerp(a, b, t), expected)
+                errors[apart, k, t] = hp.ulps_of(UNIT, spatial.quat_slerp(a, b, t), expected)
     assert hp.errors_over(4, errors) == []
 
 
@@ -133,5 +133,5 @@ def test_integrate_to_four_ulp() -> None:
             turn = [mpmath.mpf(dt) * entry for entry in hp.exact(angvel)]
             expected = hp.mul(hp.unit(hp.exact(quat)), hp.exp(turn))
             actual = spatial.quat_integrate(quat, angvel, dt)
-            errors[angle, dt, k] = hp.ulps_of(ONE, actual, expected)
+            errors[angle, dt, k] = hp.ulps_of(UNIT, actual, expected)
     assert hp.errors_over(4, errors) == []

@@ -10,7 +10,7 @@ import pytest
 from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.scene import SceneError, scenes
 from support.bench_runs import measure
-from support.surveys import NOTHING
+from support.surveys import NO_DECLARATIONS
 
 pytestmark = pytest.mark.site
 
@@ -64,7 +64,7 @@ def test_times_are_of_the_clock() -> None:
     """A clock that ticks evenly: whatever is timed takes the same, and nothing is uncertain."""
     ticks = iter(range(0, 10**15, 2_000_000))
     model = stiff(0.01, 0.1, 10)
-    (line,) = scenes(model, NOTHING, quick=True)
+    (line,) = scenes(model, NO_DECLARATIONS, quick=True)
     report = measure_scenario(model, line, quick=True, clock=lambda: next(ticks))
     for line in report.rows:
         assert line.cost is not None and line.seconds is not None and line.realtime is not None

@@ -44,7 +44,7 @@ def test_commands_are_held_so_that_runge_kutta_keeps_its_order() -> None:
     assert 0.1 * fine.position[0] < fine.figure[0] < fine.position[0]
 
 
-DOUBLE = """\
+DOUBLE_PENDULUM = """\
 <mujoco>
   <option timestep="0.005" integrator="RK4"><flag contact="disable"/></option>
   <worldbody>
@@ -64,7 +64,7 @@ DOUBLE = """\
 
 def test_chaos_has_a_horizon_and_then_statistics() -> None:
     (report,) = measure(
-        mujoco.MjModel.from_xml_string(DOUBLE),
+        mujoco.MjModel.from_xml_string(DOUBLE_PENDULUM),
         '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 9\nsample = 0.04\n',
         quick=True,
     )

@@ -52,9 +52,9 @@ def test_errors_of_zero_and_nothing_at_all() -> None:
     assert are_on_front(None, None) == [False, False]
 
 
-OWN = "no other setting is cheaper without being less accurate"
-GONE = "the scene does not run under its own setting, Euler at 2 ms: the state is not finite"
-SEEN = "a learner would notice its error, which is 2.5 times what can be seen"
+OWN_BEST = "no other setting is cheaper without being less accurate"
+OWN_FAILS = "the scene does not run under its own setting, Euler at 2 ms: the state is not finite"
+ERROR_SEEN = "a learner would notice its error, which is 2.5 times what can be seen"
 
 
 @pytest.mark.parametrize(
@@ -63,17 +63,21 @@ SEEN = "a learner would notice its error, which is 2.5 times what can be seen"
         (
             ((1, 1e-3), (4, 1e-7)),
             None,
-            f"{OWN}; a learner would not notice its error, which is 0.001 of what can be seen",
+            f"{OWN_BEST}; a learner would not notice its error, which is 0.001 of what can be seen",
         ),
         (
             ((1, 2.5), (0.94, 2.5e-6)),
             1,
-            f"RK4 at 10 ms is better: it takes 0.94 of the time and errs far less; {SEEN}; the "
-            "cheapest without one that is seen is RK4 at 10 ms, at 0.94 times its cost",
+            f"RK4 at 10 ms is better: it takes 0.94 of the time and errs far less; {ERROR_SEEN}; "
+            "the cheapest without one that is seen is RK4 at 10 ms, at 0.94 times its cost",
         ),
-        (((1, 2.5), (2, 2.4)), None, f"{OWN}; {SEEN}, and that of every other setting too"),
-        ((None, (1, 2.0)), 1, f"{GONE}; RK4 at 10 ms is the most accurate that does"),
-        ((None, None), None, GONE),
+        (
+            ((1, 2.5), (2, 2.4)),
+            None,
+            f"{OWN_BEST}; {ERROR_SEEN}, and that of every other setting too",
+        ),
+        ((None, (1, 2.0)), 1, f"{OWN_FAILS}; RK4 at 10 ms is the most accurate that does"),
+        ((None, None), None, OWN_FAILS),
     ],
 )
 def test_verdicts(points: tuple[Point, ...], better: int | None, text: str) -> None:

@@ -11,7 +11,7 @@ import pytest
 from coursebuild.numerics.engine import EngineStates
 from coursebuild.numerics.observe import find_sticks, measure_slip
 from coursebuild.numerics.scene import Scene, scenes
-from support.surveys import NOTHING
+from support.surveys import NO_DECLARATIONS
 
 BALL = """\
 <mujoco>
@@ -25,7 +25,7 @@ BALL = """\
 
 def ball() -> tuple[Any, Scene]:
     model = mujoco.MjModel.from_xml_string(BALL)
-    (scene,) = scenes(model, NOTHING)
+    (scene,) = scenes(model, NO_DECLARATIONS)
     return model, scene
 
 

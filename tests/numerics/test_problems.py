@@ -20,17 +20,17 @@ DIRECTIONS = ("axis", "zaxis", "condim", "iterations")
 """Attributes of MJCF whose size says nothing."""
 _PLANE = {f"geom size {n}" for n in range(3)}  # it is infinite
 _SOFT = {f"geom solimp {n}" for n in (2, 3, 4)}  # dmin is dmax: how one becomes the other
-_ACROSS = {"inertial diaginertia 0", "inertial diaginertia 2"}  # it turns about the other axis
+_OTHER_AXES = {"inertial diaginertia 0", "inertial diaginertia 2"}  # it turns about the other axis
 _FRICTIONS = {"geom friction 1", "geom friction 2"}  # against twisting and rolling
 _BODY = {"geom size 0", "geom mass 0"}  # it does not turn, and falls or swings by what is given
 IMMATERIAL = {
     "tumbling-box": {"geom mass 0"},  # without forces all moments may be multiplied alike
-    "pendulum": _ACROSS,
-    "double-pendulum": _ACROSS,
-    "chain-hinges": _ACROSS,
+    "pendulum": _OTHER_AXES,
+    "double-pendulum": _OTHER_AXES,
+    "chain-hinges": _OTHER_AXES,
     "chain-balls": {f"qpos {4 * n}" for n in range(1, 6)},  # the length of a quaternion
     # What is light beside a body a million times as heavy.
-    "chain-heavy-tip": _ACROSS
+    "chain-heavy-tip": _OTHER_AXES
     | {"inertial diaginertia 1", "inertial mass 0", "solution inertia", "solution masses 2"},
     "free-top": {"inertial mass 0"},  # its centre rests, here and in the next ones
     "thin-rod": {"inertial mass 0"},

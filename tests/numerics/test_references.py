@@ -14,7 +14,7 @@ from coursebuild.numerics.pilot import run_pilot
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.references import KnownMotion, find_reference
 from coursebuild.numerics.scene import SceneError, scenes
-from support.surveys import NOTHING, parse_declared
+from support.surveys import NO_DECLARATIONS, parse_declared
 
 pytestmark = pytest.mark.site
 
@@ -72,7 +72,7 @@ def test_a_smooth_scene_is_integrated_twice() -> None:
     ids=["contact", "limit", "friction"],
 )
 def test_where_something_jumps_the_engine_is_its_own_reference(model: Any, reason: str) -> None:
-    (scene,) = scenes(model, NOTHING, quick=True)
+    (scene,) = scenes(model, NO_DECLARATIONS, quick=True)
     pilot = run_pilot(model, scene)
     assert pilot.jumps == (reason,)
     reference = find_reference(model, pilot, quick=True)
@@ -91,7 +91,7 @@ def test_an_activation_at_its_limit_is_a_jump() -> None:
     # `mj_forward` knows nothing of the clamp: both integrations agree, on another motion.
     model = pendulum("damping='1'", actuator=FULL.format(most=0.3))
     model.key_ctrl[0, 0] = 1.0
-    (scene,) = scenes(model, NOTHING, quick=True)
+    (scene,) = scenes(model, NO_DECLARATIONS, quick=True)
     pilot = run_pilot(model, scene)
     assert pilot.jumps == ("an activation at its limit",)
     reference = find_reference(model, pilot, quick=True)

@@ -13,7 +13,7 @@ from coursebuild.core.model.scenarios import is_multiple
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.scene import Scene, SceneError, scenes
-from support.surveys import NOTHING, parse_declared
+from support.surveys import NO_DECLARATIONS, parse_declared
 
 ARM = """\
 <mujoco>
@@ -44,7 +44,7 @@ def only(text: str, model: Any = None) -> Scene:
 
 
 def test_keyframes_are_scenarios_by_themselves() -> None:
-    first, second = scenes(arm(), NOTHING)
+    first, second = scenes(arm(), NO_DECLARATIONS)
     assert (first.name, first.scenario.keyframe) == ("home", 0)
     assert (second.name, second.scenario.keyframe) == ("keyframe-1", 1)
     assert first.scenario.duration == 2.0
@@ -53,7 +53,7 @@ def test_keyframes_are_scenarios_by_themselves() -> None:
 
 def test_where_nothing_moves_there_is_nothing_to_measure() -> None:
     still = mujoco.MjModel.from_xml_string("<mujoco/>")
-    assert scenes(still, NOTHING) == ()
+    assert scenes(still, NO_DECLARATIONS) == ()
     with pytest.raises(SceneError, match="nothing can move"):
         scenes(still, parse_declared('[[scenario]]\nname = "a"\n'))
 
@@ -115,7 +115,7 @@ def test_a_tiny_timestep_makes_a_short_scenario_from_the_models_own_state() -> N
         "<mujoco><option timestep='1e-6'/><worldbody><body><joint/><geom size='1'/></body>"
         "</worldbody></mujoco>"
     )
-    (scene,) = scenes(model, NOTHING)
+    (scene,) = scenes(model, NO_DECLARATIONS)
     assert (scene.name, scene.scenario.keyframe) == ("start", -1)
     assert scene.scenario.duration == pytest.approx(0.02, rel=0.01)
 

@@ -12,7 +12,7 @@ from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import MeasuredSetting
 from coursebuild.numerics.scene import scenes
 from coursebuild.numerics.timing import MIN_ROUNDS, Job, costs, time_jobs
-from support.surveys import NOTHING
+from support.surveys import NO_DECLARATIONS
 
 
 class Machine:
@@ -100,7 +100,7 @@ SPRING = """\
 def test_costs_are_of_the_whole_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
     """A clock that goes by what steps cost where the spring is: less and less, as it swings out."""
     model = mujoco.MjModel.from_xml_string(SPRING)
-    (scene,) = scenes(model, NOTHING)
+    (scene,) = scenes(model, NO_DECLARATIONS)
     machine, real = Machine(), mujoco.mj_step
     price = {mujoco.mjtIntegrator.mjINT_EULER: 300.0, mujoco.mjtIntegrator.mjINT_RK4: 1300.0}
 

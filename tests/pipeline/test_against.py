@@ -18,9 +18,9 @@ from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.site
 
-HERE = engine_version()
-OTHER = "9.1.0"
-REAL_NUMBER = int("{:d}{:03d}{:03d}".format(*map(int, HERE.split("."))))
+VERSION = engine_version()
+NEW_VERSION = "9.1.0"
+REAL_NUMBER = int("{:d}{:03d}{:03d}".format(*map(int, VERSION.split("."))))
 ENGINE = """\
 import numpy
 __version__ = "{version}"
@@ -44,11 +44,18 @@ def wheels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with wheels of small packages, the only place where pip looks."""
     folder = tmp_path / "wheels"
     folder.mkdir()
-    for version, number in ((HERE, REAL_NUMBER), (OTHER, 9_001_000)):
+    for version, number in ((VERSION, REAL_NUMBER), (NEW_VERSION, 9_001_000)):
         code = ENGINE.format(version=version, number=number)
-        code += "def mju_isBad(x):\n    return 1\n" if version == HERE else "import mujoco_core\n"
-        wheel(folder, version, code, part="" if version == HERE else f"mujoco-core=={version}")
-    wheel(folder, OTHER, "", name="mujoco_core")
+        code += (
+            "def mju_isBad(x):\n    return 1\n" if version == VERSION else "import mujoco_core\n"
+        )
+        wheel(
+            folder,
+            version,
+            code,
+            part="" if version == VERSION else f"mujoco-core=={version}",
+        )
+    wheel(folder, NEW_VERSION, "", name="mujoco_core")
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.setenv("PIP_FIND_LINKS", str(folder))
     monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
@@ -95,7 +102,7 @@ def environments(course: Folder) -> list[str]:
     return sorted(name.removeprefix("mujoco-").rpartition("-")[0] for name in names)
 
 
-def check_against(course: Folder, *arguments: str, version: str = OTHER) -> CommandResult:
+def check_against(course: Folder, *arguments: str, version: str = NEW_VERSION) -> CommandResult:
     return course.main("check", "--against", version, *arguments)
 
 
@@ -105,21 +112,25 @@ NUMBER = block(
     'import mujoco\nprint("header", mujoco.mjVERSION_HEADER)\nprint("and 1")',
     f"header {REAL_NUMBER}\nand 1",
 )
-FAILING = block("failing.py", "import mujoco\nmujoco.mju_isBad(1.0)\nprint(1)", "1")
+FAILING_SCRIPT = block("failing.py", "import mujoco\nmujoco.mju_isBad(1.0)\nprint(1)", "1")
 
 
-SUM = f"MuJoCo {OTHER} against {HERE}, Python {platform.python_version()}:"
+SUM = f"MuJoCo {NEW_VERSION} against {VERSION}, Python {platform.python_version()}:"
 
 
 def test_changed_outputs_are_told_number_by_number(
     make: Make, wheels: Path, installed: Path
 ) -> None:
-    course = borrow(make(f"## A\n\n{NUMBER}{FAILING}", f"## B\n\n{PLAIN}"), installed)
+    course = borrow(make(f"## A\n\n{NUMBER}{FAILING_SCRIPT}", f"## B\n\n{PLAIN}"), installed)
     assert course.main("check", "-q").out == ""
     report = json.loads(check_against(course, "1.2", "--format", "json", "-q").out)
     assert [(s["path"], s["status"]) for s in report["scripts"]] == [("examples/plain.py", "same")]
-    assert (report["engine"], report["against"], report["models"]) == (HERE, OTHER, [])
-    assert environments(course) == [OTHER], "no control was needed"
+    assert (report["engine"], report["against"], report["models"]) == (
+        VERSION,
+        NEW_VERSION,
+        [],
+    )
+    assert environments(course) == [NEW_VERSION], "no control was needed"
     quiet, result = check_against(course, "-q"), check_against(course)
     error = abs(9_001_000 - REAL_NUMBER) / REAL_NUMBER
     assert (quiet.status, quiet.err, result.status) == (0, "", 0)
@@ -127,20 +138,20 @@ def test_changed_outputs_are_told_number_by_number(
     assert (
         result.out
         == f"""\
-changed    examples/number.py  by MuJoCo {OTHER}
-  content/lessons/1.1-one.md:12:8: recorded {REAL_NUMBER}; MuJoCo {OTHER} printed 9001000 \
+changed    examples/number.py  by MuJoCo {NEW_VERSION}
+  content/lessons/1.1-one.md:12:8: recorded {REAL_NUMBER}; MuJoCo {NEW_VERSION} printed 9001000 \
 (relative error {error:.1e}, no digit agrees)
 
-fails      examples/failing.py  by MuJoCo {OTHER}
+fails      examples/failing.py  by MuJoCo {NEW_VERSION}
   content/lessons/1.1-one.md:18: `examples/failing.py` exited with status 1: AttributeError: \
 module 'mujoco' has no attribute 'mju_isBad'
 
 same       examples/plain.py
 
-{SUM} 3 scripts: 1 the same, 1 changed by MuJoCo {OTHER}, 1 failing with MuJoCo {OTHER}
+{SUM} 3 scripts: 1 the same, 1 changed by MuJoCo {NEW_VERSION}, 1 failing with MuJoCo {NEW_VERSION}
 """
     )
-    assert environments(course) == sorted((HERE, OTHER))
+    assert environments(course) == sorted((VERSION, NEW_VERSION))
     report = json.loads(check_against(course, "--format", "json", "-q").out)
     first = report["scripts"][0]
     assert (first["status"], first["by_mujoco"], first["failure"]) == ("changed", True, None)
@@ -165,21 +176,24 @@ def test_another_cause_than_mujoco_is_not_blamed_on_it(
     lesson = "## A\n\n" + block("pi.py", code, "3.1416")
     course = borrow(make(lesson), installed)
     assert check_against(course, "-q").out.startswith(
-        f"unclear    examples/pi.py  (it does not do in a fresh environment with MuJoCo {HERE} "
+        f"unclear    examples/pi.py  (it does not do in a fresh environment with MuJoCo {VERSION} "
         "what it does here either)\n"
         "  content/lessons/1.1-one.md:11:1: recorded 3.1416; "
     )
-    (wheels / f"mujoco-{HERE}-py3-none-any.whl").unlink()
-    assert check_against(borrow(make(lesson, name="alone"), installed, OTHER), "-q").out.startswith(
-        f"unclear    examples/pi.py  (no fresh environment with MuJoCo {HERE} could be made: "
-        f"pip finds no MuJoCo {HERE} for Python "
+    (wheels / f"mujoco-{VERSION}-py3-none-any.whl").unlink()
+    assert check_against(
+        borrow(make(lesson, name="alone"), installed, NEW_VERSION), "-q"
+    ).out.startswith(
+        f"unclear    examples/pi.py  (no fresh environment with MuJoCo {VERSION} could be made: "
+        f"pip finds no MuJoCo {VERSION} for Python "
     )
 
 
 def test_scripts_that_cannot_be_compared_say_why(make: Make, wheels: Path, installed: Path) -> None:
     random = "import mujoco, os\nprint(mujoco.__version__, os.urandom(8).hex())"
     fixed = (
-        f"import mujoco, os\nprint('{HERE}' if mujoco.__version__ == '{HERE}' else os.urandom(8))"
+        "import mujoco, os\n"
+        f"print('{VERSION}' if mujoco.__version__ == '{VERSION}' else os.urandom(8))"
     )
     course = make(
         "## A\n\n"
@@ -188,7 +202,7 @@ def test_scripts_that_cannot_be_compared_say_why(make: Make, wheels: Path, insta
         + block("broken.py", "raise SystemExit(3)", "x")
         + block("never.py", "print(1)", "1", info="norun")
         + block("needs.py", "print(1)", "1", info="requires=nowhere")
-        + block("lottery.py", fixed, HERE)
+        + block("lottery.py", fixed, VERSION)
         + block("printed.py", "import mujoco\nprint(mujoco.__version__)")
     )
     course.write("models/ball.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
@@ -199,7 +213,7 @@ def test_scripts_that_cannot_be_compared_say_why(make: Make, wheels: Path, insta
     assert result.out.endswith("; 0 of 1 MJCF text compiles there\n")
     lines = [line for line in result.out.splitlines() if "  (" in line or "  by" in line]
     assert sorted(lines) == [
-        f"changed    examples/printed.py  by MuJoCo {OTHER}",
+        f"changed    examples/printed.py  by MuJoCo {NEW_VERSION}",
         "drifted    examples/drifted.py  (what is recorded is not what it prints here)",
         "unclear    examples/lottery.py  (two runs of it there did not do the same)",
         "uncompared examples/broken.py  (it does not run to its end here)",
@@ -229,12 +243,12 @@ def test_wrong_combinations_of_arguments_give_2(make: Make) -> None:
 
 def test_latest_is_the_newest_that_pip_finds(make: Make, wheels: Path, installed: Path) -> None:
     course = borrow(make(f"## A\n\n{NUMBER}"), installed)
-    assert f"changed by MuJoCo {OTHER}" in check_against(course, "-q", version="latest").out
-    (wheels / f"mujoco-{OTHER}-py3-none-any.whl").unlink()
+    assert f"changed by MuJoCo {NEW_VERSION}" in check_against(course, "-q", version="latest").out
+    (wheels / f"mujoco-{NEW_VERSION}-py3-none-any.whl").unlink()
     result = check_against(course, "-q", version="latest")
-    output = SUM.replace(OTHER, HERE) + " 0 scripts: nothing to compare\n"
+    output = SUM.replace(NEW_VERSION, VERSION) + " 0 scripts: nothing to compare\n"
     assert (result.status, result.out) == (0, output)
-    (wheels / f"mujoco-{HERE}-py3-none-any.whl").unlink()
+    (wheels / f"mujoco-{VERSION}-py3-none-any.whl").unlink()
     result = check_against(course, "-q", version="latest")
     assert result.status == 1
     assert result.err.startswith("coursebuild: pip finds no MuJoCo at all for Python ")
@@ -280,21 +294,23 @@ def test_interrupted_installations_leave_nothing_and_two_commands_at_once_instal
             wait_until_alone(course)
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with (
-        kill_at_end(course.start("check", "--against", OTHER, **pipes)) as first,
-        kill_at_end(course.start("check", "--against", OTHER, **pipes)) as second,
+        kill_at_end(course.start("check", "--against", NEW_VERSION, **pipes)) as first,
+        kill_at_end(course.start("check", "--against", NEW_VERSION, **pipes)) as second,
     ):
         outputs = [process.communicate(timeout=900) for process in (first, second)]
     assert outputs[0][0] == outputs[1][0] != b""
     errors = b"".join(error for _, error in outputs)
-    assert errors.count(b"installing MuJoCo " + OTHER.encode()) == 1
-    assert environments(course) == sorted((HERE, OTHER)), "what the killed one left is gone"
+    assert errors.count(b"installing MuJoCo " + NEW_VERSION.encode()) == 1
+    assert environments(course) == sorted((VERSION, NEW_VERSION)), (
+        "what the killed one left is gone"
+    )
 
 
 def test_only_the_environments_used_last_stay(make: Make, wheels: Path, installed: Path) -> None:
-    course = borrow(make(f"## A\n\n{PLAIN}"), installed, OTHER)
+    course = borrow(make(f"## A\n\n{PLAIN}"), installed, NEW_VERSION)
     for number in range(5):
         old = course.root / f".coursebuild/environments/mujoco-8.{number}-x"
         old.mkdir(parents=True)
         os.utime(old, (number, number))
     assert check_against(course, "-q").status == 0
-    assert environments(course) == ["8.2", "8.3", "8.4", OTHER]
+    assert environments(course) == ["8.2", "8.3", "8.4", NEW_VERSION]

@@ -15,19 +15,21 @@ pytestmark = pytest.mark.site
 
 READS = 'from pathlib import Path\nprint(len(Path("models/data.txt").read_text()))\n'
 HELPER = 'word = "help"\nif __name__ == "__main__":\n    print(word)\n'
-HELPED = "from helper import word\nprint(word)\n"
+HELPED_SCRIPT = "from helper import word\nprint(word)\n"
 LESSON = (
     "## A\n\n"
     + block("hello.py", HELLO, "hello 3.14159")
     + block("reads.py", READS, "3")
     + "It has `3`{out=examples/reads.py} letters, see [the data](../../models/data.txt).\n"
 )
-OTHER = "## B\n\n" + block("helper.py", HELPER, "help") + block("helped.py", HELPED, "help")
+SECOND_LESSON = (
+    "## B\n\n" + block("helper.py", HELPER, "help") + block("helped.py", HELPED_SCRIPT, "help")
+)
 
 
 @pytest.fixture
 def course(make: Make) -> Folder:
-    folder = make(LESSON, OTHER)
+    folder = make(LESSON, SECOND_LESSON)
     folder.write("models/data.txt", "abc")
     return folder
 
@@ -250,7 +252,7 @@ def test_explain_what_cannot_be_explained_gives_2(course: Folder) -> None:
     assert (result.status, result.err) == (2, f"coursebuild: {message}\n")
 
 
-PACKAGED = """
+PACKAGE_SCRIPT = """
 import os
 from pathlib import Path
 
@@ -270,7 +272,9 @@ print(word, mjcourse.__name__, mjcourse.OWN, os.environ["FAST"])
 def test_scripts_import_from_the_folders_of_the_course(make: Make) -> None:
     """They come before our folders, and count as inputs, as do variables that the course sets."""
     output = "word mjcourse True 1"
-    folder = make("## A\n\n" + block("a.py", PACKAGED, output, info="writes=runs/ requires=pkg"))
+    folder = make(
+        "## A\n\n" + block("a.py", PACKAGE_SCRIPT, output, info="writes=runs/ requires=pkg")
+    )
     folder.write("src/pkg/__init__.py", "")
     folder.write("src/pkg/part.py", 'word = "word"\n')
     folder.write("src/mjcourse/__init__.py", "OWN = True\n")

@@ -8,7 +8,7 @@ from support.scratch_course import GOOD, Make, block
 
 pytestmark = pytest.mark.site
 
-TWO = "## Two\n\n" + block("a.py", "print('a')", "a") + block("sub/b.py", "print('b')", "b")
+TWO_SCRIPTS = "## Two\n\n" + block("a.py", "print('a')", "a") + block("sub/b.py", "print('b')", "b")
 SHAPES = {
     "plain": "```python file=examples/x.py\nprint(1)\n```\n\nAfter.\n",
     "quote": "> ```python file=examples/x.py\n> print(1)\n> ```\n>\n> After.\n",
@@ -17,14 +17,14 @@ SHAPES = {
     "deep": "> - item\n>\n>   ````python file=examples/x.py\n>   print(1)\n>   ````\n>\n> After.\n",
     "last": "```python file=examples/x.py\nprint(1)\n```",
 }
-EDITED = (
+EDITED_SCRIPT = (
     'def f():\n\t"""A text\n\n      with ``` inside\n    """\n'
     '\tif True:\n\t\treturn "ü"\n\n\n# end\n'
 )
 
 
 def test_files_are_written_once_and_removed_with_their_scripts(make: Make) -> None:
-    folder = make(TWO)
+    folder = make(TWO_SCRIPTS)
     result = folder.main("extract")
     assert result.status == 0
     assert "wrote examples/a.py\nwrote examples/sub/b.py\n" in result.out
@@ -34,7 +34,7 @@ def test_files_are_written_once_and_removed_with_their_scripts(make: Make) -> No
         result = folder.main("extract", *options)
         assert (result.status, "every script is extracted already" in result.out) == (0, True)
     assert times == {p: (folder.root / "examples" / p).stat().st_mtime_ns for p in times}
-    assert folder.text(folder.lesson()) == TWO
+    assert folder.text(folder.lesson()) == TWO_SCRIPTS
     folder.write("examples/mine.txt", "not extracted")
     folder.write(folder.lesson(), GOOD)
     result = folder.main("extract")
@@ -47,12 +47,12 @@ def test_files_are_written_once_and_removed_with_their_scripts(make: Make) -> No
 # --- adopting
 
 
-SAVED = (
-    EDITED,
-    EDITED.replace("\n", "\r\n"),
-    "\ufeff" + EDITED,
-    EDITED.rstrip("\n"),
-    EDITED + "\n\n",
+SAVED_SCRIPTS = (
+    EDITED_SCRIPT,
+    EDITED_SCRIPT.replace("\n", "\r\n"),
+    "\ufeff" + EDITED_SCRIPT,
+    EDITED_SCRIPT.rstrip("\n"),
+    EDITED_SCRIPT + "\n\n",
 )
 
 
@@ -64,7 +64,7 @@ def test_edit_is_adopted_into_a_block_of_every_shape(make: Make) -> None:
         for number, shape in enumerate(SHAPES.values(), 1)
     ]
     folder = make(*texts)
-    for file in SAVED:
+    for file in SAVED_SCRIPTS:
         for number, text in enumerate(texts, 1):
             folder.write(folder.lesson(number), text)
             (folder.root / f"examples/x{number}.py").unlink(missing_ok=True)
@@ -76,23 +76,23 @@ def test_edit_is_adopted_into_a_block_of_every_shape(make: Make) -> None:
         for number, (shape, text) in enumerate(zip(SHAPES, texts, strict=True), 1):
             before, _, after = text.partition("print(1)" + newline)
             lead = before.rpartition(newline)[2]
-            body = [(lead + line if line else lead.rstrip()) for line in EDITED.splitlines()]
+            body = [(lead + line if line else lead.rstrip()) for line in EDITED_SCRIPT.splitlines()]
             block_text = before[: len(before) - len(lead)] if lead else before
             whole = block_text + newline.join(body) + newline + after
             assert folder.text(folder.lesson(number)) == whole, (shape, file)
-            assert folder.text(f"examples/x{number}.py") == EDITED, (shape, file)
+            assert folder.text(f"examples/x{number}.py") == EDITED_SCRIPT, (shape, file)
             assert f"updated {folder.lesson(number)}\n" in result.out, shape
         assert "every script is extracted already" in folder.main("extract", "--adopt").out
 
 
 def test_several_edits_of_one_lesson_are_adopted_at_once(make: Make) -> None:
-    folder = make(TWO + block("c.py", "print('c')", "c"), GOOD)
+    folder = make(TWO_SCRIPTS + block("c.py", "print('c')", "c"), GOOD)
     folder.main("extract")
     folder.replace(folder.lesson(), "print('c')", "print('C')")  # an edit, which stays
     folder.write("examples/a.py", "print('a')\nprint('more')\n")
     folder.write("examples/sub/b.py", "# b\n\nprint('b')\n")
     assert folder.main("extract", "--adopt").status == 0
-    adopted = TWO.replace("print('a')\n", "print('a')\nprint('more')\n").replace(
+    adopted = TWO_SCRIPTS.replace("print('a')\n", "print('a')\nprint('more')\n").replace(
         "print('b')\n", "# b\n\nprint('b')\n"
     )
     assert folder.text(folder.lesson()) == adopted + block("c.py", "print('C')", "c")
@@ -103,7 +103,7 @@ def test_several_edits_of_one_lesson_are_adopted_at_once(make: Make) -> None:
 
 
 def test_edit_that_a_block_cannot_hold_is_left_alone(make: Make) -> None:
-    folder = make(TWO)
+    folder = make(TWO_SCRIPTS)
     folder.main("extract")
     for data, says in (
         (b"caf\xe9\n", "it is not UTF-8"),
@@ -116,11 +116,11 @@ def test_edit_that_a_block_cannot_hold_is_left_alone(make: Make) -> None:
         assert result.status == 1
         assert f"examples/a.py cannot be brought into the lesson: {says}" in result.out
         assert folder.read("examples/a.py") == data
-        assert folder.text(folder.lesson()) == TWO
+        assert folder.text(folder.lesson()) == TWO_SCRIPTS
 
 
 def test_of_two_edits_neither_is_lost(make: Make) -> None:
-    folder = make(TWO)
+    folder = make(TWO_SCRIPTS)
     folder.main("extract")
     folder.write("examples/a.py", "print('a')  # by hand\n")
     folder.replace(folder.lesson(), "print('a')", "print('A')")
@@ -140,7 +140,7 @@ def test_of_two_edits_neither_is_lost(make: Make) -> None:
 
 def test_a_read_only_example_is_adopted_and_settled(make: Make) -> None:
     """An example is derived from its lesson: it is replaced whatever its mode."""
-    folder = make(TWO)
+    folder = make(TWO_SCRIPTS)
     folder.main("extract")
     folder.write("examples/a.py", b"print('edited')\r\n")
     (folder.root / "examples/a.py").chmod(0o444)

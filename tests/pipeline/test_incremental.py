@@ -20,7 +20,7 @@ from support.scratch_course import Folder
 
 pytestmark = pytest.mark.site
 
-SERVED = ("compressed", "fonts", "mjb", "parts", "pictures", "published", "unchanged")
+UNSHARED_KINDS = ("compressed", "fonts", "mjb", "parts", "pictures", "published", "unchanged")
 """Kinds of entries that hold bytes of the site, or that are not shared."""
 GLOSSARY, SYMBOLS = "glossary/index.html", "symbols/index.html"
 
@@ -142,7 +142,7 @@ def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Cou
         for path in sorted(folder.rglob("*")):
             name = path.relative_to(folder).as_posix()
             kind = name.partition("/")[0]
-            if path.is_file() and len(path.name) == 64 and kind not in SERVED:
+            if path.is_file() and len(path.name) == 64 and kind not in UNSHARED_KINDS:
                 path.write_bytes(sealed(name, junk))
                 kinds.add(kind)
         assert {"summaries", "pages", "maps", "index"} <= kinds

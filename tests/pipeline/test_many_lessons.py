@@ -16,7 +16,7 @@ from support.scratch_course import Folder, block
 
 pytestmark = pytest.mark.slow
 
-FEW, MANY = 20, 50
+FEW_LESSONS, MANY_LESSONS = 20, 50
 TEXT = 20_000
 """Bytes of prose in a lesson."""
 SLOPE = 60_000
@@ -68,10 +68,12 @@ def peak(folder: Folder) -> int:
 def test_memory_does_not_grow_with_the_lessons(
     tmp_path: Path, stores: Path, again: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(reading, "ROOM", FEW * TEXT // 2)  # else it would take hundreds of lessons
-    peaks: dict[int, list[int]] = {FEW: [], MANY: []}
+    monkeypatch.setattr(
+        reading, "ROOM", FEW_LESSONS * TEXT // 2
+    )  # else it would take hundreds of lessons
+    peaks: dict[int, list[int]] = {FEW_LESSONS: [], MANY_LESSONS: []}
     # Several times: whatever else the process does can only add to it.
-    for number, count in enumerate((FEW, FEW, MANY, MANY)):
+    for number, count in enumerate((FEW_LESSONS, FEW_LESSONS, MANY_LESSONS, MANY_LESSONS)):
         folder = Folder(tmp_path / str(number))
         write_course(folder, count)
         folder.borrow(stores)
@@ -79,5 +81,5 @@ def test_memory_does_not_grow_with_the_lessons(
             build(folder.options(), Path("public"))
             folder.replace("content/lessons/1.2-l.md", "See [there]", "See again [there]")
         peaks[count].append(peak(folder))
-    slope = (min(peaks[MANY]) - min(peaks[FEW])) / (MANY - FEW)
+    slope = (min(peaks[MANY_LESSONS]) - min(peaks[FEW_LESSONS])) / (MANY_LESSONS - FEW_LESSONS)
     assert slope < SLOPE, f"{slope:.0f} bytes a lesson: {peaks}"

@@ -43,7 +43,7 @@ What it costs, as [the model's page](model:box#measured-awkward) has it.
   ```bench box show=table
   ```
 """
-PAGE, NUMERICS, SHOWING = "models/box.html", "numerics/index.html", "lessons/1.2-two.html"
+PAGE, NUMERICS, SCENARIO_LESSON = "models/box.html", "numerics/index.html", "lessons/1.2-two.html"
 
 
 class Course:
@@ -93,7 +93,7 @@ class Course:
 
     def figures(self) -> list[str]:
         """The reports that the lesson shows, without their drawings."""
-        parts = self.page(SHOWING).split('<figure class="bench scenario">')[1:]
+        parts = self.page(SCENARIO_LESSON).split('<figure class="bench scenario">')[1:]
         figures = (part.split("</figure>")[0] for part in parts)
         return [re.sub(r"<svg.*?</svg>", "<svg>", part, flags=re.S) for part in figures]
 
@@ -120,7 +120,7 @@ def course(built_course: Folder, tmp_path: Path) -> Course:
 
 def test_what_was_recorded_is_on_its_pages_and_in_the_lesson(built_course: Folder) -> None:
     course = Course(built_course)
-    page, lesson = course.page(), course.page(SHOWING)
+    page, lesson = course.page(), course.page(SCENARIO_LESSON)
     assert 'class="work-precision"' in page and "Nobody reads it." in page
     assert "It swings." in course.page(NUMERICS)
     assert (course.folder.root / "public/files/reports/box.bench.json").is_file()
@@ -142,10 +142,10 @@ def test_what_was_recorded_is_on_its_pages_and_in_the_lesson(built_course: Folde
 
 
 def test_report_is_in_markdown_notebook_ebook_and_search(course: Course) -> None:
-    copy = course.page(SHOWING.replace("html", "md"))
+    copy = course.page(SCENARIO_LESSON.replace("html", "md"))
     assert "**[box](../models/box.md#measured-swing): A pendulum swings**" in copy
     assert "error of" in copy and "| Euler at 2 ms |" in copy and "<svg" not in copy
-    cells = json.loads(course.page(SHOWING.replace("html", "ipynb")))["cells"]
+    cells = json.loads(course.page(SCENARIO_LESSON.replace("html", "ipynb")))["cells"]
     assert any("| Euler at 2 ms |" in "".join(cell["source"]) for cell in cells)
     searched = (course.folder.root / "public").rglob("*.js")
     texts = [path.read_text("utf-8") for path in searched]
@@ -168,7 +168,7 @@ def test_another_report_draws_the_pages_that_show_it_and_no_others(course: Cours
     assert drawn_pages(course.folder) == {PAGE}
     swing, awkward = report.scenarios
     course.write_bench(replace(report, scenarios=(swing, replace(awkward, title="Other"))))
-    assert drawn_pages(course.folder) == {PAGE, SHOWING}
+    assert drawn_pages(course.folder) == {PAGE, SCENARIO_LESSON}
     (course.folder.root / STABILITY.path()).unlink()
     assert drawn_pages(course.folder) == {
         "index.html",
@@ -225,7 +225,7 @@ def test_the_preview_follows_reports(course: Course) -> None:
         def shows(path: str, text: str) -> None:
             wait_until(lambda: text in preview.get(path)[2].decode(), f"{text!r} on {path}")
 
-        shows(SHOWING, "A pendulum swings")
+        shows(SCENARIO_LESSON, "A pendulum swings")
         course.write_diet("it is far away")
         course.write_cases("it hangs")
         report = course.bench()
@@ -233,9 +233,9 @@ def test_the_preview_follows_reports(course: Course) -> None:
         course.write_bench(replace(report, scenarios=(first, report.scenarios[1])))
         shows(PAGE, "It is far away.")
         shows(NUMERICS, "It hangs.")
-        shows(SHOWING, "It falls")
+        shows(SCENARIO_LESSON, "It falls")
         course.folder.replace("content/lessons/1.2-two.md", "=awkward", "=swing")
-        shows(SHOWING, "#measured-swing")
+        shows(SCENARIO_LESSON, "#measured-swing")
         course.folder.replace("models/box.xml", "<mujoco>", "<mujoco >")
         shows(PAGE, "Not measured.")
 

@@ -19,15 +19,15 @@ from coursebuild.core.run.memory import longest_first
 from coursebuild.core.scripts.sensitivity import amplification
 from coursebuild.report.explained import Explanation, RunExplanation, explanation_text
 from coursebuild.report.terminal import Style
-from support.fake_runs import JOB, LOOKED, NOTHING, PATH, SCRIPT, Desk
+from support.fake_runs import EMPTY_TRACE, JOB, MODEL_TRACE, PATH, SCRIPT, Desk
 from support.poisoned_values import mutations
 
 Act = Callable[[Desk], object]
-SOUGHT = Trace((), (), (), (), "", sought=("examples/{json}",))
-DIVERGED = Divergence(Sign.STATE, "0.5", "", PATH, 1)
+SOUGHT_MODULE = Trace((), (), (), (), "", sought=("examples/{json}",))
+DIVERGENCE = Divergence(Sign.STATE, "0.5", "", PATH, 1)
 STATE = "1 1 0x1.0p+0 0x1.0p+0 0x1.8p-1 0x0.0p+0"
-DAMAGED = "the entry {}… in the shared cache is damaged: it is made again"
-ODD = os.fsdecode(b"models/\xff.bin")
+DAMAGED_MESSAGE = "the entry {}… in the shared cache is damaged: it is made again"
+ODD_PATH = os.fsdecode(b"models/\xff.bin")
 
 
 @pytest.fixture
@@ -62,10 +62,10 @@ def test_results_and_failures_are_remembered_whole(desk: Desk) -> None:
 
 
 def outside(path: str) -> dict[str, Trace]:
-    return {"trace": replace(NOTHING, outside=(path,))}
+    return {"trace": replace(EMPTY_TRACE, outside=(path,))}
 
 
-FORGOTTEN: list[tuple[Outcome, dict[str, object], str]] = [
+UNSTORED_OUTCOMES: list[tuple[Outcome, dict[str, object], str]] = [
     (Outcome.TIMEOUT, {}, "it was stopped after its time limit"),
     (Outcome.KILLED, {}, "a signal ended it"),
     (Outcome.SKIPPED, {"missing": ("scipy", "jax")}, "it needs scipy, jax"),
@@ -73,14 +73,14 @@ FORGOTTEN: list[tuple[Outcome, dict[str, object], str]] = [
     (Outcome.FAILED, {"stderr": "x\nModuleNotFoundError: jax"}, "it did not find a module"),
     (Outcome.FAILED, {"stderr": "ImportError: cannot import"}, "it did not find a module"),
     (Outcome.OK, {"trace": None}, "nobody could watch what it looks at"),
-    (Outcome.OK, {"trace": replace(NOTHING, opaque="it starts others")}, "it starts others"),
+    (Outcome.OK, {"trace": replace(EMPTY_TRACE, opaque="it starts others")}, "it starts others"),
     (Outcome.OK, outside("/dev/random"), "it reads /dev/random"),
     (Outcome.OK, outside("/proc/stat"), "it reads /proc/stat"),
 ]
 
 
 def test_runs_that_another_may_not_repeat_are_not_remembered(desk: Desk) -> None:
-    for outcome, fields, reason in FORGOTTEN:
+    for outcome, fields, reason in UNSTORED_OUTCOMES:
         shutil.rmtree(desk.root / ".coursebuild", ignore_errors=True)
         desk.run(outcome=outcome, **fields)
         assert (desk.recall(), desk.rerun_reason()) == (None, reason)
@@ -108,7 +108,7 @@ def test_a_few_results_are_kept_for_a_script(desk: Desk) -> None:
     for number in range(12):
         desk.write("models/a.xml", str(number).encode())
         desk.settle()
-        desk.run(LOOKED, stdout=f"{number}\n")
+        desk.run(MODEL_TRACE, stdout=f"{number}\n")
     run = desk.recall()
     assert run is not None and run.stdout == "11\n"
     assert len(entries(desk)) <= 8
@@ -122,7 +122,7 @@ def test_longest_runs_come_first_and_unknown_ones_before_them() -> None:
 
 def test_poisoned_results_of_a_shared_cache_are_one_or_told(tmp_path: Path) -> None:
     """A shared entry may hold any output, but nothing else is taken from it unchecked."""
-    trace = Trace(("models/a.xml",), ("models",), (), ("json",), "", (DIVERGED,), True, (STATE,))
+    trace = Trace(("models/a.xml",), ("models",), (), ("json",), "", (DIVERGENCE,), True, (STATE,))
     place = tmp_path / "shared"
     Desk(tmp_path / "maker", shared=str(place)).run(trace, figures=(("a.svg", b"<svg/>"),))
     (entry,) = [path for path in place.rglob("*") if path.is_file()]
@@ -149,7 +149,7 @@ def test_poisoned_results_of_a_shared_cache_are_one_or_told(tmp_path: Path) -> N
         text = explanation_text(Explanation(PATH, "script", (explanation,)), Style(colour=False))
         assert "\x1b" not in text
         if run is None:
-            assert victim.messages in ([], [DAMAGED.format(name[:20])]), data
+            assert victim.messages in ([], [DAMAGED_MESSAGE.format(name[:20])]), data
         else:
             believed += 1
             assert run.path == PATH
@@ -196,10 +196,10 @@ def files(*paths: str) -> Trace:
     return Trace(paths, (), (), (), "")
 
 
-SEEN: dict[str, tuple[list[Act], Trace, list[tuple[Act, bool]]]] = {
+NOTICED_CHANGES: dict[str, tuple[list[Act], Trace, list[tuple[Act, bool]]]] = {
     "a file": (
         [],
-        LOOKED,
+        MODEL_TRACE,
         [
             (lambda desk: os.utime(desk.root / "models/a.xml"), True),
             (write("models/other.xml"), True),
@@ -210,7 +210,7 @@ SEEN: dict[str, tuple[list[Act], Trace, list[tuple[Act, bool]]]] = {
     ),
     "a file that goes": (
         [],
-        LOOKED,
+        MODEL_TRACE,
         [
             (remove("models/a.xml"), False),
             (folder("models/a.xml"), False),
@@ -222,7 +222,11 @@ SEEN: dict[str, tuple[list[Act], Trace, list[tuple[Act, bool]]]] = {
         files("models/link.xml"),
         [(link("b.xml"), False)],
     ),
-    "a name that is no text": ([write(ODD, b"1")], files(ODD), [(write(ODD, b"2"), False)]),
+    "a name that is no text": (
+        [write(ODD_PATH, b"1")],
+        files(ODD_PATH),
+        [(write(ODD_PATH, b"2"), False)],
+    ),
     "a name in capitals": ([], files("models/A.xml"), [(write("models/A.xml"), False)]),
     "a folder": (
         [],
@@ -231,19 +235,19 @@ SEEN: dict[str, tuple[list[Act], Trace, list[tuple[Act, bool]]]] = {
     ),
     "a module that is sought": (
         [],
-        SOUGHT,
+        SOUGHT_MODULE,
         [(write("examples/picture.png"), True), (write("examples/json.py"), False)],
     ),
     "a file of the future": (
         [lambda desk: os.utime(desk.root / "models/a.xml", (4e9, 4e9))],
-        LOOKED,
+        MODEL_TRACE,
         [(write("models/a.xml"), False)],
     ),
 }
 
 
 def test_result_holds_until_something_that_was_looked_at_changes(tmp_path: Path) -> None:
-    for name, (before, trace, steps) in SEEN.items():
+    for name, (before, trace, steps) in NOTICED_CHANGES.items():
         desk = Desk(tmp_path / name)
         for act in before:
             act(desk)
@@ -269,7 +273,7 @@ def test_a_course_that_is_moved_runs_only_what_printed_its_place(
     desk: Desk, tmp_path: Path
 ) -> None:
     stderr = f'File "{desk.root}/examples/a.py"\n'
-    desk.run(LOOKED, outcome=Outcome.FAILED, status=1, stderr=stderr)
+    desk.run(MODEL_TRACE, outcome=Outcome.FAILED, status=1, stderr=stderr)
     desk.root.rename(tmp_path / "moved")
     desk.root = tmp_path / "moved"
     run = desk.recall()
@@ -305,11 +309,11 @@ def blink(desk: Desk) -> None:
 
 
 WHILE_IT_RAN: tuple[tuple[Trace, Act, str], ...] = (
-    (LOOKED, write("models/a.xml"), "models/a.xml changed while it ran"),
-    (LOOKED, blink, "models/none.xml changed while it ran"),
-    (NOTHING, write(PATH, b"print('other')\n"), "its file changed while it ran"),
-    (LOOKED, write("content/lessons/1.1-a.md"), ""),
-    (SOUGHT, write("examples/picture.png"), ""),
+    (MODEL_TRACE, write("models/a.xml"), "models/a.xml changed while it ran"),
+    (MODEL_TRACE, blink, "models/none.xml changed while it ran"),
+    (EMPTY_TRACE, write(PATH, b"print('other')\n"), "its file changed while it ran"),
+    (MODEL_TRACE, write("content/lessons/1.1-a.md"), ""),
+    (SOUGHT_MODULE, write("examples/picture.png"), ""),
 )
 
 
@@ -322,18 +326,18 @@ def test_result_is_not_kept_where_something_was_saved_while_the_script_ran(tmp_p
 
 
 def test_a_module_that_appeared_while_the_script_ran_was_not_seen_by_it(desk: Desk) -> None:
-    desk.run(SOUGHT, during=lambda: desk.write("examples/json.py", b""))
+    desk.run(SOUGHT_MODULE, during=lambda: desk.write("examples/json.py", b""))
     assert desk.recall() is None
     (desk.root / "examples/json.py").unlink()
     assert desk.recall() is not None
 
 
-EDITED = ("models/a.xml", "models/b.xml", "data.txt")
-edits = st.tuples(st.sampled_from(EDITED), st.sampled_from([b"1", b"2", b"", None]))
+EDITED_PATHS = ("models/a.xml", "models/b.xml", "data.txt")
+edits = st.tuples(st.sampled_from(EDITED_PATHS), st.sampled_from([b"1", b"2", b"", None]))
 
 
 @settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.lists(edits, max_size=6), st.sets(st.sampled_from(EDITED)))
+@given(st.lists(edits, max_size=6), st.sets(st.sampled_from(EDITED_PATHS)))
 def test_script_runs_again_if_and_only_if_a_file_it_read_changed(
     tmp_path_factory: pytest.TempPathFactory,
     changes: list[tuple[str, bytes | None]],
@@ -367,15 +371,15 @@ def test_script_runs_again_if_and_only_if_a_file_it_read_changed(
 
 
 def test_a_fresh_run_says_what_differs(desk: Desk) -> None:
-    desk.run(LOOKED, stdout="one\n")
+    desk.run(MODEL_TRACE, stdout="one\n")
     desk.fresh = True
     assert desk.recall() is None
-    ((before, now),) = desk.run(LOOKED, stdout="two\n").differing_runs
+    ((before, now),) = desk.run(MODEL_TRACE, stdout="two\n").differing_runs
     assert (before.stdout, now.stdout) == ("one\n", "two\n")
-    assert desk.run(LOOKED, stdout="two\n").differing_runs == []
+    assert desk.run(MODEL_TRACE, stdout="two\n").differing_runs == []
     desk.write("models/a.xml", b"other")
     desk.settle()
-    assert desk.run(LOOKED, stdout="three\n").differing_runs == []
+    assert desk.run(MODEL_TRACE, stdout="three\n").differing_runs == []
     desk.fresh = False
     run = desk.recall()
     assert run is not None and run.stdout == "three\n", "the new result is the one that is kept"
@@ -383,7 +387,9 @@ def test_a_fresh_run_says_what_differs(desk: Desk) -> None:
 
 def test_another_machine_has_the_result(desk: Desk, tmp_path: Path) -> None:
     desk.shared = str(tmp_path / "shared")
-    desk.run(LOOKED, outcome=Outcome.FAILED, status=1, stderr=f'File "{desk.root}/examples/a.py"\n')
+    desk.run(
+        MODEL_TRACE, outcome=Outcome.FAILED, status=1, stderr=f'File "{desk.root}/examples/a.py"\n'
+    )
     second_desk = Desk(tmp_path / "other", shared=desk.shared)
     run = second_desk.recall()
     assert run is not None

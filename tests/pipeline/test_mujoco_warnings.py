@@ -52,7 +52,7 @@ def test_measuring_leaves_no_log_of_mujoco(
     assert not list(tmp_path.rglob("MUJOCO_LOG*"))
 
 
-CROWDED = f"""\
+CROWDED_MODEL = f"""\
 <mujoco>
   <size memory="10K"/>
   <worldbody>
@@ -68,7 +68,7 @@ def test_bench_tells_a_model_that_mujoco_gives_up(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write(tmp_path / "content" / "course.toml", "")
-    write(tmp_path / "models" / "box.xml", CROWDED)
+    write(tmp_path / "models" / "box.xml", CROWDED_MODEL)
     write(tmp_path / "models" / "box.toml", TOML.replace("qvel = [1.0]\n", ""))
     assert main(["-C", str(tmp_path), "bench", "--quick"]) == 1
     lines = capsys.readouterr().out.splitlines()

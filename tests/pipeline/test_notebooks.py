@@ -89,7 +89,7 @@ def executed(path: Path, folder: Path) -> dict[str, str]:
     return printed
 
 
-TWO = (
+TWO_SECTIONS = (
     "## Uses\n\n"
     + block("first.py", "import later\nimport elsewhere\nprint(later.x, elsewhere.y)", "1 2")
     + "## Later\n\n"
@@ -104,7 +104,7 @@ TWO = (
 
 @pytest.mark.filterwarnings("ignore")
 def test_notebook_brings_the_modules_its_scripts_import(make: Make, tmp_path: Path) -> None:
-    folder = make(TWO, "## Else\n\n" + block("elsewhere.py", "y = 2"))
+    folder = make(TWO_SECTIONS, "## Else\n\n" + block("elsewhere.py", "y = 2"))
     assert folder.main("build", "--quiet").status == 0
     path = folder.root / "public" / "lessons" / "1.1-one.ipynb"
     assert executed(path, tmp_path / "empty") == {
@@ -140,7 +140,7 @@ def test_notebook_brings_the_modules_its_scripts_import(make: Make, tmp_path: Pa
 
 @pytest.mark.filterwarnings("ignore")
 def test_failing_script_stops_its_notebook(make: Make, tmp_path: Path) -> None:
-    folder = make(TWO, "## Else\n\n" + block("elsewhere.py", "y = 2"))
+    folder = make(TWO_SECTIONS, "## Else\n\n" + block("elsewhere.py", "y = 2"))
     assert folder.main("build", "--quiet").status == 0
     notebook = nbformat.read(folder.root / "public" / "lessons" / "1.1-one.ipynb", as_version=4)
     for cell in notebook.cells:

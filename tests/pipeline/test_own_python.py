@@ -28,12 +28,12 @@ try:
 except ModuleNotFoundError as error:
     print(error)
 """
-PRINTED = "/.venv Mars mjcourse.spatial\nNo module named 'msgspec'"
+OUTPUT = "/.venv Mars mjcourse.spatial\nNo module named 'msgspec'"
 
 
 @pytest.fixture
 def course(make: Make) -> Folder:
-    return with_environment(make, SCRIPT, PRINTED)
+    return with_environment(make, SCRIPT, OUTPUT)
 
 
 def with_environment(make: Make, script: str, printed: str) -> Folder:
@@ -92,7 +92,7 @@ def test_scripts_find_what_is_installed_in_the_environment_of_the_course(course:
     assert f"MuJoCo {engine_version()}" in page and f"Python {python_version()}" in page
 
 
-WRONG: tuple[tuple[Callable[[Path], object], str], ...] = (
+BROKEN_ENVIRONMENTS: tuple[tuple[Callable[[Path], object], str], ...] = (
     (
         lambda prefix: (prefix / "bin/python").unlink(),
         "error[script-python]: there is no interpreter `.venv/bin/python`",
@@ -123,7 +123,7 @@ def test_an_environment_in_which_scripts_cannot_run_is_told(course: Folder) -> N
     result = course.main("check", "--against", "3.1.0")
     assert result.status == 2
     assert "scripts of this course run with .venv/bin/python" in result.err
-    for spoil, message in WRONG:
+    for spoil, message in BROKEN_ENVIRONMENTS:
         spoil(course.root / ".venv")
         result = course.main("check")
         assert result.status == 1

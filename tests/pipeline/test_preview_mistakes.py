@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, expect
 
 from support.preview_page import LESSON, PreviewPage, lesson_page, see
 from support.preview_process import serve_preview
-from support.scratch_course import GOOD, HELD, Make, block
+from support.scratch_course import GOOD, WAIT_FOR_GO, Make, block
 from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.browser
@@ -151,7 +151,7 @@ with open("b.png", "wb") as file:
 def test_script_that_runs_and_fails_is_marked(make: Make, browser: Browser) -> None:
     folder = make(GOOD)
     with lesson_page(folder, browser) as page:
-        folder.replace(folder.lesson(), 'print("hello"', f'{HELD}print("hello"')
+        folder.replace(folder.lesson(), 'print("hello"', f'{WAIT_FOR_GO}print("hello"')
         mark = page.locator(".output").get_by_role("status")
         expect(mark).to_have_text("The script is running.")
         folder.write("go", "")

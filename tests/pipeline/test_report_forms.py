@@ -8,7 +8,7 @@ import re
 import pytest
 
 from support.scratch_course import (
-    DRIFTED,
+    DRIFTED_LESSON,
     FIRST,
     GOOD,
     SECOND,
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.site
 
 
 def test_quiet_says_what_is_wrong_and_no_more(make: Make) -> None:
-    folder = make(DRIFTED, GOOD + "![](../pic.png)\n\n#### Skipped\n")
+    folder = make(DRIFTED_LESSON, GOOD + "![](../pic.png)\n\n#### Skipped\n")
     folder.write("content/pic.png", "")
     for command in ("build", "check"):
         result = folder.main(command, "-q")

@@ -18,7 +18,7 @@ MODEL = """
   <worldbody><body><joint type="slide" axis="1 0 0"/><geom size="1" mass="1"/></body></worldbody>
 </mujoco>
 """
-LOST = f"""
+DIVERGING_SCRIPT = f"""
 import mujoco
 
 model = mujoco.MjModel.from_xml_string('''{MODEL}''')
@@ -31,7 +31,9 @@ print("error", data.qpos[0])
 
 def test_lost_simulation_fails_every_command_unless_its_lesson_says_so(make: Make) -> None:
     def lesson(force: str, info: str = "", output: str = "error 0.0") -> str:
-        return "## One\n\n" + block("a.py", LOST.replace("1e15", force), output, info=info)
+        return "## One\n\n" + block(
+            "a.py", DIVERGING_SCRIPT.replace("1e15", force), output, info=info
+        )
 
     def rules() -> list[str]:
         report = json.loads(folder.main("check", "--format", "json").out)

@@ -13,7 +13,7 @@ from support.scratch_course import Folder, Make, block
 
 pytestmark = pytest.mark.site
 
-DOUBLE = """
+DOUBLE_PENDULUM = """
 import mujoco
 
 XML = '''
@@ -115,10 +115,10 @@ def noise_warnings(report: dict[str, Any]) -> list[dict[str, Any]]:
 def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     """A course with all of the scripts, whose sensitivity was measured once."""
     folder = Folder(tmp_path_factory.mktemp("sensitivity") / "course")
-    scripts = [("double", DOUBLE), ("fall", FALL), ("limit", LIMIT), ("plain", PLAIN)]
+    scripts = [("double", DOUBLE_PENDULUM), ("fall", FALL), ("limit", LIMIT), ("plain", PLAIN)]
     scripts += [(name, SWING.replace("INTEGRATOR", name)) for name in ("Euler", "RK4")]
     blocks = [block(f"{name}.py", code, "?") for name, code in scripts]
-    blocks.append(block("loose.py", DOUBLE, "?", "rtol=10 atol=100"))
+    blocks.append(block("loose.py", DOUBLE_PENDULUM, "?", "rtol=10 atol=100"))
     folder.fill(["## One\n\n" + "".join(blocks)], stores)
     folder.main("update", "--quiet")
     return folder
@@ -227,7 +227,7 @@ def test_only_the_lessons_that_are_named(make: Make) -> None:
 
 
 def test_update_warns_of_noise_that_it_records_and_asks_only_where_it_writes(make: Make) -> None:
-    folder = make("## One\n\n" + block("a.py", DOUBLE, "?") + block("b.py", FALL, "?"))
+    folder = make("## One\n\n" + block("a.py", DOUBLE_PENDULUM, "?") + block("b.py", FALL, "?"))
     assert "moving initial states" not in folder.main("update", "--dry-run").err
     result = folder.main("update")
     assert result.status == 0

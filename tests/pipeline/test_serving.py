@@ -95,7 +95,7 @@ def test_address_of_nothing_has_the_page_that_says_so(preview: Preview) -> None:
     assert b'data-page="no/such/page.html" data-state=""' in body  # it is told when it connects
 
 
-OUTSIDE = (
+OUTSIDE_PATHS = (
     "/../secret.txt",
     "/lessons/../../secret.txt",
     "/%2e%2e/secret.txt",
@@ -118,7 +118,7 @@ OUTSIDE = (
 
 def test_nothing_but_the_site_is_served(preview: Preview) -> None:
     answers = []
-    for path in OUTSIDE:
+    for path in OUTSIDE_PATHS:
         status, _, body = preview.get(path)
         if status != 404 or b"not of the site" in body or b"root:" in body:
             answers.append((path, status))

@@ -9,7 +9,15 @@ from pathlib import Path
 import pytest
 
 from support.preview_process import PATIENT, serve_preview
-from support.scratch_course import GOOD, HELD, SILENT, Make, block, kill_at_end, wait_until_alone
+from support.scratch_course import (
+    GOOD,
+    SILENT,
+    WAIT_FOR_GO,
+    Make,
+    block,
+    kill_at_end,
+    wait_until_alone,
+)
 from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.site
@@ -167,7 +175,7 @@ def test_pages_elsewhere_are_followed_and_two_browsers_told_alike(make: Make) ->
 def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_for(
     make: Make,
 ) -> None:
-    code = f"open('begun', 'a').write('x')\n{HELD}print(1)"
+    code = f"open('begun', 'a').write('x')\n{WAIT_FOR_GO}print(1)"
     folder = make("## First\n\n" + block("x.py", code, "1", info="timeout=3000"))
     with serve_preview(folder) as preview, preview.events() as events:
         wait_for_file(folder.root / "begun")
@@ -185,7 +193,7 @@ def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_fo
         folder.replace(folder.lesson(), "print(1)", "print(int(1))")
         wait_for_file(folder.root / "begun", 2)
         events.until(lambda page: page.news["scripts"][0]["state"] == "running")
-        folder.replace(folder.lesson(), HELD, "")
+        folder.replace(folder.lesson(), WAIT_FOR_GO, "")
         events.wait_until_settled("script-writes")
         assert events.news["scripts"] == [{"path": "examples/x.py", "state": "ok"}]
         assert folder.read("begun") == b"xxx"
@@ -193,7 +201,7 @@ def test_saves_while_scripts_run_are_taken_and_what_was_changed_is_not_waited_fo
 
 def test_what_a_script_prints_is_shown_while_others_run(make: Make) -> None:
     reads = "print(open('models/data.txt').read())"
-    folder = make("## A\n\n" + block("a.py", reads, "1") + block("b.py", HELD + reads, "1"))
+    folder = make("## A\n\n" + block("a.py", reads, "1") + block("b.py", WAIT_FOR_GO + reads, "1"))
     folder.write("models/data.txt", "1")
     folder.write("go", "")
     with serve_preview(folder, "--jobs", "2") as preview, preview.events() as events:

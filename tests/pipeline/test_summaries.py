@@ -104,7 +104,7 @@ TEXT = "".join(
         "***\n\n",
     ]
 )
-SEEN = [
+VISIBLE_CHANGES = [
     ("{#here}", "{#there}"),
     ("lesson:1.2#here", "lesson:1.1#here"),
     ("<b id=b>", "<b id=c>"),
@@ -137,5 +137,5 @@ def test_fingerprint_changes_with_what_others_see_and_not_with_prose(
 
     plain = of(TEXT)
     assert of("Plain words.\n\n" + TEXT) == plain == of(TEXT + "Plain words.\n")
-    assert all(old in TEXT for old, _ in SEEN)
-    assert [new for old, new in SEEN if of(TEXT.replace(old, new, 1)) == plain] == []
+    assert all(old in TEXT for old, _ in VISIBLE_CHANGES)
+    assert [new for old, new in VISIBLE_CHANGES if of(TEXT.replace(old, new, 1)) == plain] == []

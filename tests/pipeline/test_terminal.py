@@ -22,8 +22,8 @@ import pytest
 
 from support.scratch_course import (
     GOOD,
-    HELD,
     SILENT,
+    WAIT_FOR_GO,
     Folder,
     Make,
     block,
@@ -112,7 +112,7 @@ def screen(output: str) -> str:
 
 
 def test_a_terminal_shows_what_runs_and_then_only_the_results(make: Make) -> None:
-    lesson = block("a.py", HELD + "print(1)", "1", info="timeout=600")
+    lesson = block("a.py", WAIT_FOR_GO + "print(1)", "1", info="timeout=600")
     folder = make("## One\n\n" + lesson + block("b.py", "print(2)", "2"))
     with terminal(folder, "check", "--jobs", "2") as window:
         window.read("running scripts 0/2  ")
@@ -131,7 +131,9 @@ def test_a_terminal_shows_what_runs_and_then_only_the_results(make: Make) -> Non
 
 def test_the_live_line_fits_the_terminal(make: Make) -> None:
     names = [f"{'長い名前' * 4}_{n}.py" for n in range(3)]
-    folder = make("## One\n\n" + "".join(block(name, HELD, info="timeout=600") for name in names))
+    folder = make(
+        "## One\n\n" + "".join(block(name, WAIT_FOR_GO, info="timeout=600") for name in names)
+    )
     with terminal(folder, "check", "--jobs", "3", columns=44) as window:
         window.read("running scripts 0/3  examples/長い")
         folder.write("go", "")

@@ -11,7 +11,7 @@ from support.scratch_course import GOOD, Make, block
 
 pytestmark = pytest.mark.site
 
-EVERYTHING = """## Everything
+FULL_LESSON = """## Everything
 
 Text with trailing spaces,  \n	a tab, a form feed\x0c, a no-break space\xa0 and U+2028\u2028.
 
@@ -55,7 +55,7 @@ never
 
 The end, without a final newline: `1.5`{out=examples/plain.py}"""
 
-UPDATED = EVERYTHING.replace(
+UPDATED_LESSON = FULL_LESSON.replace(
     "```text\nOLD\n```\n\n> [!note]",
     "```text\nalpha 1.5\n\nbeta    -0.25\n```\n\n> [!note]",
 ).replace("> ```text\n> OLD\n> lines\n", "> ```text\n> quoted\n>\n>     indented\n")
@@ -63,11 +63,11 @@ UPDATED = EVERYTHING.replace(
 
 def test_update_changes_outputs_and_no_other_byte(make: Make) -> None:
     """Not even line ends of Windows or a byte order mark."""
-    folder = make(("\ufeff" + EVERYTHING).replace("\n", "\r\n").encode())
+    folder = make(("\ufeff" + FULL_LESSON).replace("\n", "\r\n").encode())
     result = folder.main("update")
     assert result.status == 0, result.out
     text = folder.text(folder.lesson())
-    assert text == ("\ufeff" + UPDATED).replace("\n", "\r\n").replace("never", clock(text))
+    assert text == ("\ufeff" + UPDATED_LESSON).replace("\n", "\r\n").replace("never", clock(text))
     assert folder.main("check").status == 0
     assert folder.main("update").status == 0
     assert folder.text(folder.lesson()) == text  # volatile text too

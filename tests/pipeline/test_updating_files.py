@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from support.scratch_course import GOOD, HELD, Make, block, command, kill_at_end
+from support.scratch_course import GOOD, WAIT_FOR_GO, Make, block, command, kill_at_end
 from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
@@ -106,7 +106,9 @@ def test_update_tells_what_cannot_be_read_or_written(make: Make) -> None:
 
 def test_build_and_update_begun_together_take_turns(make: Make) -> None:
     """A build and an update at once: one waits for the other, and both succeed."""
-    folder = make("## One\n\n" + block("x.py", HELD + "print(1)", "OLD", info="timeout=600"), GOOD)
+    folder = make(
+        "## One\n\n" + block("x.py", WAIT_FOR_GO + "print(1)", "OLD", info="timeout=600"), GOOD
+    )
     outputs = folder.tmp / "update", folder.tmp / "build"
     quiet = {"stdout": subprocess.DEVNULL}
 

@@ -28,13 +28,15 @@ CHANGES: dict[str, Callable[[Path], object]] = {
     "closed": lambda path: path.chmod(0o400),
     "emptied": lambda path: os.truncate(path, 0),
 }
-CHANGED = [f"{folder}{name}.md" for folder in ("content/lessons/", "docs/", "") for name in CHANGES]
+CHANGED_PAGES = [
+    f"{folder}{name}.md" for folder in ("content/lessons/", "docs/", "") for name in CHANGES
+]
 
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
     root = tmp_path / "course"
-    for path in (LESSON, "docs/guide.md", "docs/silent.md", *CHANGED):
+    for path in (LESSON, "docs/guide.md", "docs/silent.md", *CHANGED_PAGES):
         (root / path).parent.mkdir(parents=True, exist_ok=True)
         (root / path).write_text(path)
     return root
@@ -43,7 +45,7 @@ def root(tmp_path: Path) -> Path:
 @pytest.fixture
 def saves(root: Path) -> Iterator[FolderWatcher]:
     watcher = FolderWatcher(root)
-    watcher.watch_also(frozenset({"docs/guide.md", LESSON, *CHANGED}), {"lib", "."})
+    watcher.watch_also(frozenset({"docs/guide.md", LESSON, *CHANGED_PAGES}), {"lib", "."})
     watcher.start()
     yield watcher
     watcher.stop()
@@ -86,12 +88,16 @@ def test_every_change_is_told_of_and_nothing_else(root: Path, saves: FolderWatch
         (root / path).parent.mkdir(exist_ok=True)
         (root / path).write_text("x")
     assert not saves.get(0.5)
-    for path in CHANGED:
+    for path in CHANGED_PAGES:
         CHANGES[Path(path).stem](root / path)
     odd = [f"content/{name}" for name in ("a\nb.md", "é ß.md", "x" * 255)]
     for path in odd:
         (root / path).write_text("x")
-    assert wait_for_changes(saves, {*CHANGED, *odd}) == {*CHANGED, *odd, "content/lessons/other.md"}
+    assert wait_for_changes(saves, {*CHANGED_PAGES, *odd}) == {
+        *CHANGED_PAGES,
+        *odd,
+        "content/lessons/other.md",
+    }
 
 
 def test_folders_that_are_made_later(root: Path, saves: FolderWatcher) -> None:

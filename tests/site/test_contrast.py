@@ -23,7 +23,7 @@ SHEETS = sorted(path for path in CSS.glob("*.css") if path.name != "preview.css"
 THEMES = ("light", "dark")
 GROUNDS = ("var(--paper)", "var(--sheet)")
 TRACES = tuple(f"var(--trace-{n})" for n in range(1, 8))
-MEANT = ("var(--rule-firm)", *TRACES)
+MEANINGFUL_COLOURS = ("var(--rule-firm)", *TRACES)
 """Colours of lines and marks that tell something."""
 
 Colour = tuple[float, float, float, float]
@@ -176,7 +176,7 @@ def test_text(theme: str) -> None:
 
 WITHOUT_TEXT = ("::before", "::after", "::backdrop", "::-webkit-progress", "::-moz-progress")
 """Of boxes that are marks themselves."""
-LEAST = {"var(--ink)": 7.0, "var(--ink-soft)": 4.5}
+LEAST_CONTRASTS = {"var(--ink)": 7.0, "var(--ink-soft)": 4.5}
 """On what is marked for a while: a selection, the target of a link, a line."""
 
 
@@ -191,7 +191,7 @@ def test_text_on_tints(theme: str) -> None:
         if any(part in rule.selector for part in WITHOUT_TEXT):
             continue
         grounds = [blend(top, ground) for top in colours(tint, theme) for ground in plain(theme)]
-        for name, limit in LEAST.items():
+        for name, limit in LEAST_CONTRASTS.items():
             least = min(contrast(a, b) for a in colours(name, theme) for b in grounds)
             if least < limit:
                 failures.append((rule.file, rule.selector, tint, name, round(least, 2)))
@@ -204,7 +204,7 @@ def test_marks_and_lines(theme: str) -> None:
     failures = []
     strokes = {value for rule in ALL for value in _strokes(rule)}
     assert strokes > {"var(--accent)", "var(--rule-firm)"}
-    for value in sorted({*MEANT, *strokes}):
+    for value in sorted({*MEANINGFUL_COLOURS, *strokes}):
         least = min(contrast(a, b) for a in colours(value, theme) for b in plain(theme))
         if least < 4.5:
             failures.append((value, round(least, 2)))
@@ -218,7 +218,9 @@ def test_figures_of_the_course() -> None:
     colours_used = {
         f"#{digits}" for line in lines for digits in re.findall(r"\b[0-9a-f]{6}\b", line)
     }
-    pairs = [pair for name in (*MEANT, "var(--ink)") for pair in PROPERTIES[name[4:-1]]]
+    pairs = [
+        pair for name in (*MEANINGFUL_COLOURS, "var(--ink)") for pair in PROPERTIES[name[4:-1]]
+    ]
     assert len(colours_used) > 6
     assert colours_used - {pair.partition("(")[2].partition(",")[0] for pair in pairs} == set()
 

@@ -21,7 +21,7 @@ from coursebuild.numerics.reports.bench import (
 MACHINE = Machine("3.14.0", "3.11.7", "2.3.0", "Linux x86_64", "A Processor @ 2 GHz")
 VERDICT = RowVerdict(True, None, None, None, False, "The scene’s own setting is on the front.")
 FIRST = FittedOrder(1.0, 0.01, 0.02)
-_KNOWN = (("Euler", 1, 1.0), ("implicit", 1, 1.2), ("RK4", 4, 3.9))
+_INTEGRATORS = (("Euler", 1, 1.0), ("implicit", 1, 1.2), ("RK4", 4, 3.9))
 
 
 def setting(integrator: str = "Euler", timestep: float = 0.002, **fields: Any) -> MeasuredSetting:
@@ -101,7 +101,7 @@ def scenario(rows: Sequence[WorkPrecisionRow], **overrides: Any) -> ScenarioRepo
 def swing() -> ScenarioReport:
     """Return three integrators over a ladder of timesteps; Euler diverges at the longest."""
     rows = []
-    for integrator, order, work in _KNOWN:
+    for integrator, order, work in _INTEGRATORS:
         for timestep in (0.05, 0.02, 0.01, 0.005, 0.002, 0.001):
             if integrator == "Euler" and timestep == 0.05:
                 rows.append(diverged_row(integrator, timestep))

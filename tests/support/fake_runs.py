@@ -16,8 +16,8 @@ from coursebuild.core.run.memory import Memory
 SCRIPT = b"print('hello')\n"
 PATH = "examples/a.py"
 JOB = ScriptJob(PATH, (), 10.0, ())
-NOTHING = Trace((), (), (), (), "")
-LOOKED = Trace(("models/a.xml", "models/none.xml"), (), (), (), "")
+EMPTY_TRACE = Trace((), (), (), (), "")
+MODEL_TRACE = Trace(("models/a.xml", "models/none.xml"), (), (), (), "")
 
 
 @dataclass
@@ -61,7 +61,7 @@ class Desk:
 
     def run(
         self,
-        trace: Trace | None = NOTHING,
+        trace: Trace | None = EMPTY_TRACE,
         job: ScriptJob = JOB,
         text: bytes = SCRIPT,
         during: object = None,

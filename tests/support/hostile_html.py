@@ -32,7 +32,7 @@ HOSTILE = [
     "<figure><img src='sketch.svg' alt=''><figcaption>cap</figcaption></figure>",
 ]  # fmt: skip
 
-REFUSED = [text for text in HOSTILE if text.startswith(("<b>bold\n", "</textarea"))]
+REFUSED_TEXTS = [text for text in HOSTILE if text.startswith(("<b>bold\n", "</textarea"))]
 """Those that a check rejects: elements that are not closed, or not open."""
 
 _PIECES = (

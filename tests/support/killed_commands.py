@@ -32,7 +32,7 @@ from coursebuild.core.registry import features
 
 BY_PATH = ("open", "rename", "replace", "link", "unlink", "rmdir", "mkdir")
 BY_FD = ("write", "fsync", "ftruncate", "fchmod")
-DIED = 137
+KILLED_STATUS = 137
 READY = (
     "argparse",
     "coursebuild.pipeline.site",
@@ -84,7 +84,7 @@ class Doom:
             if self.concerns(name, arguments) and self.meets(name):
                 if name == "write":
                     really(arguments[0], bytes(arguments[1])[: len(arguments[1]) // 2])
-                os._exit(DIED)
+                os._exit(KILLED_STATUS)
             return really(*arguments, **keywords)
 
         return call
@@ -96,7 +96,7 @@ class Doom:
 
         def exchange(a: Path, b: Path) -> bool:
             if self.meets("exchange"):
-                os._exit(DIED)
+                os._exit(KILLED_STATUS)
             return really(a, b)
 
         publishing.exchange = exchange

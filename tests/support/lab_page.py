@@ -14,7 +14,7 @@ from playwright.sync_api import BrowserContext, Locator, Page, Request, Route, e
 
 from support.chromium import SLOW
 
-SWING, AUTO, ALL, TWINS, EDITED = 0, 1, 2, 3, 4
+SWING, AUTO, ALL, TWINS, EDITED_LAB = 0, 1, 2, 3, 4
 """The index of each lab on the page."""
 
 MOUNT = """async (number) => {

@@ -16,7 +16,7 @@ from coursebuild.report import Style
 from support.scratch_course import Folder
 
 COPIES = (".br", ".gz")
-OURS = (".coursebuild-site", "files.json", "service-worker.js")
+SITE_ONLY_FILES = (".coursebuild-site", "files.json", "service-worker.js")
 """Files that only a published site has: the marker of the tool, and those for use offline."""
 TRIALS = ("labs", "mjb", "pictures")
 """Stores of slow results, which live courses and clean builds share in these tests."""
@@ -102,7 +102,7 @@ def builds(tmp_path: Path, stores: Path) -> Builds:
 
 
 def _is_compared(path: str) -> bool:
-    return not path.endswith(COPIES) and path not in OURS
+    return not path.endswith(COPIES) and path not in SITE_ONLY_FILES
 
 
 def differences(a: dict[str, bytes], b: dict[str, bytes]) -> list[str]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from support.scratch_course import Folder, wait_until_alone
 
-DIED = 137
+KILLED_STATUS = 137
 
 
 class Mortals:
@@ -43,7 +43,10 @@ class Mortals:
         got through then, which leaves what a whole run leaves.
         """
         status, calls = self.run(folder, *arguments, fatal=fatal)
-        assert status == DIED or (status == 0 and fatal - 4 <= len(calls) < fatal), (status, fatal)
+        assert status == KILLED_STATUS or (status == 0 and fatal - 4 <= len(calls) < fatal), (
+            status,
+            fatal,
+        )
         wait_until_alone(folder)
 
 

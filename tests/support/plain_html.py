@@ -28,7 +28,7 @@ SCHEMES = {
     model.PageTarget: "page",
     model.TermTarget: "term",
 }
-OURS = (
+MARKUP_RULES = (
     (r' <a class="anchor" href="#[^"]*" aria-label="[^"]*">#</a>', ""),
     (r'<(h[1-6]|dfn) id="[^"]*"(?: class="[^"]*")?>', r"<\1>"),
     (r'<div class="table"[^>]*>\n(<table>.*?</table>\n)</div>\n', r"\1"),
@@ -44,7 +44,7 @@ def plain_html(document: model.Document) -> str:
 
 def plain_blocks(blocks: Iterable[model.Block]) -> str:
     text = str(render_blocks(blocks, PlainContext()))
-    for pattern, plain in OURS:
+    for pattern, plain in MARKUP_RULES:
         text = re.sub(pattern, plain, text, flags=re.DOTALL)
     return text
 

@@ -9,7 +9,7 @@ import random
 from collections.abc import Iterator
 from typing import Any
 
-_PUT: tuple[Any, ...] = (
+_POISONS: tuple[Any, ...] = (
     *(None, True, -1, 0, 7.5, 10**400, 1 << 62, -1e308, math.nan, math.inf),
     *("", "\x1b[2J", "</script><script>x</script>", "../../../etc/passwd", "\ud800", "A" * 5000),
     *([], {}, [[]], [[[1, "a"]]], {"type": "f64", "data": "AAAA"}, {"type": "u8", "data": "?"}),
@@ -34,7 +34,7 @@ def mutate(value: Any, chance: random.Random) -> Any:
     if chance.random() < 0.15 and len(path) > 1:
         del parent[path[-1]]
     else:
-        parent[path[-1]] = chance.choice(_PUT)
+        parent[path[-1]] = chance.choice(_POISONS)
     return whole[0]
 
 

@@ -39,7 +39,7 @@ def texts(folder: Path) -> dict[str, str]:
     }
 
 
-MANY = {"a": "1", "b__c": "1", "b__d": "1", "e__f__g": "1"}
+SITE_FILES = {"a": "1", "b__c": "1", "b__d": "1", "e__f__g": "1"}
 TEXTS = {path: f"{path} 1" for path in ("a.html", "b/c.html", "b/d.html", "e/f/g.html")}
 
 
@@ -60,9 +60,9 @@ def pages() -> Pages:
 
 @pytest.fixture
 def spared(root: Path, pages: Pages) -> Path:
-    """A course with a site of the files MANY and a spare, in which one of them is older."""
-    publish(root, root / "public", pages(**MANY | {"a": "0"}))
-    publish(root, root / "public", pages(**MANY))
+    """A course with a site of the files SITE_FILES and a spare, in which one of them is older."""
+    publish(root, root / "public", pages(**SITE_FILES | {"a": "0"}))
+    publish(root, root / "public", pages(**SITE_FILES))
     assert texts(root / SPARE) == TEXTS | {"a.html": "a.html 0"}
     pages.made_paths.clear()
     return root

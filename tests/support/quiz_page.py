@@ -16,7 +16,7 @@ MCQ, SEVERAL, NUMBER, ANGLE, PREDICT, OPEN, OUTPUT, ORDER, BARE = range(9)
 """The questions, by number."""
 
 QUESTIONS = 9
-WRITTEN = re.compile("Your answer|What it prints")
+ANSWER_LABEL = re.compile("Your answer|What it prints")
 KEY = "() => Object.keys(localStorage).find((key) => key.startsWith('coursebuild.progress.'))"
 
 
@@ -44,7 +44,7 @@ def question(page: Page, number: int) -> Locator:
 
 def answer_field(page: Page, number: int) -> Locator:
     """Where an answer is written."""
-    return question(page, number).get_by_role("textbox", name=WRITTEN)
+    return question(page, number).get_by_role("textbox", name=ANSWER_LABEL)
 
 
 def verdict(page: Page, number: int) -> Locator:

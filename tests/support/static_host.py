@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Self
 from urllib.parse import unquote, urlsplit
 
-_LASTING = re.compile(r".*/assets/.*\.[0-9a-f]{8}\.[a-z0-9]+")
+_IMMUTABLE_PATH = re.compile(r".*/assets/.*\.[0-9a-f]{8}\.[a-z0-9]+")
 
 
 class Host(contextlib.AbstractContextManager["Host"]):
@@ -142,7 +142,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         self.send_header("Content-Type", kind + text)
         self.send_header("Vary", "Accept-Encoding")
         self.send_header("ETag", tag)
-        lasting = _LASTING.fullmatch(urlsplit(self.path).path)
+        lasting = _IMMUTABLE_PATH.fullmatch(urlsplit(self.path).path)
         lifetime = "max-age=31536000, immutable" if lasting else "max-age=0, must-revalidate"
         self.send_header("Cache-Control", lifetime)
         self.send_header("Content-Length", str(len(data)))

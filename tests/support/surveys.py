@@ -71,7 +71,7 @@ def parse_declared(text: str) -> Declarations:
     return result.value
 
 
-NOTHING = parse_declared("")
+NO_DECLARATIONS = parse_declared("")
 
 
 def run_survey(
@@ -80,7 +80,7 @@ def run_survey(
     lesson: str = "",
     keeps: Mapping[str, str] | None = None,
     has_commands: bool = False,
-    declarations: Declarations = NOTHING,
+    declarations: Declarations = NO_DECLARATIONS,
     quick: bool = True,
     clock: Clock | None = None,
 ) -> Survey:

@@ -22,7 +22,7 @@ from coursebuild.core.model import (
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.source import Excerpt, Span
 
-HIDDEN = {"span", "children", "blocks", "items", "header", "rows"}
+HIDDEN_FIELDS = {"span", "children", "blocks", "items", "header", "rows"}
 
 
 def format_span(span: Span) -> str:
@@ -55,7 +55,9 @@ def _nodes(nodes: tuple[Block | Inline, ...], depth: int) -> Iterator[str]:
 
 def _node(node: Block | Inline | ListItem, depth: int) -> Iterator[str]:
     indent = "  " * depth
-    values = [_value(f.name, getattr(node, f.name)) for f in fields(node) if f.name not in HIDDEN]
+    values = [
+        _value(f.name, getattr(node, f.name)) for f in fields(node) if f.name not in HIDDEN_FIELDS
+    ]
     words = [type(node).__name__, format_span(node.span), *filter(None, values)]
     yield indent + " ".join(words)
     if isinstance(node, Table):

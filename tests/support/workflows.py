@@ -20,7 +20,9 @@ from typing import Any
 from support.scratch_course import ROOT
 
 _EXPRESSION = re.compile(r"\$\{\{ (.*?) \}\}")
-_NOTED = '#!/bin/sh\necho "${0##*/} $*" >> "$NOTES"\n[ ! -d public ] || cp -R public/. "$SENT"\n'
+_NOTING_PROGRAM = (
+    '#!/bin/sh\necho "${0##*/} $*" >> "$NOTES"\n[ ! -d public ] || cp -R public/. "$SENT"\n'
+)
 _COURSEBUILD = f'#!/bin/sh\nexec {sys.executable} -m coursebuild "$@"\n'
 
 
@@ -49,7 +51,7 @@ class Runner:
     def __post_init__(self) -> None:
         for name in ("bin", "home", "tmp", "sent", "artifacts", "pages"):
             (self.folder / name).mkdir(parents=True)
-        programs = dict.fromkeys(("pip", "npx", "rsync", "sudo"), _NOTED) | {
+        programs = dict.fromkeys(("pip", "npx", "rsync", "sudo"), _NOTING_PROGRAM) | {
             "coursebuild": _COURSEBUILD
         }
         for name, text in programs.items():

@@ -14,8 +14,8 @@ from benchmarks.generate.document import (
     Lesson,
     Number,
     Open,
+    OutputQuestion,
     Piece,
-    Printed,
     Prose,
     Question,
     Quiz,
@@ -95,5 +95,5 @@ def question_value(question: Question, script: str) -> dict[str, object]:
             return {"kind": "numeric", "q": text, "answer": value, "explain": explain}
         case Open(text, reference):
             return {"kind": "open", "q": text, "reference": reference}
-        case Printed(text, line, _):
+        case OutputQuestion(text, line, _):
             return {"kind": "output", "q": text, "of": script, "line": line}

@@ -18,8 +18,8 @@ from benchmarks.generate.document import (
     Lesson,
     Number,
     Open,
+    OutputQuestion,
     Piece,
-    Printed,
     Prose,
     Question,
     Quiz,
@@ -74,7 +74,7 @@ class Dialect:
                 return f"{text}\n\n{self.answer(f'{value:g}. {explain}')}"
             case Open(text, reference):
                 return f"{text}\n\n{self.answer(reference)}"
-            case Printed(text, _, line):
+            case OutputQuestion(text, _, line):
                 return f"{text}\n\n{self.answer(f'`{line}`')}"
 
     def answer(self, text: str) -> str:

@@ -85,7 +85,7 @@ def test_several_processes_write_read_and_prune_at_once(tmp_path: Path) -> None:
     assert names <= {key(number) for number in range(5)}
 
 
-KILLED = """
+KILLED_SCRIPT = """
 import os, sys
 from pathlib import Path
 from coursebuild.core.engine import memo
@@ -99,7 +99,7 @@ memo.Memo(Path(sys.argv[1])).put("kind", sys.argv[2], b"x" * 100_000)
 
 def test_a_writer_that_was_killed_leaves_nothing_that_is_served_or_stays(tmp_path: Path) -> None:
     process = subprocess.Popen(
-        [sys.executable, "-c", KILLED, str(tmp_path), KEY],
+        [sys.executable, "-c", KILLED_SCRIPT, str(tmp_path), KEY],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env={**os.environ, "PYTHONPATH": str(ROOT)},

@@ -158,7 +158,7 @@ def refusal(root: Path, out: Path) -> str:
     return caught.value.message.removeprefix(f"{out} ")
 
 
-AUTHORED = (
+AUTHOR_PATHS = (
     *("content", "content/lessons/out", "content/course.toml", "models/x", "examples", ".git/x"),
     ".coursebuild/x",
 )
@@ -169,7 +169,7 @@ def test_places_of_the_author_are_refused(root: Path) -> None:
         reason = "is the project itself" if name == "." else "holds the project"
         assert refusal(root, root / name) == reason
     (root / "link").symlink_to("content")
-    inside = {name: name.partition("/")[0] for name in AUTHORED}
+    inside = {name: name.partition("/")[0] for name in AUTHOR_PATHS}
     for name, folder in (inside | {"public/../models": "models", "link": "content"}).items():
         reason = f"lies in {folder}/ of the project, where no site may go"
         assert refusal(root, root / name) == reason

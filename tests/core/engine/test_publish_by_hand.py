@@ -11,7 +11,7 @@ import pytest
 
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
-from support.published_sites import MANY, SPARE, TEXTS, Pages, entries, texts
+from support.published_sites import SITE_FILES, SPARE, TEXTS, Pages, entries, texts
 from support.published_sites import pages as pages
 from support.published_sites import root as root
 from support.published_sites import spared as spared
@@ -101,21 +101,21 @@ def test_changes_by_hand(
             path.is_file() and path.name == "b"
         ):
             path.unlink()
-    publish(spared, out, pages(**MANY | {"a": "2"}))
+    publish(spared, out, pages(**SITE_FILES | {"a": "2"}))
     assert texts(out) == TEXTS | {"a.html": "a.html 2"}
     assert not any(p.is_symlink() or p.is_fifo() for p in out.rglob("*"))
     assert {p.stat().st_mode & 0o777 for p in out.rglob("*") if p.is_dir()} == {0o755}
     assert not (out / "b/empty").exists()
     assert (out / "b/c.html").read_text() == "b/c.html 1"
-    publish(spared, out, pages(**MANY | {"a": "3"}))
+    publish(spared, out, pages(**SITE_FILES | {"a": "3"}))
     assert texts(out) == TEXTS | {"a.html": "a.html 3"}
     assert entries(spared) == ["content", "public"]
 
 
 def test_what_is_unlinked_in_the_spare_stays_in_the_site(spared: Path, pages: Pages) -> None:
     with (spared / "public/b/c.html").open() as stream:
-        publish(spared, spared / "public", pages(**MANY | {"b__c": "2"}))
-        publish(spared, spared / "public", pages(**MANY | {"b__c": "3"}))
+        publish(spared, spared / "public", pages(**SITE_FILES | {"b__c": "2"}))
+        publish(spared, spared / "public", pages(**SITE_FILES | {"b__c": "3"}))
         assert stream.read() == "b/c.html 1"
 
 
@@ -129,7 +129,7 @@ def test_a_link_to_a_folder_leads_nowhere(
     (elsewhere / "mine").write_text("mine")
     before = texts(elsewhere)
     (spared / SPARE / place).symlink_to(elsewhere)
-    publish(spared, spared / "public", pages(**MANY | {"a": "2"}))
+    publish(spared, spared / "public", pages(**SITE_FILES | {"a": "2"}))
     assert texts(spared / "public") == TEXTS | {"a.html": "a.html 2"}
     assert not any(p.is_symlink() for p in (spared / "public").rglob("*"))
     assert texts(elsewhere) == before
@@ -151,7 +151,7 @@ def test_something_else_for_a_spare(spared: Path, tmp_path: Path, pages: Pages, 
             (spare / MARKER).write_text("x")
     before = texts(elsewhere)
     for key in "23":
-        assert publish(spared, spared / "public", pages(**MANY | {"a": key})) == ("a.html",)
+        assert publish(spared, spared / "public", pages(**SITE_FILES | {"a": key})) == ("a.html",)
         assert texts(spared / "public") == TEXTS | {"a.html": f"a.html {key}"}
     assert texts(elsewhere) == before
     assert entries(spared) == ["content", "public"]

@@ -15,7 +15,7 @@ from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
-from support.published_sites import MANY, SPARE, TEXTS, Pages, entries, texts
+from support.published_sites import SITE_FILES, SPARE, TEXTS, Pages, entries, texts
 from support.published_sites import pages as pages
 from support.published_sites import root as root
 from support.published_sites import spared as spared
@@ -32,11 +32,11 @@ def test_what_did_not_change_is_neither_made_nor_linked(
         really(source, target, follow_symlinks=follow_symlinks)
 
     monkeypatch.setattr(os, "link", link)
-    assert publish(spared, spared / "public", pages(**MANY | {"b__d": "2"})) == ("b/d.html",)
+    assert publish(spared, spared / "public", pages(**SITE_FILES | {"b__d": "2"})) == ("b/d.html",)
     assert links == ["a.html"]  # which changed the time before
     assert texts(spared / "public") == TEXTS | {"b/d.html": "b/d.html 2"}
     assert texts(spared / SPARE) == TEXTS
-    assert publish(spared, spared / "public", pages(**MANY | {"b__d": "3"})) == ("b/d.html",)
+    assert publish(spared, spared / "public", pages(**SITE_FILES | {"b__d": "3"})) == ("b/d.html",)
     assert links == ["a.html"]
     assert pages.made_paths == ["b/d.html", "b/d.html"]
     assert entries(spared) == ["content", "public"]
@@ -74,7 +74,7 @@ def test_a_long_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: st
 def test_two_places_have_one_spare(spared: Path, pages: Pages) -> None:
     for key in "234":
         for out in ("public", "other"):
-            publish(spared, spared / out, pages(**MANY | {"a": key}))
+            publish(spared, spared / out, pages(**SITE_FILES | {"a": key}))
             assert texts(spared / out) == TEXTS | {"a.html": f"a.html {key}"}
     assert entries(spared) == ["content", "other", "public"]
 
@@ -91,7 +91,7 @@ def test_a_place_on_another_file_system_than_the_course(
 
     monkeypatch.setattr(Path, "rename", rename)
     for key in "23":
-        assert publish(spared, spared / "public", pages(**MANY | {"a": key})) == ("a.html",)
+        assert publish(spared, spared / "public", pages(**SITE_FILES | {"a": key})) == ("a.html",)
         assert texts(spared / "public") == TEXTS | {"a.html": f"a.html {key}"}
         assert entries(spared) == ["content", "public"]
 
@@ -101,10 +101,12 @@ def test_a_failure_while_a_page_is_made_leaves_the_old_site(spared: Path, pages:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        publish(spared, spared / "public", [*pages(**MANY), CachedFile("x.html", "2", broken)])
+        publish(
+            spared, spared / "public", [*pages(**SITE_FILES), CachedFile("x.html", "2", broken)]
+        )
     assert texts(spared / "public") == TEXTS
     assert entries(spared) == ["content", "public"]
-    assert publish(spared, spared / "public", pages(**MANY | {"a": "2"})) == ("a.html",)
+    assert publish(spared, spared / "public", pages(**SITE_FILES | {"a": "2"})) == ("a.html",)
 
 
 @pytest.mark.parametrize("removes", [True, False])
@@ -119,24 +121,26 @@ def test_somebody_changes_the_folder_that_is_written(spared: Path, removes: bool
 
     pages = Pages()
     with pytest.raises(EffectError, match="somebody else changes what is being written"):
-        publish(spared, spared / "public", [*pages(**MANY), CachedFile("x.html", "1", make)])
+        publish(spared, spared / "public", [*pages(**SITE_FILES), CachedFile("x.html", "1", make)])
     assert texts(spared / "public") == TEXTS
     assert entries(spared) == ["content", "public"]
-    publish(spared, spared / "public", [*pages(**MANY), CachedFile("x.html", "2", lambda: b"new")])
+    publish(
+        spared, spared / "public", [*pages(**SITE_FILES), CachedFile("x.html", "2", lambda: b"new")]
+    )
     assert texts(spared / "public") == TEXTS | {"x.html": "new"}
 
 
 def test_a_site_that_may_only_be_read_leaves_nothing_beside_it(held_back: Path) -> None:
     out, pages = held_back / "public", Pages()
-    publish(held_back, out, pages(**MANY))
+    publish(held_back, out, pages(**SITE_FILES))
     out.chmod(0o555)
     for number in range(2, 5):
-        publish(held_back, out, pages(**MANY | {"a": str(number)}))
+        publish(held_back, out, pages(**SITE_FILES | {"a": str(number)}))
         assert entries(held_back) == ["public"]
         assert texts(out) == TEXTS | {"a.html": f"a.html {number}"}
         assert (held_back / SPARE).is_dir()
         assert out.stat().st_mode & 0o777 == 0o555
-    assert pages.made_paths[len(MANY) :] == ["a.html"] * 3
+    assert pages.made_paths[len(SITE_FILES) :] == ["a.html"] * 3
     out.chmod(0o755)
 
 

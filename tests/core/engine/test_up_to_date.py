@@ -15,7 +15,7 @@ from coursebuild.core.engine import up_to_date
 from coursebuild.core.engine.up_to_date import Watcher, unchanged
 
 COMMAND = ("build", "public")
-WELL = "all is well\n"
+ALL_IS_WELL = "all is well\n"
 LESSON, MODEL = "content/lessons/1.1-a.md", "models/m.xml"
 
 
@@ -40,7 +40,7 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return root
 
 
-def keep(root: Path, message: str = WELL, during: Callable[[Path], object] = bool) -> bool:
+def keep(root: Path, message: str = ALL_IS_WELL, during: Callable[[Path], object] = bool) -> bool:
     """Whether a command could record the state when its work was done."""
     watcher = Watcher(str(root), COMMAND)
     during(root)
@@ -53,7 +53,7 @@ def last_message(root: Path) -> str | None:
 
 def test_the_last_message_is_repeated(root: Path) -> None:
     assert last_message(root) is None
-    for text in (WELL, "", "é\n\nwarning: x\n", "\n\n\n", "\udc80\n"):
+    for text in (ALL_IS_WELL, "", "é\n\nwarning: x\n", "\n\n\n", "\udc80\n"):
         assert keep(root, text)
         assert [last_message(root), last_message(root)] == [text, text]
 
@@ -105,9 +105,9 @@ def remove(root: Path) -> None:
     (root / MODEL).unlink()
 
 
-REWRITTEN = (LESSON, MODEL, "data/d.csv", "public/index.html", "examples/a.py")
+REWRITTEN_PATHS = (LESSON, MODEL, "data/d.csv", "public/index.html", "examples/a.py")
 CHANGES: dict[str, Callable[[Path], object]] = {
-    **{path: rewrite(path) for path in REWRITTEN},
+    **{path: rewrite(path) for path in REWRITTEN_PATHS},
     "touched": lambda root: os.utime(root / "content/course.toml"),
     "a file more": add,
     "a folder more": lambda root: (root / "content/new").mkdir(),
@@ -146,7 +146,7 @@ def test_what_is_no_part_of_the_course_is_not_looked_at(root: Path) -> None:
     (root / "content/__pycache__").mkdir()
     (root / "README.md").touch()
     (root / ".git").mkdir()
-    assert last_message(root) == WELL
+    assert last_message(root) == ALL_IS_WELL
 
 
 @pytest.mark.parametrize("change", [add, remove, rewrite(MODEL), rewrite("data/d.csv")])
@@ -159,7 +159,7 @@ def test_what_changes_during_the_work_is_not_kept(
 
 def test_what_the_work_writes_may_be_new(root: Path) -> None:
     assert keep(root, during=rewrite("public/index.html"))
-    assert last_message(root) == WELL
+    assert last_message(root) == ALL_IS_WELL
 
 
 def test_a_file_whose_time_says_nothing_is_not_kept(root: Path) -> None:

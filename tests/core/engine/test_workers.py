@@ -21,7 +21,7 @@ from support.runners import wait_until_ended
 pytestmark = pytest.mark.site
 
 ROOT = Path(__file__).parents[3]
-HERE = os.getpid()
+PARENT_PID = os.getpid()
 
 
 def with_process(task: object) -> tuple[object, int]:
@@ -57,7 +57,7 @@ def test_a_task_goes_to_the_worker_that_it_names_and_finds_what_that_remembers()
 
 def test_what_a_worker_did_not_answer_is_answered_here() -> None:
     def dies(number: int) -> tuple[object, int]:
-        if (number >= 20 or number % 5 == 3) and os.getpid() != HERE:
+        if (number >= 20 or number % 5 == 3) and os.getpid() != PARENT_PID:
             os.kill(os.getpid(), signal.SIGKILL)
         return with_process(number)
 
@@ -71,7 +71,7 @@ def test_what_a_worker_did_not_answer_is_answered_here() -> None:
     assert [number for number, _ in answers] == list(range(30))
     assert {
         process for (_, process), worker in zip(answers, by, strict=True) if worker is None
-    } == {HERE}
+    } == {PARENT_PID}
     assert by[25:] == (None,) * 5
 
 
@@ -117,7 +117,7 @@ def test_after_a_failure_no_answer_is_taken_for_another() -> None:
     with Workers(answer, 2) as workers:
         with pytest.raises(EffectError, match="no answer"):
             list(workers.map([(0, "slow"), (1, "bad")]))
-        assert list(workers.map([(None, "later")])) == [(("later", HERE), None)]
+        assert list(workers.map([(None, "later")])) == [(("later", PARENT_PID), None)]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

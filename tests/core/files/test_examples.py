@@ -97,7 +97,7 @@ def test_the_authors_own_files_are_left_alone(tmp_path: Path) -> None:
     assert (tmp_path / A[0]).read_bytes() == b"own too\n"
 
 
-DAMAGED = [
+DAMAGED_MANIFESTS = [
     *(b"", b"{", b"[]", b"null", b"\xff", b'{"files": 3}'),
     b'{"files": {"examples/a.py": 3}}',
     b'{"files": {"examples/a.py": [3]}}',
@@ -106,7 +106,7 @@ DAMAGED = [
 ]
 
 
-@pytest.mark.parametrize("manifest", [None, *DAMAGED])
+@pytest.mark.parametrize("manifest", [None, *DAMAGED_MANIFESTS])
 def test_a_lost_manifest_makes_it_careful(tmp_path: Path, manifest: bytes | None) -> None:
     root = tmp_path / "course"
     root.mkdir()

@@ -113,7 +113,7 @@ LATIN, BINARY, UTF16 = (
     "looks like a binary file",
     "looks like UTF-16",
 )
-WRONG = [
+INVALID_BYTES = [
     (b"ab\xe9c", 1, 3, "byte 0xe9 is not UTF-8", LATIN),
     ("é\r\n\U0001d4b3x".encode() + b"\xffz", 2, 3, "byte 0xff is not UTF-8", LATIN),
     (b"a\rb\r\n\xc3", 3, 1, "byte 0xc3 is not UTF-8", LATIN),
@@ -133,7 +133,7 @@ WRONG = [
 def test_bytes_that_are_not_utf8_are_shown_and_what_is_no_text_is_read_no_further(
     root: Path,
 ) -> None:
-    for data, line, column, message, guess in WRONG:
+    for data, line, column, message, guess in INVALID_BYTES:
         fill(root, {LESSON: data})
         parsed_course = read_course(root)
         [diagnostic] = parsed_course.diagnostics

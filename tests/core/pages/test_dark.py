@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from coursebuild.core.pages.dark import dark_colours, dark_drawing
 
-DRAWN = """<svg viewBox="0 0 9 9"><style>.a{fill:#0072B2}</style>
+DRAWING = """<svg viewBox="0 0 9 9"><style>.a{fill:#0072B2}</style>
 <defs><g id="x1"/></defs>
 <path class="a" style="stroke: #1e1e1c; fill-opacity: 1" fill="none"/>
 <path stroke="blue" fill="url(#x1)"/><use href="#x1" color="#fff"/></svg>"""
@@ -17,4 +17,4 @@ CSS = """--a: light-dark(#0072b2, #56b4e9); --b: light-dark(#1e1e1c,#e6e3dc);
 
 
 def test_colours_of_pages_are_known_and_others_turned_round() -> None:
-    assert dark_drawing(DRAWN, dark_colours(CSS)) == DARK
+    assert dark_drawing(DRAWING, dark_colours(CSS)) == DARK

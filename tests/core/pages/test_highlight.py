@@ -71,11 +71,11 @@ def test_visible_text_has_nothing_that_html_forbids(text: str) -> None:
 
 
 LANGUAGES = "python xml json bash sh text c++ diff console pycon pytb doscon ps1con irc".split()
-UNENDED = "$ run it\nerror: x\n    = help: `y` <z>"
+UNENDED_LINE = "$ run it\nerror: x\n    = help: `y` <z>"
 """Some lexers see lines that end only, which the last line of a block does not."""
 
 
-@given(st.sampled_from(LANGUAGES), st.text() | st.sampled_from([UNENDED, ">>> 1\n1", " x "]))
+@given(st.sampled_from(LANGUAGES), st.text() | st.sampled_from([UNENDED_LINE, ">>> 1\n1", " x "]))
 def test_highlighting_keeps_every_character(language: str, text: str) -> None:
     lines = [re.sub(r"</?span[^>]*>", "", line) for line in highlight_lines(language, text)]
     assert unescape("\n".join(lines)) == visible(text)

@@ -16,13 +16,13 @@ TEXTS = (
     ("strings/en.toml", "a = 1"),
 )
 VALUES = {"a": "<&>", "b": (Markup("<b>1</b>"), "2")}
-SHOWN = "<p>&lt;&amp;&gt;<b>1</b>, 2</p>\n"
+RENDERED_HTML = "<p>&lt;&amp;&gt;<b>1</b>, 2</p>\n"
 
 
 def test_compiled_templates_write_what_their_texts_do(tmp_path: Path) -> None:
     compile_templates(TEXTS, tmp_path)
     for folder in (tmp_path, None):
-        assert templates_of(TEXTS, folder).get_template("page.html").render(VALUES) == SHOWN
+        assert templates_of(TEXTS, folder).get_template("page.html").render(VALUES) == RENDERED_HTML
 
 
 def test_an_edited_template_is_not_taken_from_what_was_compiled(tmp_path: Path) -> None:

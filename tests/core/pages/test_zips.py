@@ -20,7 +20,7 @@ from coursebuild.core.pages.zips import Package, Surroundings, make_archives
 from coursebuild.core.text.source import Source
 from support.rendered_course import Make
 
-ONE = """```python file=examples/one.py
+LESSON = """```python file=examples/one.py
 import json, sys
 import numpy as np
 import helper
@@ -28,7 +28,7 @@ from mjcourse import model_path
 print(model_path("arm"))
 ```
 """
-TWO = """```python file=examples/helper.py
+HELPER_LESSON = """```python file=examples/helper.py
 import yaml.nodes
 VALUE = 1
 ```
@@ -56,7 +56,7 @@ SURROUNDINGS = Surroundings(
 
 @pytest.fixture
 def rendered(make: Make) -> Any:
-    rendered = make(ONE, **{"1.1": TWO})
+    rendered = make(LESSON, **{"1.1": HELPER_LESSON})
     facts = ModelFacts(1, 1, 0, 0, 0, 0, 0.002, "Euler", 1.0, (), (), (),
                        ("models/part.xml", "models/meshes/hand.obj"))  # fmt: skip
     models = tuple(

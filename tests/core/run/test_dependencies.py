@@ -14,8 +14,8 @@ from coursebuild.core.run.dependencies import (
     state_changes,
 )
 
-AROUND = (("Python", "CPython 3.11.7"), ("platform", "linux x86_64"))
-INPUTS = Inputs("examples/a.py", "0" * 64, ("--fast",), 10.0, ("scipy",), AROUND)
+ENVIRONMENT = (("Python", "CPython 3.11.7"), ("platform", "linux x86_64"))
+INPUTS = Inputs("examples/a.py", "0" * 64, ("--fast",), 10.0, ("scipy",), ENVIRONMENT)
 
 
 def test_changes_of_inputs() -> None:

@@ -49,7 +49,7 @@ SIZE = 1e-12
 FORWARD = "mujoco.mj_forward(model, data)\n"
 STEP = "mujoco.mj_step(model, data)\n"
 PULL = "data.qpos[:] = 0.5, 0.25\n"
-OTHER = "model = mujoco.MjModel.from_xml_string(BODY)\ndata = mujoco.MjData(model)\n"
+NEW_BODY = "model = mujoco.MjModel.from_xml_string(BODY)\ndata = mujoco.MjData(model)\n"
 STATE = "tell('q', data.qpos)\ntell('v', data.qvel)\n"
 ReadValues = Callable[..., dict[str, list[float]]]
 
@@ -86,19 +86,19 @@ def test_an_unperturbed_run_is_unchanged(read_values: ReadValues) -> None:
     assert read_values(text, 0) != read_values(text, 1)
 
 
-FREE = "model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_SPRING\n"
-MOVED = (
+DISABLE_SPRING = "model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_SPRING\n"
+PERTURBED_SCRIPTS = (
     *(
         f"{PULL}mujoco.{function}(model, data)\n"
         for function in ("mj_forward", "mj_step1", "mj_kinematics", "mj_inverse", "mj_fwdPosition")
     ),
-    f"{PULL}{FREE}for _ in range(100):\n    mujoco.mj_step(m=model, d=data, nstep=2)\n",
+    f"{PULL}{DISABLE_SPRING}for _ in range(100):\n    mujoco.mj_step(m=model, d=data, nstep=2)\n",
     f"{STEP * 5}{PULL}data.qvel[:] = 0\n{FORWARD}",
 )
 
 
 def test_a_state_is_moved_once_before_anything_is_computed_from_it(read_values: ReadValues) -> None:
-    for text in MOVED:
+    for text in PERTURBED_SCRIPTS:
         assert is_moved(read_values(text + STATE)["q"], 0.5, 0.25), text
 
 
@@ -190,7 +190,7 @@ mujoco.mj_forward(model, data)
 tell("lengths", [np.linalg.norm(data.qpos[at:at + 4]) for at in (3, 7)])
 tell("apart", [np.abs(data.qpos - before)[at:at + 4].max() for at in (3, 7)])
 """
-    values = read_values(OTHER + text + STATE)
+    values = read_values(NEW_BODY + text + STATE)
     assert values["lengths"] == pytest.approx([1.0, 1.0], abs=3e-16)
     assert all(1e-13 < apart < 1e-12 for apart in values["apart"])
     assert is_moved(values["q"][2:3], 1.0)
@@ -202,7 +202,7 @@ def test_zeros_stay_but_for_trees_that_have_nothing_else(read_values: ReadValues
     assert values["v"] == [0.0, 0.0]
     values = read_values("data.qvel[0] = 0.5\n" + FORWARD + STATE)
     assert values["q"][0] == 0.0 and is_moved(values["v"][:1], 0.5)
-    positions = read_values(OTHER + FORWARD + STATE)["q"]
+    positions = read_values(NEW_BODY + FORWARD + STATE)["q"]
     assert (positions[:2], positions[3:8]) == ([0.0] * 2, [1.0, 0.0, 0.0, 0.0, 1.0])
     assert all(abs(abs(x) - SIZE / 2) < 1e-20 for x in positions[8:11]), "the other tree rests"
 
@@ -214,7 +214,7 @@ for _ in range(1000):
     mujoco.mj_step(model, data)
     data.qpos[3:7] /= np.linalg.norm(data.qpos[3:7]) * (1 + 1e-15)
 """
-    plain, perturbed = (read_values(OTHER + text + STATE, number)["q"] for number in (0, 1))
+    plain, perturbed = (read_values(NEW_BODY + text + STATE, number)["q"] for number in (0, 1))
     assert perturbed == pytest.approx(plain, rel=1e-10, abs=1e-10)
 
 
@@ -247,7 +247,7 @@ def test_rollouts(read_values: ReadValues) -> None:
 from mujoco import rollout
 states = np.zeros((2, mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
 states[:, 1:3] = (0.5, 0.25), (1.0, 2.0)
-{FREE}
+{DISABLE_SPRING}
 end, _ = rollout.rollout(model, data, states, nstep=3)
 tell("given", states[:, 1:3])
 tell("end", end[:, -1, 1:3])

@@ -29,7 +29,7 @@ data = mujoco.MjData(model)
 FAST = "data.qvel[0] = 1e20\n"
 STEP = "mujoco.mj_step(model, data)\n"
 LINE = len(HEAD.splitlines())
-WARNED = "WARNING: Nan, Inf or huge value in QVEL at DOF 0. The simulation is unstable."
+WARNING_TEXT = "WARNING: Nan, Inf or huge value in QVEL at DOF 0. The simulation is unstable."
 FindDivergences = Callable[[str], tuple[Divergence, ...]]
 
 
@@ -63,7 +63,7 @@ def test_a_warning_is_noticed_with_its_line_time_and_model(
     assert find_divergences(HEAD + "import numpy.random\n" + FAST + STEP) == warned(3)
 
 
-AFTERWARDS = (
+LAST_STATEMENTS = (
     "mujoco.mj_resetData(model, data)\n",
     "data.warning[mujoco.mjtWarning.mjWARN_BADQVEL].number = 0\n",
     "data = mujoco.MjData(model)\n",
@@ -90,7 +90,7 @@ IMPORTS = (
 def test_a_warning_is_noticed_however_the_script_goes_about_it(
     find_divergences: FindDivergences,
 ) -> None:
-    scripts = [HEAD + FAST + STEP + after for after in AFTERWARDS]
+    scripts = [HEAD + FAST + STEP + after for after in LAST_STATEMENTS]
     scripts += [f"{HEAD}{FAST}{step}\n" for step in STEPS]
     scripts += [HEAD.replace("import mujoco\n", text, 1) + FAST + STEP for text in IMPORTS]
     for script in scripts:
@@ -186,7 +186,7 @@ for _ in range(300):
 PLATE = FALL.replace('size="0.1" mass', 'type="box" size="0.1 0.1 1e-4" mass').replace(
     'pos="0 0 0.1"', 'pos="0 0 1e-4"'
 )
-APART = FALL.replace('name="floor"', 'name="floor" contype="0" conaffinity="0"')
+FALL_WITHOUT_CONTACT = FALL.replace('name="floor"', 'name="floor" contype="0" conaffinity="0"')
 
 
 def test_a_body_that_is_pressed_into_another_by_half_its_thickness(
@@ -198,7 +198,7 @@ def test_a_body_that_is_pressed_into_another_by_half_its_thickness(
         (PLATE, 300, True),
         (FALL, 4500, False),
         (FALL, 0, False),
-        (APART, 5000, False),  # an overlap without contact is the model's own
+        (FALL_WITHOUT_CONTACT, 5000, False),  # an overlap without contact is the model's own
     ):
         deep = [
             (divergence.sign, divergence.geoms)
@@ -254,7 +254,7 @@ def test_the_log_of_an_unwatched_process_is_removed_unless_it_was_there(
 ) -> None:
     text = HEAD + FAST + STEP
     start = f"import subprocess, sys\nsubprocess.run([sys.executable, '-c', {text!r}])\n"
-    assert WARNED in run(start).stderr
+    assert WARNING_TEXT in run(start).stderr
     assert [path.name for path in root.iterdir()] == ["examples"]
     (root / "MUJOCO_LOG.TXT").write_text("mine\n")
     run(text)

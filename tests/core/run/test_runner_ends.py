@@ -27,7 +27,7 @@ from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
 
-ME = (
+RECORD_PID = (
     "import os, time\nopen('examples/tmp', 'w').write(os.environ['TMPDIR'])\n"
     "open('examples/me', 'w').write(str(os.getpid()))\n"
 )
@@ -84,7 +84,7 @@ def test_all_that_a_hanging_script_has_started_ends(server: ScriptServer, root: 
 
 @forked_or_not
 def test_script_that_kills_its_supervisor(root: Path, fork: bool) -> None:
-    (root / "examples/a.py").write_text(f"{ME}os.kill(os.getppid(), 9)\ntime.sleep(60)\n")
+    (root / "examples/a.py").write_text(f"{RECORD_PID}os.kill(os.getppid(), 9)\ntime.sleep(60)\n")
     (root / "examples/b.py").write_text("print('b')\n")
     jobs = [job("examples/a.py"), job("examples/b.py"), job("examples/b.py")]
     with ScriptServer(fork=fork) as server:
@@ -100,7 +100,7 @@ def test_script_that_kills_its_supervisor(root: Path, fork: bool) -> None:
 def test_nothing_survives_the_tool(root: Path, number: int) -> None:
     """Each signal ends the tool; 0 stands for SIGKILL with spawned scripts."""
     fork, number = bool(number), number or signal.SIGKILL
-    (root / "examples/x.py").write_text(f"{DAEMON}\n{ME}time.sleep(100)\n")
+    (root / "examples/x.py").write_text(f"{DAEMON}\n{RECORD_PID}time.sleep(100)\n")
     command = [sys.executable, "-c", TOOL, root, str(fork)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=SOURCE_TREE) as tool:
         script = wait_for(root / "examples/me")
@@ -117,7 +117,7 @@ def test_nothing_survives_the_tool(root: Path, number: int) -> None:
 
 
 def test_unwanted_run_is_stopped(root: Path) -> None:
-    (root / "examples/x.py").write_text(f"{ME}time.sleep(60)\n")
+    (root / "examples/x.py").write_text(f"{RECORD_PID}time.sleep(60)\n")
     (root / "examples/y.py").write_text("print('y')\n")
 
     def unwanted(running: frozenset[str]) -> bool:
@@ -133,7 +133,7 @@ def test_unwanted_run_is_stopped(root: Path) -> None:
 
 
 def test_error_in_a_callback_ends_the_run(server: ScriptServer, root: Path) -> None:
-    (root / "examples/x.py").write_text(f"{ME}time.sleep(60)\n")
+    (root / "examples/x.py").write_text(f"{RECORD_PID}time.sleep(60)\n")
     (root / "examples/y.py").write_text(
         "import os, time\nwhile not os.path.exists('examples/me'): time.sleep(0.01)\n"
     )

@@ -71,7 +71,7 @@ def neighbour() -> Iterator[int]:
         process.kill()
 
 
-DENIED = ("OSError [Errno", "FileNotFound", "Permission")
+DENIED_ERRORS = ("OSError [Errno", "FileNotFound", "Permission")
 ATTEMPTS: dict[str, str | tuple[str, ...]] = {
     # the course
     "open('lesson.md', 'a')": "OSError [Errno ",
@@ -84,13 +84,13 @@ ATTEMPTS: dict[str, str | tuple[str, ...]] = {
     "libc.mount(b'', os.fsencode(os.getcwd()), b'', 4128, None)": "-1",
     "libc.umount2(os.fsencode(os.getcwd()), 2)": "-1",
     # the system
-    "open('/proc/sys/kernel/core_pattern', 'w')": DENIED,
-    "open('/proc/sysrq-trigger', 'w')": DENIED,
-    "open('/usr/evil', 'w')": DENIED,
-    "open(sys.executable, 'a')": DENIED,
-    "open('/dev/evil', 'w')": DENIED,
-    "open('/etc/shadow').read()": DENIED,
-    "os.listdir('/run')": DENIED,
+    "open('/proc/sys/kernel/core_pattern', 'w')": DENIED_ERRORS,
+    "open('/proc/sysrq-trigger', 'w')": DENIED_ERRORS,
+    "open('/usr/evil', 'w')": DENIED_ERRORS,
+    "open(sys.executable, 'a')": DENIED_ERRORS,
+    "open('/dev/evil', 'w')": DENIED_ERRORS,
+    "open('/etc/shadow').read()": DENIED_ERRORS,
+    "os.listdir('/run')": DENIED_ERRORS,
     "libc.unshare(0x10000000)": "-1",
     # the folder of the user, where what is written is gone afterwards
     "open(os.path.expanduser('~/secret')).read()": "FileNotFoundError",

@@ -20,7 +20,7 @@ from support.runners import Run, both_ways, job, run_hanging
 
 pytestmark = pytest.mark.site
 
-Traced = Callable[[str], Trace]
+RunTraced = Callable[[str], Trace]
 PROGRAMS, NETWORK = "it starts other programs", "it uses the network"
 WRITES = "it writes files of the project"
 
@@ -37,7 +37,7 @@ def root(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def traced(run: Run) -> Traced:
+def traced(run: Run) -> RunTraced:
     def trace_one(code: str) -> Trace:
         trace = run(code).trace
         assert trace is not None
@@ -75,7 +75,7 @@ READ: list[tuple[str, set[str]]] = [
 ]
 
 
-def test_files_that_are_read_however_the_script_ends(traced: Traced) -> None:
+def test_files_that_are_read_however_the_script_ends(traced: RunTraced) -> None:
     for code, files in READ:
         trace = traced(code)
         assert set(trace.files) == files, code
@@ -89,7 +89,7 @@ def test_files_that_are_read_before_a_timeout(server: ScriptServer, root: Path) 
 
 
 def test_files_outside_and_links_into_the_project(
-    traced: Traced, root: Path, tmp_path: Path
+    traced: RunTraced, root: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "out.txt").touch()
     (tmp_path / "link").symlink_to(root)
@@ -102,7 +102,7 @@ def test_files_outside_and_links_into_the_project(
 
 
 @both_ways
-def test_folders_that_are_listed(traced: Traced) -> None:
+def test_folders_that_are_listed(traced: RunTraced) -> None:
     trace = traced(
         "import os, glob, pathlib\nos.listdir('data')\nos.listdir()\nglob.glob('lib/*')\n"
         "list(pathlib.Path('examples').iterdir())\nlist(os.scandir('data'))\n"
@@ -112,7 +112,7 @@ def test_folders_that_are_listed(traced: Traced) -> None:
     assert trace.opaque == ""
 
 
-def test_files_that_forked_processes_read(traced: Traced) -> None:
+def test_files_that_forked_processes_read(traced: RunTraced) -> None:
     code = """
 import os
 def tried(path):
@@ -130,7 +130,7 @@ for i in range(4): os.wait()
     assert set(traced(code).files) == expected
 
 
-def test_thousands_of_files_are_noted_up_to_a_limit(traced: Traced) -> None:
+def test_thousands_of_files_are_noted_up_to_a_limit(traced: RunTraced) -> None:
     code = "for i in range({}):\n    try: open(f'data/{{i}}-with-a-long-name')\n"
     code += "    except OSError: pass\n"
     trace = traced(code.format(5_000))
@@ -141,7 +141,7 @@ def test_thousands_of_files_are_noted_up_to_a_limit(traced: Traced) -> None:
 # --- imports
 
 
-def test_modules_of_the_project_are_files(traced: Traced, root: Path) -> None:
+def test_modules_of_the_project_are_files(traced: RunTraced, root: Path) -> None:
     (root / "examples/pack").mkdir()
     for name in ("sibling", "random", "pack/__init__", "pack/inner"):
         (root / f"examples/{name}.py").write_text("value = 'mine'")
@@ -156,7 +156,7 @@ def test_modules_of_the_project_are_files(traced: Traced, root: Path) -> None:
     assert (trace.folders, trace.modules) == ((), ())
 
 
-def test_a_cached_module_counts_as_its_source(traced: Traced, root: Path) -> None:
+def test_a_cached_module_counts_as_its_source(traced: RunTraced, root: Path) -> None:
     (root / "examples/sibling.py").write_text("value = 1")
     code = "import py_compile\npy_compile.compile(__file__.replace('x.py', 'sibling.py'))"
     assert WRITES in traced(code).opaque
@@ -165,7 +165,7 @@ def test_a_cached_module_counts_as_its_source(traced: Traced, root: Path) -> Non
     assert trace.files == ("examples/sibling.py", "examples/sibling/__init__.py")
 
 
-def test_what_could_hide_a_module_and_what_is_not_installed(traced: Traced) -> None:
+def test_what_could_hide_a_module_and_what_is_not_installed(traced: RunTraced) -> None:
     trace = traced(
         "import json\nimport numpy.linalg\nimport sys\n"
         "try: import no_such_module\nexcept ImportError: pass"
@@ -264,12 +264,14 @@ OPAQUE: list[tuple[str, str]] = [
 ]
 
 
-def test_reasons_why_a_trace_is_opaque(traced: Traced) -> None:
+def test_reasons_why_a_trace_is_opaque(traced: RunTraced) -> None:
     for code, reason in OPAQUE:
         assert traced(code).opaque == reason, code
 
 
-def test_effects_are_noted_once_for_each_line(traced: Traced, root: Path, tmp_path: Path) -> None:
+def test_effects_are_noted_once_for_each_line(
+    traced: RunTraced, root: Path, tmp_path: Path
+) -> None:
     (root / "examples/sibling.py").write_text("\ndef write(): open('data/c', 'w')\n")
     trace = traced(
         f"import os, sibling, socket\nopen({str(tmp_path / 'o')!r}, 'w')\n"
@@ -289,6 +291,6 @@ def test_effects_are_noted_once_for_each_line(traced: Traced, root: Path, tmp_pa
     ]
 
 
-def test_files_that_a_script_wrote_are_no_dependency(traced: Traced) -> None:
+def test_files_that_a_script_wrote_are_no_dependency(traced: RunTraced) -> None:
     trace = traced("open('data/new', 'w').close()\nopen('data/new')\nopen('data/a.txt')")
     assert trace.files == ("data/a.txt",)

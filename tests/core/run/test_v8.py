@@ -33,7 +33,7 @@ pytestmark = pytest.mark.engine
 ROOT = Path(v8.__file__).parents[3]
 
 GLOBAL = {"class", "style", "mathbackground", "mathcolor"}
-ALLOWED = {
+ALLOWED_ATTRIBUTES = {
     name: set(attributes)
     for name, *attributes in map(
         str.split,
@@ -152,9 +152,9 @@ class TestMarkup:
         strange = [
             f"<{element.tag} {element.attrib}>"
             for element in root.iter()
-            if not set(element.attrib) <= ALLOWED.get(element.tag, set()) | GLOBAL
+            if not set(element.attrib) <= ALLOWED_ATTRIBUTES.get(element.tag, set()) | GLOBAL
             or "undefined" in element.attrib.values()
-            or element.tag not in ALLOWED
+            or element.tag not in ALLOWED_ATTRIBUTES
         ]
         return ", ".join(strange)
 

@@ -17,7 +17,7 @@ from coursebuild.core.scripts.compare import verify
 from coursebuild.core.text.diagnostics import Diagnostic
 from support.sample_lessons import course, describe, document, make_run
 
-PRINTED = """\
+OUTPUT = """\
 an L-shaped body: [0.073333 0.026667 0.      ] m
 moments [0.00376854 0.01383146 0.0168    ]
 axis (z): 0 flips
@@ -33,7 +33,7 @@ def script(path: str = "examples/a.py") -> str:
     return f"```python file={path}\nprint(1)\n```\n"
 
 
-def output(text: str = PRINTED, keys: str = "") -> str:
+def output(text: str = OUTPUT, keys: str = "") -> str:
     return f"\nOutput:\n\n```text {keys}\n{text}```\n"
 
 
@@ -58,7 +58,7 @@ def check(
     return check_bindings(lesson, printed)
 
 
-def find_mistake(binding: str, printed: str = PRINTED) -> Diagnostic | None:
+def find_mistake(binding: str, printed: str = OUTPUT) -> Diagnostic | None:
     diagnostics = check(f"{script()}{output(printed)}\nHere: {binding}\n", make_run(printed))
     assert len(diagnostics) <= 1
     return diagnostics[0] if diagnostics else None
@@ -129,7 +129,7 @@ def test_a_named_script_is_found_anywhere() -> None:
     second = document(
         script("examples/b.py") + output("y 2.5\n") + output("y 3.5\n"), "content/lessons/1.1-x.md"
     )
-    runs = (make_run(PRINTED), make_run("y 2.5\ny 3.5\n", path="examples/b.py"))
+    runs = (make_run(OUTPUT), make_run("y 2.5\ny 3.5\n", path="examples/b.py"))
     text = (
         "`+6.6 %`{out=examples/a.py} `2.5`{out=examples/b.py} `3.5`{out=examples/b.py}\n\n" + LESSON
     )
@@ -146,12 +146,12 @@ def test_a_named_script_without_a_recorded_output_counts_by_its_run() -> None:
         LESSON + script("examples/c.py") + "\n`1.5`{out=examples/c.py} `1.7`{out=examples/c.py}\n"
     )
     run = make_run("x 1.52\n", path="examples/c.py")
-    assert [d.span.text for d in check(text, make_run(PRINTED), run)] == ["1.7"]
+    assert [d.span.text for d in check(text, make_run(OUTPUT), run)] == ["1.7"]
     skipped_run = make_run("", path="examples/c.py", outcome=Outcome.SKIPPED)
-    assert check(text, make_run(PRINTED), skipped_run) == ()
-    assert check(text, make_run(PRINTED)) == ()
+    assert check(text, make_run(OUTPUT), skipped_run) == ()
+    assert check(text, make_run(OUTPUT)) == ()
     norun = make_run("", path="examples/c.py", outcome=Outcome.NORUN)
-    diagnostics = check(text, make_run(PRINTED), norun)
+    diagnostics = check(text, make_run(OUTPUT), norun)
     assert (
         describe(diagnostics[0])
         == """\
@@ -176,7 +176,7 @@ def test_recorded_text_counts_where_nothing_ran() -> None:
 
 def test_where_recorded_text_drifted_the_run_counts_too() -> None:
     text = LESSON + "\n`6.6 %`{out} `6.7 %`{out} `6.8 %`{out}\n"
-    (diagnostic,) = check(text, make_run(PRINTED.replace("6.641", "6.702")))
+    (diagnostic,) = check(text, make_run(OUTPUT.replace("6.641", "6.702")))
     assert (diagnostic.span.text, diagnostic.label) == (
         "6.8 %",
         "the nearest printed value is +6.702",
@@ -191,7 +191,7 @@ def test_bindings_may_show_what_an_ellipsis_leaves_out() -> None:
 
 
 def test_bindings_in_quotes_and_footnotes_are_checked() -> None:
-    diagnostics = check(LESSON + "\n> `9.9`{out}[^a]\n\n[^a]: `9.8`{out}\n", make_run(PRINTED))
+    diagnostics = check(LESSON + "\n> `9.9`{out}[^a]\n\n[^a]: `9.8`{out}\n", make_run(OUTPUT))
     assert [d.span.text for d in diagnostics] == ["9.9", "9.8"]
 
 
@@ -200,7 +200,7 @@ def test_numbers_of_recorded_tables_count() -> None:
         script() + "\nOutput:\n\n| a | b |\n| --- | --- |\n| Euler | **+6.641 %** |\n\n"
         "`+6.6 %`{out} `6.9e-04`{out} `Euler +6.6 %`{out} `7.7 %`{out}\n"
     )
-    diagnostics = check(text, make_run(PRINTED))
+    diagnostics = check(text, make_run(OUTPUT))
     assert [(d.span.text, d.label) for d in diagnostics] == [
         ("7.7 %", "the nearest printed value is +6.641")
     ]
@@ -223,17 +223,17 @@ def test_bindings_depend_on_the_values_that_they_show() -> None:
         LESSON
         + "\n`+6.6 %`{out} `\u22126.0 %`{out} `4 flips`{out} `0.0733, 0.0267`{out} `RK4`{out}\n"
     )
-    new_output = PRINTED.replace("6.641", "6.702").replace("0.026667", "0.03").replace("RK4", "RK5")
+    new_output = OUTPUT.replace("6.641", "6.702").replace("0.026667", "0.03").replace("RK4", "RK5")
     assert find_dependents(text, new_output) == [
         ("+6.6 %", "+6.641", "+6.702"),
         ("0.0733, 0.0267", "0.026667", "0.03"),
         ("RK4", "RK4", "RK5"),
     ]
-    assert find_dependents(text, PRINTED) == []
+    assert find_dependents(text, OUTPUT) == []
     second = document("`+6.6 %`{out=examples/a.py} `6.6`{out}\n", "content/lessons/5.1-x.md")
     table = "\nOutput:\n\n| a | b |\n| --- | --- |\n| `Euler` | **+6.641 %** |\n"
     for lesson in (LESSON, script() + table):
-        dependents = find_dependents(lesson, PRINTED.replace("6.641", "6.702"), second)
+        dependents = find_dependents(lesson, OUTPUT.replace("6.641", "6.702"), second)
         assert dependents == [("+6.6 %", "+6.641", "+6.702")]
 
 

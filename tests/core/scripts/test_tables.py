@@ -9,7 +9,7 @@ from coursebuild.core.model.results import Verdict
 from coursebuild.core.scripts.compare import compare
 from support.sample_lessons import DIGITS, EXACT, VOLATILE, table, tolerance
 
-PRINTED = """\
+OUTPUT = """\
 integrators
   RK4           kinetic energy  -0.000 %   |change| 3.9e-11 kg m^2/s
   Euler         kinetic energy  +6.641 %   |change| 6.9e-04 kg m^2/s
@@ -26,7 +26,7 @@ ROWS = """\
 
 def verdict(
     rows: str,
-    printed: str = PRINTED,
+    printed: str = OUTPUT,
     comparison: Comparison = EXACT,
     filters: tuple[Filter, ...] = (),
 ) -> Verdict:

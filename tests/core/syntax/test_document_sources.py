@@ -105,7 +105,7 @@ def test_deep_emphasis_loses_its_marks_and_no_text() -> None:
     assert str(plain_html(parse(text))).count("a ") == 200
 
 
-REPEATED = [
+REPEATED_PIECES = [
     *("[", "]", "*", "_", "$", "$$", "`", "~", "|", "<", "&", "!", "![", "[^", "[^a]", "("),
     *("{", "\\", "#", ">", "> ", "- ", "1. ", "\t", "$a", "a$ ", "$$a\n\n", "*a ", "a*"),
     *("*a_", "**a ", "a**b", "[a](", '[a](b "', "[a](<b", "[a][b]", "[a]: b\n"),
@@ -141,7 +141,7 @@ NESTED = [("[", "]"), ("[", "](u)"), ("![", "](u)"), ("*a ", "b*")]
 @pytest.mark.site
 def test_work_grows_in_proportion_to_repeated_pieces() -> None:
     failures = []
-    for piece in REPEATED:
+    for piece in REPEATED_PIECES:
         size = 300 // len(piece)
         calls(piece)
         once, twice = calls(piece * size), calls(piece * (2 * size))

@@ -95,25 +95,32 @@ def keys(*questions: str) -> list[str]:
     return [question.key for question in quiz.questions]
 
 
-WHY = '{"kind": "open", "q": "Why is it?", "reference": "R"}'
+QUESTION = '{"kind": "open", "q": "Why is it?", "reference": "R"}'
 
 
 def test_the_key_of_a_question_is_its_id_or_comes_from_its_kind_and_text() -> None:
     key = hashlib.sha256(b"open\nWhy is it?").hexdigest()[:8]
-    assert keys(WHY) == [key]
-    assert keys(WHY.replace('"R"', '"Another"').replace("is it", "\\n is   it")) == [key]
-    assert keys(WHY.replace('"open"', '"open", "id": "own"')) == ["own"]
-    assert keys(WHY.replace("Why", "How")) != [key]
-    output = WHY.replace("open", "output").replace('"reference": "R"', '"of": "a.py", "line": 1')
+    assert keys(QUESTION) == [key]
+    assert keys(QUESTION.replace('"R"', '"Another"').replace("is it", "\\n is   it")) == [key]
+    assert keys(QUESTION.replace('"open"', '"open", "id": "own"')) == ["own"]
+    assert keys(QUESTION.replace("Why", "How")) != [key]
+    output = QUESTION.replace("open", "output").replace(
+        '"reference": "R"', '"of": "a.py", "line": 1'
+    )
     assert keys(output) != [key]
     # Others of the quiz are no matter, wherever they stand.
-    assert keys(MCQ % '"answer": 0', WHY)[1] == keys(WHY, MCQ % '"answer": 1')[0] == key
+    assert keys(MCQ % '"answer": 0', QUESTION)[1] == keys(QUESTION, MCQ % '"answer": 1')[0] == key
 
 
 def test_keys_of_a_quiz_are_never_the_same() -> None:
-    key = keys(WHY)[0]
-    with_used_id = WHY.replace('"open"', f'"open", "id": "{key}-2"')
-    assert keys(WHY, WHY, WHY, with_used_id) == [key, f"{key}-3", f"{key}-4", f"{key}-2"]
+    key = keys(QUESTION)[0]
+    with_used_id = QUESTION.replace('"open"', f'"open", "id": "{key}-2"')
+    assert keys(QUESTION, QUESTION, QUESTION, with_used_id) == [
+        key,
+        f"{key}-3",
+        f"{key}-4",
+        f"{key}-2",
+    ]
 
 
 def test_options_and_items_have_keys_of_their_texts_alone() -> None:

@@ -5,12 +5,24 @@ from __future__ import annotations
 from coursebuild.core.text.source import Excerpt, Source
 from coursebuild.core.text.units import check_unit
 
-USUAL = (
+USUAL_UNITS = (
     *("", "1", "1/s²", "kg m^2", "kg·m²", "kg.m^2", "N m/rad", "m/s^{2}", "m s^-2", "m s⁻¹"),
     *("m / s", "J/(kg K)", "kg m²/(s K)", "m^(1/2)", "°", "°C", "%", "°/s", "kHz"),
 )
-SELDOM = "sec metres ft psi eV Å rev/min rpm turn Nm µm \u2126 ‰".split()
-WRONG = ("(m", "m//s", "m^", "m**2", "2 m", "9**9**9 m", "m^99999999", "$", "m" * 200, "1/", "/")
+RARE_UNITS = "sec metres ft psi eV Å rev/min rpm turn Nm µm \u2126 ‰".split()
+INVALID_UNITS = (
+    "(m",
+    "m//s",
+    "m^",
+    "m**2",
+    "2 m",
+    "9**9**9 m",
+    "m^99999999",
+    "$",
+    "m" * 200,
+    "1/",
+    "/",
+)
 
 
 def messages(unit: str) -> list[str]:
@@ -19,7 +31,7 @@ def messages(unit: str) -> list[str]:
 
 
 def test_valid_units() -> None:
-    assert {unit: messages(unit) for unit in (*USUAL, *SELDOM) if messages(unit)} == {}
+    assert {unit: messages(unit) for unit in (*USUAL_UNITS, *RARE_UNITS) if messages(unit)} == {}
 
 
 def test_wrong_units_are_reported_with_the_likely_one() -> None:
@@ -30,4 +42,4 @@ def test_wrong_units_are_reported_with_the_likely_one() -> None:
     for word, unit in likely.items():
         assert [m.partition(": ")[2] for m in messages(word)] == [f"did you mean `{unit}`?"], word
     assert messages("strides") == ["strides: leave it out, and say in words what is counted"]
-    assert [unit for unit in WRONG if not messages(unit)] == []
+    assert [unit for unit in INVALID_UNITS if not messages(unit)] == []

@@ -62,7 +62,7 @@ def test_text_is_tidied_and_keeps_its_lines(text: str, expected: str) -> None:
     assert tidy(text) == expected
 
 
-WRAPPED = {
+WRAPPED_TEXTS = {
     "words": ("One two three\nfour five six.", "One two three four\nfive six."),
     "no other block": ("About fifteen and - 7 or 1. or # x", "About fifteen and -\n7 or 1. or # x"),
     "solid parts": (
@@ -86,7 +86,7 @@ WRAPPED = {
 }
 
 
-@pytest.mark.parametrize(("text", "expected"), WRAPPED.values(), ids=WRAPPED)
+@pytest.mark.parametrize(("text", "expected"), WRAPPED_TEXTS.values(), ids=WRAPPED_TEXTS)
 def test_paragraphs_are_wrapped_at_a_width(text: str, expected: str) -> None:
     assert tidy(text) == f"{text}\n"
     assert tidy(text, width=18) == f"{expected}\n"

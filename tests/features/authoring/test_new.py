@@ -77,7 +77,7 @@ def test_new_lesson_is_checked_and_built_as_it_is(make: Make) -> None:
     assert ids[1:] == ["1.1", "1.2", "1.2.1", "1.3", "1.10"]
 
 
-REFUSED = [
+REFUSED_COMMANDS = [
     ("lesson 1.1 T", "there is a lesson 1.1 already: Lesson one"),
     ("lesson 7.1 T", "the map has no level for `7.1`; known: `1`"),
     ("lesson ../x T", "the map has no level for `../x`; known: `1`"),
@@ -100,7 +100,7 @@ def test_refused_addition_changes_nothing(make: Make) -> None:
     folder.write("content/lessons/1.7-there.md", "## There\n")
     folder.write("models/there.xml", "<mujoco/>")
     before = folder.tree()
-    for arguments, message in REFUSED:
+    for arguments, message in REFUSED_COMMANDS:
         result = folder.main("new", *arguments.split(" "))
         assert (result.status, result.out) == (2, ""), arguments
         assert message in result.err, arguments

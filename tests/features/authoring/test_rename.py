@@ -151,7 +151,7 @@ def test_doubtful_places_are_listed_and_nothing_is_changed(make: Make) -> None:
     assert folder.text("features/own.py") == '"""For Lesson 1.2."""\n'
 
 
-REFUSED = [
+REFUSED_COMMANDS = [
     ("1.9 1.8", "no lesson is called `1.9`"),
     ("1.2 1.2", "there is a lesson 1.2 already: Lesson two"),
     ("1.2 1.3", "there is a lesson 1.3 already: Lesson three"),
@@ -164,7 +164,7 @@ REFUSED = [
 def test_refused_renaming_changes_nothing(course: Folder) -> None:
     course.write("content/lessons/1.8-two.md", "## There\n")
     before = course.tree()
-    for arguments, message in REFUSED:
+    for arguments, message in REFUSED_COMMANDS:
         result = course.main("rename", *arguments.split())
         assert (result.status, result.out) == (2, ""), arguments
         assert message in result.err, arguments

@@ -27,7 +27,7 @@ FENCES = [fence for page in PAGES for fence in fences(DOCS / f"how-to/{page}.md"
 DOCUMENTED = {fence.value("file"): fence.text for fence in FENCES if fence.value("file")}
 COURSE = ".github/workflows/course.yml"
 WEEKLY = ".github/workflows/weekly.yml"
-PINNED = re.compile(
+PINNED_ACTION = re.compile(
     r"actions/[a-z/-]+@(v\d+|[0-9a-f]{40})|\./|OWNER/coursebuild@v" + re.escape(__version__)
 )
 SUDO = (
@@ -103,7 +103,7 @@ def test_actions_are_pinned_and_no_expression_becomes_code() -> None:
     (example,) = (yaml.safe_load(fence.text) for fence in FENCES if fence.is_("action"))
     steps = [step for job in jobs() for step in job["steps"]] + example + ACTION["runs"]["steps"]
     actions = [step["uses"] for step in steps if "uses" in step]
-    assert [name for name in actions if not PINNED.fullmatch(name)] == []
+    assert [name for name in actions if not PINNED_ACTION.fullmatch(name)] == []
     assert [line for line in commands(steps) if "${{" in line] == []
     for step in steps:
         if step.get("uses", "").startswith("actions/checkout@"):

@@ -27,7 +27,7 @@ from support.bench_reports import awkward, row, scenario, scene
 from support.fixture_cases import check_text
 
 HERE = Path(__file__).parent
-CHECKED = RecordCheck(
+RECORD_CHECK = RecordCheck(
     "arm",
     "content/reports/arm.bench.json",
     (
@@ -49,7 +49,7 @@ def test_text_is_as_wide_as_the_terminal(rewriting: bool) -> None:
 
 
 def test_departures_as_text(rewriting: bool) -> None:
-    text = format_checks([CHECKED, replace(CHECKED, name="leg", departures=())], Style())
+    text = format_checks([RECORD_CHECK, replace(RECORD_CHECK, name="leg", departures=())], Style())
     check_text(HERE / "departures.txt", text, rewriting=rewriting)
 
 

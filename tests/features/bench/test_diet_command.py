@@ -197,42 +197,44 @@ def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
     assert [place["name"] for place in findings["unused-keyframe"]["places"]] == ["go"]
 
 
-SHARED = "<mujocoinclude>\n  <option/>\n  <sensor>\n    <clock/>\n  </sensor>\n</mujocoinclude>\n"
+SHARED_PART = (
+    "<mujocoinclude>\n  <option/>\n  <sensor>\n    <clock/>\n  </sensor>\n</mujocoinclude>\n"
+)
 
 
 def test_a_file_of_two_models_is_not_changed(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     models = course / "models"
-    (models / "part.xml").write_text(SHARED)
+    (models / "part.xml").write_text(SHARED_PART)
     text = CLEAN.replace("<mujoco>", '<mujoco>\n  <include file="part.xml"/>')
     (models / "swing.xml").write_text(text)
     assert run(course, "swing", "--fix") == 0
     assert "<clock/>" not in (models / "part.xml").read_text()
-    (models / "part.xml").write_text(SHARED)
+    (models / "part.xml").write_text(SHARED_PART)
     (models / "other.xml").write_text(text)
     capsys.readouterr()
     assert run(course, "swing", "--fix") == 1
     out = " ".join(capsys.readouterr().out.split())
     assert "not for --fix: models/other.xml uses models/part.xml too" in out
-    assert (models / "part.xml").read_text() == SHARED
+    assert (models / "part.xml").read_text() == SHARED_PART
 
 
 def test_where_a_file_cannot_be_written_none_is(
     course: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     models = course / "models"
-    (models / "part.xml").write_text(SHARED)
+    (models / "part.xml").write_text(SHARED_PART)
     text = MODEL.replace("<mujoco>", '<mujoco>\n  <include file="part.xml"/>')
     (models / "swing.xml").write_text(text)
     (models / "swing.xml").chmod(0o444)
     assert run(course, "--fix") == 1
     assert "error: models/swing.xml is read-only" in capsys.readouterr().out
-    assert (models / "part.xml").read_text() == SHARED
+    assert (models / "part.xml").read_text() == SHARED_PART
     (models / "swing.xml").chmod(0o644)
     assert run(course) == 1, "what was not written is not taken for done"
     assert run(course, "--fix") == 0
-    assert (models / "part.xml").read_text() != SHARED
+    assert (models / "part.xml").read_text() != SHARED_PART
 
 
 def test_a_report_is_recorded(course: Path, capsys: pytest.CaptureFixture[str]) -> None:

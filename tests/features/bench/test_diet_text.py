@@ -20,34 +20,34 @@ from support.fixture_cases import check_text
 from support.model_reports import diet, finding
 
 EDIT = TextEdit("models/arm.xml", 9, 1, 100, 130, '    <gyro\n name="gyro"/>\n', "")
-SURE = Saving(2.2, 0.01, True, 1234, 30)
+CERTAIN_SAVING = Saving(2.2, 0.01, True, 1234, 30)
 FINDING = finding(
     message="nobody reads the sensor gyro",
     places=(ModelPlace("gyro", 'mujoco/sensor/gyro[@name="gyro"]', "models/arm.xml", 9, 5),),
-    saving=SURE,
+    saving=CERTAIN_SAVING,
     edits=(EDIT,),
 )
-REPORT = replace(diet(FINDING), model="arm", fixed=SURE, slim=SURE)
+REPORT = replace(diet(FINDING), model="arm", fixed=CERTAIN_SAVING, slim=CERTAIN_SAVING)
 
 
-KEPT = replace(FINDING, kept="shown in class", fixable=False, unfixed="it is kept")
-MANY = replace(FINDING, edits=(EDIT,) * 9, unfixed="models/b.xml uses models/arm.xml too")
+KEPT_FINDING = replace(FINDING, kept="shown in class", fixable=False, unfixed="it is kept")
+LONG_FINDING = replace(FINDING, edits=(EDIT,) * 9, unfixed="models/b.xml uses models/arm.xml too")
 REPORTS = [
     REPORT,
     replace(
         REPORT,
         model="kept and lost",
-        findings=(KEPT,),
+        findings=(KEPT_FINDING,),
         fixed=None,
         slim=None,
         scenarios=(DietScenario("go", 9, "reset", ("the clock says 0 s",)),),
         stale=(StaleKeep("unused-site", "models/arm.toml", 3, 11),),
     ),
-    replace(REPORT, model="kept", findings=(KEPT,)),
+    replace(REPORT, model="kept", findings=(KEPT_FINDING,)),
     replace(
         REPORT,
         model="tried",
-        findings=(MANY,),
+        findings=(LONG_FINDING,),
         tried=(
             RejectedTrial("cone", "…", ("elliptic",), 1e-3, ""),
             RejectedTrial("solver", "…", ("CG",), None, "it saves no time"),

@@ -128,7 +128,7 @@ USE = """(m) => {
   const all = (functions) => functions.map((f) => f(env))
   return [env.ctx, all(m.readouts), m.plots.map(all), m.expect[0](env)]
 }"""
-USED = [{"n": 1, "a": 3, "b": 4, "p": 5, "o": "a", "c": "pressed"}, [1, "it's"], [[7]], 5]
+EXPECTED_REPLY = [{"n": 1, "a": 3, "b": 4, "p": 5, "o": "a", "c": "pressed"}, [1, "it's"], [[7]], 5]
 
 
 def test_a_module_and_its_literal_do_what_its_pieces_say_and_are_strict(tmp_path: Path) -> None:
@@ -146,7 +146,7 @@ def test_a_module_and_its_literal_do_what_its_pieces_say_and_are_strict(tmp_path
     (tmp_path / "main.mjs").write_text(main, encoding="utf-8")
     process = subprocess.run(["node", "main.mjs"], cwd=tmp_path, capture_output=True, text=True)
     assert process.returncode == 0, process.stderr
-    assert json.loads(process.stdout) == [USED, USED, "ReferenceError"]
+    assert json.loads(process.stdout) == [EXPECTED_REPLY, EXPECTED_REPLY, "ReferenceError"]
 
 
 def test_data_is_json_without_the_code() -> None:

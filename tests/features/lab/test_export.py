@@ -93,7 +93,7 @@ WORD, TRIPLE = "ctx.word = '1'", "ctx.word * 3"
 """The second is 3 in JavaScript and '111' in Python, which the translator cannot know."""
 BUTTON = {"type": "button", "label": "b", "run": "ctx.i = 77; data.qvel[ctx.i] += 1"}
 SLIDER = {"label": "s", "min": 0, "max": 1, "value": 0, "param": "s"}
-OFFERED: list[dict[str, Any]] = [
+EXPORTED_LABS: list[dict[str, Any]] = [
     RICH,
     {"controller": "data.ctrl[0] = Math.sin(3 * data.time) ** 3"},
     {"controller": "model.opt.gravity[0] = sim.time > 0.5 ? 2 : 0"},
@@ -104,7 +104,7 @@ OFFERED: list[dict[str, Any]] = [
 ]
 """All at once; a function of the C library, which may differ in the last bit; what native MuJoCo
 cannot repeat; runs that end at other times."""
-WITHHELD: list[tuple[dict[str, Any], str]] = [
+REFUSED_LABS: list[tuple[dict[str, Any], str]] = [
     ({"setup": "data.qpos[0] = Math.random()"}, "a call of `Math.random` has no counterpart in"),
     ({"setup": f"{WORD}; data.qvel[0] = {TRIPLE}"}, "its state after 200 steps is apart from the"),
     (
@@ -138,7 +138,7 @@ def test_script_is_offered_where_it_does_what_the_lab_does_and_a_reason_where_no
     tmp_path: Path,
 ) -> None:
     usual = {"xml": PENDULUM, "verify": {"seconds": 1}}
-    labs = [{**usual, **lab} for lab in (*OFFERED, *(lab for lab, _ in WITHHELD))]
+    labs = [{**usual, **lab} for lab in (*EXPORTED_LABS, *(lab for lab, _ in REFUSED_LABS))]
     fences = (f"```lab\n{json.dumps(lab, ensure_ascii=False)}\n```\n\n" for lab in labs)
     options = Options(root=tmp_path, jobs=1, quiet=True)
     engines = Engines(tmp_path)
@@ -146,11 +146,11 @@ def test_script_is_offered_where_it_does_what_the_lab_does_and_a_reason_where_no
     results, diagnostics = try_labs(make_course("".join(fences)), options, engines)
     assert [d.rule for d in diagnostics if d.rule != "lab-reset"] == ["lab-expect"]
     lines = [result.line for result in results]
-    assert [line.unexported for line in lines[: len(OFFERED)]] == [""] * len(OFFERED)
+    assert [line.unexported for line in lines[: len(EXPORTED_LABS)]] == [""] * len(EXPORTED_LABS)
     assert lines[2].parity == "compared with native MuJoCo as its Python export"
     parity = "not compared with native MuJoCo: its controller changes the model"
-    assert lines[len(OFFERED) + 2].parity == parity
-    for (lab, reason), result in zip(WITHHELD, results[len(OFFERED) :], strict=True):
+    assert lines[len(EXPORTED_LABS) + 2].parity == parity
+    for (lab, reason), result in zip(REFUSED_LABS, results[len(EXPORTED_LABS) :], strict=True):
         assert result.output.script is None
         assert result.line.unexported.startswith(reason), (lab, result.line.unexported)
     name, text = results[0].output.script

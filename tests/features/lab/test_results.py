@@ -16,9 +16,9 @@ pytestmark = pytest.mark.engine
 RESETS = '{"model": "ball",\n"setup": "ctx.n = (ctx.n ?? 0) + 1; data.qvel[1] = ctx.n"}'
 
 
-STILL = """<!-- Copyright: nobody. --><!-- A box that nothing
+STILL_MODEL = """<!-- Copyright: nobody. --><!-- A box that nothing
 moves. --><mujoco><worldbody><geom type="box" size=".1 .1 .1"/></worldbody></mujoco>"""
-LOST = """<mujoco><option timestep="1"/><worldbody><body>
+DIVERGING_MODEL = """<mujoco><option timestep="1"/><worldbody><body>
 <joint type="slide" stiffness="1e6"/><geom size=".1"/></body></worldbody>
 <keyframe><key qpos="1"/></keyframe></mujoco>"""
 """It diverges."""
@@ -43,8 +43,8 @@ class BuiltSite(NamedTuple):
 def site(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> BuiltSite:
     root = tmp_path_factory.mktemp("built") / "course"
     folder = course(root, stores, "## A lab\n\n" + fence(RIGHT), "## A\n\n" + fence(RESETS))
-    folder.write("models/a/still.xml", STILL)
-    folder.write("models/lost.xml", LOST)
+    folder.write("models/a/still.xml", STILL_MODEL)
+    folder.write("models/lost.xml", DIVERGING_MODEL)
     report = run_check(folder, status=0)
     build = folder.main("build")
     assert build.status == 0, build.out + build.err

@@ -19,7 +19,7 @@ from support.png_files import read_png
 
 pytestmark = pytest.mark.engine
 
-EVERYTHING = """
+FULL_MODEL = """
 <mujoco>
   <asset>
     <texture name="grid" type="2d" builtin="checker" width="8" height="8" rgb1="1 0 0" rgb2="0 1 0"/>
@@ -64,7 +64,7 @@ def solids(main: dict[str, Any]) -> list[Solid]:
 
 @pytest.fixture(scope="module")
 def rich_scene(bench: Bench) -> tuple[Any, dict[str, Any]]:
-    return main_of(bench, xml=EVERYTHING, overlays=["frames", "com"], toggles=["frames"])
+    return main_of(bench, xml=FULL_MODEL, overlays=["frames", "com"], toggles=["frames"])
 
 
 def test_all_geoms_have_their_shape_and_place(rich_scene: tuple[Any, dict[str, Any]]) -> None:

@@ -16,7 +16,11 @@ from support.scratch_course import Folder, block, wait_until_alone
 
 pytestmark = pytest.mark.site
 
-ONE, TWO, MAP = "content/lessons/1.1-one.md", "content/lessons/1.2-two.md", "content/course.toml"
+FIRST_LESSON, SECOND_LESSON, MAP = (
+    "content/lessons/1.1-one.md",
+    "content/lessons/1.2-two.md",
+    "content/course.toml",
+)
 FALL = """## Fall 🪂
 
 The [moment of inertia]{term} weighs mass by its distance. Turning is $\\omega${symbol="angular
@@ -67,7 +71,7 @@ BALL = """<!-- A ball in the air. -->
 
 def wait_for_results(editor: Editor) -> None:
     """Until everything has run."""
-    editor.wait_for(lambda: "nq = 7" in editor.hover_text(TWO, "model:ba|ll"))
+    editor.wait_for(lambda: "nq = 7" in editor.hover_text(SECOND_LESSON, "model:ba|ll"))
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +80,7 @@ def editor(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[E
     folder.write("models/ball.xml", BALL)
     folder.fill([FALL, LINKS], stores)
     editor = Editor(folder)
-    for path in (ONE, TWO, MAP):
+    for path in (FIRST_LESSON, SECOND_LESSON, MAP):
         editor.write(path, folder.text(path))
     wait_for_results(editor)
     yield editor
@@ -87,7 +91,7 @@ def editor(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[E
 @pytest.fixture(autouse=True)
 def unchanged(editor: Editor) -> Iterator[None]:
     """Each test finds the course as it was, and the server has written into none of its files."""
-    texts = {path: editor.folder.text(path) for path in (ONE, TWO, MAP)}
+    texts = {path: editor.folder.text(path) for path in (FIRST_LESSON, SECOND_LESSON, MAP)}
     yield
     for path, text in texts.items():
         editor.write(path, text)
@@ -100,8 +104,10 @@ def unchanged(editor: Editor) -> Iterator[None]:
 
 
 def test_mistakes_are_reported_while_typing_and_nothing_is_saved(editor: Editor) -> None:
-    editor.write(TWO, LINKS.replace("\n", "\r\n") + "\r\n🙂 𝄞 Lesson 9.9 is not there.\r\n")
-    (mistake,) = editor.until(TWO, "link-lesson")
+    editor.write(
+        SECOND_LESSON, LINKS.replace("\n", "\r\n") + "\r\n🙂 𝄞 Lesson 9.9 is not there.\r\n"
+    )
+    (mistake,) = editor.until(SECOND_LESSON, "link-lesson")
     place = types.Position(5, 13)  # in UTF-16, of which the two characters before take two each
     assert mistake.range == types.Range(place, types.Position(5, 16))
     assert mistake.severity == types.DiagnosticSeverity.Error
@@ -111,54 +117,57 @@ def test_mistakes_are_reported_while_typing_and_nothing_is_saved(editor: Editor)
     assert mistake.code_description and mistake.code_description.href.endswith(
         "rules.md#link-lesson"
     )
-    editor.write(TWO, LINKS)
-    editor.until(TWO)
-    assert editor.folder.text(TWO) == LINKS
+    editor.write(SECOND_LESSON, LINKS)
+    editor.until(SECOND_LESSON)
+    assert editor.folder.text(SECOND_LESSON) == LINKS
 
 
 def test_a_mistake_has_related_places(editor: Editor) -> None:
-    editor.write(TWO, LINKS + "\nA [moment of inertia]{term} again.\n")
-    (diagnostic,) = editor.until(TWO, "term-repeated")
+    editor.write(SECOND_LESSON, LINKS + "\nA [moment of inertia]{term} again.\n")
+    (diagnostic,) = editor.until(SECOND_LESSON, "term-repeated")
     (note,) = diagnostic.related_information or ()
-    assert (editor.places.path(note.location.uri), note.location.range.start.line) == (ONE, 2)
+    assert (editor.places.path(note.location.uri), note.location.range.start.line) == (
+        FIRST_LESSON,
+        2,
+    )
 
 
 def test_outputs_are_compared_while_typing(editor: Editor) -> None:
-    editor.until(ONE)
+    editor.until(FIRST_LESSON)
     typed = FALL.replace("at 1.000 m\n```", "at 1.700 m\n```").replace("`1.000`", "`1.3`")
     typed = f"New lines above.\n\n{typed}"
-    editor.write(ONE, typed)
-    drift, binding = editor.until(ONE, "output-drift", "binding-mismatch")
+    editor.write(FIRST_LESSON, typed)
+    drift, binding = editor.until(FIRST_LESSON, "output-drift", "binding-mismatch")
     assert "this run printed 1.000" in drift.message
     assert (drift.range.start.line, binding.range.start.line) == (22, 25)
 
 
 def test_scripts_run_when_they_are_saved(editor: Editor) -> None:
     typed = FALL.replace("print(", 'print("a ball", ')
-    editor.write(ONE, typed)
-    editor.until(ONE)  # what it prints now is not known yet
-    editor.save(ONE)
-    editor.until(ONE, "output-drift")
-    editor.write(ONE, "A line more.\n\n" + typed)
-    (diagnostic,) = editor.until(ONE, "output-drift")
+    editor.write(FIRST_LESSON, typed)
+    editor.until(FIRST_LESSON)  # what it prints now is not known yet
+    editor.save(FIRST_LESSON)
+    editor.until(FIRST_LESSON, "output-drift")
+    editor.write(FIRST_LESSON, "A line more.\n\n" + typed)
+    (diagnostic,) = editor.until(FIRST_LESSON, "output-drift")
     assert diagnostic.range.start.line == 20
     accept = "Accept what `examples/fall.py` prints"
     # offered once the script has run a second time
-    action = editor.wait_for(lambda: editor.actions(ONE, "at 1.|000 m").get(accept))
+    action = editor.wait_for(lambda: editor.actions(FIRST_LESSON, "at 1.|000 m").get(accept))
     assert action.kind == types.CodeActionKind.QuickFix and action.diagnostics
     (new,) = editor.apply_edits(action.edit.changes).values()
     assert new == ("A line more.\n\n" + typed).replace("\nafter", "\na ball after")
-    editor.write(ONE, new)
-    editor.until(ONE)
+    editor.write(FIRST_LESSON, new)
+    editor.until(FIRST_LESSON)
 
 
 def test_diagnostics_of_a_run_follow_their_lines(editor: Editor) -> None:
     typed = FALL.replace("print(", "print(1 / 0, ")
-    editor.write(ONE, typed)
-    editor.save(ONE)
-    (diagnostic,) = editor.until(ONE, "script-failed")
-    editor.write(ONE, "A line more.\n\n" + typed)
-    editor.until(ONE, "script-failed", line=diagnostic.range.start.line + 2)
+    editor.write(FIRST_LESSON, typed)
+    editor.save(FIRST_LESSON)
+    (diagnostic,) = editor.until(FIRST_LESSON, "script-failed")
+    editor.write(FIRST_LESSON, "A line more.\n\n" + typed)
+    editor.until(FIRST_LESSON, "script-failed", line=diagnostic.range.start.line + 2)
 
 
 def test_a_broken_map_is_reported_and_the_last_course_stays(editor: Editor) -> None:
@@ -166,15 +175,25 @@ def test_a_broken_map_is_reported_and_the_last_course_stays(editor: Editor) -> N
     editor.write(MAP, text + "\n[[silence]]\nrule = \n")
     (diagnostic,) = editor.until(MAP, "map-syntax")
     assert diagnostic.range.start.line == text.count("\n") + 2
-    assert editor.hover_text(TWO, "lesson:1.|1#fall").startswith("**Lesson 1.1: ")
+    assert editor.hover_text(SECOND_LESSON, "lesson:1.|1#fall").startswith("**Lesson 1.1: ")
 
 
-ODD = ("", "\0", "\ud83d", "```lab simlab\n{", "> [!", "$$", "[x](lesson:", "| a\n|-", "é" * 9999)
+ODD_TEXTS = (
+    "",
+    "\0",
+    "\ud83d",
+    "```lab simlab\n{",
+    "> [!",
+    "$$",
+    "[x](lesson:",
+    "| a\n|-",
+    "é" * 9999,
+)
 
 
 def test_any_text_is_read(editor: Editor) -> None:
-    for text in ODD:
-        for path in (ONE, MAP, "models/ball.xml"):
+    for text in ODD_TEXTS:
+        for path in (FIRST_LESSON, MAP, "models/ball.xml"):
             editor.write(path, text)
             for ask in (editor.hover_text, editor.proposals, editor.actions):
                 ask(path, "|" + text)
@@ -185,55 +204,55 @@ def test_any_text_is_read(editor: Editor) -> None:
 
 def test_a_text_that_is_too_long_is_not_read(editor: Editor) -> None:
     text = "$x$ *a* {out} " * 20_000
-    editor.write(ONE, text)
-    editor.until(ONE, "text-long")
-    params = editor.identifier(ONE), types.FormattingOptions(4, True)
+    editor.write(FIRST_LESSON, text)
+    editor.until(FIRST_LESSON, "text-long")
+    params = editor.identifier(FIRST_LESSON), types.FormattingOptions(4, True)
     assert not editor.request("formatting", types.DocumentFormattingParams(*params))
     assert not editor.request("folding_range", types.FoldingRangeParams(params[0]))
-    assert not editor.actions(ONE, text[:3] + "|" + text[3:])
-    editor.write(ONE, FALL)
-    editor.until(ONE)
-    assert "after 0.002 s" in editor.hover_text(ONE, "`1.0|00`{out}")
+    assert not editor.actions(FIRST_LESSON, text[:3] + "|" + text[3:])
+    editor.write(FIRST_LESSON, FALL)
+    editor.until(FIRST_LESSON)
+    assert "after 0.002 s" in editor.hover_text(FIRST_LESSON, "`1.0|00`{out}")
 
 
 def test_a_model_that_goes_is_missed(editor: Editor) -> None:
-    editor.until(TWO)
+    editor.until(SECOND_LESSON)
     (editor.folder.root / "models/ball.xml").unlink()
-    editor.until(TWO, "link-model")
+    editor.until(SECOND_LESSON, "link-model")
     editor.folder.write("models/ball.xml", BALL)
-    editor.until(TWO)
+    editor.until(SECOND_LESSON)
     wait_for_results(editor)
 
 
 # --- what things are
 
 HOVERS = [
-    (ONE, "$\\om|ega${symbol", "- `\\omega`: angular velocity, rad/s"),
-    (ONE, "I \\om|ega^2", "- `\\omega`: angular velocity, rad/s"),
-    (ONE, "data.qp|os[2]:", "mjtNum * qpos"),
-    (ONE, "data.qp|os[2]:", "shape `(nq,)`, here `(7,)`"),
-    (ONE, "model.opt.time|step", "timestep"),
-    (ONE, "mujoco.mj_st|ep(", "Advance simulation"),
-    (ONE, '"expr": "data.qp|os', "position"),
-    (ONE, "`1.0|00`{out}", "after 0.002 s at 1.000 m"),
-    (ONE, "[!warn|ing]", "Something here goes wrong easily, or costs dearly."),
-    (ONE, '"tit|le"', "`title`: "),
-    (ONE, 'model_path("ba|ll")', "A ball in the air."),
-    (TWO, "model:ba|ll", "A ball in the air.\n\n1 bodies, 1 geoms; nq = 7, nv = 6"),
+    (FIRST_LESSON, "$\\om|ega${symbol", "- `\\omega`: angular velocity, rad/s"),
+    (FIRST_LESSON, "I \\om|ega^2", "- `\\omega`: angular velocity, rad/s"),
+    (FIRST_LESSON, "data.qp|os[2]:", "mjtNum * qpos"),
+    (FIRST_LESSON, "data.qp|os[2]:", "shape `(nq,)`, here `(7,)`"),
+    (FIRST_LESSON, "model.opt.time|step", "timestep"),
+    (FIRST_LESSON, "mujoco.mj_st|ep(", "Advance simulation"),
+    (FIRST_LESSON, '"expr": "data.qp|os', "position"),
+    (FIRST_LESSON, "`1.0|00`{out}", "after 0.002 s at 1.000 m"),
+    (FIRST_LESSON, "[!warn|ing]", "Something here goes wrong easily, or costs dearly."),
+    (FIRST_LESSON, '"tit|le"', "`title`: "),
+    (FIRST_LESSON, 'model_path("ba|ll")', "A ball in the air."),
+    (SECOND_LESSON, "model:ba|ll", "A ball in the air.\n\n1 bodies, 1 geoms; nq = 7, nv = 6"),
     (
-        TWO,
+        SECOND_LESSON,
         "term:mom|ent",
         "\n\nThe moment of inertia weighs mass by its distance.",
     ),
-    (TWO, "lesson:1.1#fa|ll", "**Lesson 1.1: "),
-    (TWO, "lesson:1.1#eq:en|ergy", "```tex\nE = m g h\n```"),
-    (TWO, "examples/fa|ll.py", "`examples/fall.py`, a script of 1.1"),
+    (SECOND_LESSON, "lesson:1.1#fa|ll", "**Lesson 1.1: "),
+    (SECOND_LESSON, "lesson:1.1#eq:en|ergy", "```tex\nE = m g h\n```"),
+    (SECOND_LESSON, "examples/fa|ll.py", "`examples/fall.py`, a script of 1.1"),
     (MAP, "stat|us =", ""),
 ]
 
 
 def test_hovers(editor: Editor) -> None:
-    for path in (ONE, TWO, MAP):
+    for path in (FIRST_LESSON, SECOND_LESSON, MAP):
         editor.until(path)
     texts = [(path, needle, editor.hover_text(path, needle)) for path, needle, _ in HOVERS]
     assert [
@@ -242,16 +261,16 @@ def test_hovers(editor: Editor) -> None:
 
 
 DEFINITIONS = [
-    (ONE, "I \\om|ega^2", f"{ONE}:3"),
-    (ONE, "`1.0|00`{out}", f"{ONE}:21"),
-    (TWO, "model:ba|ll", "models/ball.xml:1"),
-    (TWO, "term:mom|ent", f"{ONE}:3"),
-    (TWO, "lesson:1.1#fa|ll", f"{ONE}:1"),
-    (TWO, "lesson:1.1#eq:en|ergy", f"{ONE}:6"),
-    (TWO, "examples/fa|ll.py", f"{ONE}:8"),
-    (TWO, "Lesson 1.1| and", f"{ONE}:1"),
-    (TWO, "(#li|nks)", f"{TWO}:1"),
-    (MAP, 'id = "1.|2"', f"{TWO}:1"),
+    (FIRST_LESSON, "I \\om|ega^2", f"{FIRST_LESSON}:3"),
+    (FIRST_LESSON, "`1.0|00`{out}", f"{FIRST_LESSON}:21"),
+    (SECOND_LESSON, "model:ba|ll", "models/ball.xml:1"),
+    (SECOND_LESSON, "term:mom|ent", f"{FIRST_LESSON}:3"),
+    (SECOND_LESSON, "lesson:1.1#fa|ll", f"{FIRST_LESSON}:1"),
+    (SECOND_LESSON, "lesson:1.1#eq:en|ergy", f"{FIRST_LESSON}:6"),
+    (SECOND_LESSON, "examples/fa|ll.py", f"{FIRST_LESSON}:8"),
+    (SECOND_LESSON, "Lesson 1.1| and", f"{FIRST_LESSON}:1"),
+    (SECOND_LESSON, "(#li|nks)", f"{SECOND_LESSON}:1"),
+    (MAP, 'id = "1.|2"', f"{SECOND_LESSON}:1"),
 ]
 
 
@@ -266,18 +285,18 @@ def test_definitions(editor: Editor) -> None:
 @pytest.mark.parametrize(
     ("path", "typed", "label", "new"),
     [
-        (TWO, "[x](lesson:|", "1.1", "1.1"),
-        (TWO, "As Lesson 1|", "1.2", "1.2"),
-        (TWO, "[x](model:b|", "ball", "ball"),
-        (TWO, "[x](term:|", "moment-of-inertia", "moment-of-inertia"),
-        (TWO, "[x](lesson:1.1#|", "eq:energy", "eq:energy"),
-        (TWO, "`1`{out=|", "examples/fall.py", "examples/fall.py"),
-        (TWO, "> [!w|", "warning", "warning"),
-        (TWO, "```|", "quiz", "quiz"),
-        (TWO, "```python\nmodel.opt.|\n```", "timestep", "timestep"),
-        (TWO, '```lab simlab\n{"camera": {"|}}\n```', "azimuth", '"azimuth"'),
-        (TWO, '```quiz\n{"questions": [{"kind": "|"}]}\n```', "mcq", '"mcq"'),
-        (TWO, '```quiz\n{"questions": [{"kind": "numeric", |}]}\n```', "tol", '"tol"'),
+        (SECOND_LESSON, "[x](lesson:|", "1.1", "1.1"),
+        (SECOND_LESSON, "As Lesson 1|", "1.2", "1.2"),
+        (SECOND_LESSON, "[x](model:b|", "ball", "ball"),
+        (SECOND_LESSON, "[x](term:|", "moment-of-inertia", "moment-of-inertia"),
+        (SECOND_LESSON, "[x](lesson:1.1#|", "eq:energy", "eq:energy"),
+        (SECOND_LESSON, "`1`{out=|", "examples/fall.py", "examples/fall.py"),
+        (SECOND_LESSON, "> [!w|", "warning", "warning"),
+        (SECOND_LESSON, "```|", "quiz", "quiz"),
+        (SECOND_LESSON, "```python\nmodel.opt.|\n```", "timestep", "timestep"),
+        (SECOND_LESSON, '```lab simlab\n{"camera": {"|}}\n```', "azimuth", '"azimuth"'),
+        (SECOND_LESSON, '```quiz\n{"questions": [{"kind": "|"}]}\n```', "mcq", '"mcq"'),
+        (SECOND_LESSON, '```quiz\n{"questions": [{"kind": "numeric", |}]}\n```', "tol", '"tol"'),
         (MAP, "\n[[silence]]\nrule = |", "heading-skip", '"heading-skip"'),
         (MAP, "\n[[level]]\n|", "title", "title"),
         (MAP, '\n[[level.lesson]]\nprerequisites = ["1.1", "|', "1.2", '"1.2"'),
@@ -296,8 +315,8 @@ def test_completions(editor: Editor, path: str, typed: str, label: str, new: str
 
 
 def test_existing_keys_and_those_of_other_questions_are_not_proposed(editor: Editor) -> None:
-    editor.write(TWO, '```quiz\n{"questions": [{"kind": "numeric", "q": "?", }]}\n```\n')
-    assert not {"options", "q", "kind"} & editor.proposals(TWO, '"q": "?", |').keys()
+    editor.write(SECOND_LESSON, '```quiz\n{"questions": [{"kind": "numeric", "q": "?", }]}\n```\n')
+    assert not {"options", "q", "kind"} & editor.proposals(SECOND_LESSON, '"q": "?", |').keys()
 
 
 # --- what is offered
@@ -306,31 +325,31 @@ def test_existing_keys_and_those_of_other_questions_are_not_proposed(editor: Edi
 def test_a_number_that_was_printed_can_be_bound(editor: Editor) -> None:
     sentence = "It fell for 0.002 s, not 5 s, to `1.000` m."
     text = FALL.replace("> [!warning]", f"{sentence}\n\n> [!warning]")
-    editor.write(ONE, text)
-    (bind,) = editor.actions(ONE, "for 0.0|02 s, not").values()
+    editor.write(FIRST_LESSON, text)
+    (bind,) = editor.actions(FIRST_LESSON, "for 0.0|02 s, not").values()
     assert bind.title == "Bind `0.002` to what `examples/fall.py` prints"
-    assert editor.apply_edits(bind.edit.changes)[ONE] == text.replace(
+    assert editor.apply_edits(bind.edit.changes)[FIRST_LESSON] == text.replace(
         "r 0.002 s, not", "r `0.002`{out} s, not"
     )
-    (bind,) = editor.actions(ONE, "to `1.0|00` m.").values()
-    assert editor.apply_edits(bind.edit.changes)[ONE] == text.replace(
+    (bind,) = editor.actions(FIRST_LESSON, "to `1.0|00` m.").values()
+    assert editor.apply_edits(bind.edit.changes)[FIRST_LESSON] == text.replace(
         "`1.000` m.", "`1.000`{out} m."
     )
-    assert not editor.actions(ONE, "not |5 s")
-    assert not editor.actions(ONE, "at 1.|000 m\n```")
+    assert not editor.actions(FIRST_LESSON, "not |5 s")
+    assert not editor.actions(FIRST_LESSON, "at 1.|000 m\n```")
 
 
 def test_a_proposal_of_a_diagnostic_is_a_quick_fix(editor: Editor) -> None:
     text = FALL.replace("at `1.000`{out} m", "at `1.200 m`{out}")
-    editor.write(ONE, text)
-    editor.until(ONE, "binding-mismatch")
-    (fix,) = editor.actions(ONE, "`1.2|00 m`").values()
+    editor.write(FIRST_LESSON, text)
+    editor.until(FIRST_LESSON, "binding-mismatch")
+    (fix,) = editor.actions(FIRST_LESSON, "`1.2|00 m`").values()
     assert (fix.title, fix.kind) == ("Write `1.000 m`", types.CodeActionKind.QuickFix)
-    assert editor.apply_edits(fix.edit.changes)[ONE] == text.replace("1.200", "1.000")
+    assert editor.apply_edits(fix.edit.changes)[FIRST_LESSON] == text.replace("1.200", "1.000")
 
 
 def test_renaming_a_lesson(editor: Editor) -> None:
-    place = editor.identifier(TWO), editor.place(TWO, "lesson:1.|1#fall")
+    place = editor.identifier(SECOND_LESSON), editor.place(SECOND_LESSON, "lesson:1.|1#fall")
     name = editor.request("prepare_rename", types.PrepareRenameParams(*place))
     assert name.range.end.character - name.range.start.character == len("1.1")
     assert name.placeholder == "1.1"
@@ -338,12 +357,12 @@ def test_renaming_a_lesson(editor: Editor) -> None:
     *edits, file_rename = rename_edit.document_changes
     assert editor.places.path(file_rename.new_uri) == "content/lessons/1.5-one.md"
     new = editor.apply_edits({edit.text_document.uri: edit.edits for edit in edits})
-    assert new[TWO] == LINKS.replace("1.1", "1.5")
+    assert new[SECOND_LESSON] == LINKS.replace("1.1", "1.5")
     assert 'id = "1.5"' in new[MAP]
     assert 'id = "1.1"' not in new[MAP]
     with pytest.raises(JsonRpcException, match=r"there is a lesson 1\.2 already"):
         editor.request("rename", types.RenameParams(*place, new_name="1.2"))
-    heading = editor.identifier(TWO), editor.place(TWO, "## L|inks")
+    heading = editor.identifier(SECOND_LESSON), editor.place(SECOND_LESSON, "## L|inks")
     assert editor.request("prepare_rename", types.PrepareRenameParams(*heading)) is None
 
 
@@ -356,21 +375,31 @@ def rename(editor: Editor, path: str, needle: str, name: str) -> dict[str, str]:
 def test_renaming_a_term_and_a_label(editor: Editor) -> None:
     text = LINKS + "\n[again][r] and [the term](lesson:1.1#term:moment-of-inertia).\n\n"
     text += "[r]: lesson:1.1#eq:energy\n"
-    editor.write(TWO, text)
-    for path, needle in ((ONE, "{#eq:en|ergy}"), (TWO, "lesson:1.1#eq:en|ergy)")):
+    editor.write(SECOND_LESSON, text)
+    for path, needle in (
+        (FIRST_LESSON, "{#eq:en|ergy}"),
+        (SECOND_LESSON, "lesson:1.1#eq:en|ergy)"),
+    ):
         new = rename(editor, path, needle, "eq:E-1")
-        texts = {ONE: FALL, TWO: text}
+        texts = {FIRST_LESSON: FALL, SECOND_LESSON: text}
         assert new == {p: t.replace("eq:energy", "eq:E-1") for p, t in texts.items()}
-    for path, needle in ((ONE, "[mom|ent of inertia]"), (TWO, "term:mom|ent-of-inertia),")):
+    for path, needle in (
+        (FIRST_LESSON, "[mom|ent of inertia]"),
+        (SECOND_LESSON, "term:mom|ent-of-inertia),"),
+    ):
         new = rename(editor, path, needle, "Rotational inertia")
         assert new == {
-            ONE: FALL.replace("]{term}", ']{term="Rotational inertia"}'),
-            TWO: text.replace("term:moment-of-inertia", "term:rotational-inertia"),
+            FIRST_LESSON: FALL.replace("]{term}", ']{term="Rotational inertia"}'),
+            SECOND_LESSON: text.replace("term:moment-of-inertia", "term:rotational-inertia"),
         }
-    assert rename(editor, TWO, "lesson:1.1#fa|ll)", "x") == {}  # it follows from the heading
+    assert (
+        rename(editor, SECOND_LESSON, "lesson:1.1#fa|ll)", "x") == {}
+    )  # it follows from the heading
     labelled = text.replace("## Links", "## Links {#all .further}").replace("(#links)", "(#all)")
-    editor.write(TWO, labelled)
-    assert rename(editor, TWO, "{#a|ll", "both")[TWO] == labelled.replace("#all", "#both")
+    editor.write(SECOND_LESSON, labelled)
+    assert rename(editor, SECOND_LESSON, "{#a|ll", "both")[SECOND_LESSON] == labelled.replace(
+        "#all", "#both"
+    )
     for needle, name, reason in (
         ("term:mom|ent-of-inertia),", "{}", "a term has letters or digits"),
         ("lesson:1.1#eq:en|ergy)", "energy", "a label is `eq:`"),
@@ -378,12 +407,14 @@ def test_renaming_a_term_and_a_label(editor: Editor) -> None:
         ("{#a|ll", "a b", "a label is letters"),
     ):
         with pytest.raises(JsonRpcException, match=reason):
-            rename(editor, TWO, needle, name)
+            rename(editor, SECOND_LESSON, needle, name)
 
 
 def test_headings_and_folds(editor: Editor) -> None:
-    editor.write(TWO, "## A\n\n### B `c`\n\n> [!tip]\n> Fold\n\n## D\n\n```text\nx\n```\n")
-    document = editor.identifier(TWO)
+    editor.write(
+        SECOND_LESSON, "## A\n\n### B `c`\n\n> [!tip]\n> Fold\n\n## D\n\n```text\nx\n```\n"
+    )
+    document = editor.identifier(SECOND_LESSON)
     symbols = editor.request("document_symbol", types.DocumentSymbolParams(document))
     assert [(s.name, [i.name for i in s.children]) for s in symbols] == [("A", ["B c"]), ("D", [])]
     folds = editor.request("folding_range", types.FoldingRangeParams(document))
@@ -392,12 +423,12 @@ def test_headings_and_folds(editor: Editor) -> None:
 
 
 def test_a_text_is_formatted(editor: Editor) -> None:
-    params = editor.identifier(TWO), types.FormattingOptions(4, True)
-    editor.write(TWO, "## A\n\n| a | b |\n|-|-|\n| 100 | 2 |\n")
+    params = editor.identifier(SECOND_LESSON), types.FormattingOptions(4, True)
+    editor.write(SECOND_LESSON, "## A\n\n| a | b |\n|-|-|\n| 100 | 2 |\n")
     (edit,) = editor.request("formatting", types.DocumentFormattingParams(*params))
     new = "## A\n\n| a   | b   |\n| --- | --- |\n| 100 | 2   |\n"
-    assert editor.apply_edits({editor.places.uri(TWO): [edit]}) == {TWO: new}
-    editor.write(TWO, new)
+    assert editor.apply_edits({editor.places.uri(SECOND_LESSON): [edit]}) == {SECOND_LESSON: new}
+    editor.write(SECOND_LESSON, new)
     assert not editor.request("formatting", types.DocumentFormattingParams(*params))
 
 

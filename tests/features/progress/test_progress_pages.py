@@ -21,17 +21,17 @@ def open_question(text: str, **fields: str) -> dict[str, Any]:
     return {"kind": "open", "q": text, "reference": "So.", **fields}
 
 
-TWO = quiz("0.1-one", open_question("Why?"), open_question("How?", id="how")) + quiz(
+TWO_QUIZZES = quiz("0.1-one", open_question("Why?"), open_question("How?", id="how")) + quiz(
     "0.1-two", open_question("What?")
 )
-WHY, WHAT = text_key("open", "Why?"), text_key("open", "What?")
-NAMES = f"0.1-one:{WHY},how 0.1-two:{WHAT}"
+WHY_KEY, WHAT_KEY = text_key("open", "Why?"), text_key("open", "What?")
+NAMES = f"0.1-one:{WHY_KEY},how 0.1-two:{WHAT_KEY}"
 
 
 @pytest.fixture(scope="module")
 def pages(make: Make) -> dict[str, str]:
     """The pages of a course with questions in a lesson and in another page."""
-    site = make(TWO, about=quiz("about", open_question("Which?", id="which"))).site()
+    site = make(TWO_QUIZZES, about=quiz("about", open_question("Which?", id="which"))).site()
     return {path: data.decode() for path, data in site.items() if path.endswith(".html")}
 
 

@@ -16,7 +16,7 @@ from support.archives import (
     packaging_schema,
     referenced_files,
 )
-from support.hostile_html import HOSTILE, REFUSED
+from support.hostile_html import HOSTILE, REFUSED_TEXTS
 from support.qti_rules import MATHML, QTI
 from support.qti_rules import mistakes as item_mistakes
 from support.question_zoo import ANY, SCRIPT, SVG, quiz
@@ -154,7 +154,7 @@ def test_items_of_outputs_texts_and_orders(zoo_items: dict[str, etree._Element])
 
 # --- hard cases
 
-WARNED = {
+WARNINGS_BY_TEXT = {
     "<video src='sketch.svg'>words</video>": "`<video>` has no place in QTI and is left out",
     "<ol start='5'><li>five</li></ol>": "a numbered list counts from 1",
     "<del>no</del>": "crossed-out text is marked by a class",
@@ -175,7 +175,7 @@ def test_package_of_hard_cases_is_whole_and_its_losses_are_reported(make_course:
     hostile = [
         {**ANY["mcq"], "q": text, "explain": text, "hints": [text], "label": text[:40],
          "options": [text, "b"], "answer": 0, "feedback": [text, text]}
-        for text in HOSTILE if text not in REFUSED
+        for text in HOSTILE if text not in REFUSED_TEXTS
     ]  # fmt: skip
     formula_question = {**ANY["zero"], "q": f"Inline ${FORMULAS}$ and\n\n$${FORMULAS}$$"}
     twice = [ANY["zero"], {**ANY["zero"], "q": "Again?"}]
@@ -184,7 +184,7 @@ def test_package_of_hard_cases_is_whole_and_its_losses_are_reported(make_course:
         + SCRIPT.replace("fall.py", "fall.py requires=no_such_module")
         + quiz("unknown", ANY["output"], ANY["zero"])
         + quiz("hostile", *hostile, title='<i>"T" & co</i>')
-        + quiz("warned", *({**ANY["zero"], "q": text} for text in WARNED))
+        + quiz("warned", *({**ANY["zero"], "q": text} for text in WARNINGS_BY_TEXT))
         + quiz("formulas", formula_question)
         + "".join(quiz(id, *twice) for id in IDS)
     )
@@ -199,7 +199,10 @@ def test_package_of_hard_cases_is_whole_and_its_losses_are_reported(make_course:
     command = export(folder)
     files = entries(folder.root / ZIP)
     check(files)
-    losses = "it is left out: its script was not run, so nobody knows the key", *WARNED.values()
+    losses = (
+        "it is left out: its script was not run, so nobody knows the key",
+        *WARNINGS_BY_TEXT.values(),
+    )
     message = "this question is not whole in the QTI package: "
     assert [loss for loss in losses if f"{message}{loss}" not in command.out] == []
     assert len(items(files, "quiz.unknown")) == 1

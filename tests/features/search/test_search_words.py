@@ -12,17 +12,17 @@ from hypothesis import strategies as st
 from coursebuild.features.search.tex import plain_formula
 from coursebuild.features.search.words import count_terms, is_fuzzy, shelf_of, terms_of
 
-AGREED = json.loads(
+SHARED_CASES = json.loads(
     (Path(__file__).parents[3] / "site" / "tests" / "search-words.json").read_text("utf-8")
 )
 
 
 def test_terms_are_those_that_the_browser_makes() -> None:
-    assert [[text, terms_of(text)] for text, _ in AGREED["terms"]] == AGREED["terms"]
+    assert [[text, terms_of(text)] for text, _ in SHARED_CASES["terms"]] == SHARED_CASES["terms"]
 
 
 def test_shelves_are_those_of_the_browser() -> None:
-    for term, shelf, fuzzy, _ in AGREED["shelves"]:
+    for term, shelf, fuzzy, _ in SHARED_CASES["shelves"]:
         assert (shelf_of(term), is_fuzzy(term)) == (shelf, fuzzy), term
 
 

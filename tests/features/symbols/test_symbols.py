@@ -82,13 +82,13 @@ def test_a_symbol_does_not_depend_on_its_formula(typeset: Typeset) -> None:
         assert alone[0] in symbols(typeset(tex)), tex
 
 
-SINGLE = r"\omega \mathbf{c}_k x^* \tilde{I}_{xy} I_{zz} \Delta \ell".split()
+SINGLE_SYMBOLS = r"\omega \mathbf{c}_k x^* \tilde{I}_{xy} I_{zz} \Delta \ell".split()
 NAMES = r"\mathrm{Re} \mathit{St}".split()
 NO_SYMBOL = r"mg v^2 A^\top I=1 1 \frac{a}{b}".split()
 
 
 def test_a_single_symbol_equals_that_of_a_formula(typeset: Typeset) -> None:
-    for tex in SINGLE:
+    for tex in SINGLE_SYMBOLS:
         assert symbols(typeset(f"1 + {tex}")) == (only_symbol(typeset(tex)),)
     assert [tex for tex in (*NAMES, *NO_SYMBOL) if only_symbol(typeset(tex))] == NAMES
     assert only_symbol("<math></math>") is None

@@ -14,16 +14,16 @@ from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.compare import compare, pruning_scenes
 from coursebuild.numerics.pruning.index_map import IndexMap, Removal, fits, index_map, transfer
 from coursebuild.numerics.scene import Scene
-from support.surveys import NOTHING, parse_declared
+from support.surveys import NO_DECLARATIONS, parse_declared
 
-DOUBLE = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/>
+DOUBLE_PENDULUM = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/>
   <body pos="1 0 0"><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0" mass="{mass!r}"/></body>
   </body></worldbody><keyframe><key qpos="-1.4 .5"/></keyframe></mujoco>"""
 
 
 def scene_of(duration: float, keyframe: int = -1) -> Scene:
     scenario = Scenario(duration, 0.002, keyframe=keyframe)
-    nobody = DeclaredScenario("go", span=NOTHING.source.span(0, 0))
+    nobody = DeclaredScenario("go", span=NO_DECLARATIONS.source.span(0, 0))
     return Scene("go", "go", scenario, (0.002,), 0.002, BenchTable(), nobody)
 
 
@@ -31,7 +31,7 @@ CHAOS, SHORT = scene_of(15.0, 0), scene_of(1.0, 0)
 
 
 def double(mass: float = 1.0) -> Any:
-    return mujoco.MjModel.from_xml_string(DOUBLE.format(mass=mass))
+    return mujoco.MjModel.from_xml_string(DOUBLE_PENDULUM.format(mass=mass))
 
 
 def identity_map(model: Any) -> IndexMap:
@@ -101,7 +101,7 @@ def test_a_state_is_brought_over() -> None:
 def test_scenarios_as_the_author_wrote_them() -> None:
     text = """[[scenario]]\nname = "push"\nduration = 1\nsample = 0.1\nhold = 0.2
 controls = [[1], [2]]\nqvel = [0, 5]\n"""
-    mjcf = DOUBLE.format(mass=1.0).replace('<joint axis="0 1 0"/>', '<joint name="j"/>', 1)
+    mjcf = DOUBLE_PENDULUM.format(mass=1.0).replace('<joint axis="0 1 0"/>', '<joint name="j"/>', 1)
     motor = "<actuator><motor joint='j'/></actuator></mujoco>"
     model = mujoco.MjModel.from_xml_string(mjcf.replace("</mujoco>", motor))
     (scene,) = pruning_scenes(model, parse_declared(text))

@@ -22,7 +22,7 @@ def remove_by_tag(text: str, *tags: str) -> str:
     return after(text, *remove_elements(elements))
 
 
-ODD = (
+ODD_MODEL = (
     "\ufeff<?xml version='1.0' encoding='ISO-8859-1'?>\r\n"
     '<!-- <geom name="no"/> -->\r\n'
     "<mujoco model = 'é&amp;<'>\r\n".replace("&amp;<", "&amp;&lt;")
@@ -34,7 +34,7 @@ ODD = (
 
 def test_places_in_an_odd_text() -> None:
     """A byte order mark, CRLF, a wrong encoding, quotes, references, comments, CDATA."""
-    markup = document(ODD)
+    markup = document(ODD_MODEL)
     elements = list(markup.root.walk())
     assert [element.tag for element in elements] == ["mujoco", "worldbody", "body", "geom", "geom"]
     assert markup.root.get("model") == "é&<"

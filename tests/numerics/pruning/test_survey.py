@@ -38,11 +38,11 @@ ASSETS = """<asset>
     <mesh name="ünüsed" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>
     <hfield name="hill" nrow="2" ncol="2" size="1 1 1 1" elevation="0 1 0 1"/>
   </asset>"""
-SHOWN = """<geom type="mesh" mesh="used" material="table" mass="0"/>"""
+VISIBLE_GEOM = """<geom type="mesh" mesh="used" material="table" mass="0"/>"""
 
 
 def test_assets_that_nothing_uses_with_those_that_only_they_use() -> None:
-    text = scene(PENDULUM.replace("</body>", SHOWN + "</body>"), head=ASSETS)
+    text = scene(PENDULUM.replace("</body>", VISIBLE_GEOM + "</body>"), head=ASSETS)
     survey = run_survey(text)
     findings = findings_by_kind(survey)
     assert {kind: names(finding) for kind, finding in findings.items()} == {
@@ -64,7 +64,7 @@ def test_assets_that_nothing_uses_with_those_that_only_they_use() -> None:
 
 
 def test_a_texture_of_a_kept_material_is_used() -> None:
-    text = scene(PENDULUM.replace("</body>", SHOWN + "</body>"), head=ASSETS)
+    text = scene(PENDULUM.replace("</body>", VISIBLE_GEOM + "</body>"), head=ASSETS)
     survey = run_survey(text, keeps={"unused-material curtain": "for the next lesson"})
     findings = findings_by_kind(survey)
     assert findings["unused-material"].kept == "for the next lesson"
