@@ -19,8 +19,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(HERE))
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
 
 from benchmarks.measure.building import make_site, measure_builds  # noqa: E402
 from benchmarks.measure.process import CommandError  # noqa: E402
@@ -29,7 +29,7 @@ from benchmarks.measure.running import jcache_version, measure_scripts  # noqa: 
 from benchmarks.measure.serving import measure_serving  # noqa: E402
 from benchmarks.measure.tools import Places, all_tools  # noqa: E402
 
-DOCS = HERE / "docs/explanation/benchmarks.md"
+DOCS = ROOT / "docs/explanation/benchmarks.md"
 PARTS = ("builds", "serve", "scripts")
 
 

@@ -13,8 +13,8 @@ import importlib
 import sys
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(HERE))
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
 
 from benchmarks.generate.lesson import lesson_name, make_lesson  # noqa: E402
 

@@ -39,8 +39,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-HERE = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(HERE))
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
 
 PENDULUM = """<mujoco><option timestep="0.002" integrator="RK4"/><worldbody>
 <body pos="0 0 1"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -.5" size=".02"/>
@@ -82,7 +82,7 @@ def boxes(count: int) -> str:
 
 
 MODELS = {
-    "tumbling_box": (HERE / "models" / "tumbling_box.xml").read_text(encoding="utf-8"),
+    "tumbling_box": (ROOT / "models" / "tumbling_box.xml").read_text(encoding="utf-8"),
     "double_pendulum": PENDULUM,
     "chain": chain(10),
     "six_boxes": boxes(6),
@@ -131,7 +131,7 @@ def make_course(folder: Path) -> None:
 def run(folder: Path, *arguments: str) -> str:
     """Run coursebuild in the scratch course."""
     command = [sys.executable, "-m", "coursebuild", "-C", str(folder), *arguments]
-    environment = {**os.environ, "PYTHONPATH": str(HERE)}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     process = subprocess.run(command, capture_output=True, text=True, env=environment)
     if process.returncode != 0:
         sys.exit(process.stdout + process.stderr)

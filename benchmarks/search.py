@@ -38,8 +38,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-HERE = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(HERE))
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
 
 from benchmarks.generate.wordy import vocabulary, write_wordy  # noqa: E402
 
@@ -77,8 +77,8 @@ def build_course(folder: Path, patch: str = "") -> float:
     """Build a course; gives the processor time of it and its children, s."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     command = [sys.executable, "-c", COMMAND.format(patch=patch), "-C", str(folder)]
-    environment = {**os.environ, "PYTHONPATH": str(HERE)}
-    subprocess.run([*command, "build", "--quiet"], check=True, env=environment, cwd=HERE)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    subprocess.run([*command, "build", "--quiet"], check=True, env=environment, cwd=ROOT)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 

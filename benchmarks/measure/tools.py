@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[2]
 SCRIPT_KINDS = ("scripts", "last", "installed")
 """The folders of `.coursebuild/` with results of scripts, which a cold build may use."""
 
@@ -96,7 +96,7 @@ def environment(places: Places) -> dict[str, str]:
     Python keeps what it compiled, as it does for readers: a tool that is tried out of its sources
     would otherwise compile them anew in each run, which those that are installed do not.
     """
-    paths = [str(HERE), os.environ.get("PYTHONPATH", "")]
+    paths = [str(ROOT), os.environ.get("PYTHONPATH", "")]
     inherited = {name: v for name, v in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     return {
         **inherited,
@@ -123,7 +123,7 @@ def read_version(command: list[str] | None) -> str | None:
         check=False,
         stdin=subprocess.DEVNULL,
         timeout=60,
-        env=os.environ | {"PYTHONPATH": str(HERE)},
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
     )
     match = re.search(r"\d+\.\d[\w.]*", process.stdout + process.stderr)
     return match[0] if match and process.returncode == 0 else None

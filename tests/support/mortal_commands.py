@@ -43,10 +43,8 @@ class Mortals:
         got through then, which leaves what a whole run leaves.
         """
         status, calls = self.run(folder, *arguments, fatal=fatal)
-        assert status == KILLED_STATUS or (status == 0 and fatal - 4 <= len(calls) < fatal), (
-            status,
-            fatal,
-        )
+        has_survived = status == 0 and fatal - 4 <= len(calls) < fatal
+        assert status == KILLED_STATUS or has_survived, (status, fatal)
         wait_until_alone(folder)
 
 

@@ -50,7 +50,7 @@ from coursebuild.numerics.reports.strokes import (
     symbols,
 )
 
-WIDE, NARROW, PAIRED = (620.0, 320.0), (350.0, 260.0), (430.0, 236.0)
+WIDE_SIZE, NARROW_SIZE, PAIR_SIZE = (620.0, 320.0), (350.0, 260.0), (430.0, 236.0)
 """The width of a chart and the height between its axes: for wide screens, for narrow ones, and for
 charts beside each other."""
 _TOP = 16.0
@@ -121,7 +121,7 @@ def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
     body, height = "".join(_parts(chart, x, y)), y.start + 48
     if chart.marks:
         lines = (Entry("line", line.name, line.number) for line in chart.lines)
-        left = 6.0 if size == NARROW else x.start
+        left = 6.0 if size == NARROW_SIZE else x.start
         key_svg, height = key((*lines, *chart.marks), left, y.start + 62, size[0])
         body += key_svg
     return svg(body, (size[0], height), name, (chart.title, chart.text))

@@ -19,7 +19,15 @@ from collections.abc import Iterator, Sequence
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import FLOORS, ScenarioReport, WorkPrecisionRow
 from coursebuild.numerics.reports.cases import CaseReport
-from coursebuild.numerics.reports.chart import NARROW, PAIRED, WIDE, Chart, Line, Point, chart_svg
+from coursebuild.numerics.reports.chart import (
+    NARROW_SIZE,
+    PAIR_SIZE,
+    WIDE_SIZE,
+    Chart,
+    Line,
+    Point,
+    chart_svg,
+)
 from coursebuild.numerics.reports.strokes import Entry
 from coursebuild.numerics.reports.text import (
     INTEGRATORS,
@@ -41,7 +49,7 @@ def plot_svg(report: ScenarioReport, *, name: str, narrow: bool = False) -> str:
         narrow: for narrow screens: the text has the same size there.
     """
     chart = work_precision(report)
-    return "" if chart is None else chart_svg(chart, name, NARROW if narrow else WIDE)
+    return "" if chart is None else chart_svg(chart, name, NARROW_SIZE if narrow else WIDE_SIZE)
 
 
 def work_precision(report: ScenarioReport) -> Chart | None:
@@ -205,7 +213,7 @@ def case_svg(report: CaseReport, quantity: Quantity, name: str) -> str:
         lines=lines,
         least=quantity.least,
     )
-    return chart_svg(chart, name, PAIRED)
+    return chart_svg(chart, name, PAIR_SIZE)
 
 
 def _case_points(report: CaseReport, quantity: Quantity, integrator: str) -> Iterator[Point]:

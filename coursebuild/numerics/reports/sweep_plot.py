@@ -13,7 +13,7 @@ from itertools import groupby, pairwise
 
 from coursebuild.core.drawing.marks import shorten_to_width, text_width
 from coursebuild.core.drawing.scales import Scale, log
-from coursebuild.numerics.reports.chart import NARROW, WIDE
+from coursebuild.numerics.reports.chart import NARROW_SIZE, WIDE_SIZE
 from coursebuild.numerics.reports.strokes import (
     FINE,
     MARK,
@@ -58,7 +58,7 @@ def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
         narrow: for narrow screens: the scales stand below each other.
     """
     figures = shown_figures(sweep)[:_MAX_FIGURES]
-    width, _ = NARROW if narrow else WIDE
+    width, _ = NARROW_SIZE if narrow else WIDE_SIZE
     if not figures:
         return ""
     texts = [*(f"  {row.value}" for row in sweep.rows), *(row.parameter for row in sweep.rows)]
