@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import BrowserContext, Locator, Page, Route, expect
 
+from support.chromium import OpenAddress
 from support.lab_page import becomes, until, wait_for_condition
 from support.reader_page import (
     FALL_PAGE,
@@ -22,8 +22,6 @@ from support.reader_page import (
 )
 
 pytestmark = pytest.mark.browser
-
-OpenAddress = Callable[[str], Page]
 
 
 def expect_mark(page: Page, id: str, text: str) -> None:

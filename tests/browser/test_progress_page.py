@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from support.chromium import OpenAddress
 from support.lab_page import becomes, until
 from support.reader_page import (
     FALL_PAGE,
@@ -23,7 +24,6 @@ from support.reader_page import (
 
 pytestmark = pytest.mark.browser
 
-OpenAddress = Callable[[str], Page]
 IMPORT_STATUS = '[data-control="import"] [role=status]'
 """What the page says of a file that was brought in."""
 

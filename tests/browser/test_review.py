@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from support.built_sites import Site
+from support.chromium import OpenAddress
 from support.reader_page import FALL_PAGE, OVERALL, PUSH_PAGE, WAY, choose, question, store_answers
 from support.scratch_course import Folder
 from support.static_host import Host
 
 pytestmark = pytest.mark.browser
-
-OpenAddress = Callable[[str], Page]
 
 
 def review_of(page: Page) -> Locator:

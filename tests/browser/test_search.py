@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import pytest
 from playwright.sync_api import BrowserContext, Locator, Page, expect
 
 from support.axe import violations
 from support.built_sites import Site
+from support.chromium import OpenAddress
 from support.lab_page import becomes, until, wait_until_settled
 
 pytestmark = pytest.mark.browser
@@ -18,8 +19,6 @@ pytestmark = pytest.mark.browser
 HOSTILE = '<img src=x onerror="alert(1)"> & <b>bold'
 FIRST_LESSON, SECOND_LESSON = "lessons/1.1-one.html", "lessons/1.2-two.html"
 SHOWS_QUERY = "(q) => document.querySelector('.search-dialog').dataset.shown === q"
-
-OpenAddress = Callable[[str], Page]
 
 
 @pytest.fixture

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from playwright.sync_api import Browser, BrowserContext, Playwright, expect
+from playwright.sync_api import Browser, BrowserContext, Page, Playwright, expect
 
 SLOW = 120_000
 """Milliseconds that a slow machine may take for anything."""
 expect.set_options(timeout=SLOW)
+
+OpenAddress = Callable[[str], Page]
+"""Opens a page of the site, by its path."""
 
 _KINDS = {
     "webgl": ("--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
