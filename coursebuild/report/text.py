@@ -11,7 +11,8 @@ Entry points: `to_text(report, style)`, `diagnostic_text(diagnostic, style)`; `s
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from typing import assert_never
 
 from coursebuild.core.model.results import TrialLine
@@ -32,10 +33,13 @@ from coursebuild.report.terminal import (
 )
 from coursebuild.report.values import Report, ScriptLine, plural, summary_line
 
+_MOST_OF_A_RULE = 20
+"""Diagnostics of one rule in one file that are shown."""
+
 
 def to_text(report: Report, style: Style) -> str:
-    """The report as text: each diagnostic, the scripts, and a summary line."""
-    parts = [diagnostic_text(d, style) + "\n" for d in report.diagnostics]
+    """The report as text: diagnostics, the scripts, and a summary line."""
+    parts = list(_diagnostic_parts(report.diagnostics, style))
     lines = [script_line(line, style) for line in report.scripts]
     lines += [lab_line(line, style) for line in report.labs]
     if lines:
@@ -46,6 +50,24 @@ def to_text(report: Report, style: Style) -> str:
         parts.append("".join(visible_lines(remark) + "\n" for remark in report.remarks))
     parts.append(style.paint(summary_line(report), GREEN if report.ok else RED) + "\n")
     return "\n".join(parts)
+
+
+def _diagnostic_parts(diagnostics: Sequence[Diagnostic], style: Style) -> Iterator[str]:
+    """The first diagnostics of each rule in each file, then how many more there are."""
+    counts: Counter[tuple[str, str, str]] = Counter()
+    for d in diagnostics:
+        key = d.severity, d.rule, d.span.path
+        counts[key] += 1
+        if counts[key] <= _MOST_OF_A_RULE:
+            yield diagnostic_text(d, style) + "\n"
+    rest = "".join(
+        f"{severity}[{rule}]: {count - _MOST_OF_A_RULE:,} more in {visible(path)}"
+        "; `coursebuild check --format json` lists all\n"
+        for (severity, rule, path), count in counts.items()
+        if count > _MOST_OF_A_RULE
+    )
+    if rest:
+        yield rest
 
 
 def script_line(line: ScriptLine, style: Style) -> str:

@@ -114,6 +114,24 @@ def test_report_lists_scripts_and_ends_with_a_summary() -> None:
     )
 
 
+def test_many_diagnostics_of_a_rule_in_a_file_are_counted() -> None:
+    source = Source("content/lessons/1.1-x.md", "<b>\n" * 1500)
+    rules = ["html-unbalanced"] * 1500 + ["math-syntax"]
+    diagnostics = tuple(
+        diagnose(rule, source.span(4 * n, 4 * n + 3), "m") for n, rule in enumerate(rules)
+    )
+    report = Report(diagnostics, (), Summary(1, 0, 0, 0, 1501, 0, 0, 1.0))
+    text = render_report(report, "text", Style())
+    assert text.count("[html-unbalanced]: m\n") == 20
+    assert text.count("[math-syntax]: m\n") == 1
+    assert text.endswith(
+        "\n\nerror[html-unbalanced]: 1,480 more in content/lessons/1.1-x.md"
+        "; `coursebuild check --format json` lists all\n"
+        "\n1 lesson, 0 scripts run: 1501 errors\n"
+    )
+    assert render_report(report, "github", Style()).count("html-unbalanced") == 1500
+
+
 def test_colour_is_only_colour() -> None:
     source, a, b = at("abc def", "def")
     diagnostic = diagnose("math-syntax", source.span(a, b), "m", label="l", help="h")
