@@ -28,6 +28,7 @@ from coursebuild.core.pages import font_files, fonts
 
 WEIGHTS = {fonts.TEXT: (400, 700), fonts.CODE: (400, 700)}
 """The weights that the style sheet uses."""
+RADICAL = "√"
 WIDEST = 1.07
 """A radical's advance width in those of the smallest: what is more than 1 stays as a thin space."""
 
@@ -56,7 +57,7 @@ def narrow_radicals(font: TTFont) -> None:
 
     MathML Core: the preferred inline size of a stretched operator is that of its widest variant.
     """
-    smallest = font.getBestCmap().get(ord(fonts.RADICAL))
+    smallest = font.getBestCmap().get(ord(RADICAL))
     if smallest is None or "MATH" not in font or "glyf" not in font:
         return
     variants = font["MATH"].table.MathVariants
@@ -101,7 +102,7 @@ def prepare(folder: Path, cuts: Path) -> None:
     files_by_key: dict[str, str] = {}
     prepared_faces = fonts.read_faces(listing.read_bytes())
     faces_with_data = [(face, (folder / face.file).read_bytes()) for face in prepared_faces]
-    for job in fonts.font_jobs(faces_with_data, "".join(fonts.BASE), ""):
+    for job in fonts.font_jobs(faces_with_data, "".join(fonts.GREEK), " "):
         files_by_key[job.key] = job.face.file.replace(".ttf", ".woff2")
         (cuts / files_by_key[job.key]).write_bytes(fonts.subset_font(job))
     text = json.dumps(files_by_key, indent=1, sort_keys=True)

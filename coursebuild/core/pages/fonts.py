@@ -6,9 +6,10 @@ which does one job, bytes to bytes; `face_rules`, the `@font-face` rules.
 1. A face is a font of the bundle with its family, style, range of weights and characters.
    `site/prepare_fonts.py` has done what does not depend on a course: it has left only the weights
    that the style sheet uses, and decompressed the font.
-2. A job keeps the characters of a face that the pages use; an unused face is left out. HarfBuzz
-   chooses the glyphs (for mathematics with all variants and pieces of brackets), and fontTools
-   compresses them.
+2. A job keeps the characters of a face that the pages use, and the usual ones: most courses need
+   only these, whose fonts are cut when the tool is bundled, and few edits change a font. A face
+   without used characters is left out. HarfBuzz chooses the glyphs (for mathematics with all
+   variants and pieces of brackets), and fontTools compresses them.
 3. While a font loads, text is set in a local one, scaled so that lines break in the same places:
    see `FALLBACKS`.
 4. The course's own fonts come first: the tool's are used only for the characters that they lack.
@@ -34,7 +35,20 @@ _COURSE_FAMILIES = {TEXT: COURSE["text"], CODE: COURSE["code"]}
 """The course's families that come before families of the bundle."""
 
 BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·¹½×éöü–—‘’“”…•−")
-"""Characters that are always kept, so that few edits change a font."""
+"""Characters of text that every site keeps."""
+GREEK = frozenset("".join(map(chr, range(0x391, 0x3CA))) + "ϑϕϖϰϱϵ") - {"\u03a2"}
+"""Letters that are kept together: a page that has one of them may soon have another."""
+MATHEMATICS = BASE.union(
+    GREEK,
+    map(chr, range(0x1D400, 0x1D434)),  # bold letters
+    map(chr, range(0x1D736, 0x1D755)),  # bold italic Greek letters
+    map(chr, range(0x1D7CE, 0x1D7D8)),  # bold digits
+    "¨¬÷ˆ˙˜\u0302\u0303\u0307\u0308\u20d7‖†′″…⁡‾⋅⋮⋯⋱⌈⌉⌊⌋⏞⏟□⟂⟨⟩\ufe0e",
+    "∀∂∃∅∆∇∈∉∏∑∓∗∘∙√∝∞∠∣∥∧∨∩∪∫∬∭∮∼≃≅≈≠≡≤≥≪≫⊂⊃⊆⊇⊕⊗⊤⊥",
+    "ℏℐℑℒℓℕℚℜℝℤℂℋ𝒪𝛀←↑→↓↔⇐⇒⇔↦⟶⟹",
+)
+"""Signs that are kept together where a page has formulas. The sign of roots must be among them: it
+is drawn, though it is not in their text."""
 
 _VERSION = 6
 """Part of a job's key; increase it when the way of cutting changes."""
@@ -86,24 +100,27 @@ def font_jobs(
 ) -> tuple[FontJob, ...]:
     """What to cut for pages that use the characters of `text`, and of `mathematics` in formulas.
 
-    `own` are the fonts of the course, which stand in the place of others of their families.
+    `course_faces` are the fonts of the course, which replace others of their families.
     """
     jobs: list[FontJob] = []
     letters = BASE | set(text)
+    if letters & GREEK:
+        letters |= GREEK
     course_characters: dict[str, set[str]] = {}
     for face, data in course_faces:
         used_characters = letters & characters_in(face.characters)
         jobs.append(FontJob(face, data, "".join(sorted(used_characters))))
         course_characters.setdefault(face.family, set()).update(used_characters)
+    signs = _mathematical(MATHEMATICS.union(mathematics)) if mathematics else set[str]()
     assigned: dict[tuple[str, str], set[str]] = {}
     for face, data in faces:
         missing = letters - course_characters.get(_COURSE_FAMILIES.get(face.family, ""), set())
-        needed_characters = missing if face.family != MATH else _mathematical(mathematics)
+        needed_characters = missing if face.family != MATH else signs
         assigned_characters = assigned.setdefault((face.family, face.style), set())
         characters = (needed_characters & characters_in(face.characters)) - assigned_characters
         if face.unicode_range is not None:
             characters &= characters_in(face.unicode_range)
-        if characters and (mathematics or face.family != MATH):
+        if characters:
             assigned_characters |= characters
             jobs.append(FontJob(face, data, "".join(sorted(characters))))
     return tuple(jobs)
@@ -132,10 +149,9 @@ def unicode_range(characters: str) -> str:
     return ", ".join(f"U+{a:X}" if a == b else f"U+{a:X}-{b:X}" for a, b in runs)
 
 
-def _mathematical(characters: str) -> set[str]:
+def _mathematical(characters: frozenset[str]) -> set[str]:
     """Characters of formulas, with the italics that a browser replaces single letters by."""
-    characters_ = {*characters, *map(chr, range(0x20, 0x7F)), RADICAL}
-    return characters_ | {italic for c in characters_ if (italic := italic_letter(c))}
+    return {*characters, *map(italic_letter, characters)} - {""}
 
 
 def italic_letter(character: str) -> str:
@@ -153,9 +169,6 @@ def italic_letter(character: str) -> str:
         return chr(0x1D6FC + code - 0x3B1)
     return _ITALIC_SYMBOLS.get(character, "")
 
-
-RADICAL = "√"
-"""The sign of roots, which is drawn though it is not in their text."""
 
 _ITALIC_SYMBOLS = {
     "ı": "\U0001d6a4",
