@@ -12,8 +12,8 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.files.errors import UsageError
-from coursebuild.core.files.write import write_atomic
+from coursebuild.core.files.changes import FileChange, change_files, undo_changes
+from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.course_json import read_course_json
@@ -76,21 +76,24 @@ def convert(folder: Path) -> ConvertedCourse:
 
 
 def write_course(course: ConvertedCourse, folder: Path, source: Path) -> None:
-    """Write the files of a new course.
+    """Write all files of a new course, or none.
 
     Raises:
         UsageError: the folder is the one that is imported, or in it, or has one of the files.
         EffectError: a file cannot be written.
     """
     target = folder.resolve()
+    undo_changes(target)
     if target.is_relative_to(source.resolve()):
         raise UsageError(f"{folder} is in the folder that is imported, which is only read")
     for path in course.files:
         if (target / path).exists():
             raise UsageError(f"{folder} has {path} already; name an empty folder with --out")
-    for path, data in course.files.items():
-        (target / path).parent.mkdir(parents=True, exist_ok=True)
-        write_atomic(target, path, data, expected=None)
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise EffectError(f"{folder} cannot be made: {reason(error)}") from None
+    change_files(target, [FileChange(path, None, data) for path, data in course.files.items()])
 
 
 def _new_ids(lessons: Sequence[ImportedText]) -> dict[str, str]:

@@ -112,3 +112,16 @@ def test_nothing_is_written_over(
     reason = "has content/course.toml already; name an empty folder with --out"
     assert message == f"coursebuild: {tmp_path / 'there'} {reason}\n"
     assert texts(tmp_path / "there") == {"content/course.toml": b"mine"}
+
+
+def test_import_that_fails_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "one.md").write_text("# One\n\nText.\n")
+    (tmp_path / "there").mkdir()
+    (tmp_path / "there" / "content").write_text("mine")
+    assert main(["import", "old", "--out", "there"]) == 1
+    assert "content" in capsys.readouterr().err
+    assert texts(tmp_path / "there") == {"content": b"mine"}
