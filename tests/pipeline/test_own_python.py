@@ -92,6 +92,13 @@ def test_scripts_find_what_is_installed_in_the_environment_of_the_course(course:
     assert f"MuJoCo {engine_version()}" in page and f"Python {python_version()}" in page
 
 
+def replace_engine(info: Path, version: str) -> None:
+    info.unlink()
+    new = info.with_name(f"mujoco-{version}.dist-info")
+    new.mkdir()
+    (new / "METADATA").write_text(f"Metadata-Version: 2.1\nName: mujoco\nVersion: {version}\n")
+
+
 BROKEN_ENVIRONMENTS: tuple[tuple[Callable[[Path], object], str], ...] = (
     (
         lambda prefix: (prefix / "bin/python").unlink(),
@@ -110,9 +117,7 @@ BROKEN_ENVIRONMENTS: tuple[tuple[Callable[[Path], object], str], ...] = (
         "error[script-python]: MuJoCo is not installed for `.venv/bin/python`",
     ),
     (
-        lambda prefix: next(prefix.glob("lib/*/*/mujoco-*")).rename(
-            next(prefix.glob("lib/*/site-packages")) / "mujoco-3.1.0.dist-info"
-        ),
+        lambda prefix: replace_engine(next(prefix.glob("lib/*/*/mujoco-*")), "3.1.0"),
         f"error[engine-version]: the course is written for MuJoCo {engine_version()}, and 3.1.0 "
         "is installed for `.venv/bin/python`",
     ),

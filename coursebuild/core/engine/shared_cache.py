@@ -3,14 +3,14 @@
 Entry point: `shared_cache(address)` returns the `SharedCache` that a `Memo` uses.
 
 1. It holds entries of memos under the same names; the memo that reads an entry verifies it.
-2. Reading waits for the place. Threads write while the work goes on.
+2. Reading waits for the place. Up to four threads write while the work goes on.
 3. A place that cannot be reached or takes too long is reported once and left alone for a while:
    it costs time, but is never an error.
 """
 
 from __future__ import annotations
 
-import queue
+import contextlib
 import threading
 import time
 from collections.abc import Callable
@@ -151,11 +151,8 @@ class SharedCache:
         """Called once, with a message, when the place cannot be used."""
         self._was_reported = False
         self._down_until = -1.0
-        self._queue: queue.Queue[tuple[str, bytes]] = queue.Queue()
-        self._writers = 0
         self._lock = threading.Lock()
-        self._unsent = 0
-        self._sent = threading.Condition()
+        self._writers = threading.Semaphore(_WRITERS)
 
     def read(self, name: str) -> bytes | None:
         """An entry; `None` where there is none or the place fails."""
@@ -166,46 +163,36 @@ class SharedCache:
         return self._ask(lambda: self.place.names(f"{self._folder}/{folder}"), [])
 
     def write(self, name: str, entry: bytes) -> None:
-        """Queue an entry to be sent in the background."""
+        """Send an entry in the background; wait only while many others are being sent."""
         if self._is_down():
             return
-        with self._sent:
-            self._unsent += 1
-        self._queue.put((name, entry))
-        with self._lock:
-            if self._writers < _WRITERS:
-                self._writers += 1
-                threading.Thread(target=self._send, name="shared cache", daemon=True).start()
+        if self._writers.acquire(timeout=self.timeout):
+            # A thread each, since an idle one would keep this process from forking.
+            work = (name, entry)
+            threading.Thread(target=self._send, args=work, name="shared cache", daemon=True).start()
+        else:
+            self._fail(f"no answer within {self.timeout:g} s")
 
     def flush(self, seconds: float = _FLUSH_TIMEOUT) -> None:
         """Wait until everything is sent, but not for ever."""
         until = time.monotonic() + seconds
-        with self._sent:
-            while self._unsent and not self._is_down():
-                left = until - time.monotonic()
-                if left <= 0:
-                    self._fail(f"{self._unsent} results could not be sent in {seconds:g} s")
+        with contextlib.ExitStack() as idle:
+            for _ in range(_WRITERS):
+                if self._is_down():
                     return
-                self._sent.wait(min(left, 0.5))
+                if not self._writers.acquire(timeout=max(until - time.monotonic(), 0.0)):
+                    self._fail(f"results could not be sent in {seconds:g} s")
+                    return
+                idle.callback(self._writers.release)
 
-    def _send(self) -> None:
-        """Send what is queued, then end: an idle thread would keep this process from forking."""
-        while True:
-            with self._lock:  # or an entry queued now would find no writer
-                try:
-                    name, entry = self._queue.get_nowait()
-                except queue.Empty:
-                    self._writers -= 1
-                    return
-            try:
-                if not self._is_down():
-                    self.place.write(f"{self._folder}/{name}", entry)
-            except Exception as error:  # libraries of clouds raise what they like
-                self._fail(_words(error))
-            finally:
-                with self._sent:
-                    self._unsent -= 1
-                    self._sent.notify_all()
+    def _send(self, name: str, entry: bytes) -> None:
+        try:
+            if not self._is_down():
+                self.place.write(f"{self._folder}/{name}", entry)
+        except Exception as error:  # libraries of clouds raise what they like
+            self._fail(_words(error))
+        finally:
+            self._writers.release()
 
     def _ask(self, function: Callable[[], T], otherwise: T) -> T:
         """The function's result if it comes in time; a call that hangs is abandoned."""

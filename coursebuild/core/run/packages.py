@@ -3,8 +3,8 @@
 Entry points: `InstalledPackages`; `distributions`, `module_files`, for archives of scripts.
 
 Reading what each distribution provides takes a quarter of a second, so the whole map is stored
-until one of the folders with installed packages changes. A module that no distribution names, and
-one of this tool's own, is identified by the content of its files.
+under the names in the folders with installed packages, which say their versions. A module that no
+distribution names, and one of this tool's own, is identified by the content of its files.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import importlib.metadata
 import importlib.util
+import os
 import sys
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -26,14 +26,9 @@ from coursebuild.core.engine.digests import file_state
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model.results import OutputFile
 
-if TYPE_CHECKING:
-    from importlib.metadata import Distribution
-
 ABSENT = ""
 _TOOL_PACKAGE = "coursebuild"
 _LIBRARY = Path(__file__).resolve().parents[3]
-_TICK = 2_000_000_000
-"""The coarsest clock of a file system, ns."""
 _FOLDERS = ("site-packages", "dist-packages")
 
 
@@ -117,39 +112,28 @@ def _spec(module: str, folders: Sequence[str]) -> ModuleSpec | None:
 
 def _map_distributions(store: Memo, folders: Sequence[str]) -> Mapping[str, str]:
     """The distributions, with versions, of each top-level module in these folders."""
-    key = _signature(folders)
+    key = hashlib.sha256(repr((sys.version, *map(_names, folders))).encode()).hexdigest()
     # It is no result of the course, so that `--no-cache` does not make it again.
-    names = None if key is None else store.peek("installed", key, _read)
+    names = store.peek("installed", key, _read)
     if names is None:
         names = _scan(folders)
-        if key is not None:
-            store.put_value("installed", key, names)
+        store.put_value("installed", key, names)
     return names
+
+
+def _names(folder: str) -> list[str]:
+    """The names in a folder, sorted; none if there is no such folder."""
+    try:
+        return sorted(os.listdir(folder))  # noqa: PTH208
+    except OSError:
+        return []
 
 
 def _read(data: bytes) -> dict[str, str]:
     return msgspec.json.decode(data, type=dict[str, str])
 
 
-def _signature(folders: Sequence[str]) -> str | None:
-    """A hash that differs when something was installed; `None` right after that."""
-    parts: list[object] = [3, sys.version]
-    for folder in folders:
-        try:
-            status = Path(folder).stat()
-        except OSError:
-            parts.append((folder, None))
-            continue
-        latest = max(status.st_mtime_ns, status.st_ctime_ns)
-        if latest + _TICK >= time.time_ns():
-            return None
-        parts.append((folder, status.st_ino, status.st_mtime_ns, status.st_ctime_ns))
-    return hashlib.sha256(repr(parts).encode()).hexdigest()
-
-
 def _scan(folders: Sequence[str]) -> dict[str, str]:
-    import importlib.metadata  # takes longer than the rest of a run that finds nothing to do
-
     names_by_module: dict[str, set[str]] = {}
     seen_names: set[str] = set()
     for distribution in importlib.metadata.distributions(path=list(folders)):
@@ -162,7 +146,7 @@ def _scan(folders: Sequence[str]) -> dict[str, str]:
     return {module: ", ".join(sorted(names)) for module, names in names_by_module.items()}
 
 
-def _modules(distribution: Distribution) -> set[str]:
+def _modules(distribution: importlib.metadata.Distribution) -> set[str]:
     """The top-level modules of a distribution."""
     top_level = distribution.read_text("top_level.txt")
     if top_level:

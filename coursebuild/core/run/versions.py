@@ -6,9 +6,10 @@ of another interpreter.
 
 from __future__ import annotations
 
-import os
+import functools
 import sys
 from collections.abc import Iterable
+from importlib.metadata import distributions
 
 from coursebuild.core.files.errors import EffectError
 
@@ -18,13 +19,14 @@ def python_version() -> str:
     return sys.version.split()[0]
 
 
+@functools.cache
 def engine_version() -> str:
     """The version of the installed MuJoCo, such as `3.14.0`.
 
     Raises:
         EffectError: there is none.
     """
-    version = _version("mujoco")
+    version = version_in(sys.path, "mujoco")
     if version is None:
         raise EffectError(
             "MuJoCo is not installed for this Python", help="run `pip install coursebuild` again"
@@ -34,31 +36,10 @@ def engine_version() -> str:
 
 def package_version(name: str, folders: Iterable[str] | None = None) -> str:
     """The version of a distribution, here or in these folders; `none` where it is not installed."""
-    return (_version(name) if folders is None else version_in(folders, name)) or "none"
+    return version_in(sys.path if folders is None else folders, name) or "none"
 
 
 def version_in(folders: Iterable[str], name: str) -> str | None:
     """The version of a distribution that is installed in one of these folders."""
-    start = f"{name.replace('-', '_').lower()}-"
-    for folder in folders:
-        try:
-            entries = [e for e in os.listdir(folder or ".") if e.lower().startswith(start)]  # noqa: PTH208
-        except OSError:
-            continue
-        for entry in sorted(entries):
-            if entry.endswith(".dist-info"):
-                return entry[len(start) : -len(".dist-info")]
-    return None
-
-
-def _version(name: str) -> str | None:
-    """The version of a distribution, read from the name of its `.dist-info` folder if possible."""
-    version = version_in(sys.path, name)
-    if version is not None:
-        return version
-    import importlib.metadata  # reads more, and is slow to import
-
-    try:
-        return importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return None
+    installed = distributions(name=name, path=list(folders))
+    return next((distribution.version for distribution in installed), None)

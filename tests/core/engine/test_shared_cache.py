@@ -165,7 +165,7 @@ def test_sending_ends_when_it_takes_too_long(tmp_path: Path) -> None:
     store.put("labs", KEY, b"made", shared=True)
     shared.flush(0.2)
     stop.set()
-    trouble = "1 results could not be sent in 0.2 s"
+    trouble = "results could not be sent in 0.2 s"
     assert messages == [f"the shared cache s3://there cannot be used: {trouble}"]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.metadata
-import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from coursebuild.core.run.packages import ABSENT, InstalledPackages
 
 @pytest.fixture
 def site(tmp_path: Path) -> Path:
-    """A folder of installed packages, made long ago."""
+    """A folder of installed packages."""
     folder = tmp_path / "site-packages"
     folder.mkdir()
     install(folder, "Some-Tool", "1.2", ["tool/__init__.py", "tool/part.py", "single.py"])
@@ -33,12 +32,6 @@ def install(folder: Path, name: str, version: str, files: list[str]) -> None:
     for file in files:
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
         (folder / file).write_text(f"# {name} {version}\n")
-
-
-@pytest.fixture
-def later(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = time.time_ns
-    monkeypatch.setattr(time, "time_ns", lambda: real() + 3_600_000_000_000)
 
 
 def ask(tmp_path: Path, site: Path) -> InstalledPackages:
@@ -75,7 +68,6 @@ def test_a_module_that_no_distribution_names_is_known_by_its_files(
     assert second.version("folder") != before[1]
 
 
-@pytest.mark.usefixtures("later")
 def test_the_map_is_kept_until_something_is_installed(
     tmp_path: Path, site: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
