@@ -21,7 +21,8 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator
+from itertools import chain, islice
 from multiprocessing.connection import Connection, Pipe, wait
 from typing import Any, Generic, NoReturn, Self, TypeVar
 
@@ -39,16 +40,24 @@ def can_fork() -> bool:
     """Whether this process can be forked: it has one thread, and nothing that forking breaks."""
     if sys.platform == "darwin":
         return False
-    # A fork copies only the thread that forks, and MuJoCo has some of its own.
+    # A fork copies only the thread that forks, and MuJoCo has some of its reserved.
     return threading.active_count() == 1 and "mujoco" not in sys.modules
+
+
+class _Task(Struct, frozen=True, eq=False):
+    number: int
+    """In the order of the tasks."""
+    owner: int | None
+    """The number of the worker that it is reserved for."""
+    value: Any
 
 
 class _Worker(Struct, eq=False):
     number: int
     process: int
     connection: Connection
-    task: int | None = None
-    """The number of its current task."""
+    task: _Task | None = None
+    """What it works on."""
 
 
 class Workers(Generic[Task, Result]):
@@ -81,33 +90,31 @@ class Workers(Generic[Task, Result]):
 
         A task comes with the number of the worker that it is reserved for, if any.
         """
-        numbered_tasks, there_are_more = enumerate(tasks), True
-        unfinished: dict[int, Task] = {}
-        """Tasks without a result."""
-        unassigned: list[tuple[int, int | None]] = []
-        """Tasks that no worker has begun, each with the worker it is reserved for."""
+        new_tasks = (_Task(number, *task) for number, task in enumerate(tasks))
+        unassigned: list[_Task] = []
         results: dict[int, tuple[Result, int | None]] = {}
-        next_number = 0
+        taken_count = yielded_count = 0
+        there_are_more = True
         try:
-            while there_are_more or unfinished or results:
+            while there_are_more or yielded_count < taken_count:
                 if can_take_more := there_are_more and len(unassigned) < _MOST_WAITING:
-                    number, task = next(numbered_tasks, (-1, None))
-                    there_are_more = task is not None
-                    if task is not None:
-                        unassigned.append((number, task[0]))
-                        unfinished[number] = task[1]
+                    next_tasks = [*islice(new_tasks, 1)]
+                    there_are_more = bool(next_tasks)
+                    taken_count += len(next_tasks)
+                    unassigned += next_tasks
                 for worker in self._workers.values():
-                    if worker.task is None and unassigned:
-                        self._assign(worker, unassigned, unfinished)
+                    if worker.task is None:
+                        self._assign(worker, unassigned)
                 busy = {w.connection: w for w in self._workers.values() if w.task is not None}
                 if not busy and not can_take_more and unassigned:
-                    number, _ = unassigned.pop(0)
-                    results[number] = self._work(unfinished.pop(number)), None
+                    task = unassigned.pop(0)
+                    results[task.number] = self._work(task.value), None
                 for ready in wait(busy, 0 if can_take_more or not busy else None):
-                    self._collect(busy[ready], unfinished, results)  # type: ignore[index]
-                while next_number in results:
-                    yield results.pop(next_number)
-                    next_number += 1
+                    number, result = self._collect(busy[ready])  # type: ignore[index]
+                    results[number] = result
+                while yielded_count in results:
+                    yield results.pop(yielded_count)
+                    yielded_count += 1
         except BaseException:  # or a result still to come would count for a later task
             self.close()
             raise
@@ -119,45 +126,33 @@ class Workers(Generic[Task, Result]):
         for worker in [*self._workers.values()]:
             self._drop(worker)
 
-    def _assign(
-        self,
-        worker: _Worker,
-        unassigned: list[tuple[int, int | None]],
-        unfinished: Mapping[int, Task],
-    ) -> None:
+    def _assign(self, worker: _Worker, unassigned: list[_Task]) -> None:
         """Send an idle worker a task: one reserved for it, or else one reserved for nobody.
 
         Where too many tasks wait, it gets one reserved for another worker.
         """
         other_numbers = self._workers.keys() - {worker.number}
-        reserved = next((entry for entry in unassigned if entry[1] == worker.number), None)
-        free = next((entry for entry in unassigned if entry[1] not in other_numbers), None)
-        entry = reserved or free or (unassigned[0] if len(unassigned) >= _MOST_WAITING else None)
-        if entry is not None:
-            unassigned.remove(entry)
-            worker.task = entry[0]
+        reserved = (task for task in unassigned if task.owner == worker.number)
+        free = (task for task in unassigned if task.owner not in other_numbers)
+        rest = unassigned if len(unassigned) >= _MOST_WAITING else []
+        worker.task = next(chain(reserved, free, rest), None)
+        if worker.task is not None:
+            unassigned.remove(worker.task)
             with contextlib.suppress(OSError):  # it is dead, which `_collect` will notice
-                worker.connection.send_bytes(pickle.dumps(unfinished[worker.task]))
+                worker.connection.send_bytes(pickle.dumps(worker.task.value))
 
-    def _collect(
-        self,
-        worker: _Worker,
-        unfinished: dict[int, Task],
-        results: dict[int, tuple[Result, int | None]],
-    ) -> None:
-        """Receive the result of a worker's task; if the worker has died, do the task here."""
-        assert worker.task is not None
-        task = unfinished.pop(worker.task)
+    def _collect(self, worker: _Worker) -> tuple[int, tuple[Result, int | None]]:
+        """The number of a worker's task, and its result; if the worker has died, do it here."""
+        task, worker.task = worker.task, None
+        assert task is not None
         try:
             is_result, value = pickle.loads(worker.connection.recv_bytes())
         except (EOFError, OSError):
             self._drop(worker)
-            results[worker.task] = self._work(task), None
-            return
+            return task.number, (self._work(task.value), None)
         if not is_result:
             raise value
-        results[worker.task] = value, worker.number
-        worker.task = None
+        return task.number, (value, worker.number)
 
     def _drop(self, worker: _Worker) -> None:
         del self._workers[worker.number]

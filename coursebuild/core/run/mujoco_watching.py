@@ -35,7 +35,7 @@ _KINDS = (
     (" in QACC ", "mjWARN_BADQACC", "accelerations"),
 )
 """A part of MuJoCo's message, the counter, and our name for the sign."""
-_REQUIRED_ATTRIBUTES = ("MjData", "_functions", "mjtGeom", "mjtWarning")
+_REQUIRED_ATTRIBUTES = ("MjData", "_functions", "mjtGeom", "mjtWarning", "set_mju_user_warning")
 _DEFAULT_MODEL_NAME = "MuJoCo Model"
 """MuJoCo's name for a model that its author has not named."""
 _MOST_NOTES = 16
@@ -90,8 +90,7 @@ class _Watch:
         wrap(spec, "recompile", None, lambda args, keywords, result: self._hold(result[1]))
         resets = ("mj_resetData", "mj_resetDataKeyframe", "mj_resetDataDebug")
         mujoco_tracing.wrap_functions(mujoco, resets, self._before_reset)
-        self._warnings = Warnings(mujoco, self._note_warning)  # kept for the library to call
-        self._warnings.install()
+        Warnings(mujoco, self._note_warning)
 
     def finish(self) -> None:
         for key in list(self._data_by_id):
