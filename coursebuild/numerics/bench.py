@@ -211,7 +211,7 @@ def _with_costs(
 
 def _fit_orders(basis: Basis, rows: Sequence[WorkPrecisionRow]) -> tuple[OrderRow, ...]:
     baseline, reference = basis.baseline, basis.reference
-    motion = reference.motion
+    motion = motion_of(basis.model, reference.states)
     angles = angular_distance(motion.attitude[:1], motion.attitude)
     extent = Sizes(
         float(np.linalg.norm(np.ptp(motion.position, axis=0))),
@@ -282,7 +282,8 @@ def _with_errors(
     model, scene, cone = basis.model, basis.pilot.scene, basis.cones[row.setting.cone]
     reference = cone.reference
     states = run.states.head(len(reference.states.times))
-    run_errors = errors(motion_of(model, states), reference.motion, reference.floor)
+    exact = motion_of(model, reference.states)
+    run_errors = errors(motion_of(model, states), exact, reference.floor)
     floor = FLOORS * visible_error(model, scene, reference.states, reference.second_states)
     visible = visible_error(model, scene, states, reference.states)
     noticeable = None if max(1, visible) <= floor else visible >= 1

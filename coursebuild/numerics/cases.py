@@ -24,7 +24,6 @@ from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.engine import (
     EngineStates,
     compile_model,
-    full_state,
     initial_data,
     motion_of,
     refsafe_active,
@@ -113,8 +112,7 @@ def _costs(
         step = next((line.timestep for line in lines if line.status == "ok"), None)
         if step is not None:
             model = compile_model(problem.mjcf, integrator, step)
-            state = full_state(model, initial_data(problem.scenario, model))
-            jobs.append(scenario_job(model, [(problem.scenario, state)], step))
+            jobs.append(scenario_job(model, [problem.scenario], step))
             names.append(integrator.value)
             counts.append(round(problem.scenario.duration / step))
     timings = time_jobs(jobs, 0, clock, quick=True) if jobs else ()

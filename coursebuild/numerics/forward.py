@@ -73,7 +73,7 @@ def forward_states(
     state = np.concatenate([data.qpos, data.qvel, data.act])
     rate = _rate(model, data, evaluations)
     states = np.empty((len(times), len(state)))
-    for begin, end, command in _holds(scenario, float(times[-1])):
+    for begin, end, command in scenario.holds(float(times[-1])):
         if command:
             data.ctrl[:] = command
         selected = (times > begin + 1e-12) & (times <= end + 1e-12)
@@ -86,19 +86,6 @@ def forward_states(
     for at in coordinates(model)[1]:
         qpos[:, at : at + 4] /= np.linalg.norm(qpos[:, at : at + 4], axis=1, keepdims=True)
     return EngineStates(times, qpos, states[:, nq : nq + nv].copy(), states[:, nq + nv :].copy())
-
-
-def _holds(scenario: Scenario, end: float) -> list[tuple[float, float, tuple[float, ...]]]:
-    """The beginnings and ends (s) of the intervals in which commands hold, with the commands."""
-    if not scenario.controls:
-        return [(0.0, end, ())]
-    holds = []
-    for index, command in enumerate(scenario.controls):
-        begin = index * scenario.hold
-        until = begin + scenario.hold if index + 1 < len(scenario.controls) else end
-        if begin < end:
-            holds.append((begin, min(until, end), command))
-    return holds
 
 
 def _rate(model: Any, data: Any, evaluations: float) -> Rate:

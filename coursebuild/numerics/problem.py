@@ -93,10 +93,24 @@ class Scenario(Struct, frozen=True):
             samples = whole_number(self.hold, self.sample, "the hold", "the sampling interval")
         return self.controls[min(index // samples, len(self.controls) - 1)]
 
+    def holds(self, end: float | None = None) -> list[tuple[float, float, tuple[float, ...]]]:
+        """The intervals in which commands hold: begin and end (s), and the command.
+
+        They follow each other to `end` (s), or for the duration. There is one without commands.
+        """
+        end = self.duration if end is None else end
+        begins = [index * self.hold for index in range(max(1, len(self.controls)))]
+        commands = self.controls or ((),)
+        return [
+            (begin, min(until, end), command)
+            for begin, until, command in zip(begins, (*begins[1:], end), commands, strict=True)
+            if begin < end
+        ]
+
     def commands(self, timestep: float) -> Iterator[tuple[float, ...]]:
         """The command of each step, for a timestep (s)."""
-        for index in range(len(self.times)):
-            yield from itertools.repeat(self.command(index), self.steps(timestep))
+        for begin, end, command in self.holds():
+            yield from itertools.repeat(command, round((end - begin) / timestep))
 
 
 def whole_number(length: float, part: float, length_name: str, part_name: str) -> int:

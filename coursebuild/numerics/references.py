@@ -54,7 +54,7 @@ from coursebuild.numerics.measure import (
 )
 from coursebuild.numerics.observe import Sticks, find_sticks, visible_error
 from coursebuild.numerics.pilot import Pilot, position_distances
-from coursebuild.numerics.problem import ROUNDING, Integrator, Motion, Setup, Sizes
+from coursebuild.numerics.problem import ROUNDING, Integrator, Setup, Sizes
 from coursebuild.numerics.reports.bench import FLOORS
 from coursebuild.numerics.scene import ExactMotion, SceneError
 from coursebuild.numerics.settings import CONES
@@ -84,7 +84,6 @@ class KnownMotion(Struct, frozen=True):
     states: EngineStates
     second_states: EngineStates
     """The same motion by the second reference."""
-    motion: Motion
     floor: Sizes
     """How far it may be off."""
     second: str
@@ -120,19 +119,20 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         reference = replace(self_reference(model, pilot, quick=quick), note=note)
     if declaration.closed_form:
         problem, motion = closed_motion(model, pilot.scene, declaration, reference.states.times)
+        states = states_of(model, motion, reference.states)
         subject = f"the closed form of `{declaration.closed_form}`"
         place, source = declaration.place("reference"), problem.reference.source
-        return _with_closed_form(model, reference, motion, source, floor(problem), subject, place)
+        return _with_closed_form(model, reference, states, source, floor(problem), subject, place)
     exact = None if declaration.reference else pilot.scene.exact
     if exact is None:
         return reference
-    motion = _exact_motion(model, pilot, exact, reference)
-    return _with_closed_form(
-        model, reference, motion, exact.span.path, ROUNDING, f"`{exact.span.path}`", exact.span
-    )
+    states, source = _exact_states(model, pilot, exact, reference), exact.span.path
+    return _with_closed_form(model, reference, states, source, ROUNDING, f"`{source}`", exact.span)
 
 
-def _exact_motion(model: Any, pilot: Pilot, exact: ExactMotion, second: KnownMotion) -> Motion:
+def _exact_states(
+    model: Any, pilot: Pilot, exact: ExactMotion, second: KnownMotion
+) -> EngineStates:
     """The course's exact motion; where it gives no velocities, with those of the second one."""
     data, states = initial_data(pilot.scene.scenario, model), second.states
     qpos, qvel = exact.states(states.times, data.qpos.copy(), data.qvel.copy())
@@ -143,7 +143,7 @@ def _exact_motion(model: Any, pilot: Pilot, exact: ExactMotion, second: KnownMot
     ):
         message = f"`{exact.span.path}` gives other numbers of coordinates than the model has"
         raise SceneError(message, exact.span, "they are those of `qpos`, and perhaps of `qvel`")
-    return motion_of(model, course_states)
+    return course_states
 
 
 def _no_integration(reason: str, declaration: DeclaredScenario) -> SceneError:
@@ -213,26 +213,27 @@ def _combine(
     second: str,
     second_states: EngineStates,
 ) -> KnownMotion:
-    motion, horizon = motion_of(model, states), float(states.times[-1])
-    gap = largest_errors(errors(motion, motion_of(model, second_states)))
+    gap, horizon = _gap(model, states, second_states), float(states.times[-1])
     floor = gap.at_least(ROUNDING)
-    return KnownMotion(
-        kind, source, states, second_states, motion, floor, second, gap.largest, horizon
-    )
+    return KnownMotion(kind, source, states, second_states, floor, second, gap.largest, horizon)
+
+
+def _gap(model: Any, states: EngineStates, second_states: EngineStates) -> Sizes:
+    """The largest difference of two motions."""
+    return largest_errors(errors(motion_of(model, states), motion_of(model, second_states)))
 
 
 def _with_closed_form(
     model: Any,
     second: KnownMotion,
-    motion: Motion,
+    states: EngineStates,
     source: str,
     least: Sizes,
     subject: str,
     place: Span,
 ) -> KnownMotion:
     """Put a closed form first, and what was integrated second."""
-    gap = largest_errors(errors(motion, second.motion))
-    states = states_of(model, motion, second.states)
+    gap = _gap(model, states, second.states)
     distance = float(position_distances(model, states.qpos, second.states.qpos).max(initial=0.0))
     floor = least
     if second.kind == "ode":
@@ -247,7 +248,6 @@ def _with_closed_form(
         source=source,
         states=states,
         second_states=second.states,
-        motion=motion,
         floor=floor,
         second=second.source,
         agreement=gap.largest,
@@ -286,9 +286,7 @@ def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[st
             continue
         count = min(len(limit.states.times), len(truth.states.times))
         limit_states, true_states = limit.states.head(count), truth.states.head(count)
-        gap = largest_errors(
-            errors(motion_of(model, limit_states), motion_of(model, true_states))
-        ).place
+        gap = _gap(model, limit_states, true_states).place
         least = FLOORS * max(limit.floor.place, truth.floor.place)
         if truth is reference:
             cones[cone] = Cone(reference, max(gap, least), 0.0, sticks)

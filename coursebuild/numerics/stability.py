@@ -33,7 +33,6 @@ from coursebuild.numerics.problem import (
     Integrator,
     Limit,
     Problem,
-    Scenario,
     Setup,
 )
 from coursebuild.numerics.reports.bench import StableRow
@@ -209,10 +208,16 @@ def run_trial(
     timestep = float(model.opt.timestep)
     steps = step_count(span, timestep)
     interval = max(8, steps // _LOOKS)
+    commands = {
+        min(math.ceil(begin / timestep - 1e-9), steps): command
+        for begin, _, command in setup.scenario.holds(span)
+    }
+    looks = {steps * part // _PARTS for part in range(_PARTS + 1)}
     sizes: list[tuple[int, float]] = []
     peaks, total = Peaks(), 0
-    for begin, end in itertools.pairwise(_edges(setup.scenario, timestep, steps)):
-        _apply_command(setup.scenario, data, begin * timestep)
+    for begin, end in itertools.pairwise(sorted(looks.union(commands))):
+        if commands.get(begin):
+            data.ctrl[:] = commands[begin]
         try:
             peaks, steps_made = advance_watching(
                 model, data, end - begin, peaks, thickness, interval=interval, setup=setup
@@ -226,20 +231,6 @@ def run_trial(
             break
     judgement = judge(model, data, total * timestep, peaks, setup)
     return StabilityTrial(timestep, judgement.status, _growth(sizes))
-
-
-def _edges(scenario: Scenario, timestep: float, steps: int) -> list[int]:
-    """The steps at which the run is interrupted: to look, and to change the command."""
-    edges = {steps * part // _PARTS for part in range(_PARTS + 1)}
-    for index in range(1, len(scenario.controls)):
-        edges.add(min(math.ceil(index * scenario.hold / timestep - 1e-9), steps))
-    return sorted(edges)
-
-
-def _apply_command(scenario: Scenario, data: Any, time: float) -> None:
-    if scenario.controls:
-        index = int(time / scenario.hold + 1e-9) if scenario.hold else 0
-        data.ctrl[:] = scenario.controls[min(index, len(scenario.controls) - 1)]
 
 
 def _growth(sizes: list[tuple[int, float]]) -> float:

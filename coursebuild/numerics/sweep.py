@@ -26,7 +26,6 @@ from coursebuild.core.model.scenarios import DeclaredSweep, SweepValue, Variatio
 from coursebuild.numerics.engine import (
     EngineStates,
     advance,
-    full_state,
     initial_data,
     integrator_of,
     silent,
@@ -255,15 +254,11 @@ def _with_costs(
 ) -> list[SweepRow]:
     """Add costs; the first model is as it is, the others are those of the rows."""
     usable = [n for n, row in enumerate(rows) if row.status == "ok"]
-    jobs = [_job(scenario, models[n]) for n in (0, *(n + 1 for n in usable))]
+    timed_models = [models[n] for n in (0, *(n + 1 for n in usable))]
+    jobs = [scenario_job(model, [scenario], float(model.opt.timestep)) for model in timed_models]
     for n, timing in zip(usable, time_jobs(jobs, 0, clock, quick=quick)[1:], strict=True):
         rows[n] = replace(rows[n], cost=timing.ratio)
     return rows
-
-
-def _job(scenario: Scenario, model: Any) -> Job:
-    state = full_state(model, initial_data(scenario, model))
-    return scenario_job(model, [(scenario, state)], float(model.opt.timestep))
 
 
 def _rollouts(

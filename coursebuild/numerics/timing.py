@@ -1,7 +1,7 @@
 """The costs of scenarios relative to each other, on a machine that does other things too.
 
 Entry points: `time_jobs(jobs, baseline, clock)`; `costs(model, scene, settings, …)`, of settings of
-a scene; `scenario_job(model, scenes)`, a model's whole scenarios as a job.
+a scene; `scenario_job(model, scenarios, timestep)`, a model's whole scenarios as a job.
 
 1. A job is a scenario from its beginning to its end, so that each setting is timed on its own
    states; what takes little time is repeated.
@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Sequence
-from itertools import groupby
 from typing import Any, TypeAlias
 
 import mujoco
@@ -138,10 +137,9 @@ def costs(
 ) -> tuple[Timing, ...]:
     """The costs of a scenario under some settings, relative to number `baseline` of them."""
     variant = with_setting(model, settings[baseline])
-    state = full_state(variant, initial_data(scene.scenario, variant))
 
     def job(setting: MeasuredSetting) -> Job:
-        run = scenario_job(variant, [(scene.scenario, state)], setting.timestep)
+        run = scenario_job(variant, [scene.scenario], setting.timestep)
 
         def work() -> None:
             apply(variant, setting)
@@ -155,22 +153,27 @@ def costs(
 
 def scenario_job(
     model: Any,
-    begins: Sequence[tuple[Scenario, Array]],
+    scenarios: Sequence[Scenario],
     timestep: float,
+    *,
+    states: Sequence[Array] | None = None,
     actuators: Sequence[int] | None = None,
 ) -> Job:
-    """A job that runs scenarios from full states; `actuators`: those commanded, else all."""
+    """A job that runs scenarios.
+
+    `states`: full ones to begin in, else those of the scenarios; `actuators`: those commanded, else
+    all.
+    """
     data, commanded = mujoco.MjData(model), slice(None) if actuators is None else list(actuators)
-    runs = [
-        (
-            state,
-            [
-                (np.array(command)[commanded] if command else None, len([*steps]))
-                for command, steps in groupby(scenario.commands(timestep))
-            ],
-        )
-        for scenario, state in begins
-    ]
+    if states is None:
+        states = [full_state(model, initial_data(scenario, model)) for scenario in scenarios]
+    runs = []
+    for scenario, state in zip(scenarios, states, strict=True):
+        parts = [
+            (np.array(command)[commanded] if command else None, round((end - begin) / timestep))
+            for begin, end, command in scenario.holds()
+        ]
+        runs.append((state, parts))
 
     def job() -> None:
         for state, parts in runs:

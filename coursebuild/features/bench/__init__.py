@@ -15,14 +15,14 @@ from coursebuild.features.bench.model_page import (
     measurement_facts,
     measurements_view,
 )
-from coursebuild.features.bench.page import bench_data, bench_markdown, draw_bench, index_bench
+from coursebuild.features.bench.page import bench_markdown, bench_view, draw_bench, index_bench
 from coursebuild.features.bench.parse import parse_bench
 
 KIND = FenceKind(
     name="bench",
     block=Bench,
     parse=parse_bench,
-    values=bench_data,
+    values=bench_view,
     draw=draw_bench,
     markdown=bench_markdown,
     index=index_bench,

@@ -1,6 +1,6 @@
 """A recorded report in a text: the plot of a scenario, its tables, and where it was measured.
 
-Entry points: `bench_data`, the values that a page needs; `draw_bench`, `bench_markdown`,
+Entry points: `bench_view`, the values that a page needs; `draw_bench`, `bench_markdown`,
 `index_bench`.
 
 The block shows the same as the page of the model. If no report fits the course, it says so, with
@@ -9,7 +9,6 @@ the command that makes one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
@@ -17,13 +16,12 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import document_blocks, scenario_anchor
-from coursebuild.core.model.results import Machine
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.marks import escape_marks, guard_lines
 from coursebuild.features.bench.figures import Grid, machine_text
 from coursebuild.features.bench.model import Bench, declared_scenarios
 from coursebuild.features.bench.scenarios import ScenarioView, plots, scenario_view
-from coursebuild.numerics.reports.bench import ScenarioReport
+from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.records import BENCH
 from coursebuild.numerics.reports.sweep import SweepReport
 
@@ -31,17 +29,6 @@ if TYPE_CHECKING:
     from coursebuild.core.features import IndexReader, MarkdownWriter
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.pages.library import Library
-
-
-class BenchData(Struct, frozen=True):
-    """What a page needs of a report."""
-
-    href: str
-    """The address of the same on the model's page."""
-    report: ScenarioReport | SweepReport | None
-    """`None` if none fits the course."""
-    machine: Machine | None
-    """The machine on which it was measured."""
 
 
 class BenchView(Struct, frozen=True):
@@ -52,49 +39,69 @@ class BenchView(Struct, frozen=True):
     """The address of the same on the model's page."""
     command: str
     scenario: ScenarioView | None = None
-    """`None` if nothing was measured."""
+    """`None` if no report fits the course."""
     tables: tuple[Grid, ...] = ()
     folded_table: Grid | None = None
     """The table of settings, if it is folded below something else."""
     machine: str = ""
 
 
-def bench_data(library: Library, place: urls.Place, bench: Bench) -> BenchData:
-    """Find the report that a block on a page shows."""
+def bench_view(library: Library, place: urls.Place, bench: Bench) -> BenchView:
+    """Find the report that a block on a page shows, and make what the page shows of it."""
     scene = library.reports.scenes.get(bench.model)
-    scenarios = () if scene is None else scene.scenarios
-    sweeps = () if scene is None else scene.sweeps
-    reports: Iterator[ScenarioReport | SweepReport]
-    reports = (scenario for scenario in scenarios if bench.scenario in (None, scenario.name))
-    if bench.sweep is not None:
-        reports = (sweep for sweep in sweeps if sweep.name == bench.sweep)
-    report = next(reports, None)
+    report = None if scene is None else _find_report(scene, bench)
     anchor = "measured"
     if isinstance(report, SweepReport):
         anchor = scenario_anchor(f"sweep-{report.name}")
     elif report is not None and report.name in declared_scenarios(library.course, bench.model):
         anchor = scenario_anchor(report.name)
     href = place.href(urls.model_page_path(bench.model), anchor)
-    machine = None if scene is None or report is None else scene.machine
-    return BenchData(href, report, machine)
+    view = BenchView(bench.model, href, BENCH.command(bench.model))
+    if scene is None or report is None:
+        return view
+    scenario = scenario_view(library.words, report)
+    only_table, is_sweep = bench.shows == ("table",), isinstance(report, SweepReport)
+    grids = {"stable": scenario.stable, "orders": scenario.orders}
+    tables = [grid for name in bench.shows if (grid := grids.get(name)) is not None]
+    if not is_sweep and {"plot", "table"}.isdisjoint(bench.shows):  # these are about settings
+        scenario = replace(scenario, verdict="", notes=())
+    has_fold = not only_table and (is_sweep or "table" in bench.shows)
+    return replace(
+        view,
+        scenario=scenario,
+        tables=(scenario.settings,) if only_table else tuple(tables),
+        folded_table=scenario.settings if has_fold else None,
+        machine=machine_text(library.words, scene.machine),
+    )
+
+
+def _find_report(scene: SceneReport, bench: Bench) -> ScenarioReport | SweepReport | None:
+    if bench.sweep is not None:
+        return next((sweep for sweep in scene.sweeps if sweep.name == bench.sweep), None)
+    return next((s for s in scene.scenarios if bench.scenario in (None, s.name)), None)
 
 
 def draw_bench(page: PageContext, block: Bench) -> Markup:
-    """Draw the report."""
-    return page.template("bench/bench.html", bench=_view(page, block), plots=_plots(page, block))
+    """Draw the report, with its plot for wide and for narrow screens."""
+    view = _view(page, block)
+    drawings: tuple[Markup, ...] = ()
+    if view.scenario is not None and "plot" in block.shows:
+        # The blocks of a page are numbered.
+        places = [b.span.start for b in document_blocks(page.document) if isinstance(b, Bench)]
+        drawings = plots(f"_bench-{places.index(block.span.start) + 1}", view.scenario.report)
+    return page.template("bench/bench.html", bench=view, plots=drawings)
 
 
 def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
     """Write the report without its plot, and what the plot shows."""
     from coursebuild.numerics.reports.plot import work_precision
 
-    page, report = writer.page, _data(writer.page, block).report
-    if isinstance(report, SweepReport):
-        report = None  # its table holds all that its plot shows
-    html = page.template("bench/bench.html", bench=_view(page, block), plots=())
+    view = _view(writer.page, block)
+    html = writer.page.template("bench/bench.html", bench=view, plots=())
     head, *rest = writer.html(html).split("\n\n")
-    if report is not None and "plot" in block.shows:
-        # The block says the verdict itself.
+    report = None if view.scenario is None else view.scenario.report
+    if isinstance(report, ScenarioReport) and "plot" in block.shows:
+        # The block says the verdict itself. The table of a sweep holds all that its plot shows.
         plot = work_precision(replace(report, verdict=replace(report.verdict, text="")))
         if plot is not None:
             rest.insert(0, guard_lines(escape_marks(f"{plot.title}. {plot.text}")))
@@ -104,42 +111,12 @@ def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
 def index_bench(reader: IndexReader, block: Bench) -> None:
     """Index the model, and the title of its report."""
     reader.add_name(block.model)
-    data = reader.values(block)
-    if isinstance(data, BenchData) and data.report is not None:
-        reader.add("text", data.report.title or data.report.name)
-
-
-def _data(page: PageContext, block: Bench) -> BenchData:
-    data = page.inputs.blocks[block.span.start]
-    assert isinstance(data, BenchData)
-    return data
+    view = reader.values(block)
+    if isinstance(view, BenchView) and view.scenario is not None:
+        reader.add("text", view.scenario.title)
 
 
 def _view(page: PageContext, block: Bench) -> BenchView:
-    words, data = page.renderer.words, _data(page, block)
-    view = BenchView(block.model, data.href, BENCH.command(block.model))
-    if data.report is None or data.machine is None:
-        return view
-    scenario = scenario_view(words, data.report)
-    only_table, is_sweep = block.shows == ("table",), isinstance(data.report, SweepReport)
-    grids = {"stable": scenario.stable, "orders": scenario.orders}
-    tables = [grid for name in block.shows if (grid := grids.get(name)) is not None]
-    if not is_sweep and {"plot", "table"}.isdisjoint(block.shows):  # these are about settings
-        scenario = replace(scenario, verdict="", notes=())
-    has_fold = not only_table and (is_sweep or "table" in block.shows)
-    return replace(
-        view,
-        scenario=scenario,
-        tables=(scenario.settings,) if only_table else tuple(tables),
-        folded_table=scenario.settings if has_fold else None,
-        machine=machine_text(words, data.machine),
-    )
-
-
-def _plots(page: PageContext, block: Bench) -> tuple[Markup, ...]:
-    """Draw the plot for wide and for narrow screens; the blocks of a page are numbered."""
-    report = _data(page, block).report
-    if report is None or "plot" not in block.shows:
-        return ()
-    places = [b.span.start for b in document_blocks(page.document) if isinstance(b, Bench)]
-    return plots(f"_bench-{places.index(block.span.start) + 1}", report)
+    view = page.inputs.blocks[block.span.start]
+    assert isinstance(view, BenchView)
+    return view

@@ -151,20 +151,19 @@ class PruningTrials:
         """Time of the whole model over that of this one, in whole scenarios."""
         if self.clock is None:
             return None
-        whole, index, begins, variant_begins = self.text.model, trial.index, [], []
+        whole, index, states = self.text.model, trial.index, []
+        scenarios, timestep = [scene.scenario for scene in self.scenes], self.scenes[0].timestep
         try:
-            for scene in self.scenes:
-                data, variant_data = initial_data(scene.scenario, whole), mujoco.MjData(trial.model)
+            for scenario in scenarios:
+                data, variant_data = initial_data(scenario, whole), mujoco.MjData(trial.model)
                 transfer(whole, data, index, trial.model, variant_data)
-                begins.append((scene.scenario, full_state(whole, data)))
-                variant_begins.append((scene.scenario, full_state(trial.model, variant_data)))
+                states.append(full_state(trial.model, variant_data))
         except ValueError:
             return None
+        actuators = index["nu"].tolist()
         jobs = (
-            scenario_job(whole, begins, self.scenes[0].timestep),
-            scenario_job(
-                trial.model, variant_begins, self.scenes[0].timestep, index["nu"].tolist()
-            ),
+            scenario_job(whole, scenarios, timestep),
+            scenario_job(trial.model, scenarios, timestep, states=states, actuators=actuators),
         )
         with silent():
             whole_time, pruned_time = time_jobs(jobs, 1, self.clock, quick=self.quick)
