@@ -183,8 +183,7 @@ def run_headless(engine: Any, lab: Any, mjb: bytes, steps: int) -> Callable[[], 
     from coursebuild.features.lab.compile import compile_lab
 
     module = compile_lab(lab, "lab")
-    config = json.loads(module.config)
-    request = {"config": config, "code": module.literal, "parity": False}
+    request = {"config": module.config, "code": module.literal, "parity": False}
 
     def run() -> float:
         reply = engine.trial({**request, "seconds": 0.002 * steps}, mjb, 60.0)

@@ -1,4 +1,4 @@
-"""A lab's code as an ES module, and its data as JSON.
+"""A lab's code as an ES module, and its data for JSON.
 
 Entry points: `compile_lab(lab, name)`, `pieces(lab)`.
 
@@ -67,8 +67,8 @@ class LabModule(Struct, frozen=True):
     """An ES module."""
     literal: str
     """The code as a JavaScript expression, for an engine without modules."""
-    config: str
-    """The data, as JSON."""
+    config: dict[str, Any]
+    """The data, as JSON has it."""
 
 
 def pieces(lab: Lab) -> Iterator[LabCode]:
@@ -100,7 +100,7 @@ def compile_lab(lab: Lab, name: str) -> LabModule:
     members = tuple(_members(lab))
     code = "".join(f"export const {member} = {text};\n" for member, text in members)
     literal = "{" + ", ".join(f"{member}: {text}" for member, text in members) + "}"
-    return LabModule(name, code, f"({literal})", config_json(lab, name))
+    return LabModule(name, code, f"({literal})", _config(lab, name))
 
 
 def _members(lab: Lab) -> Iterator[tuple[str, str]]:
@@ -145,8 +145,8 @@ _PLOT = ("ylabel", "xlabel", "window", "ymin", "ymax", "height", "refLines")
 """Fields of a plot that are passed on as written."""
 
 
-def config_json(lab: Lab, name: str) -> str:
-    """Write as JSON what the page, the worker and the trial need besides code."""
+def _config(lab: Lab, name: str) -> dict[str, Any]:
+    """Return what the page, the worker and the trial need besides code."""
     fields = lab.fields
     config = {"id": name} | {field: getattr(fields, field) for field in _FIELDS}
     config |= {
@@ -163,8 +163,8 @@ def config_json(lab: Lab, name: str) -> str:
         config["goal"] = {"hold": fields.goal.hold, "log": list(_log_data(fields, fields.goal.log))}
     if lab.kind == MJCF and lab.xml is not None:
         config |= {"kind": MJCF, "xml": lab.xml.text.rstrip("\n")}
-    data = to_builtins(config)
-    return json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    data: dict[str, Any] = to_builtins(config)
+    return data
 
 
 def _log_data(fields: SimLab, log: tuple[LogEntry, ...]) -> Iterator[tuple[float | str, ...]]:

@@ -9,6 +9,7 @@ inside a lab's configuration are relative to it: all of its files lie in one fol
 from __future__ import annotations
 
 import json
+from typing import Any
 
 from markupsafe import Markup
 from msgspec import Struct
@@ -42,8 +43,8 @@ class LabOutput(Struct, frozen=True):
 
     module: str
     """The lab's code as an ES module."""
-    config: str
-    """The lab's data as JSON."""
+    config: dict[str, Any]
+    """The lab's data, as JSON has it."""
     mjb: bytes = b""
     """The model."""
     record: LabRecord | None = None
@@ -88,17 +89,19 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
         if not isinstance(trial.output, LabOutput):
             continue
         name, lab = trial.line.name, trial.output
-        data = json.loads(lab.config)
-        is_editable = "xml" in data  # the page compiles the model, in a worker of its own
+        is_editable, model = (
+            "xml" in lab.config,
+            lab.config.get("model") or name,
+        )  # the page compiles the model, in a worker of its own
         # Labs of the same model share its file.
         parts = {
             "module": publish(f"{name}.js", lab.module.encode()),
-            "mjb": "" if is_editable else publish(f"{data.get('model') or name}.mjb", lab.mjb),
+            "mjb": "" if is_editable else publish(f"{model}.mjb", lab.mjb),
             "worker": f"{worker}#{name}" if is_editable else worker,
             "wasm": wasm,
         }
         addresses = {key: path.removeprefix(f"{_FOLDER}/") for key, path in parts.items()}
-        config = {**data, **addresses}
+        config = lab.config | addresses
         if lab.script is not None:
             config["exportPython"] = dict(zip(("name", "text"), lab.script, strict=True))
         text = json.dumps(config, ensure_ascii=False, separators=(",", ":"))

@@ -61,5 +61,4 @@ def inputs_of(lab: Lab, module: LabModule) -> Inputs:
 
 def trial_data(module: LabModule) -> dict[str, Any]:
     """Return the data of a lab without what no trial depends on."""
-    config: dict[str, Any] = json.loads(module.config)
-    return {name: value for name, value in config.items() if name not in _DISPLAY_FIELDS}
+    return {name: value for name, value in module.config.items() if name not in _DISPLAY_FIELDS}

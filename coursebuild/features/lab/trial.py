@@ -26,14 +26,15 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.features import Trial, TrialContext, TrialOutcome
+from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model.results import TrialLine, TrialResult
 from coursebuild.core.run.child import MEMORY
 from coursebuild.core.run.mjcf import model_files
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.run.model_memory import model_key
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import fingerprint
 from coursebuild.features.lab.compile import LabModule, compile_lab, pieces
-from coursebuild.features.lab.custom import custom_lab
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.files import lab_digest
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
@@ -41,7 +42,6 @@ from coursebuild.features.lab.export.trial import LabExport, export_lab, record_
 from coursebuild.features.lab.files import LabOutput
 from coursebuild.features.lab.inputs import SECONDS, inputs_of, trial_data
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, Lab
-from coursebuild.features.lab.models import model_of_lab, saved_model
 from coursebuild.features.lab.names import name_diagnostics, references
 from coursebuild.features.lab.reply import MainRun, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
@@ -101,25 +101,72 @@ class LabTrials:
                 diagnostics += lab_diagnostics
         return tuple(results), tuple(diagnostics)
 
+    def stop(self) -> None:
+        """End what runs, and let nothing begin; called from another thread."""
+        self._engines.stop()
+
     def _try_lab(self, trial: Trial) -> tuple[TrialResult | None, list[Diagnostic]]:
-        context, engines, lab = self._context, self._engines, trial.block
+        context, lab = self._context, trial.block
         assert isinstance(lab, Lab)
         if any(lab.span.contains(diagnostic.span) for diagnostic in context.diagnostics):
             return None, []
         if not (lab.is_of_text or context.static):
             return None, []  # it claims nothing, and no page is made of it
         if lab.kind not in BUILT_IN_KINDS:
-            return custom_lab(context, engines.native, trial, lab)
-        model = model_of_lab(context, lab)
-        if model is None:
-            return None, []
-        lab_trial = _LabTrial(context, engines, self._seconds, trial, lab, model)
+            return self._publish_custom_lab(trial, lab)
+        if lab.xml is not None:
+            model = Source("models/.lab.xml", lab.xml.text)
+        elif (course_model := _find_model(context, lab.fields.model or "")) is not None:
+            model = course_model
+        else:
+            return None, []  # reported at the model or its name
+        lab_trial = _LabTrial(context, self._engines, self._seconds, trial, lab, model)
         result, diagnostics = lab_trial.run()
         return result, diagnostics if lab.is_of_text else []
 
-    def stop(self) -> None:
-        """End what runs, and let nothing begin; called from another thread."""
-        self._engines.stop()
+    def _publish_custom_lab(
+        self, trial: Trial, lab: Lab
+    ) -> tuple[TrialResult | None, list[Diagnostic]]:
+        """Publish a lab of a course's own kind, of which only `content/labs/KIND.js` knows more.
+
+        So there is no trial; but if its JSON has a `model`, it must exist and compile.
+        """
+        context, code, mjb = self._context, f"content/labs/{lab.kind}.js", b""
+        if code not in context.course.files:
+            return None, []  # reported at the kind
+        data = json.loads(lab.config)
+        if isinstance(name := data.get("model"), str):
+            names = [model.name for model in context.course.models]
+            if name not in names:
+                message, help = f"no model `{name}` in models/", did_you_mean(name, names)
+                return None, [diagnose("lab-model", lab.span.first_line(), message, help=help)]
+            model = _find_model(context, name)
+            if model is None:
+                return None, []  # reported at the model
+            mjb = _save_model(context, self._engines.native, model)
+        module = read_bytes(context.root, code).decode("utf-8", "replace")
+        config = {"id": trial.name, "kind": lab.kind, "title": lab.fields.title, "data": data}
+        line = TrialLine(trial.name, lab.fields.title, trial.owner, "ok")
+        return TrialResult(lab.span, line, LabOutput(module, config, mjb)), []
+
+
+def _find_model(context: TrialContext, name: str) -> Source | None:
+    """Return a model of the course; `None` if there is none that compiles."""
+    compilation = context.models.get(name)
+    if compilation is None or not compilation.facts:
+        return None
+    return next((m.source for m in context.course.models if m.name == name), None)
+
+
+def _save_model(context: TrialContext, native: NativeEngine, model: Source) -> bytes:
+    """Return a model as an MJB file; from the store if nothing in it has changed."""
+    store, key = context.memory.store, model_key(context.root, model.path, model.text)
+    mjb = store.get("mjb", key, bytes)
+    if mjb is None:
+        mjb = native.save(model.path, model.text)
+        if model_key(context.root, model.path, model.text) == key:  # it was not edited meanwhile
+            store.put("mjb", key, mjb)
+    return mjb
 
 
 class _Evaluation(Struct, frozen=True):
@@ -144,33 +191,28 @@ class _LabTrial(Struct, frozen=True):
     lab: Lab
     model: Source
 
-    def run(self) -> tuple[TrialResult | None, list[Diagnostic]]:
+    def run(self) -> tuple[TrialResult, list[Diagnostic]]:
         """Run the trial, or read the reply of an earlier one, and evaluate it."""
-        start = time.monotonic()
-        lab = self.lab
+        lab, store = self.lab, self.context.memory.store
         module = compile_lab(lab, self.trial.name)
         inputs = inputs_of(lab, module)
         try:
-            mjb = saved_model(self.context, self.engines.native, self.model)
+            mjb = _save_model(self.context, self.engines.native, self.model)
             key = fingerprint((inputs.text, inputs.conditions, mjb))
             evaluate = functools.partial(self._evaluate_reply, module, key)
-            evaluation = self.context.memory.store.get("labs", key, evaluate, shared=True)
-            is_cached = evaluation is not None
-            if evaluation is None:
-                diagnostics = self._check_code(mjb)
-                if diagnostics:
-                    return self._failed_result(module, start), diagnostics
-                evaluation = evaluate(self._run_trial(module, mjb, key))
+            stored = store.get("labs", key, evaluate, shared=True)
+            if stored is None and (diagnostics := self._check_code(mjb)):
+                return self._fail(module, diagnostics)
+            evaluation = stored or evaluate(self._run_trial(module, mjb, key))
         except NativeError as error:
             diagnostic = diagnose("lab-engine", lab.place(()), f"native MuJoCo {error}")
-            return self._failed_result(module, start), [diagnostic]
+            return self._fail(module, [diagnostic])
         reply, failures = evaluation.reply, evaluation.failures
         export = LabExport(None) if failures else self._export(reply)
-        path, text = self.model.path, self.model.text
-        model_path = () if lab.xml is not None else (path,)
+        files = model_files(self.context.root, self.model.path, self.model.text)
         self.context.memory.note_trial(
             inputs,
-            (*model_path, *model_files(self.context.root, path, text)),
+            (*((self.model.path,) if lab.xml is None else ()), *files),
             ok=not failures,
             lasting=_is_lasting(reply),
             seconds=reply.seconds,
@@ -181,16 +223,23 @@ class _LabTrial(Struct, frozen=True):
             title=lab.fields.title,
             lesson=self.trial.owner,
             status="failed" if failures else "ok",
-            seconds=reply.seconds if is_cached else time.monotonic() - start,
+            seconds=reply.seconds,
             steps_per_second=reply.steps_per_second,
             tried=len(reply.attempts),
             parity=_parity_text(reply, export),
             fill=None if reply.main is None else reply.main["fill"],
-            cached=is_cached,
+            cached=stored is not None,
             unexported=export.reason,
         )
         output = replace(evaluation.output, mjb=mjb, script=export.script)
         return TrialResult(lab.span, line, output), [*failures, *evaluation.remarks]
+
+    def _fail(
+        self, module: LabModule, diagnostics: list[Diagnostic]
+    ) -> tuple[TrialResult, list[Diagnostic]]:
+        """Make the result of a lab that could not be tried."""
+        line = TrialLine(module.name, self.lab.fields.title, self.trial.owner, "failed")
+        return TrialResult(self.lab.span, line, LabOutput(module.code, module.config)), diagnostics
 
     def _evaluate_reply(self, module: LabModule, key: str, data: bytes) -> _Evaluation:
         """Evaluate a stored reply.
@@ -209,13 +258,6 @@ class _LabTrial(Struct, frozen=True):
             picture = self._draw_picture(key, main)
             output = replace(output, record=lab_record(lab, main), picture=picture)
         return _Evaluation(reply, failures, remarks, output)
-
-    def _failed_result(self, module: LabModule, start: float) -> TrialResult:
-        """Make the result of a lab that could not be tried."""
-        seconds = time.monotonic() - start
-        title = self.lab.fields.title
-        line = TrialLine(module.name, title, self.trial.owner, "failed", seconds)
-        return TrialResult(self.lab.span, line, LabOutput(module.code, module.config))
 
     def _check_code(self, mjb: bytes) -> list[Diagnostic]:
         """Report code that no engine could run; if there is none, names that do not exist."""
@@ -288,16 +330,16 @@ class _LabTrial(Struct, frozen=True):
         return store.get_or_create("pictures", picture_key, lambda: draw_picture(self.lab, main))
 
 
-def _add_camera(config: str, main: MainRun | None) -> str:
+def _add_camera(config: dict[str, Any], main: MainRun | None) -> dict[str, Any]:
     """Add to a lab's data the camera and the scene's extent that its trial worked out."""
     if main is None:
         return config
-    camera = {name: main["scene"]["camera"][name] for name in Camera.__struct_fields__}
-    data = {**json.loads(config), "camera": camera, "floor": main["scene"]["floor"]}
-    data["arrows"] = main["arrows"]
-    if "xml" in data:  # the reader may change the model to one that this camera does not suit
-        data["extent"] = main["scene"]["extent"]
-    return json.dumps(data, ensure_ascii=False, separators=(",", ":"))
+    scene = main["scene"]
+    camera = {name: scene["camera"][name] for name in Camera.__struct_fields__}
+    found = {"camera": camera, "floor": scene["floor"], "arrows": main["arrows"]}
+    if "xml" in config:  # the reader may change the model to one that this camera does not suit
+        found["extent"] = scene["extent"]
+    return config | found
 
 
 def _is_lasting(reply: TrialReply) -> bool:

@@ -170,7 +170,7 @@ def test_data_is_json_without_the_code() -> None:
         camera={"azimuth": 10},
         key=0,
     )
-    config = compile_lab(lab, "4.2-lab-1").config
+    config = json.dumps(compile_lab(lab, "4.2-lab-1").config, allow_nan=False)
     assert "marker" not in config
     data = json.loads(config)
     assert (data["id"], data["title"]) == ("4.2-lab-1", lab.fields.title)

@@ -5,7 +5,6 @@ Entry point: `real_time_factor`.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from coursebuild.core.files.errors import EffectError
@@ -33,7 +32,7 @@ def real_time_factor(
     place = source.span(0, 0)
     module = compile_lab(Lab(place, SIMLAB, place, "", SimLab(key=key)), "speed")
     request = {
-        "config": json.loads(module.config),
+        "config": module.config,
         "code": module.literal,
         "seconds": min(duration, _STEPS * timestep),
         "parity": False,
