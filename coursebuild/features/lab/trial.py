@@ -200,10 +200,10 @@ class _LabTrial(Struct, frozen=True):
             mjb = _save_model(self.context, self.engines.native, self.model)
             key = fingerprint((inputs.text, inputs.conditions, mjb))
             evaluate = functools.partial(self._evaluate_reply, module, key)
-            stored = store.get("labs", key, evaluate, shared=True)
-            if stored is None and (diagnostics := self._check_code(mjb)):
+            cached_evaluation = store.get("labs", key, evaluate, shared=True)
+            if cached_evaluation is None and (diagnostics := self._check_code(mjb)):
                 return self._fail(module, diagnostics)
-            evaluation = stored or evaluate(self._run_trial(module, mjb, key))
+            evaluation = cached_evaluation or evaluate(self._run_trial(module, mjb, key))
         except NativeError as error:
             diagnostic = diagnose("lab-engine", lab.place(()), f"native MuJoCo {error}")
             return self._fail(module, [diagnostic])
@@ -228,7 +228,7 @@ class _LabTrial(Struct, frozen=True):
             tried=len(reply.attempts),
             parity=_parity_text(reply, export),
             fill=None if reply.main is None else reply.main["fill"],
-            cached=stored is not None,
+            cached=cached_evaluation is not None,
             unexported=export.reason,
         )
         output = replace(evaluation.output, mjb=mjb, script=export.script)
@@ -336,10 +336,10 @@ def _add_camera(config: dict[str, Any], main: MainRun | None) -> dict[str, Any]:
         return config
     scene = main["scene"]
     camera = {name: scene["camera"][name] for name in Camera.__struct_fields__}
-    found = {"camera": camera, "floor": scene["floor"], "arrows": main["arrows"]}
+    framing = {"camera": camera, "floor": scene["floor"], "arrows": main["arrows"]}
     if "xml" in config:  # the reader may change the model to one that this camera does not suit
-        found["extent"] = scene["extent"]
-    return config | found
+        framing["extent"] = scene["extent"]
+    return config | framing
 
 
 def _is_lasting(reply: TrialReply) -> bool:

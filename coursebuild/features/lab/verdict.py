@@ -18,20 +18,46 @@ from coursebuild.features.lab.model import MJCF, Entry, Lab
 from coursebuild.features.lab.reply import Parity, TrialFailure, TrialReply
 from coursebuild.features.lab.schema import Button
 
-_RULES = {
-    "throws": "lab-throws",
-    "nan": "lab-value",
-    "type": "lab-value",
-    "warning": "lab-warning",
-    "diverged": "lab-diverged",
-    "deep": "lab-penetration",
-    "expect": "lab-expect",
-    "stopAt": "lab-expect",
-    "goal": "lab-goal",
-    "timeout": "lab-timeout",
-    "engine": "lab-engine",
-    "shared": "lab-shared",
+_EXPLANATIONS = {
+    "throws": ("lab-throws", "{name} throws{time}: {message}", ""),
+    "nan": ("lab-value", "{name} {message}{time}", "where there is to be no value, give `null`"),
+    "type": ("lab-value", "{name} {message}", ""),
+    "warning": ("lab-warning", "MuJoCo warns{time}: {message}", ""),
+    "diverged": (
+        "lab-diverged",
+        "the simulation diverges{time}: {message}",
+        "try a smaller timestep, another integrator, or a narrower range; if it is to diverge, "
+        "claim so: {diverges}",
+    ),
+    "deep": (
+        "lab-penetration",
+        "bodies lie deep in each other{time}: {message}",
+        "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts (`solref`), or a "
+        "narrower range; if they are to lie so, say so: {deep}",
+    ),
+    "expect": ("lab-expect", "the claim does not hold: {message}", ""),
+    "stopAt": ("lab-expect", "{message}", ""),
+    "goal": (
+        "lab-goal",
+        "the goal is reached {message}",
+        "ask for something that has to be done",
+    ),
+    "log": (
+        "lab-goal",
+        "the log does not reach the goal {message}",
+        "reach it in the preview (`coursebuild serve`), and take what `Copy log` gives",
+    ),
+    "timeout": ("lab-timeout", "{name} {message}", "look for a loop or a list without an end"),
+    "length": ("lab-timeout", "trying {name} takes too long", "run less of it: {seconds}"),
+    "engine": ("lab-engine", "the browser's engine says: {message}", ""),
+    "shared": (
+        "lab-shared",
+        "{name} changes what all labs share: {message}",
+        "labs run side by side; keep what this one needs in `ctx`",
+    ),
 }
+"""The rule, text and help of each kind of failure. `log` is a failure of the goal at its log, and
+`length` a timeout in which no single call of lab code took long."""
 
 
 def _entry_name(lab: Lab, entry: Entry) -> str:
@@ -100,8 +126,8 @@ def _check_failures(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 
     MuJoCo warns of the main run again in every attempt; to report it once is enough.
     """
-    failures = [f for f in trial.failures if f.kind != _DEPTH_KIND and not _is_claimed(lab, f)]
-    of_main_run = {f.kind for f in failures if f.entry == () and f.kind in _OF_MUJOCO}
+    failures = [f for f in trial.failures if f.kind != "deep" and not _is_claimed(lab, f)]
+    of_main_run = {f.kind for f in failures if f.entry == () and f.kind in ("warning", "diverged")}
     for failure in failures:
         if failure.entry == () or failure.kind not in of_main_run:
             yield _make_diagnostic(lab, failure)
@@ -109,7 +135,7 @@ def _check_failures(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 
 def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
     """Whether the simulation diverges there, and the lab claims that it does."""
-    if failure.kind != _DIVERGENCE_KIND:
+    if failure.kind != "diverged":
         return False
     claims = [claim for claim in lab.fields.expect if claim.diverges]
     from_start = any(not claim.steps for claim in claims)
@@ -123,21 +149,17 @@ def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
             return from_start
 
 
-_DEPTH_KIND, _DIVERGENCE_KIND = "deep", "diverged"
-_OF_MUJOCO = ("warning", _DIVERGENCE_KIND)
-
-
 def _check_depth(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report bodies that lie deep in each other; only once if the main run has some."""
     if not lab.verify.deep:
-        failures = [f for f in trial.failures if f.kind == _DEPTH_KIND]
+        failures = [f for f in trial.failures if f.kind == "deep"]
         of_main_run = [f for f in failures if f.entry == ()]
         yield from (_make_diagnostic(lab, failure) for failure in of_main_run or failures)
 
 
 def _check_depth_claim(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report a lab that says `deep` without need."""
-    if lab.verify.deep and not any(failure.kind == _DEPTH_KIND for failure in trial.failures):
+    if lab.verify.deep and not any(failure.kind == "deep" for failure in trial.failures):
         message = "the lab says `deep`, and no bodies lay deep in each other"
         span = lab.place(("verify", "deep"))
         yield diagnose("lab-shallow", span, message, help="take `deep` away")
@@ -160,77 +182,44 @@ _SMALL = 0.1
 
 
 def _make_diagnostic(lab: Lab, failure: TrialFailure) -> Diagnostic:
-    during = "" if failure.during is None else failure.during.description
-    label = f"while trying: {during}" if during not in ("", "start") else ""
-    text, help = _explain(lab, failure)
-    span = lab.place(failure.entry)
-    if lab.xml is not None and failure.kind == "engine":
-        line = error_line(failure.message or "", lab.xml.text)
-        span = line_span(lab.xml, line, 0, span)
-    return diagnose(_RULES[failure.kind], span, text, label=label, help=help)
-
-
-def _explain(lab: Lab, failure: TrialFailure) -> tuple[str, str]:
-    """Say what is wrong, and what helps."""
-    name = _entry_name(lab, failure.entry)
-    time = f" at t = {failure.time:.6g} s" if failure.time else ""
+    kind: str = failure.kind
     message = (failure.message or "something that has no text").rstrip(".")
-    match failure.kind:
-        case "throws":
-            function = _OF_MATH.search(message)
-            help = f"did you mean `Math.{function[1].replace('pi', 'PI')}`?" if function else ""
-            return f"{name} throws{time}: {message}", help
-        case "nan":
-            help = (
-                "where there is to be no value, give `null`" if failure.entry[0] != "expect" else ""
-            )
-            return f"{name} {message}{time}", help
-        case "type":
-            return f"{name} {message}", ""
-        case "warning":
-            return f"MuJoCo warns{time}: {message}", ""
-        case "diverged":
-            help = (
-                "try a smaller timestep, another integrator, or a narrower range; if it is to "
-                f"diverge, claim so: {_how_to_write(lab, 'diverges')}"
-            )
-            return f"the simulation diverges{time}: {message}", help
-        case "deep":
-            help = (
-                "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts "
-                "(`solref`), or a narrower range; if they are to lie so, say so: "
-                f"{_how_to_write(lab, 'deep')}"
-            )
-            return f"bodies lie deep in each other{time}: {message}", help
-        case "expect":
-            expr = lab.fields.expect[int(failure.entry[1])].expr
-            reason = f"`{_shorten(expr)}` {message}" if expr is not None else message
-            return f"the claim does not hold: {reason}", ""
+    span, special_help = lab.place(failure.entry), None
+    match kind:
+        case "throws" if function := _OF_MATH.search(message):
+            special_help = f"did you mean `Math.{function[1].replace('pi', 'PI')}`?"
+        case "nan" if failure.entry[0] == "expect":
+            special_help = ""
+        case "expect" if (expr := lab.fields.expect[int(failure.entry[1])].expr) is not None:
+            message = f"`{_shorten(expr)}` {message}"
         case "goal" if failure.entry[-1] == "log":
-            help = "reach it in the preview (`coursebuild serve`), and take what `Copy log` gives"
-            return f"the log does not reach the goal {message}", help
-        case "goal":
-            return f"the goal is reached {message}", "ask for something that has to be done"
+            kind = "log"
         case "timeout" if message == "did not finish in time":
-            return (
-                f"trying {name} takes too long",
-                f"run less of it: {_how_to_write(lab, 'seconds')}",
-            )
-        case "timeout":
-            return f"{name} {message}", "look for a loop or a list without an end"
-        case "shared":
-            help = "labs run side by side; keep what this one needs in `ctx`"
-            return f"{name} changes what all labs share: {message}", help
+            kind = "length"
         case "engine":
-            help = (
-                "a model that the reader edits is one text, beside which there are no files"
-                if lab.kind == MJCF and "opening file" in message
-                else ""
-            )
-            error = readable_error(message.replace("MuJoCo Error: ", ""))
-            return f"the browser's engine says: {error}", help
+            if lab.xml is not None:
+                span = line_span(lab.xml, error_line(message, lab.xml.text), 0, span)
+            if lab.kind == MJCF and "opening file" in message:
+                special_help = (
+                    "a model that the reader edits is one text, beside which there are no files"
+                )
+            message = readable_error(message.replace("MuJoCo Error: ", ""))
         case _:
-            return message, ""
+            pass
+    rule, text, help = _EXPLANATIONS[kind]
+    values = {
+        "name": _entry_name(lab, failure.entry),
+        "time": f" at t = {failure.time:.6g} s" if failure.time else "",
+        "message": message,
+    }
+    during = "" if failure.during is None else failure.during.description
+    return diagnose(
+        rule,
+        span,
+        text.format_map(values),
+        label=f"while trying: {during}" if during not in ("", "start") else "",
+        help=help.format_map(_spellings(lab)) if special_help is None else special_help,
+    )
 
 
 def _check_reset(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
@@ -265,7 +254,7 @@ def _check_parity(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
         f"(t = {time:.6g} s), by up to {parity.relative:.1e} of the state, where {tolerance:g} is "
         "allowed",
         help="a controller that changes `model` while it runs cannot be repeated natively; where "
-        f"the motion is chaotic say how far it may part: {_how_to_write(lab, 'parity')}",
+        f"the motion is chaotic say how far it may part: {_spellings(lab)['parity']}",
     )
 
 
@@ -277,9 +266,9 @@ _SPELLINGS = {
 }
 
 
-def _how_to_write(lab: Lab, setting: str) -> str:
-    """Show how a lab's author writes a setting: in the JSON, or as keys of the fence."""
-    return f"`{_SPELLINGS[setting][lab.kind == MJCF]}`"
+def _spellings(lab: Lab) -> dict[str, str]:
+    """Return how a lab's author writes settings: in the JSON, or as keys of the fence."""
+    return {name: f"`{pair[lab.kind == MJCF]}`" for name, pair in _SPELLINGS.items()}
 
 
 def _shorten(code: str) -> str:

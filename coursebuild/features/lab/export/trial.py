@@ -31,9 +31,6 @@ from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.reply import PARITY_RTOL, MainRun, unpack_arrays
 from coursebuild.features.lab.schema import Select, Slider
 
-_SECONDS = 5.0
-_MOST_STEPS = 20_000
-"""Length of a trial's main run, unless the lab sets it: simulated seconds, and the most steps."""
 _RELATIVE = 1e-9
 _ABSOLUTE = 1e-12
 """Tolerances of readouts of the same state."""
@@ -60,12 +57,13 @@ def export_lab(
 
     `main` is the main run of the lab's trial.
     """
+    start, end = (main["pictures"][i]["time"] for i in (0, -1))
     metadata = ExportMetadata(
         file_name(trial.name),
         _origin(context.course, trial.owner),
         context.course.title,
         engine_version(),
-        _seconds(lab, main),
+        round(end - start, 9),
     )
     # The record stands for the model: a change that matters changes it, too.
     readouts = [picture["readouts"] for picture in main["pictures"]]
@@ -119,17 +117,6 @@ def _origin(course: Course, owner: str) -> str:
             return f"a lab of lesson {owner}, “{lesson.title}”"
     title = next((page.title for page in course.pages if page.id == owner), owner)
     return f"a lab of the page “{title}”"
-
-
-def _seconds(lab: Lab, main: MainRun) -> float:
-    """Return the simulated time of the main run."""
-    stop = lab.fields.stopAt
-    if lab.verify.seconds is not None:
-        return lab.verify.seconds if stop is None else min(lab.verify.seconds, stop)
-    seconds = _SECONDS if stop is None else stop
-    if main["steps"] == _MOST_STEPS:
-        seconds = min(seconds, round(float(main["steps"] * main["timestep"]), 9))
-    return seconds
 
 
 def _control_variants(lab: Lab) -> list[dict[int, float | str]]:
