@@ -1,6 +1,6 @@
 """Inline content: markdown-it's inline tokens become `Inline` nodes with spans.
 
-Entry point: `InlineReader.read`. There is one pass over the flat tokens, with a stack of open
+Entry point: `read_inlines`. There is one pass over the flat tokens, with a stack of open
 emphasis, strong, strikethrough, links and terms:
 
 1. Texts and soft line ends are collected; the next token of another kind turns them into `Text`,
@@ -71,39 +71,44 @@ class _Frame(Struct):
     nodes: list[Inline] = field(default_factory=list)
 
 
-class InlineReader:
-    """Reads the inline content of one text."""
+def read_inlines(
+    content: Excerpt,
+    state: ParsingState,
+    references: References,
+    balance: Balance,
+    *,
+    mentions: bool = True,
+    html: bool = False,
+) -> tuple[Inline, ...]:
+    """The inlines of a block's content.
 
-    def __init__(self, references: References, state: ParsingState, balance: Balance) -> None:
-        self.references = references
-        self.state = state
-        self.balance = balance
-        self.report = state.report
-
-    def read(
-        self, content: Excerpt, *, mentions: bool = True, html: bool = False
-    ) -> tuple[Inline, ...]:
-        """The inlines of a block's content.
-
-        `mentions` says whether "Lesson 2.2" becomes a link. In `html` only tags, entities and
-        formulas are read, and its elements may be closed in another block.
-        """
-        tokens = inline_tokens(content.text, {"references": self.references}, html=html)
-        token_reader = _TokenReader(self, content, mentions)
-        if html:
-            return token_reader.read(tokens)
-        self.balance.enter()
-        inlines = token_reader.read(tokens)
-        self.balance.leave()
-        return inlines
+    `mentions` says whether "Lesson 2.2" becomes a link. In `html` only tags, entities and formulas
+    are read, and its elements may be closed in another block.
+    """
+    tokens = inline_tokens(content.text, {"references": references}, html=html)
+    reader = _TokenReader(content, state, references, balance, mentions)
+    if html:
+        return reader.read(tokens)
+    balance.enter()
+    inlines = reader.read(tokens)
+    balance.leave()
+    return inlines
 
 
 class _TokenReader:
     """Reads the tokens of one block's content."""
 
-    def __init__(self, reader: InlineReader, content: Excerpt, mentions: bool) -> None:
-        self.reader = reader
-        self.content = content
+    def __init__(
+        self,
+        content: Excerpt,
+        state: ParsingState,
+        references: References,
+        balance: Balance,
+        mentions: bool,
+    ) -> None:
+        self.content, self.state, self.references = content, state, references
+        self.balance = balance
+        self.report = state.report
         self.stack = [_Frame(None)]
         self.pieces: list[TextPiece] = []
         self.texts: list[tuple[int, str]] = []
@@ -134,7 +139,7 @@ class _TokenReader:
                 self._add_leaf(token)
         self._flush()
         for diagnostic in check_unread_markup(self.content, self.texts):
-            self.reader.report(diagnostic)
+            self.report(diagnostic)
         return tuple(self.stack[0].nodes)
 
     # -- texts
@@ -153,9 +158,7 @@ class _TokenReader:
     def _read_unclosed_math(self, token: PositionedToken) -> None:
         span = self.content.span(token.start, token.end)
         help = "close it with `$$` in the same paragraph, or write `\\$` for a dollar sign"
-        self.reader.report(
-            diagnose("math-unclosed", span, "display math is never closed", help=help)
-        )
+        self.report(diagnose("math-unclosed", span, "display math is never closed", help=help))
         self.pieces.append(TextPiece(token.content, token.start, token.end))
 
     # -- containers
@@ -165,13 +168,13 @@ class _TokenReader:
         is_link = token.type == "link_open"
         flat = len(self.stack) > MAX_DEPTH and not is_link and token.type != "term_open"
         self.stack.append(_Frame(token, self.stack[-1].nodes if flat else []))
-        self.reader.balance.enter()
+        self.balance.enter()
         self.open_links += is_link or token.type == "term_open"
 
     def _close(self, token: PositionedToken) -> None:
         self._flush()
         frame = self.stack.pop()
-        self.reader.balance.leave()
+        self.balance.leave()
         siblings = self.stack[-1].nodes
         if frame.nodes is siblings:
             return
@@ -197,7 +200,7 @@ class _TokenReader:
     ) -> Term | None:
         assert closing.map is not None
         span = self.content.span(opening.start, closing.end)
-        report = self.reader.report
+        report = self.report
         given_name = read_term(self.content.slice(*closing.map), report)
         if given_name is None:
             return None
@@ -217,7 +220,7 @@ class _TokenReader:
             destination = self._find_destination(opening.start, closing.start, closing.end)
         diagnostic = check_scheme(url, destination)
         if diagnostic is not None:
-            self.reader.report(diagnostic)
+            self.report(diagnostic)
             return None
         title = str(opening.attrs.get("title", ""))
         return Link(span, classify(url), destination, title, children)
@@ -233,7 +236,7 @@ class _TokenReader:
         label = text[start + 1 : label_end]
         if end > label_end + 3:
             label = text[label_end + 2 : end - 1]
-        definition = self.reader.references.get(normalizeReference(label))
+        definition = self.references.get(normalizeReference(label))
         if definition is None:
             return self.content.span(start, end)
         definition_text: Excerpt = definition["place"]
@@ -270,16 +273,16 @@ class _TokenReader:
     def _read_math(self, token: PositionedToken, span: Span) -> Math:
         assert token.map is not None
         if not token.content.strip():
-            self.reader.report(diagnose("math-syntax", span, "the formula is empty"))
+            self.report(diagnose("math-syntax", span, "the formula is empty"))
         tex, display = self.content.slice(*token.map), token.info == "display"
         if token.meta["braces"] is None:
             return Math(span, tex, display)
-        braces, report = self.content.slice(*token.meta["braces"]), self.reader.report
+        braces, report = self.content.slice(*token.meta["braces"]), self.report
         if not display:
             return Math(span, tex, display, None, *read_meaning(braces, report))
         label = read_label(braces, report)
         if label is not None:
-            self.reader.state.anchors.take(label.id, label.span)
+            self.state.anchors.take(label.id, label.span)
         return Math(span, tex, display, label)
 
     def _read_number(self, token: PositionedToken, span: Span) -> CodeSpan | NumberBinding:
@@ -290,7 +293,7 @@ class _TokenReader:
             place = self.content.span(braces.start(), braces.end())
             message = f"`{braces[0]}` does not say where the number is from"
             help = 'write `{out}`, `{out=examples/x.py}`, `{given}` or `{given="its source"}`'
-            self.reader.report(diagnose("binding-attribute", place, message, help=help))
+            self.report(diagnose("binding-attribute", place, message, help=help))
             return CodeSpan(span, token.content)
         start, end = token.map
         if end - start == len(token.content) + 2:
@@ -303,7 +306,7 @@ class _TokenReader:
     def _read_html(self, token: PositionedToken, span: Span) -> RawInline:
         html = self.content.slice(token.start, token.end)
         for tag in tags(html.text):
-            self.reader.balance.add(tag, html)
+            self.balance.add(tag, html)
             step = 0 if tag.is_complete else -1 if tag.is_end_tag else 1
             if tag.name == "a":
                 self.open_links = max(0, self.open_links + step)
@@ -317,16 +320,16 @@ class _TokenReader:
         place = self._find_destination(token.start + 1, label_end, token.end)
         diagnostic = check_scheme(url, place, image=True)
         if diagnostic is not None:
-            self.reader.report(diagnostic)
+            self.report(diagnostic)
             url = ""
         if not alt.strip():
             help = "say in the brackets what it shows, for readers who cannot see it"
             message = "the image has no text alternative"
-            self.reader.report(diagnose("image-alt", span, message, help=help))
+            self.report(diagnose("image-alt", span, message, help=help))
         return Image(span, url, alt, str(token.attrs.get("title", "")), place)
 
     def _read_footnote(self, token: PositionedToken, span: Span) -> FootnoteRef | None:
-        reference = self.reader.state.notes.refer(token.content, span)
+        reference = self.state.notes.refer(token.content, span)
         if reference is None:
             self.pieces.append(TextPiece(f"[^{token.content}]", token.start, token.end))
         return reference

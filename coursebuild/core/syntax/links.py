@@ -11,9 +11,8 @@ lines. A mention becomes a `Link` whose `target_span` is the number; the text ar
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
 from collections.abc import Sequence
-from itertools import accumulate, groupby
+from itertools import groupby
 from typing import NamedTuple
 from urllib.parse import unquote
 
@@ -133,42 +132,30 @@ def text_inlines(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
 
 def link_mentions(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
     """The run as texts, soft line ends, and links where it mentions lessons and levels."""
-    text = "".join([piece.text for piece in run])
-    starts = [0, *accumulate(len(piece.text) for piece in run)]
+    chars = _characters(run)
+    text = "".join([char.text for char in chars])
     inlines: list[Inline] = []
     position = 0
     for mentions in _MENTIONS.finditer(text):
         for number in _NUMBER.finditer(text, *mentions.span()):
             is_first = position <= mentions.start()  # its link includes the word
-            start = mentions.start() if is_first else number.start()
-            inlines += text_inlines(_slice_pieces(run, starts, position, start), content)
-            children = text_inlines(_slice_pieces(run, starts, start, number.end()), content)
+            start, end = mentions.start() if is_first else number.start(), number.end()
+            inlines += text_inlines(chars[position:start], content)
             target = LessonTarget(number[0], None) if mentions[1] else LevelTarget(number[0])
-            digits = _slice_pieces(run, starts, *number.span())
-            place = content.span(digits[0].start, digits[-1].end)
-            span = children[0].span.to(children[-1].span)
+            children = text_inlines(chars[start:end], content)
+            span = content.span(chars[start].start, chars[end - 1].end)
+            place = content.span(chars[number.start()].start, chars[end - 1].end)
             inlines.append(Link(span, target, place, "", tuple(children), mention=True))
-            position = number.end()
-    return inlines + text_inlines(_slice_pieces(run, starts, position, len(text)), content)
+            position = end
+    return inlines + text_inlines(chars[position:], content)
 
 
-def _slice_pieces(
-    run: Sequence[TextPiece], starts: list[int], start: int, end: int
-) -> list[TextPiece]:
-    """The pieces between two offsets of the joined text, in which they begin at `starts`.
-
-    A part of a piece that is not literal gets the place of the whole.
-    """
-    pieces: list[TextPiece] = []
-    i = bisect_right(starts, start) - 1
-    while i < len(run) and starts[i] < end:
-        piece = run[i]
-        first, last = max(start - starts[i], 0), min(end - starts[i], len(piece.text))
-        if last > first:
-            text = piece.text[first:last]
-            if piece.literal:
-                pieces.append(TextPiece(text, piece.start + first, piece.start + last))
-            else:
-                pieces.append(piece._replace(text=text))
-        i += 1
-    return pieces
+def _characters(run: Sequence[TextPiece]) -> list[TextPiece]:
+    """The run as pieces of one character; those of an entity have the place of the whole."""
+    return [
+        TextPiece(char, piece.start + i, piece.start + i + 1)
+        if piece.literal
+        else piece._replace(text=char)
+        for piece in run
+        for i, char in enumerate(piece.text)
+    ]

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import partial
 
 from coursebuild.core import model
 from coursebuild.core.syntax.attributes import LABEL, read_label
@@ -22,7 +23,7 @@ from coursebuild.core.syntax.dispatch import read_block
 from coursebuild.core.syntax.fence import INDENTED_FENCE, is_known_kind, read_fence
 from coursebuild.core.syntax.headings import Attributes, check_heading, read_attributes
 from coursebuild.core.syntax.html import Balance, find_media, tags
-from coursebuild.core.syntax.inlines import InlineReader
+from coursebuild.core.syntax.inlines import read_inlines
 from coursebuild.core.syntax.markdown import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
@@ -55,7 +56,9 @@ class TextReader:
         self.tokens = block_tokens(base, references)
         self.index = 0
         """That of the next token."""
-        self.inlines = InlineReader(references, state, self.balance)
+        self.inlines = partial(
+            read_inlines, state=state, references=references, balance=self.balance
+        )
         self._scan_tokens()
 
     def _scan_tokens(self) -> None:
@@ -120,7 +123,7 @@ class TextReader:
     def _read_paragraph(self, token: PositionedToken) -> model.Block:
         self.index += 2
         content = self._content(token)
-        children = self.inlines.read(content)
+        children = self.inlines(content)
         span = content.span()
         if not self.nested and "Output" in content.text[:16] and is_caption(children):
             recording = self._read_recording(children, span)
@@ -148,7 +151,7 @@ class TextReader:
         span = self._span(token)
         attributes = read_attributes(self._content(token))
         self.state.diagnostics += attributes.diagnostics
-        children = self.inlines.read(attributes.value.title, mentions=False)
+        children = self.inlines(attributes.value.title, mentions=False)
         level = int(token.tag[1:])
         state, previous_level = self.state, None if self.nested else self.state.level
         state.diagnostics += check_heading(
@@ -212,7 +215,7 @@ class TextReader:
         html = locate(self.base, token.rows)
         if self.nested or "$" in html.text:
             content = trim(html, " \t\n")
-            children = self.inlines.read(content, html=True)
+            children = self.inlines(content, html=True)
             if self.nested or any(isinstance(child, model.Math) for child in children):
                 return model.HtmlFlow(content.span(), children)
         else:
@@ -258,11 +261,11 @@ class TextReader:
         return model.BlockQuote(span, self._read_blocks("blockquote_close"))
 
     def _read_callout(self, span: Span, head: Head) -> model.Callout:
-        title = self.inlines.read(head.title)
+        title = self.inlines(head.title)
         self.index += 3
         rest: tuple[model.Block, ...] = ()
         if head.rest.text:
-            rest = (model.Paragraph(head.rest.span(), self.inlines.read(head.rest)),)
+            rest = (model.Paragraph(head.rest.span(), self.inlines(head.rest)),)
         blocks = (*rest, *self._read_blocks("blockquote_close"))
         return model.Callout(span, head.kind, head.kind_span, title, head.folded, blocks)
 
@@ -288,7 +291,7 @@ class TextReader:
         return table
 
     def _table_at(self, at: int) -> tuple[model.Table, int]:
-        return read_table(self.tokens, at, self.base, self.inlines.read, self.state.report)
+        return read_table(self.tokens, at, self.base, self.inlines, self.state.report)
 
     def _skip_footnote(self, token: PositionedToken) -> None:
         """Skip a footnote, which is read later."""
@@ -357,8 +360,7 @@ class NestedTextParser:
 
     def _read_inlines(self, content: Excerpt) -> tuple[model.Inline, ...]:
         balance = Balance(self._state.report)
-        reader = InlineReader(self._references(), self._state, balance)
-        inlines = reader.read(content)
+        inlines = read_inlines(content, self._state, self._references(), balance)
         balance.finish()
         return inlines
 
