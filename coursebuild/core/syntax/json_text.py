@@ -25,8 +25,9 @@ from coursebuild.core.syntax.nodes import (
     NumberNode,
     ObjectNode,
     StringNode,
-    build_string,
+    check_tex_escapes,
     odd_character,
+    replace_escapes,
     tex_word,
 )
 from coursebuild.core.syntax.wording import shorten
@@ -237,17 +238,11 @@ class _Reader:
             self.report(self.offset, self.offset + len(line), message, help)
             raise _UnreadableError
         self.offset = match.end()
-        content = match.span(1)
-        escapes = _ESCAPE.finditer(self.text, *content)
-        return build_string(
-            self.body,
-            match.span(),
-            content,
-            escapes,
-            self.decode_escape,
-            _backslash_help,
-            self.diagnostics,
-        )
+        escapes = _ESCAPE.finditer(self.text, *match.span(1))
+        replacements = ((escape, self.decode_escape(escape)) for escape in escapes)
+        value = replace_escapes(self.body, match.span(1), replacements)
+        self.diagnostics += check_tex_escapes(value, _backslash_help)
+        return StringNode(self.body, *match.span(), value)
 
     def decode_escape(self, match: re.Match[str]) -> str:
         """The character that an escape stands for; a wrong one is reported."""

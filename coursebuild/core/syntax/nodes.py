@@ -1,7 +1,7 @@
 """Values of JSON and TOML that know where they stand.
 
-Entry points: the union `Node`, `Member`; `build_string`, `tex_word` and `odd_character` for the
-parsers. Both languages give the same nodes, so that one decoder serves both.
+Entry points: the union `Node`, `Member`; for the parsers `replace_escapes`, `check_tex_escapes`,
+`tex_word` and `odd_character`. Both languages give the same nodes, so that one decoder serves both.
 
 A node keeps offsets into the excerpt that was parsed; its `span` in the lesson is worked out on
 demand. Nodes compare by identity: two equal numbers at two places are two nodes.
@@ -154,6 +154,7 @@ Node: TypeAlias = (
 
 _LETTERS = re.compile(r"[A-Za-z]+")
 _DOLLARS = re.compile(r"(?<!\\)\$+")
+_CONTROL = re.compile(r"[\t\n\b\f\r]")
 
 _COMMANDS = frozenset(
     """
@@ -165,38 +166,17 @@ _COMMANDS = frozenset(
 """Commands of TeX that begin with `t` or `n`."""
 
 
-def build_string(
-    body: Excerpt,
-    outer: tuple[int, int],
-    content: tuple[int, int],
-    escapes: Iterable[re.Match[str]],
-    decode_escape: Callable[[re.Match[str]], str],
-    help: Callable[[str], str],
-    diagnostics: list[Diagnostic],
-) -> StringNode:
-    """The node of a string.
-
-    `outer` has its offsets with the quotes, `content` without. `escapes` are those in it, in order,
-    and `decode_escape` decodes one. An escape that was surely meant for TeX is reported, with the
-    help that `help` gives for the command.
-    """
+def replace_escapes(
+    body: Excerpt, content: tuple[int, int], replacements: Iterable[tuple[re.Match[str], str]]
+) -> Excerpt:
+    """The content of a string, between two offsets, with a text in place of each escape."""
     parts: list[Excerpt] = []
-    controls: list[tuple[int, re.Match[str]]] = []
-    length, (position, end) = 0, content
-    for escape in escapes:
-        literal = body.slice(position, escape.start())
-        character = Excerpt(body.source, decode_escape(escape), ((0, body.offset(escape.start())),))
-        if escape[0] in ("\\t", "\\n", "\\b", "\\f", "\\r"):
-            controls.append((length + len(literal.text), escape))
-        parts += (literal, character)
-        length += len(literal.text) + len(character.text)
+    position, end = content
+    for escape, text in replacements:
+        place = ((0, body.offset(escape.start())),)
+        parts += (body.slice(position, escape.start()), Excerpt(body.source, text, place))
         position = escape.end()
-    text = Excerpt.join([*parts, body.slice(position, end)])
-    for start, command in _find_tex_escapes(text.text, controls):
-        span = body.span(start, start + 1 + len(command))
-        message = f"`\\{command[0]}` of `\\{command}` is read as a control character"
-        diagnostics.append(diagnose("field-value", span, message, help=help(command)))
-    return StringNode(body, *outer, text)
+    return Excerpt.join([*parts, body.slice(position, end)])
 
 
 def tex_word(text: str, at: int) -> str:
@@ -205,29 +185,29 @@ def tex_word(text: str, at: int) -> str:
     return match[0] if match else ""
 
 
-def _find_tex_escapes(
-    value: str, escapes: Iterable[tuple[int, re.Match[str]]]
-) -> Iterator[tuple[int, str]]:
-    r"""Yield the escapes of a decoded string that were meant for TeX: their offsets and commands.
+def check_tex_escapes(text: Excerpt, help: Callable[[str], str]) -> Iterator[Diagnostic]:
+    r"""Report the escapes of a string that were surely meant for TeX.
 
     Both languages read `\t`, `\n`, `\b`, `\f` and `\r` as control characters, so that "$\tau$"
     silently becomes a tab and "au". A backspace, form feed or carriage return before a letter has
     no use in a course's text; a tab or a line end has, so these are reported only before the rest
-    of a known command. `escapes` come with their offset in the value.
+    of a known command. `help` is that for a command.
     """
+    value = text.text
     if "$" not in value:
         return
     dollars = [match.start() for match in _DOLLARS.finditer(value)]
-    for offset, escape in escapes:
-        letter, rest = escape[0][1], tex_word(value, offset + 1)
+    for control in _CONTROL.finditer(value):
+        span = text.span(*control.span())
+        letter, rest = span.source.text[span.end : span.end + 1], tex_word(value, control.end())
+        if not rest or span.text != "\\" or letter not in "tnbfr":
+            continue  # no command, no escape, or one by its number
         is_command = letter + rest in _COMMANDS
-        in_math = bisect_left(dollars, offset) % 2 == 1
-        if letter == "n":
-            is_tex = is_command and in_math
-        else:
-            is_tex = is_command or in_math or letter in "bfr"
-        if rest and is_tex:
-            yield escape.start(), letter + rest
+        in_math = bisect_left(dollars, control.start()) % 2 == 1
+        if (is_command and in_math) if letter == "n" else (is_command or in_math or letter != "t"):
+            place = span.to(span.source.span(span.end, span.end + 1 + len(rest)))
+            message = f"`\\{letter}` of `\\{letter}{rest}` is read as a control character"
+            yield diagnose("field-value", place, message, help=help(letter + rest))
 
 
 def odd_character(char: str) -> str:

@@ -27,7 +27,8 @@ from coursebuild.core.syntax.nodes import (
     NumberNode,
     ObjectNode,
     StringNode,
-    build_string,
+    check_tex_escapes,
+    replace_escapes,
 )
 from coursebuild.core.syntax.toml_mistakes import diagnose_syntax, double_backslash, error_offset
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
@@ -230,16 +231,17 @@ class _Reader:
                 return DateNode(self.body, start, end)
 
     def read_string(self, node: tree_sitter.Node) -> StringNode:
-        place = start, end = node.byte_range
+        start, end = node.byte_range
         quote = self.text[start]
         width = 3 if end - start >= 6 and self.text.startswith(quote * 3, start) else 1
         content = (start + width, end - width)
         if width == 3 and self.text[content[0]] == "\n":  # a line end here is no part of the text
             content = (content[0] + 1, content[1])
         escapes = _ESCAPE.finditer(self.text, *content) if quote == '"' else ()
-        return build_string(
-            self.body, place, content, escapes, _decode_escape, double_backslash, self.diagnostics
-        )
+        replacements = ((escape, _decode_escape(escape)) for escape in escapes)
+        value = replace_escapes(self.body, content, replacements)
+        self.diagnostics += check_tex_escapes(value, double_backslash)
+        return StringNode(self.body, start, end, value)
 
 
 def _decode_escape(escape: re.Match[str]) -> str:
