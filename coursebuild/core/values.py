@@ -63,10 +63,7 @@ def encode(value: object) -> bytes:
     Raises:
         TypeError: a part of it is of a type that cannot be encoded.
     """
-    try:
-        return _Encoder().bytes(value)
-    except UnicodeEncodeError:  # a lone surrogate, as JSON may have one
-        return _Encoder(escape_surrogates=True).bytes(value)
+    return _Encoder().bytes(value)
 
 
 def decode(data: bytes | None, kind: type[Value], source: Source | None = None) -> Value | None:
@@ -87,22 +84,12 @@ def fingerprint(
 
     `substitutes` has a function for some types: what it returns is hashed in the place of a value.
     """
-    try:
-        data = _Encoder(substitutes).bytes(value)
-    except UnicodeEncodeError:
-        data = _Encoder(substitutes, escape_surrogates=True).bytes(value)
-    return hashlib.sha256(data).hexdigest()
+    return hashlib.sha256(_Encoder(substitutes).bytes(value)).hexdigest()
 
 
 class _Encoder:
-    def __init__(
-        self,
-        substitutes: Mapping[type, Callable[[Any], object]] | None = None,
-        *,
-        escape_surrogates: bool = False,
-    ) -> None:
+    def __init__(self, substitutes: Mapping[type, Callable[[Any], object]] | None = None) -> None:
         self._substitutes = substitutes or {}
-        self._escape_surrogates = escape_surrogates
         self._class_numbers: dict[type, int] = {}
 
     def bytes(self, value: object) -> bytes:
@@ -117,7 +104,7 @@ class _Encoder:
             value = self._substitutes[kind](value)
             kind = type(value)
         if kind is str:
-            return self._pack_text(value) if self._escape_surrogates else value
+            return value if value.isascii() else _pack_text(value)
         if kind is int:
             return value if _MIN_INT <= value < _INT_END else [_NUMBER, str(value)]
         if kind in _PLAIN:
@@ -158,12 +145,13 @@ class _Encoder:
     def _class_number(self, kind: type) -> int:
         return self._class_numbers.setdefault(kind, len(self._class_numbers) + _FIRST_CLASS)
 
-    def _pack_text(self, text: str) -> Any:
-        try:
-            text.encode()
-        except UnicodeEncodeError:
-            return [_TEXT, text.encode("utf-8", "surrogatepass")]
-        return text
+
+def _pack_text(text: str) -> Any:
+    try:
+        text.encode()
+    except UnicodeEncodeError:  # a lone surrogate, as JSON may have one
+        return [_TEXT, text.encode("utf-8", "surrogatepass")]
+    return text
 
 
 def _make_builder(names: list[str], source: Source | None) -> Callable[[list[Any]], Any]:

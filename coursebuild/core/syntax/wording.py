@@ -33,14 +33,19 @@ JSON: Format = "JSON"
 TOML: Format = "TOML"
 """The language of a value; messages call the same value an object in JSON and a table in TOML."""
 
-_NAMED_TYPES: dict[str, tuple[str, str, type[Node]]] = {
-    "string": ("a string", "strings", StringNode),
-    "integer": ("an integer", "integers", NumberNode),
-    "number": ("a number", "numbers", NumberNode),
-    "bool": ("`true` or `false`", "`true` or `false`", BoolNode),
-    "object": ("an object", "objects", ObjectNode),
+_TYPES: dict[type[inspect.Type], tuple[str, str, type[Node]]] = {
+    inspect.StrType: ("a string", "strings", StringNode),
+    inspect.LiteralType: ("a string", "strings", StringNode),
+    inspect.IntType: ("an integer", "integers", NumberNode),
+    inspect.FloatType: ("a number", "numbers", NumberNode),
+    inspect.BoolType: ("`true` or `false`", "`true` or `false`", BoolNode),
+    inspect.DictType: ("an object", "objects", ObjectNode),
+    inspect.StructType: ("an object", "objects", ObjectNode),
+    inspect.VarTupleType: ("an array", "arrays", ArrayNode),
+    inspect.TupleType: ("an array", "arrays", ArrayNode),
+    inspect.NoneType: ("", "", NullNode),
 }
-"""All types but arrays: the words for one value and for several, and the type of the node."""
+"""The words for one value and for several of a type, and the type of its node."""
 
 
 def _union_members(type: inspect.Type) -> list[inspect.Type]:
@@ -54,39 +59,18 @@ def _union_members(type: inspect.Type) -> list[inspect.Type]:
     return [t for t in types if not isinstance(t, inspect.NoneType) and t not in structs[1:]]
 
 
-def _type_name(type: inspect.Type) -> str:
-    """The name of a type that is neither a union nor `null`."""
-    match type:
-        case inspect.StrType() | inspect.LiteralType():
-            return "string"
-        case inspect.IntType():
-            return "integer"
-        case inspect.FloatType():
-            return "number"
-        case inspect.BoolType():
-            return "bool"
-        case inspect.DictType() | inspect.StructType():
-            return "object"
-        case inspect.VarTupleType() | inspect.TupleType():
-            return "array"
-        case _:
-            raise TypeError(f"no value of a lesson is of {type}")
-
-
 def _describe_type(type: inspect.Type) -> tuple[str, str]:
     """A type in words: for one value, and for several."""
     singulars, plurals = [], []
     for member in _union_members(type):
+        singular, plural, _ = _TYPES[member.__class__]
+        content = ""
         if isinstance(member, inspect.VarTupleType):
-            items = _describe_type(member.item_type)[1]
-            words = (f"an array of {items}", f"arrays of {items}")
+            content = f" of {_describe_type(member.item_type)[1]}"
         elif isinstance(member, inspect.TupleType):
-            length = f"of {len(member.item_types)} values"
-            words = (f"an array {length}", f"arrays {length}")
-        else:
-            words = _NAMED_TYPES[_type_name(member)][:2]
-        singulars.append(words[0])
-        plurals.append(words[1])
+            content = f" of {len(member.item_types)} values"
+        singulars.append(singular + content)
+        plurals.append(plural + content)
     return " or ".join(singulars), " or ".join(plurals)
 
 
@@ -96,12 +80,9 @@ def accepts(type: inspect.Type, node: Node) -> bool:
         return accepts(type.type, node)
     if isinstance(type, inspect.UnionType):
         return any(accepts(member, node) for member in type.types)
-    if isinstance(type, inspect.NoneType):
-        return isinstance(node, NullNode)
-    kind = _type_name(type)
-    if kind == "integer" and isinstance(node, NumberNode):
+    if isinstance(type, inspect.IntType) and isinstance(node, NumberNode):
         return isinstance(node.value, int)
-    return isinstance(node, ArrayNode if kind == "array" else _NAMED_TYPES[kind][2])
+    return isinstance(node, _TYPES[type.__class__][2])
 
 
 def shorten(text: str) -> str:
@@ -150,26 +131,25 @@ def type_help(node: Node, type: inspect.Type) -> str:
     """How to mend a value of the wrong type, if that is clear."""
     raw = node.raw
     members = _union_members(type)
-    names = {_type_name(member) for member in members}
+    kinds = {_TYPES[member.__class__][2] for member in members}
     arrays = [member for member in members if isinstance(member, inspect.VarTupleType)]
     item_types = (member for array in arrays for member in _union_members(array.item_type))
-    item_names = {_type_name(member) for member in item_types}
+    item_kinds = {_TYPES[member.__class__][2] for member in item_types}
     if isinstance(node, NullNode):
         return "leave the field out"
-    if isinstance(node, ObjectNode) and "object" in item_names and raw.startswith("["):
+    if isinstance(node, ObjectNode) and ObjectNode in item_kinds and raw.startswith("["):
         return f"write its header with two brackets: `[{node.mark.text}]`"
     if len(raw) > _MAX_LENGTH or "\n" in raw:
         return ""
     if isinstance(node, NumberNode | DateNode | BoolNode):
-        needs_quotes = not isinstance(node, BoolNode) or names == {"string"}
-        if "string" in names and needs_quotes:
+        if kinds == {StringNode} or (StringNode in kinds and not isinstance(node, BoolNode)):
             return f'put it between quotes: `"{raw}"`'
-        if "string" in item_names:
+        if StringNode in item_kinds:
             return f'put it between brackets and quotes: `["{raw}"]`'
     if isinstance(node, StringNode):
-        if names & {"integer", "number"} and _NUMBER.fullmatch(node.value):
+        if NumberNode in kinds and _NUMBER.fullmatch(node.value):
             return f"write it without quotes: `{node.value}`"
-        if "bool" in names and node.value.lower() in ("true", "false"):
+        if BoolNode in kinds and node.value.lower() in ("true", "false"):
             return f"write it without quotes: `{node.value.lower()}`"
     if any(accepts(array.item_type, node) for array in arrays):
         return f"put it between brackets: `[{raw}]`"
