@@ -12,15 +12,15 @@ aligns the words of a line and the rows of a table.
    lines are elided instead.
 3. `pair` pairs what matches at the start and at the end, and aligns what is left for the greatest
    sum of weights by dynamic programming (Needleman and Wunsch, J. Mol. Biol. 48, 1970) where the
-   table is small. A large rest is first cut at items that occur once on either side (patience
-   diff); what remains too large even so is paired item by item.
+   table is small. A large rest is first cut at items that are equal on both sides; what remains too
+   large even so is paired item by item.
 """
 
 from __future__ import annotations
 
+import difflib
 import enum
 import re
-from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Sequence
 
@@ -186,11 +186,13 @@ def pair(
         rows, columns = range(i0, i1), range(j0, j1)
         if len(rows) * len(columns) <= _CELLS:
             pairs += _best_pairs(rows, columns, weight, is_free)
-        elif chain := _unique_chain(left, rows, right, columns):
-            pairs += chain
-            for i, j in [*chain, (i1, j1)]:
+        elif blocks := _equal_blocks(left[i0:i1], right[j0:j1]):
+            for block in blocks:
+                i, j = rows[block.a], columns[block.b]
+                pairs += [(i + k, j + k) for k in range(block.size)]
                 regions.append((i0, i, j0, j))
-                i0, j0 = i + 1, j + 1
+                i0, j0 = i + block.size, j + block.size
+            regions.append((i0, i1, j0, j1))
         else:
             pairs += [(i, j) for i, j in zip(rows, columns, strict=False) if weight(i, j)]
     return sorted(pairs)
@@ -224,27 +226,6 @@ def _best_pairs(rows: range, columns: range, weight: Weight, is_free: Sequence[b
     return pairs
 
 
-def _unique_chain(left: Sequence[str], rows: range, right: Sequence[str], columns: range) -> _Pairs:
-    """The longest chain, growing on both sides, of items that occur once on each."""
-    left_count = Counter(left[i] for i in rows)
-    right_count = Counter(right[j] for j in columns)
-    columns_by_text = {right[j]: j for j in columns if right_count[right[j]] == 1}
-    unique_pairs = [
-        (i, columns_by_text[left[i]])
-        for i in rows
-        if left_count[left[i]] == 1 and left[i] in columns_by_text
-    ]
-    # For each length, the least place on the right at which a chain of that length ends.
-    tails: list[int] = []
-    lengths: list[int] = []
-    for _, j in unique_pairs:
-        length = bisect_left(tails, j)
-        tails[length : length + 1] = [j]
-        lengths.append(length)
-    chain: _Pairs = []
-    length_due = len(tails) - 1
-    for (i, j), length in zip(reversed(unique_pairs), reversed(lengths), strict=True):
-        if length == length_due and (not chain or j < chain[-1][1]):
-            chain.append((i, j))
-            length_due -= 1
-    return chain[::-1]
+def _equal_blocks(left: Sequence[str], right: Sequence[str]) -> Sequence[difflib.Match]:
+    """Runs x on both sides, in order, found by those that are not frequent."""
+    return difflib.SequenceMatcher(None, left, right).get_matching_blocks()[:-1]

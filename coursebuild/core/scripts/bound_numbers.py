@@ -7,14 +7,13 @@ Entry points: `printed_lines` (a recorded output), `lines_of_run` (the output of
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property
 
 from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
-from coursebuild.core.scripts.mapped_text import Side, plain_text, replace_ranges
+from coursebuild.core.scripts.mapped_text import MappedText, Side, plain_text, replace_ranges
 from coursebuild.core.scripts.numbers import (
     Number,
     round_like,
@@ -62,20 +61,10 @@ def _locator_in_fence(body: Excerpt, side: Side, line: int) -> Locate:
 
 
 def _row_line(row: tuple[RowCell, ...]) -> PrintedLine:
-    starts: list[int] = []
-    at = 0
-    for cell in row:
-        starts.append(at)
-        at += len(cell.mapped.text) + 1
-
-    def locate(start: int, end: int) -> Span:
-        first = bisect_right(starts, start) - 1
-        last = max(first, bisect_right(starts, max(start, end - 1)) - 1)
-        low, _ = row[first].mapped.origin(start - starts[first], start - starts[first])
-        _, high = row[last].mapped.origin(0, min(end - starts[last], len(row[last].mapped.text)))
-        return Span(row[first].cell.span.source, low, max(low, high))
-
-    return PrintedLine(" ".join(cell.mapped.text for cell in row), locate)
+    gap = MappedText.substitute_for(0, 0, " ")
+    cells = [part for cell in row for part in (gap, cell.mapped)]
+    line, source = MappedText.join(cells[1:]), row[0].cell.span.source
+    return PrintedLine(line.text, lambda start, end: Span(source, *line.origin(start, end)))
 
 
 def shows(number: Number, printed: Number) -> bool:

@@ -13,7 +13,7 @@ Entry point: `LineMatcher`.
 
 from __future__ import annotations
 
-from bisect import bisect_left
+import re
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache
 
@@ -21,11 +21,14 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Mode
+from coursebuild.core.scripts.mapped_text import replace_ranges
 from coursebuild.core.scripts.numbers import Number, scan, within_half_unit, within_tolerance
 
 MARK = "\x00"
 ELLIPSIS = "..."
 
+_SPACE = re.compile(rf"(?<={MARK})\s++|(?<!\s)\s++(?={MARK})")
+"""White space after a number, or before one."""
 _CLOSING = frozenset(")]},;|")
 
 SameNumber = Callable[[Number, Number], bool]
@@ -37,54 +40,29 @@ class CanonicalText(Struct, frozen=True):
     skeleton: str
     numbers: tuple[Number, ...]
     """Their offsets count in the whole line."""
-    marks: tuple[int, ...]
-    """Offsets of the numbers' marks in the skeleton."""
 
     def numbers_at(self, part: CanonicalText, place: int) -> tuple[Number, ...]:
         """The numbers of this line that pair with those of a part whose skeleton is at `place`."""
-        first = bisect_left(self.marks, place)
+        first = self.skeleton.count(MARK, 0, place)
         return self.numbers[first : first + len(part.numbers)]
 
 
 def canonicalize(text: str, offset: int = 0) -> CanonicalText:
     """The skeleton and the numbers of a text that stands at `offset` of its line."""
     numbers = scan(text)
-    safe = text.replace(MARK, "\ufffd")
-    if not numbers:
-        return CanonicalText(safe, (), ())
-    marks: list[int] = []
-    parts: list[str] = []
-    length = previous = 0
-    for index, number in enumerate(numbers):
-        stretch = _fold_spaces(
-            safe[previous : number.start], after_number=index > 0, before_number=True
-        )
-        parts += (stretch, MARK)
-        marks.append(length + len(stretch))
-        length += len(stretch) + 1
-        previous = number.end
-    parts.append(_fold_spaces(safe[previous:], after_number=True, before_number=False))
-    if offset:
-        shifted = ((number, number.start + offset, number.end + offset) for number in numbers)
-        numbers = tuple(replace(number, start=start, end=end) for number, start, end in shifted)
-    return CanonicalText("".join(parts), numbers, tuple(marks))
+    places = ((number.start, number.end, MARK) for number in numbers)
+    marked = replace_ranges(text.replace(MARK, "\ufffd"), places)
+    shifted = (replace(n, start=n.start + offset, end=n.end + offset) for n in numbers)
+    return CanonicalText(_SPACE.sub(_fold_space, marked), tuple(shifted) if offset else numbers)
 
 
-def _fold_spaces(text: str, *, after_number: bool, before_number: bool) -> str:
-    """The text between two numbers with the white space at its ends folded."""
-    body = text.strip()
-    if not body:
-        return " " if text and after_number and before_number else ""
-    if before_number:
-        body = text.rstrip()
-        if len(body) < len(text) and (body[-1].isalnum() or body[-1] == "_"):
-            body += " "
-    else:
-        body = text
-    if after_number:
-        inner = body.lstrip()
-        body = inner if len(inner) == len(body) or inner[0] in _CLOSING else " " + inner
-    return body
+def _fold_space(match: re.Match[str]) -> str:
+    """What stays of white space beside a number: one space, or none."""
+    text, start, end = match.string, *match.span()
+    before, after = text[max(start - 1, 0) : start], text[end : end + 1]
+    if before == MARK:
+        return " " if after and after not in _CLOSING else ""
+    return " " if before.isalnum() or before == "_" else ""
 
 
 def same_number(recorded: Number, printed: Number, comparison: Comparison) -> bool:
@@ -133,8 +111,8 @@ class LineMatcher:
         if recorded == printed:
             return True
         if self.elides(recorded):
-            parts = [CanonicalText(part, (), ()) for part in recorded.split(ELLIPSIS)]
-            if _find_parts(parts, CanonicalText(printed, (), ()), always_match) is not None:
+            parts = [CanonicalText(part, ()) for part in recorded.split(ELLIPSIS)]
+            if _find_parts(parts, CanonicalText(printed, ()), always_match) is not None:
                 return True
         if self.comparison.mode is Mode.EXACT:
             return False

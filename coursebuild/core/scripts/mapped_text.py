@@ -2,8 +2,8 @@
 
 Entry points: `apply_filters`, `Side.of`, `plain_text`.
 
-1. A `MappedText` knows where its text came from: copied stretches character by character, a stretch
-   that a filter wrote as a whole.
+1. A `MappedText` knows where each character came from: a copied one from its own place, one that a
+   filter wrote from all that the filter replaced.
 2. `apply_filters` removes insignificant white space, then applies the course's filters one after
    the other, each to the whole text (`^` and `$` match at lines).
 3. A `Side` is one side of a comparison: its lines without trailing white space, and without
@@ -13,9 +13,8 @@ Entry points: `apply_filters`, `Side.of`, `plain_text`.
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
-from collections.abc import Iterable, Mapping
-from itertools import accumulate
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import accumulate, chain
 
 from msgspec import Struct
 
@@ -29,29 +28,30 @@ _END_OF_LINE = re.compile(r"(?<![^\S\r\n])(?!\n)[^\S\r\n]*+(?:\r\n?|\n|\Z)")
 _EMPTY_LINES = re.compile(r"(?:\A|(?<=[^\n]\n))\n++\Z")
 
 
-class MappingSegment(Struct, frozen=True):
-    """A stretch of a mapped text, up to the next segment."""
-
-    at: int
-    """Offset in the text."""
-    start: int
-    """Offset in the origin."""
-    end: int
-    """Offset in the origin."""
-    is_verbatim: bool
-    """Copied character by character; otherwise all of the stretch stands for `[start, end)`."""
-
-
 class MappedText(Struct, frozen=True):
-    """A text whose characters know where they came from; segments are in order, without gaps."""
+    """A text whose characters know which range of the origin each of them stands for."""
 
     text: str
-    segments: tuple[MappingSegment, ...]
+    starts: Sequence[int]
+    """Where the range of each character begins."""
+    ends: Sequence[int]
 
     @classmethod
-    def of_text(cls, text: str) -> MappedText:
-        """A text that is its own origin."""
-        return cls(text, (MappingSegment(0, 0, len(text), True),))
+    def copy(cls, text: str, start: int = 0) -> MappedText:
+        """A text that stands in the origin, character by character, from `start` on."""
+        return cls(text, range(start, start + len(text)), range(start + 1, start + len(text) + 1))
+
+    @classmethod
+    def substitute_for(cls, start: int, end: int, text: str) -> MappedText:
+        """A text of which each character stands for all of a range of the origin."""
+        return cls(text, [start] * len(text), [end] * len(text))
+
+    @classmethod
+    def join(cls, parts: Sequence[MappedText]) -> MappedText:
+        """Texts put together."""
+        starts = list(chain.from_iterable(part.starts for part in parts))
+        ends = list(chain.from_iterable(part.ends for part in parts))
+        return cls("".join([part.text for part in parts]), starts, ends)
 
     @classmethod
     def of_output(cls, text: str) -> MappedText:
@@ -60,20 +60,18 @@ class MappedText(Struct, frozen=True):
         Line ends are LF, the last line has one too, no line ends in white space, no empty lines
         stand at the end.
         """
-        mapped = cls.of_text(text).substitute(_END_OF_LINE, "\n")
-        return mapped.substitute(_EMPTY_LINES, "")
-
-    def _segment_index(self, at: int) -> int:
-        """The index of the segment that an offset is in."""
-        return max(0, bisect_right(self.segments, at, key=lambda segment: segment.at) - 1)
+        return cls.copy(text).substitute(_END_OF_LINE, "\n").substitute(_EMPTY_LINES, "")
 
     def origin(self, start: int, end: int) -> tuple[int, int]:
         """The smallest range of the origin that `text[start:end]` came from; empty for no text."""
-        first = self.segments[self._segment_index(start)]
-        last = self.segments[self._segment_index(max(start, end - 1))]
-        low = first.start + start - first.at if first.is_verbatim else first.start
-        high = last.start + end - last.at if last.is_verbatim else last.end
-        return low, low if start == end else max(low, high)
+        if start < end:
+            return self.starts[start], max(self.ends[start:end])
+        places = self.starts[start:] or self.ends[-1:] or (0,)
+        return places[0], places[0]
+
+    def slice(self, start: int, end: int | None = None) -> MappedText:
+        """The mapped text `text[start:end]`."""
+        return MappedText(self.text[start:end], self.starts[start:end], self.ends[start:end])
 
     def substitute(self, pattern: re.Pattern[str], text: str) -> MappedText:
         """The text with each match replaced."""
@@ -81,51 +79,14 @@ class MappedText(Struct, frozen=True):
 
     def replace_ranges(self, places: Mapping[tuple[int, int], str]) -> MappedText:
         """The text with ranges replaced; `places` maps each (start, end), in order, to its text."""
-        parts: list[str] = []
-        segments: list[MappingSegment] = []
-        length = copied_to = 0
-        for (start, end), replacement in places.items():
-            if replacement == self.text[start:end]:
-                continue
-            self._copy(copied_to, start, length, segments)
-            parts += (self.text[copied_to:start], replacement)
-            length += start - copied_to
-            copied_to = end
-            if replacement:
-                origin = self._replaced_origin(start, end)
-                segments.append(MappingSegment(length, *origin, False))
-                length += len(replacement)
-        self._copy(copied_to, len(self.text), length, segments)
-        parts.append(self.text[copied_to:])
-        empty_segment = MappingSegment(0, 0, self.segments[-1].end, False)
-        return MappedText("".join(parts), tuple(segments) or (empty_segment,))
-
-    def _replaced_origin(self, start: int, end: int) -> tuple[int, int]:
-        """The range of the origin that a replacement of `text[start:end]` stands for.
-
-        An insertion inside or at the end of an earlier replacement stands for the same range as
-        that: no character of the origin lies between its characters.
-        """
-        segment = self.segments[self._segment_index(start)]
-        if start == end and not segment.is_verbatim and start > segment.at:
-            return segment.start, segment.end
-        return self.origin(start, end)
-
-    def _copy(self, start: int, end: int, at: int, segments: list[MappingSegment]) -> None:
-        """Append the segments of `text[start:end]`, which will stand at offset `at`."""
-        if start == end:
-            return
-        for index in range(self._segment_index(start), len(self.segments)):
-            segment = self.segments[index]
-            if segment.at >= end:
-                break
-            new_at = at + max(segment.at, start) - start
-            if segment.is_verbatim:
-                first = segment.start + max(0, start - segment.at)
-                stop = min(segment.end, segment.start + end - segment.at)
-                segments.append(MappingSegment(new_at, first, stop, True))
-            else:
-                segments.append(MappingSegment(new_at, segment.start, segment.end, False))
+        parts: list[MappedText] = []
+        at = 0
+        for (start, end), new in places.items():
+            if new != self.text[start:end]:
+                parts.append(self.slice(at, start))
+                parts.append(MappedText.substitute_for(*self.origin(start, end), new))
+                at = end
+        return MappedText.join([*parts, self.slice(at)]) if parts else self
 
 
 def apply_filters(mapped: MappedText, filters: Iterable[Filter]) -> MappedText:

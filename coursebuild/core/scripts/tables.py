@@ -33,7 +33,6 @@ from coursebuild.core.scripts.lines import (
 )
 from coursebuild.core.scripts.mapped_text import (
     MappedText,
-    MappingSegment,
     Side,
     apply_filters,
     plain_text,
@@ -252,19 +251,15 @@ def _cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
     Marks of Markdown are gone, minus signs are hyphens, runs of white space are one space. A
     stretch that Markdown changed (entities, escapes) stands for all of itself.
     """
-    texts: list[str] = []
-    segments: list[MappingSegment] = []
-    at = 0
-    for text, span in _text_stretches(cell.children):
-        if text:
-            segments.append(MappingSegment(at, span.start, span.end, span.text == text))
-            texts.append(text)
-            at += len(text)
-    if not segments:
-        segments.append(MappingSegment(0, cell.span.start, cell.span.end, False))
-    mapped = apply_filters(MappedText("".join(texts), tuple(segments)), filters)
+    stretches = [
+        MappedText.copy(text, span.start)
+        if span.text == text
+        else MappedText.substitute_for(span.start, span.end, text)
+        for text, span in _text_stretches(cell.children)
+    ]
+    mapped = apply_filters(MappedText.join(stretches), filters)
     folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
-    return MappedText(folded.text.replace("\u2212", "-"), folded.segments)
+    return MappedText(folded.text.replace("\u2212", "-"), folded.starts, folded.ends)
 
 
 def _text_stretches(inlines: Iterable[model.Inline]) -> Iterator[tuple[str, Span]]:

@@ -27,11 +27,11 @@ def test_filtering_is_substitution(text: str, rules: list[tuple[str, str]]) -> N
     expected = text
     for pattern, replacement in rules:
         expected = re.sub(pattern, replacement, expected, flags=re.MULTILINE)
-    mapped = apply_filters(MappedText.of_text(text), [Filter(*rule) for rule in rules])
+    mapped = apply_filters(MappedText.copy(text), [Filter(*rule) for rule in rules])
     assert mapped.text == expected
 
 
 def test_a_filter_ends_where_backtracking_would_not() -> None:
     text = "a" * 5000 + "b"
     rules = (Filter(r"(a+)+$", ""), Filter(r"(a|a)*c", ""), Filter("(a*)*b$", "end"))
-    assert apply_filters(MappedText.of_text(text), rules).text == "end"
+    assert apply_filters(MappedText.copy(text), rules).text == "end"
