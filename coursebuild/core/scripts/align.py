@@ -227,5 +227,5 @@ def _best_pairs(rows: range, columns: range, weight: Weight, is_free: Sequence[b
 
 
 def _equal_blocks(left: Sequence[str], right: Sequence[str]) -> Sequence[difflib.Match]:
-    """Runs x on both sides, in order, found by those that are not frequent."""
+    """Runs of items that are equal on both sides, in order; frequent items begin none."""
     return difflib.SequenceMatcher(None, left, right).get_matching_blocks()[:-1]

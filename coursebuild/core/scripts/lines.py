@@ -51,9 +51,10 @@ def canonicalize(text: str, offset: int = 0) -> CanonicalText:
     """The skeleton and the numbers of a text that stands at `offset` of its line."""
     numbers = scan(text)
     places = ((number.start, number.end, MARK) for number in numbers)
-    marked = replace_ranges(text.replace(MARK, "\ufffd"), places)
-    shifted = (replace(n, start=n.start + offset, end=n.end + offset) for n in numbers)
-    return CanonicalText(_SPACE.sub(_fold_space, marked), tuple(shifted) if offset else numbers)
+    skeleton = _SPACE.sub(_fold_space, replace_ranges(text.replace(MARK, "\ufffd"), places))
+    if offset:
+        numbers = tuple(replace(n, start=n.start + offset, end=n.end + offset) for n in numbers)
+    return CanonicalText(skeleton, numbers)
 
 
 def _fold_space(match: re.Match[str]) -> str:

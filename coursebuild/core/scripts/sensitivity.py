@@ -26,7 +26,6 @@ import math
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
-from typing import TypeAlias
 
 from msgspec.structs import replace
 
@@ -144,78 +143,68 @@ def _find_doubts(
     """Numbers and texts of a recording that moved states or halved steps change, in order."""
     exact = replace(comparison, mode=Mode.EXACT)
 
-    def find_changes(run: ScriptRun) -> _ChangesByPlace:
+    def find_changes(run: ScriptRun) -> dict[tuple[int, int], Change]:
         changes = compare(recording, exact, course.filters, run.stdout).changes
         return {(change.span.start, change.span.end): change for change in changes}
 
-    base_changes = find_changes(base)
-    moved_changes = [find_changes(run) for run in moved_runs]
-    halved_changes = {} if halved is None else find_changes(halved)
-    first_changes: _ChangesByPlace = {}
-    for changes in (*moved_changes, halved_changes):
-        first_changes = changes | first_changes
-    for place in sorted(first_changes):
-        span, recorded = first_changes[place].span, first_changes[place].recorded
-        printed = _printed_at(place, base_changes, recorded)
-        values = [_printed_at(place, changes, recorded) for changes in moved_changes]
-        half = None if halved is None else _printed_at(place, halved_changes, recorded)
+    changes_of_base = find_changes(base)
+    changes_by_run = [find_changes(run) for run in (*moved_runs, halved) if run is not None]
+    first_changes = {place: c for changes in changes_by_run[::-1] for place, c in changes.items()}
+    for place, first_change in sorted(first_changes.items()):
+        recorded = first_change.recorded
+        printed, *values = (
+            changes[place].printed if place in changes else recorded
+            for changes in (changes_of_base, *changes_by_run)
+        )
         if any(value != printed for value in values):
-            yield _judge_number(span, recorded, printed, values, half, comparison)
-        elif half is not None and half != printed:
-            number = _only_number(printed)
-            if number is not None:
-                yield _unconverged(span, number, half)
-
-
-_ChangesByPlace: TypeAlias = dict[tuple[int, int], Change]
-
-
-def _printed_at(place: tuple[int, int], changes: _ChangesByPlace, recorded: str) -> str:
-    """What a run printed at a place: what is recorded, unless that changed."""
-    return changes[place].printed if place in changes else recorded
+            half = None if halved is None else values.pop()
+            texts = recorded, printed, half
+            yield from _judge_number(first_change.span, texts, values, comparison)
 
 
 def _judge_number(
     span: Span,
-    recorded: str,
-    printed: str,
+    texts: tuple[str, str, str | None],
     values: Sequence[str],
-    halved: str | None,
     comparison: Comparison,
-) -> Doubt | Flip:
-    number, recorded_number = _only_number(printed), _only_number(recorded)
+) -> Iterator[Doubt | Flip]:
+    """What moved states and halved steps say of a number or text.
+
+    `texts` are what is recorded, what was printed, and what was with halved steps; `values` were
+    printed with moved states.
+    """
+    recorded, printed, halved = texts
+    recorded_number, number = _only_number(recorded), _only_number(printed)
     numbers = [n for value in values if (n := _only_number(value)) is not None]
-    other_value = next(value for value in values if value != printed)
+    other_value = next((value for value in values if value != printed), None)
     if number is None or recorded_number is None or len(numbers) < len(values):
-        return Flip(span, printed, other_value, compared=True)
+        if other_value is not None:
+            yield Flip(span, printed, other_value, compared=True)
+        return
     compared = any(not same_number(recorded_number, n, comparison) for n in numbers)
-    finite = sorted((n for n in (number, *numbers) if n.is_finite), key=lambda n: n.value)
-    repeat, ends = 0, (number.text, "no number")
-    if len(finite) > len(numbers):
-        spread = max(difference(number.value, n.value) for n in numbers)
-        if spread == 0:  # the same value in another form, such as -0.0
-            return Flip(span, printed, other_value, compared)
-        repeat, ends = _count_repeating(number, spread), (finite[0].text, finite[-1].text)
+    repeat, least, most = _digits(number), number.text, number.text
+    if other_value is not None:
+        repeat, most = 0, "no number"
+        if all(n.is_finite for n in (number, *numbers)):
+            spread = max(difference(number.value, n.value) for n in numbers)
+            if spread == 0:  # the same value in another form, such as -0.0
+                yield Flip(span, printed, other_value, compared)
+                return
+            ordered_numbers = sorted((number, *numbers), key=lambda n: n.value)
+            least, most = ordered_numbers[0].text, ordered_numbers[-1].text
+            repeat = _count_repeating(number, spread)
     converged = None if halved is None else _count_converged(number, halved)
-    return Doubt(
+    yield Doubt(
         span,
         number.text,
         _digits(number),
         repeat,
         converged,
-        *ends,
+        least,
+        most,
         (halved or "").strip(),
         _round_to(number, repeat if converged is None else min(repeat, converged)),
         compared,
-    )
-
-
-def _unconverged(span: Span, number: Number, halved: str) -> Doubt:
-    """A number that only half the timestep changes."""
-    digits, converged, text = _digits(number), _count_converged(number, halved), number.text
-    instead = _round_to(number, converged)
-    return Doubt(
-        span, text, digits, digits, converged, text, text, halved.strip(), instead, compared=False
     )
 
 
