@@ -106,7 +106,7 @@ def anchors(document: Document) -> Mapping[str, Span]:
     """The ids that a link may name in a document, and the spans to which they lead.
 
     Ids of its title, headings, quizzes, listings, outputs, formulas and terms, and those in raw
-    HTML; for lines of scripts, see `_names_lines`. They are kept with the document.
+    HTML; for lines of scripts, see `_check_anchor`. They are kept with the document.
     """
     return computed_once(document, "anchors", lambda: dict(_anchors(document)))
 
@@ -137,25 +137,6 @@ def _anchors(document: Document) -> Iterator[tuple[str, Span]]:
                 yield from ((id, inline.span) for id in _HTML_ID.findall(inline.html))
             elif isinstance(inline, Term):
                 yield inline.anchor, inline.span
-
-
-def _names_lines(anchor: str, document: Document) -> bool:
-    """Whether an anchor names lines of a script of a document."""
-    lines, script = linked_lines(anchor), _find_listing(anchor, document)
-    return lines is not None and script is not None and lines[2] <= _count_lines(script)
-
-
-def _find_listing(anchor: str, document: Document) -> Script | None:
-    """The script of a document of which an anchor names lines, whether it has them or not."""
-    if (lines := linked_lines(anchor)) is None:
-        return None
-    listing, first, _ = lines
-    scripts = document_scripts(document)
-    return next((s for s in scripts if line_anchor(s.path, first) == f"{listing}.L{first}"), None)
-
-
-def _count_lines(script: Script) -> int:
-    return script.code.text.rstrip("\n").count("\n") + 1
 
 
 def check_links(course: Course, document: Document, targets: LinkTargets) -> Iterator[Diagnostic]:
@@ -216,14 +197,13 @@ def _check_link(
         help = help or did_you_mean(name, names)
         yield diagnose(rule, span, missing, help=help)
     elif isinstance(target, ModelTarget):
-        scenarios = targets.scenarios.get(target.name, ())
-        yield from _check_model_anchor(span, target.anchor, targets.models[target.name], scenarios)
+        yield from _check_model_anchor(span, target, targets)
     elif isinstance(target, LessonTarget):
         lesson = targets.lessons[target.id]
-        yield from _check_anchor(span, target.anchor, lesson, f"lesson {target.id}")
+        yield from _check_document_anchor(span, target.anchor, lesson, f"lesson {target.id}")
     elif isinstance(target, PageTarget):
         page = targets.pages[target.id]
-        yield from _check_anchor(span, target.anchor, page, f"page `{target.id}`")
+        yield from _check_document_anchor(span, target.anchor, page, f"page `{target.id}`")
 
 
 def _link_help(kind: str, id: str) -> str:
@@ -292,29 +272,49 @@ def _look_up(
             assert_never(target)
 
 
-def _check_anchor(
+def _check_document_anchor(
     span: Span, anchor: str | None, document: Document | None, page_name: str
 ) -> Iterator[Diagnostic]:
-    if not anchor:
-        return
-    if document is None:
-        yield diagnose(
-            "link-anchor",
-            span,
-            f"{page_name} is planned, so it has no anchor `#{anchor}` yet",
-            help="link to the lesson itself",
-        )
-        return
-    ids = anchors(document)
+    if anchor and document is None:
+        message = f"{page_name} is planned, so it has no anchor `#{anchor}` yet"
+        yield diagnose("link-anchor", span, message, help="link to the lesson itself")
+    elif anchor and document is not None:
+        listings = {script.path: script.code.text for script in document_scripts(document)}
+        yield from _check_anchor(span, anchor, page_name, anchors(document), listings)
+
+
+def _check_model_anchor(
+    span: Span, target: ModelTarget, targets: LinkTargets
+) -> Iterator[Diagnostic]:
+    """Check the anchor of a link `model:NAME#anchor`.
+
+    The ids are those that `templates/model.html` writes. Only scenarios that `models/NAME.toml`
+    declares have one, as others are unknown before they are measured.
+    """
+    if target.anchor:
+        source = targets.models[target.name].source
+        ids = {*model_anchors(targets.scenarios.get(target.name, ())), listing_anchor(source.path)}
+        listings = {source.path: source.text.rstrip()}
+        page_name = f"the page of the model `{target.name}`"
+        yield from _check_anchor(span, target.anchor, page_name, ids, listings)
+
+
+def _check_anchor(
+    span: Span, anchor: str, page_name: str, ids: Collection[str], listings: Mapping[str, str]
+) -> Iterator[Diagnostic]:
+    """Report an anchor that is no id of a page and names no lines of its listings."""
     name = unquote(anchor)
-    if name in ids or _names_lines(name, document):
+    if name in ids:
         return
-    listing = _find_listing(name, document)
-    help = (
-        did_you_mean(anchor, ids)
-        if listing is None
-        else f"the last line of `{listing.path}` is {_count_lines(listing)}"
-    )
+    listing, first, last = linked_lines(name) or ("", 0, 0)
+    path = next((p for p in listings if line_anchor(p, first) == f"{listing}.L{first}"), None)
+    if path is None:
+        help = did_you_mean(anchor, ids)
+    else:
+        count = listings[path].rstrip("\n").count("\n") + 1
+        if last <= count:
+            return
+        help = f"the last line of `{path}` is {count}"
     yield diagnose("link-anchor", span, f"{page_name} has no anchor `#{anchor}`", help=help)
 
 
@@ -334,7 +334,7 @@ def _check_url(
             help = _link_help(route[1], route[2])
             yield diagnose("link-anchor", span, message, help=help)
             return
-        yield from _check_anchor(span, parts.fragment or None, document, "this page")
+        yield from _check_document_anchor(span, parts.fragment, document, "this page")
         return
     path = local_file(url, document.source.path)
     if path not in targets.files:
@@ -387,29 +387,3 @@ def urlsplit_or_none(url: str) -> SplitResult | None:
         return urlsplit(url)
     except ValueError:
         return None
-
-
-def _check_model_anchor(
-    span: Span, anchor: str | None, model: MjcfModel, scenarios: Collection[str]
-) -> Iterator[Diagnostic]:
-    """Check the anchor of a link `model:NAME#anchor`.
-
-    The ids are those that `templates/model.html` writes. Only scenarios that `models/NAME.toml`
-    declares have one, as others are unknown before they are measured.
-    """
-    if not anchor:
-        return
-    name, path = unquote(anchor), model.source.path
-    ids = {*model_anchors(scenarios), listing_anchor(path)}
-    if name in ids:
-        return
-    lines = linked_lines(name)
-    if lines is None or line_anchor(path, lines[1]) != f"{lines[0]}.L{lines[1]}":
-        help = did_you_mean(name, ids)
-    else:
-        last = model.source.text.rstrip().count("\n") + 1
-        if lines[2] <= last:
-            return
-        help = f"the last line of `{path}` is {last}"
-    message = f"the page of the model `{model.name}` has no anchor `#{anchor}`"
-    yield diagnose("link-anchor", span, message, help=help)
