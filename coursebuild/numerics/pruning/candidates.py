@@ -12,7 +12,7 @@ Entry points: `unread_elements(text, scenarios)`, of which no motion is computed
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from itertools import islice
 from pathlib import PurePosixPath
 from typing import Any
@@ -27,16 +27,99 @@ from coursebuild.numerics.pruning.edits import ModelEdit, set_attributes, set_op
 from coursebuild.numerics.pruning.markup import Element, place_of
 from coursebuild.numerics.pruning.model_text import ModelText, section_of
 from coursebuild.numerics.pruning.reachability import Pair, find_separate, iterate_pairs
+from coursebuild.numerics.reports.diet import name_list
 
 MOST_PAIRS = 100_000
 """With so many pairs of geoms no contact is examined."""
+
+
+class Kind(Struct, frozen=True):
+    """A kind of findings."""
+
+    message: str
+    """What is said of such things: `{}` stands for their noun and names."""
+    noun: str = ""
+    view: str = ""
+    """The kind of thing that it is to code (`differences.VIEWS`)."""
+    proof: str = ""
+    """Why such a thing changes no motion, in any state; empty where only runs speak for it."""
+    fields: str = ""
+    """Fields of the compiled model that differ without it, beside those of its view."""
+
+
+_UNUSED = "no motion is computed of it, nothing refers to it, and no code can notice"
+_BESIDE = "it is computed beside the motion, and no code can notice"
+KINDS = {
+    "energy-flag": Kind(
+        "energy is computed in every step, and nobody reads it",
+        proof=_BESIDE,
+        fields="enableflags",
+    ),
+    "fwdinv-flag": Kind(
+        "forward and inverse dynamics are compared in every step, for nobody",
+        proof=_BESIDE,
+        fields="enableflags",
+    ),
+    "sensor-unread": Kind(
+        "nobody reads the {}",
+        "sensor",
+        "Sensor",
+        "what a sensor says moves nothing, and no code can notice",
+    ),
+    "actuator-idle": Kind(
+        "nobody commands the {}",
+        "actuator",
+        "Actuator",
+        "its force is a multiple of a command that is always 0",
+        "key_ctrl nu nout nJmom tree_sleep_policy",
+    ),
+    "tendon-idle": Kind(
+        "nothing acts along the {}",
+        "tendon",
+        "Tendon",
+        "it has no force, inertia or limit of its own, and nothing refers to it",
+        "wrap_type wrap_prm nwrap nJten ten_J_rownnz ten_J_rowadr ten_J_colind",
+    ),
+    "unused-keyframe": Kind("nothing begins at the {}", "keyframe", "Keyframe", _UNUSED),
+    "unused-site": Kind("nothing uses the {}", "site", "Site", _UNUSED),
+    "unused-material": Kind("nothing uses the {}", "material", "Material", _UNUSED),
+    "unused-texture": Kind("nothing uses the {}", "texture", "Texture", _UNUSED),
+    "unused-mesh": Kind("nothing uses the {}", "mesh", "Mesh", _UNUSED, "npolygonmax"),
+    "unused-hfield": Kind("nothing uses the {}", "hfield", "Hfield", _UNUSED),
+    "unused-model": Kind("nothing uses the {}", "model", proof=_UNUSED),
+    "unused-default": Kind("no element is of the {}", "class", proof=_UNUSED),
+    "contact-off": Kind(
+        "contacts are searched for, and nothing can touch",
+        proof="no two geoms can meet, whatever the joints do",
+        fields="disableflags",
+    ),
+    "collision-unreachable": Kind(
+        "contacts are searched for on the {}, and nothing can touch there",
+        "geom",
+        proof="every geom that it could collide with is out of reach",
+        fields="geom_contype geom_conaffinity body_contype body_conaffinity"
+        " body_bvhnum body_bvhadr",
+    ),
+    "far-body": Kind(
+        "what the scene is about moves in the same way without the {}", "body", "Body"
+    ),
+    "contact-idle": Kind("contacts are searched for, and nothing touched"),
+    "collision-idle": Kind(
+        "contacts are searched for on the {}, and nothing touched there", "geom"
+    ),
+    "sleep": Kind("bodies at rest can sleep"),
+    "island": Kind("all constraints can be solved at once, without islands"),
+    "solver": Kind("the solver {} does"),
+    "cone": Kind("{} friction cones do"),
+}
+"""What uses other things comes before them, so that they can go with it."""
 
 
 class Item(Struct, frozen=True, eq=False):
     """One thing that may be needless, and the changes that take it out."""
 
     kind: str
-    """The kind of the finding, such as `sensor-unread`."""
+    """A key of `KINDS`."""
     name: str
     """Its name, or the path of its element."""
     element: Element | None
@@ -47,125 +130,67 @@ class Item(Struct, frozen=True, eq=False):
     """Attributes to take out."""
     edits: tuple[ModelEdit, ...] = ()
     """Other changes of the text."""
-    view: str = ""
-    """The kind of thing that it is to code (`differences.VIEWS`)."""
 
 
-def proof_of(kind: str) -> str:
-    """Why a needless thing of this kind changes no motion, in any state."""
-    if kind.startswith("unused-"):
-        return "no motion is computed of it, nothing refers to it, and no code can notice"
-    return _PROOFS.get(kind, "")
-
-
-_PROOFS = {
-    "sensor-unread": "what a sensor says moves nothing, and no code can notice",
-    "energy-flag": "it is computed beside the motion, and no code can notice",
-    "fwdinv-flag": "it is computed beside the motion, and no code can notice",
-    "actuator-idle": "its force is a multiple of a command that is always 0",
-    "tendon-idle": "it has no force, inertia or limit of its own, and nothing refers to it",
-    "contact-off": "no two geoms can meet, whatever the joints do",
-    "collision-unreachable": "every geom that it could collide with is out of reach",
-}
-
-
-def message_of(kind: str, names: str, count: int) -> str:
-    """The message of a finding about so many things with these names."""
-    noun = kind.removeprefix("unused-") if kind.startswith("unused-") else _NOUNS.get(kind, "")
-    if noun == "default":
-        noun = "class"
-    for (_, name, value), words in _SETTINGS.items():
-        if (kind, names) == (name, value):
-            return words
-    many = "bodies" if noun == "body" else noun + ("es" if noun in ("class", "mesh") else "s")
-    return _MESSAGES.get(kind, "nothing uses the {}").format(
-        f"{noun if count == 1 else many} {names}"
+def message_of(items: Sequence[Item]) -> str:
+    """The message of a finding about these items, all of one kind."""
+    kind = KINDS[items[0].kind]
+    plural = {"body": "bodies", "class": "classes", "mesh": "meshes"}.get(
+        kind.noun, f"{kind.noun}s"
     )
+    noun = f"{kind.noun if len(items) == 1 else plural} " if kind.noun else ""
+    return kind.message.format(noun + name_list([item.name for item in items]))
 
 
-_NOUNS = {
-    "sensor-unread": "sensor",
-    "actuator-idle": "actuator",
-    "tendon-idle": "tendon",
-    "collision-unreachable": "geom",
-    "collision-idle": "geom",
-    "far-body": "body",
-}
-_MESSAGES = {
-    "unused-default": "no element is of the {}",
-    "unused-keyframe": "nothing begins at the {}",
-    "sensor-unread": "nobody reads the {}",
-    "energy-flag": "energy is computed in every step, and nobody reads it",
-    "fwdinv-flag": "forward and inverse dynamics are compared in every step, for nobody",
-    "actuator-idle": "nobody commands the {}",
-    "tendon-idle": "nothing acts along the {}",
-    "contact-off": "contacts are searched for, and nothing can touch",
-    "contact-idle": "contacts are searched for, and nothing touched",
-    "collision-unreachable": "contacts are searched for on the {}, and nothing can touch there",
-    "collision-idle": "contacts are searched for on the {}, and nothing touched there",
-    "far-body": "what the scene is about moves in the same way without the {}",
-}
-
-
-_ASSETS = {"material": "Material", "texture": "Texture", "mesh": "Mesh", "hfield": "Hfield"}
-_ASSETS |= {"model": ""}
 _FLAGS = ("energy", "fwdinv")
 
 
 def unread_elements(text: ModelText, scenarios: Collection[Scenario]) -> list[Item]:
-    """Elements that no motion is computed from."""
+    """Elements that no motion is computed from, in the order of their kinds."""
     keys = [e for e in text.elements if e.tag == "key" and section_of(e) == "keyframe"]
     start_keys = {keys[s.keyframe] for s in scenarios if 0 <= s.keyframe < len(keys)}
-    flags = [
+    items = [
         Item(f"{flag}-flag", flag, element, drops=((element, flag),))
         for element in text.elements
         for flag in _FLAGS
         if element.tag == "flag" and element.get(flag) == "enable"
     ]
-    removable: list[tuple[int, Item]] = []
     for element in text.elements:
-        entry = _unread_kind(text, element, scenarios)
-        if entry is not None and element not in start_keys:
-            kind, view, name, order = entry
-            removable.append((order, Item(kind, name, element, (element,), view=view)))
-    return [*flags, *(item for _, item in sorted(removable, key=lambda entry: entry[0]))]
+        kind = _unread_kind(text, element, scenarios)
+        if kind and element not in start_keys:
+            items.append(Item(kind, display_name(element), element, (element,)))
+    kinds = list(KINDS)
+    return sorted(items, key=lambda item: kinds.index(item.kind))
 
 
-def _unread_kind(
-    text: ModelText, element: Element, scenarios: Collection[Scenario]
-) -> tuple[str, str, str, int] | None:
-    """The kind of an element in a finding and to code, its name, and when it is tried.
-
-    Users come before what they use, so that this can go with them.
-    """
-    thing, tag, name = text.ids(element), element.tag, display_name(element)
-    section = section_of(element)
+def _unread_kind(text: ModelText, element: Element, scenarios: Collection[Scenario]) -> str:
+    """The kind of an element in a finding; empty for one that a motion may depend on."""
+    thing, tag, section = text.ids(element), element.tag, section_of(element)
     if section == "sensor" and tag not in ("user", "plugin"):
-        return "sensor-unread", "Sensor", name, 0
+        return "sensor-unread"
     if section == "actuator" and thing and _is_forceless_actuator(text.model, thing.ids, scenarios):
-        return "actuator-idle", "Actuator", name, 1
+        return "actuator-idle"
     if section == "tendon" and thing and _is_forceless_tendon(text.model, thing.ids):
-        return "tendon-idle", "Tendon", name, 2
+        return "tendon-idle"
     if section == "keyframe" and tag == "key":
-        return "unused-keyframe", "Keyframe", name, 3
+        return "unused-keyframe"
     if thing is not None and thing.kind == "site":
-        return "unused-site", "Site", name, 4
-    if section == "asset" and tag in _ASSETS and element.get("type") != "skybox":
-        name = element.get("name") or _file_name(element)
-        return f"unused-{tag}", _ASSETS[tag], name, 5 + list(_ASSETS).index(tag)
+        return "unused-site"
+    if section == "asset" and element.get("type") != "skybox" and f"unused-{tag}" in KINDS:
+        return f"unused-{tag}"
     if tag == "default" and element.parent is not None and element.parent.tag == "default":
-        return "unused-default", "", element.get("class") or name, 5 + len(_ASSETS)
-    return None
+        return "unused-default"
+    return ""
 
 
 def display_name(element: Element) -> str:
-    """The name of an element, or the way to it where it has none."""
-    return element.get("name") or place_of(element)
+    """The name of an element, or the way to it where it has none.
 
-
-def _file_name(element: Element) -> str:
-    """An asset without a name is called after its file."""
-    name = PurePosixPath((element.get("file") or "").replace("\\", "/")).stem
+    An asset without a name is called after its file.
+    """
+    name = element.get("class" if element.tag == "default" else "name")
+    if section_of(element) == "asset":
+        name = name or PurePosixPath((element.get("file") or "").replace("\\", "/")).stem
     return name or place_of(element)
 
 
@@ -273,7 +298,7 @@ def far_bodies(
         is_viewpoint = any(inner.tag in ("camera", "light") for inner in element.walk())
         if not is_viewpoint and all(ranks[number] < most for number in numbers):
             removals = (element, *_pairs_and_sensors_of(text, element))
-            items.append(Item("far-body", display_name(element), element, removals, view="Body"))
+            items.append(Item("far-body", display_name(element), element, removals))
     return items
 
 
@@ -317,14 +342,14 @@ def _moving_trees(model: Any, runs: Collection[WatchedRun]) -> set[int]:
     return trees
 
 
-_SETTINGS = {
-    ("flag", "sleep", "enable"): "bodies at rest can sleep",
-    ("flag", "island", "disable"): "all constraints can be solved at once, without islands",
-    ("option", "solver", "Newton"): "the solver Newton does",
-    ("option", "solver", "CG"): "the solver CG does",
-    ("option", "cone", "pyramidal"): "pyramidal friction cones do",
-    ("option", "cone", "elliptic"): "elliptic friction cones do",
-}
+_SETTINGS = (
+    ("flag", "sleep", "enable"),
+    ("flag", "island", "disable"),
+    ("option", "solver", "Newton"),
+    ("option", "solver", "CG"),
+    ("option", "cone", "pyramidal"),
+    ("option", "cone", "elliptic"),
+)
 
 
 def other_settings(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:

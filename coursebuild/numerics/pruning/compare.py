@@ -14,7 +14,7 @@ declarations, quick=…)`, the scenarios by which a smaller model is judged.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import mujoco
@@ -95,26 +95,28 @@ def without_reset(model: Any) -> None:
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 
 
-def _begin(base: Any, variant: Any, index: IndexMap, scene: Scene) -> tuple[Any, Any]:
+def _begin_steps(
+    base: Any, variant: Any, index: IndexMap, scene: Scene
+) -> Iterator[tuple[int, Any, Any]]:
+    """The number of each step with the data of both models, which wait for it with its command."""
     data, variant_data = initial_data(scene.scenario, base), mujoco.MjData(variant)
     transfer(base, data, index, variant, variant_data)
-    return data, variant_data
-
-
-def _same_bits(base: Any, variant: Any, index: IndexMap, scene: Scene) -> bool:
-    data, variant_data = _begin(base, variant, index, scene)
-    end = float(variant_data.time) + scene.scenario.duration
     for step, command in enumerate(scene.scenario.commands(scene.timestep)):
         if command:
             data.ctrl[:] = command
             variant_data.ctrl[:] = data.ctrl[index["nu"]]
+        yield step, data, variant_data
+
+
+def _same_bits(base: Any, variant: Any, index: IndexMap, scene: Scene) -> bool:
+    for step, data, variant_data in _begin_steps(base, variant, index, scene):
         advance(base, data)
         advance(variant, variant_data)
         if any(a.tobytes() != b.tobytes() for a, b in _states(data, variant_data, index)):
             return False
         if step % _CONTACTS == 0 and not _equal_contacts(base, data, variant, variant_data, index):
             return False
-    return judge(variant, variant_data, end).ok
+    return judge(variant, variant_data, scene.scenario.duration).ok
 
 
 def _states(data: Any, variant_data: Any, index: IndexMap) -> tuple[tuple[Any, Any], ...]:
@@ -152,13 +154,9 @@ def _largest_departure(
 
     `whole`: over the whole scenario instead, from its beginning.
     """
-    data, variant_data = _begin(base, variant, index, scene)
     interval, length = (max(1, round(span / scene.timestep)) for span in (SHOTS, SHOT))
     worst = 0.0
-    for step, command in enumerate(scene.scenario.commands(scene.timestep)):
-        if command:
-            data.ctrl[:] = command
-            variant_data.ctrl[:] = data.ctrl[index["nu"]]
+    for step, data, variant_data in _begin_steps(base, variant, index, scene):
         at = 0 if whole else step % interval
         if at == 0 and not whole:
             transfer(base, data, index, variant, variant_data)
@@ -188,7 +186,7 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
     """Run the whole model in a scenario."""
     without_reset(model)
     data = initial_data(scene.scenario, model)
-    start, steps_made = float(data.time), 0
+    steps_made = 0
     touching: set[tuple[int, int]] = set()
     peaks, constrained, half_thickness = Peaks(), False, thickness(model)
     for command in scene.scenario.commands(scene.timestep):
@@ -203,5 +201,5 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
         peaks = update_peaks(data, peaks, half_thickness)
         if not peaks.finite:
             break
-    judgement = judge(model, data, start + steps_made * scene.timestep, peaks)
+    judgement = judge(model, data, steps_made * scene.timestep, peaks)
     return WatchedRun(scene, judgement, frozenset(touching), constrained)

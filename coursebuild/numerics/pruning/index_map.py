@@ -5,12 +5,11 @@ Entry points: `IndexMap`, `index_map`, `transfer`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
-from msgspec import Struct
 from numpy.typing import NDArray
 
 from coursebuild.numerics.engine import STATE, full_state
@@ -34,31 +33,25 @@ _STATE = {
     "mocap_quat": "nmocap",
 }
 """Parts of a state, with the field of their length."""
-_KEYS = {"key_qpos": "nq", "key_qvel": "nv", "key_act": "na", "key_ctrl": "nu"}
+KEY_SIZES = {"qpos": "nq", "qvel": "nv", "act": "na", "ctrl": "nu"}
+"""Attributes of a keyframe, with the field of their length; mocap bodies are never removed."""
 
 
-class Removal(Struct, frozen=True):
-    """The things that a change removes from a compiled model, by number."""
+def index_map(model: Any, removed: Mapping[str, Collection[int]]) -> IndexMap:
+    """The places in a model that are left without things of some kinds, given by number.
 
-    bodies: frozenset[int] = frozenset()
-    """Their descendants go too."""
-    geoms: frozenset[int] = frozenset()
-    sensors: frozenset[int] = frozenset()
-    actuators: frozenset[int] = frozenset()
-
-
-def index_map(model: Any, removal: Removal) -> IndexMap:
-    """The places in a model that are left after a removal."""
-    bodies = set(removal.bodies)
+    Those are `body`, whose descendants go too, `geom`, `sensor` and `actuator`.
+    """
+    bodies = set(removed.get("body", ()))
     for number in range(1, model.nbody):  # parents come first
         if int(model.body_parentid[number]) in bodies:
             bodies.add(number)
     body = np.setdiff1d(np.arange(model.nbody), [*bodies])
     mocap = model.body_mocapid[body]
     joints = np.flatnonzero(np.isin(model.jnt_bodyid, body))
-    ctrl = np.setdiff1d(np.arange(model.nu), [*removal.actuators])
-    sensors = np.setdiff1d(np.arange(model.nsensor), [*removal.sensors])
-    geoms = np.setdiff1d(np.arange(model.ngeom), [*removal.geoms])
+    ctrl = np.setdiff1d(np.arange(model.nu), [*removed.get("actuator", ())])
+    sensors = np.setdiff1d(np.arange(model.nsensor), [*removed.get("sensor", ())])
+    geoms = np.setdiff1d(np.arange(model.ngeom), [*removed.get("geom", ())])
     widths = [_WIDTHS.get(int(kind), 1) for kind in model.jnt_type[joints]]
     return {
         "nq": _ranges(model.jnt_qposadr[joints], widths),
@@ -87,8 +80,8 @@ def fits(index: IndexMap, whole: Any, model: Any) -> bool:
     if any(getattr(model, size) != len(places) for size, places in index.items()):
         return False
     return model.nkey != whole.nkey or all(
-        np.array_equal(getattr(model, name), getattr(whole, name)[:, index[size]])
-        for name, size in _KEYS.items()
+        np.array_equal(getattr(model, f"key_{name}"), getattr(whole, f"key_{name}")[:, index[size]])
+        for name, size in KEY_SIZES.items()
     )
 
 

@@ -25,12 +25,12 @@ from msgspec.structs import replace
 from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import Keep
 from coursebuild.numerics.pruning.candidates import (
+    KINDS,
     Item,
     far_bodies,
     idle_contacts,
     message_of,
     other_settings,
-    proof_of,
     unreachable_contacts,
     unread_elements,
 )
@@ -53,29 +53,12 @@ from coursebuild.numerics.reports.diet import (
     Saving,
     StaleKeep,
     TextEdit,
-    name_list,
 )
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.timing import Clock
 
 MIN_SPEEDUP = 1.05
 """The speedup from which on a finding that is not proved is worth a word."""
-_OWN_FIELDS = {
-    kind: frozenset(fields.split(" "))
-    for kind, fields in {
-        "energy-flag": "enableflags",
-        "fwdinv-flag": "enableflags",
-        "contact-off": "disableflags",
-        "actuator-idle": "key_ctrl nu nout nJmom tree_sleep_policy",
-        "tendon-idle": "wrap_type wrap_prm nwrap nJten ten_J_rownnz ten_J_rowadr ten_J_colind",
-        "unused-mesh": "npolygonmax",
-        "collision-unreachable": (
-            "geom_contype geom_conaffinity body_contype body_conaffinity body_bvhnum body_bvhadr"
-        ),
-    }.items()
-}
-"""Other fields of the compiled model that belong to these kinds of findings alone."""
-
 Rerun = Callable[[Mapping[str, bytes]], str]
 """New bytes of files → which script or lab then prints something else; empty where none does."""
 
@@ -163,9 +146,13 @@ class _Surveyor:
 
     def run(self, report: DietReport) -> Survey:
         """Try every candidate, then all findings together."""
-        proved_groups = self._prove()
-        groups = self._confirm([*proved_groups, *self._try_by_running(proved_groups)])
-        groups += self._try_settings()
+        text, runs = self.order.text, self.good_runs
+        groups = self._prove()
+        candidates = [far_bodies(text, self._code_names(), runs)]
+        if not any(group.finding.kind == "contact-off" for group in groups):
+            candidates.append(idle_contacts(text, runs))
+        groups = self._confirm([*groups, *self._try_by_running(candidates)])
+        groups += self._try_by_running([item] for item in other_settings(text, runs))
         self.order.tell("all together")
         fixable = [item for group in groups if group.finding.fixable for item in group.items]
         fixed = self.trials.prune(largest_subset(fixable, self._is_needless)) if fixable else None
@@ -181,12 +168,15 @@ class _Surveyor:
             report,
             findings=tuple(group.finding for group in groups),
             tried=tuple(self.rejected),
-            fixed=None if fixed is None else self.trials.measure_saving(fixed),
+            fixed=None if fixed is None else self.trials.measure_saving(fixed.edits, fixed),
             slim=slim,
             slim_difference=slim_difference,
             stale=tuple(StaleKeep(k, at.path, at.line, at.column) for k, at in stale.items()),
         )
         return Survey(report, self.order.text, () if fixed is None else fixed.edits)
+
+    def _code_names(self) -> set[str]:
+        return {name for reader in self.order.readers for name in reader.names}
 
     def _confirm(self, groups: Sequence[_PrunedGroup]) -> list[_PrunedGroup]:
         """The groups without which scripts and labs of the course print the same."""
@@ -195,10 +185,8 @@ class _Surveyor:
         confirmed = largest_subset(unkept, lambda groups: not self._find_changed_output(groups))
         for group in unkept:
             if group not in confirmed:
-                source = self._find_changed_output([group])
-                self._reject(
-                    group.items, group.finding.difference, f"{source} says something else then"
-                )
+                reason = f"{self._find_changed_output([group])} says something else then"
+                self._reject(group.items, group.finding.difference, reason)
         return [group for group in groups if group.finding.kept or group in confirmed]
 
     def _prove(self) -> list[_PrunedGroup]:
@@ -229,7 +217,7 @@ class _Surveyor:
 
     def _is_unread(self, item: Item) -> bool:
         names = {item.name} | {node.get("class") or "" for e in item.removals for node in e.walk()}
-        return self._find_noticing_reader(names - {""}, {item.view} - {""}, ()) is None
+        return self._find_noticing_reader(names - {""}, _views([item]), ()) is None
 
     def _find_noticing_reader(
         self, names: Collection[str], kinds: Collection[str], change: Collection[str]
@@ -243,9 +231,9 @@ class _Surveyor:
         trial = self.trials.prune(items)
         if trial is None:
             return False
-        kinds = frozenset(item.view for item in items if item.view)
+        kinds = _views(items)
         change = difference(self.order.text.model, trial.model)
-        own_fields = {field for item in items for field in _OWN_FIELDS.get(item.kind, ())}
+        own_fields = {field for item in items for field in KINDS[item.kind].fields.split()}
         if unrelated_fields(change, kinds) - own_fields:
             return False
         if "tree_sleep_policy" in change and self._may_sleep():
@@ -262,22 +250,10 @@ class _Surveyor:
             sleep_flag or any(reader.touches({"enableflags"}) for reader in self.order.readers)
         )
 
-    def _try_by_running(self, proved_groups: Sequence[_PrunedGroup]) -> list[_PrunedGroup]:
-        text = self.order.text
-        code_names = {name for reader in self.order.readers for name in reader.names}
-        item_groups = [far_bodies(text, code_names, self.good_runs)]
-        if not any(group.items[0].kind == "contact-off" for group in proved_groups):
-            item_groups.append(idle_contacts(text, self.good_runs))
-        return self._try_groups(item_groups)
-
-    def _try_settings(self) -> list[_PrunedGroup]:
-        return self._try_groups(
-            [[item] for item in other_settings(self.order.text, self.good_runs)]
-        )
-
-    def _try_groups(self, item_groups: Iterable[Sequence[Item]]) -> list[_PrunedGroup]:
+    def _try_by_running(self, candidates: Iterable[Sequence[Item]]) -> list[_PrunedGroup]:
+        """Take out of each list of items as many of a kind as change no motion."""
         groups: list[_PrunedGroup] = []
-        for items in item_groups:
+        for items in candidates:
             for reason, similar in self._group_items(items):
                 self.order.tell(similar[0].kind)
                 group = self._try_items(similar, reason)
@@ -329,50 +305,47 @@ class _Surveyor:
     def _make_group(
         self, items: Sequence[Item], reason: str, label: str, gap: float
     ) -> _PrunedGroup:
-        kind, trial = items[0].kind, self.trials.prune(items)
+        kind, trial, edits = items[0].kind, self.trials.prune(items), self.trials.edits(items)
         change: frozenset[str] = frozenset()
-        edits = self.trials.edits(items)
-        saving = Saving(None, None, False, 0, self.trials.count_saved_bytes(edits))
         if trial is not None:  # not where it goes only with what uses it
-            timed = not kind.startswith("unused-") or kind == "unused-site"
-            saving = self.trials.measure_saving(trial, timed=timed)
             change = difference(self.order.text.model, trial.model)
             change |= self.trials.state_difference(trial)
-        reader = self._find_noticing_reader((), {items[0].view} - {""}, change)
+        timed = not kind.startswith("unused-") or kind == "unused-site"
+        reader = self._find_noticing_reader((), _views(items), change)
+        unfixed = self._reason_unfixed(kind, reason, label, edits)
         finding = Finding(
             kind=kind,
-            message=message_of(kind, name_list([item.name for item in items]), len(items)),
+            message=message_of(items),
             places=tuple(_place(item) for item in items if item.element is not None),
             label=label,
             difference=gap,
             scenarios=tuple(run.scene.name for run in self.good_runs),
-            proof=proof_of(kind) if label == PROVED_LABEL else "",
-            saving=saving,
+            proof=KINDS[kind].proof,
+            saving=self.trials.measure_saving(edits, trial, timed=timed),
             edits=self._text_edits(edits),
-            fixable=False,
-            unfixed="",
+            fixable=not unfixed,
+            unfixed=unfixed,
             kept=reason,
             doubt=f"{reader.path} may notice" if reader is not None else "",
         )
-        unfixed = self._reason_unfixed(finding)
-        return _PrunedGroup(tuple(items), replace(finding, fixable=not unfixed, unfixed=unfixed))
+        return _PrunedGroup(tuple(items), finding)
 
-    def _reason_unfixed(self, finding: Finding) -> str:
+    def _reason_unfixed(self, kind: str, kept: str, label: str, edits: Iterable[ModelEdit]) -> str:
         """Why `--fix` does not act on a finding; empty where it does."""
-        if finding.kept:
+        if kept:
             return "it is kept"
-        if finding.label != PROVED_LABEL:
+        if label != PROVED_LABEL:
             return f"only what is {PROVED_LABEL} is changed"
-        if finding.kind == "actuator-idle" and self.order.has_commands:
+        if kind == "actuator-idle" and self.order.has_commands:
             return "scenarios give commands by number: their rows would have to be shortened"
-        locked = (self.order.locked.get(edit.path, "") for edit in finding.edits)
+        locked = (self.order.locked.get(edit.path, "") for edit in edits)
         return next(filter(None, locked), "")
 
     def _reject(self, items: Sequence[Item], difference: float | None, reason: str) -> None:
         finite = difference if difference is not None and math.isfinite(difference) else None
-        kind, names = items[0].kind, tuple(item.name for item in items)
-        message = message_of(kind, name_list([item.name for item in items]), len(items))
-        self.rejected.append(RejectedTrial(kind, message, names, finite, reason))
+        names = tuple(item.name for item in items)
+        attempt = RejectedTrial(items[0].kind, message_of(items), names, finite, reason)
+        self.rejected.append(attempt)
 
     def _text_edits(self, edits: Sequence[ModelEdit]) -> tuple[TextEdit, ...]:
         by_path = {document.path: document for document in self.order.text.documents}
@@ -409,11 +382,16 @@ class _Surveyor:
         result = None if trial is None else self.trials.compare(trial)
         if trial is None or result is None:
             return None, None
-        slim = self.trials.measure_saving(trial)
+        slim = self.trials.measure_saving(trial.edits, trial)
         best = by_time[0].finding
         if (best.saving.time or 0.0) > (slim.time or 0.0):
             return best.saving, best.difference
         return slim, result.difference
+
+
+def _views(items: Iterable[Item]) -> frozenset[str]:
+    """The kinds of things that items are to code."""
+    return frozenset(KINDS[item.kind].view for item in items) - {""}
 
 
 def _place(item: Item) -> ModelPlace:

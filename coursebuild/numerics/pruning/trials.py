@@ -25,7 +25,7 @@ from coursebuild.numerics.pruning.edits import (
     merge_edits,
     remove_elements,
 )
-from coursebuild.numerics.pruning.index_map import IndexMap, Removal, fits, index_map, transfer
+from coursebuild.numerics.pruning.index_map import KEY_SIZES, IndexMap, fits, index_map, transfer
 from coursebuild.numerics.pruning.markup import Element
 from coursebuild.numerics.pruning.model_text import ModelText, model_bytes
 from coursebuild.numerics.reports.diet import Saving
@@ -33,8 +33,6 @@ from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.timing import Clock, Timing, scenario_job, time_jobs
 
 _T = TypeVar("_T")
-_KEY_NUMBERS = {"qpos": "nq", "qvel": "nv", "act": "na", "ctrl": "nu"}
-"""For each attribute of a keyframe the field with its length; mocap bodies are never removed."""
 _DRAWS = 2
 """Random states in which two models are compared."""
 
@@ -85,20 +83,19 @@ class PruningTrials:
 
     def prune(self, items: Iterable[Item]) -> PrunedModel | None:
         """The model without these items; `None` if it does not compile, or differs otherwise."""
-        text = self.text
         try:
-            edits, removal = _changes(text, list(items))
-            index, model = index_map(text.model, removal), text.compile(edits)
+            edits, index = _changes(self.text, list(items))
+            model = self.text.compile(edits)
         except ValueError:
             return None
         without_reset(model)
-        return PrunedModel(edits, model, index) if fits(index, text.model, model) else None
+        return PrunedModel(edits, model, index) if fits(index, self.text.model, model) else None
 
     def edits(self, items: Iterable[Item]) -> tuple[ModelEdit, ...]:
         """The edits that take items out."""
         return _changes(self.text, list(items))[0]
 
-    def count_saved_bytes(self, edits: Iterable[ModelEdit]) -> int:
+    def _count_saved_bytes(self, edits: Iterable[ModelEdit]) -> int:
         """The number of bytes by which edits shorten the text."""
         before = {document.path: len(document.data) for document in self.text.documents}
         files = self.text.files(edits)
@@ -137,9 +134,13 @@ class PruningTrials:
             states.append(full_state(model, data))
         return states
 
-    def measure_saving(self, trial: PrunedModel, *, timed: bool = True) -> Saving:
-        """Measure the saving of a change, in time and bytes."""
-        text = self.count_saved_bytes(trial.edits)
+    def measure_saving(
+        self, edits: Iterable[ModelEdit], trial: PrunedModel | None, *, timed: bool = True
+    ) -> Saving:
+        """Measure the saving of a change, in time and bytes; `None`: it does not go alone."""
+        text = self._count_saved_bytes(edits)
+        if trial is None:
+            return Saving(None, None, False, 0, text)
         memory = len(model_bytes(self.text.model)) - len(model_bytes(trial.model))
         timing = self._measure_time(trial) if timed else None
         if timing is None:
@@ -172,30 +173,26 @@ class PruningTrials:
         )
 
 
-def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, ...], Removal]:
-    """All edits of items together, and what they remove from the compiled model."""
+def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, ...], IndexMap]:
+    """All edits of items together, and what they leave of the compiled model."""
     elements = list(dict.fromkeys(element for item in items for element in item.removals))
     nodes = [node for element in elements for node in element.walk()]
-    removal = Removal(
-        *(text.ids_of(nodes, kind) for kind in ("body", "geom", "sensor", "actuator"))
-    )
+    kinds = ("body", "geom", "sensor", "actuator")
+    index = index_map(text.model, {kind: text.ids_of(nodes, kind) for kind in kinds})
     drops = [drop for item in items for drop in item.drops]
     edits = [edit for item in items for edit in item.edits]
     edits += remove_elements([*elements, *find_emptied(drops, edits)])
     edits += [drop_attribute(*drop) for drop in drops]
-    edits += _keyframes(text, removal, set(nodes))
-    return merge_edits(edits), removal
+    edits += _keyframes(text, index, set(nodes))
+    return merge_edits(edits), index
 
 
 def _keyframes(
-    text: ModelText, removal: Removal, removed_elements: Collection[Element]
+    text: ModelText, index: IndexMap, removed_elements: Collection[Element]
 ) -> Iterator[ModelEdit]:
     """Remove the numbers of removed coordinates from keyframes, which list one for each."""
-    if not (removal.bodies or removal.actuators):
-        return
-    left = index_map(text.model, removal)
-    for name, size in _KEY_NUMBERS.items():
-        lost = set(range(getattr(text.model, size))) - set(left[size].tolist())
+    for name, size in KEY_SIZES.items():
+        lost = set(range(getattr(text.model, size))).difference(index[size].tolist())
         for key in text.elements:
             if key.tag == "key" and key not in removed_elements:
                 yield from drop_numbers(key, name, lost)

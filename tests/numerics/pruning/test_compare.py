@@ -12,7 +12,7 @@ from coursebuild.core.model.scenarios import BenchTable, DeclaredScenario
 from coursebuild.numerics.engine import initial_data
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.compare import compare, pruning_scenes
-from coursebuild.numerics.pruning.index_map import IndexMap, Removal, fits, index_map, transfer
+from coursebuild.numerics.pruning.index_map import IndexMap, fits, index_map, transfer
 from coursebuild.numerics.scene import Scene
 from support.surveys import NO_DECLARATIONS, parse_declared
 
@@ -35,7 +35,7 @@ def double(mass: float = 1.0) -> Any:
 
 
 def identity_map(model: Any) -> IndexMap:
-    return index_map(model, Removal())
+    return index_map(model, {})
 
 
 def test_chaos_is_no_difference() -> None:
@@ -83,7 +83,7 @@ def test_a_state_is_brought_over() -> None:
     model, spec = mujoco.MjModel.from_xml_string(FULL), mujoco.MjSpec.from_string(FULL)
     spec.delete(spec.body("a"))
     variant = spec.compile()
-    left = index_map(model, Removal(frozenset({model.body("a").id})))
+    left = index_map(model, {"body": {model.body("a").id}})
     assert fits(left, model, variant)
     data, variant_data = mujoco.MjData(model), mujoco.MjData(variant)
     data.qpos[:], data.qvel[:] = range(12), range(10)
