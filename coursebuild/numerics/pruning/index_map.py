@@ -37,21 +37,21 @@ KEY_SIZES = {"qpos": "nq", "qvel": "nv", "act": "na", "ctrl": "nu"}
 """Attributes of a keyframe, with the field of their length; mocap bodies are never removed."""
 
 
-def index_map(model: Any, removed: Mapping[str, Collection[int]]) -> IndexMap:
+def index_map(model: Any, losses: Mapping[str, Collection[int]]) -> IndexMap:
     """The places in a model that are left without things of some kinds, given by number.
 
     Those are `body`, whose descendants go too, `geom`, `sensor` and `actuator`.
     """
-    bodies = set(removed.get("body", ()))
+    bodies = set(losses.get("body", ()))
     for number in range(1, model.nbody):  # parents come first
         if int(model.body_parentid[number]) in bodies:
             bodies.add(number)
     body = np.setdiff1d(np.arange(model.nbody), [*bodies])
     mocap = model.body_mocapid[body]
     joints = np.flatnonzero(np.isin(model.jnt_bodyid, body))
-    ctrl = np.setdiff1d(np.arange(model.nu), [*removed.get("actuator", ())])
-    sensors = np.setdiff1d(np.arange(model.nsensor), [*removed.get("sensor", ())])
-    geoms = np.setdiff1d(np.arange(model.ngeom), [*removed.get("geom", ())])
+    ctrl = np.setdiff1d(np.arange(model.nu), [*losses.get("actuator", ())])
+    sensors = np.setdiff1d(np.arange(model.nsensor), [*losses.get("sensor", ())])
+    geoms = np.setdiff1d(np.arange(model.ngeom), [*losses.get("geom", ())])
     widths = [_WIDTHS.get(int(kind), 1) for kind in model.jnt_type[joints]]
     return {
         "nq": _ranges(model.jnt_qposadr[joints], widths),

@@ -330,9 +330,11 @@ class _Surveyor:
         )
         return _PrunedGroup(tuple(items), finding)
 
-    def _reason_unfixed(self, kind: str, kept: str, label: str, edits: Iterable[ModelEdit]) -> str:
+    def _reason_unfixed(
+        self, kind: str, keep_reason: str, label: str, edits: Iterable[ModelEdit]
+    ) -> str:
         """Why `--fix` does not act on a finding; empty where it does."""
-        if kept:
+        if keep_reason:
             return "it is kept"
         if label != PROVED_LABEL:
             return f"only what is {PROVED_LABEL} is changed"
