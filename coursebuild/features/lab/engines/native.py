@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from coursebuild.core.run.child import MEMORY, JsonChild
-from coursebuild.features.lab.engines import native_worker
+
+_WORKER = Path(__file__).with_name("native_worker.py")
 
 
 class NativeError(Exception):
@@ -27,7 +28,7 @@ class NativeEngine(JsonChild):
     """
 
     def __init__(self, root: Path, seconds: float = 120.0, memory: int = MEMORY) -> None:
-        super().__init__(native_worker.__file__, seconds, memory=memory)
+        super().__init__(str(_WORKER), seconds, memory=memory)
         self._root = root.resolve()
         self._limit = seconds
 

@@ -24,6 +24,9 @@ import zlib
 from pathlib import Path
 from typing import Any
 
+import mujoco
+import numpy as np
+
 _MODEL = "model.mjb"
 
 
@@ -32,9 +35,6 @@ def main() -> None:
     replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)  # MuJoCo prints its warnings
-    import mujoco
-    import numpy
-
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
     tasks = {"save": _save, "parity": _parity, "script": _script}
     print("ready", file=replies, flush=True)
@@ -42,27 +42,27 @@ def main() -> None:
         request = json.loads(line)
         signal.setitimer(signal.ITIMER_PROF, request["limit"])
         try:
-            reply = {"error": "", **tasks[request["task"]](mujoco, numpy, request)}
+            reply = {"error": "", **tasks[request["task"]](request)}
         except (ValueError, RuntimeError, mujoco.FatalError, MemoryError) as error:
             reply = {"error": str(error) or type(error).__name__}
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         print(json.dumps(reply), file=replies, flush=True)
 
 
-def _save(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
+def _save(request: Any) -> dict[str, Any]:
     path = request["path"]
     model = mujoco.MjModel.from_xml_path(path, assets={path: request["text"].encode()})
-    buffer = numpy.zeros(mujoco.mj_sizeModel(model), numpy.uint8)
+    buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
     return {"mjb": base64.b64encode(buffer.tobytes()).decode()}
 
 
-def _array(numpy: Any, packed: Any) -> Any:
+def _array(packed: Any) -> Any:
     kinds = {"f64": "<f8", "f32": "<f4", "i32": "<i4", "u32": "<u4", "u8": "u1"}
-    return numpy.frombuffer(base64.b64decode(packed["data"]), kinds[packed["type"]])
+    return np.frombuffer(base64.b64decode(packed["data"]), kinds[packed["type"]])
 
 
-def _parity(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
+def _parity(request: Any) -> dict[str, Any]:
     """Repeat a run natively.
 
     The checksum of each step shows the first that differs; the states recorded at every `stride`-th
@@ -76,30 +76,35 @@ def _parity(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
     model.opt.disableflags = flags & ~no_reset if run["autoreset"] else flags | no_reset
     data = mujoco.MjData(model)
     signature = run["signature"]
-    mujoco.mj_setState(model, data, _array(numpy, run["start"]), signature)
-    sums = _array(numpy, run["checksums"])
-    states = _array(numpy, run["states"]).reshape(-1, max(run["width"], 1))
-    writes = _Writes(mujoco, numpy, model, run, signature)
-    first, relative, at = None, 0.0, 0
+    mujoco.mj_setState(model, data, _array(run["start"]), signature)
+    sums = _array(run["checksums"])
+    states = _array(run["states"]).reshape(-1, max(run["width"], 1))
+    writes = {name: _array(packed) for name, packed in run["writes"].items()}
+    # The writes of each step, which are in the order of steps.
+    ends = np.searchsorted(writes["steps"], range(run["steps"]), side="right").tolist()
+    written_state = np.zeros(mujoco.mj_stateSize(model, signature))
+    first, relative = None, 0.0
     horizon = max(request["horizon"], run["stride"])
     for step in range(run["steps"]):
-        writes.apply(step, data)
+        part = slice(ends[step - 1] if step else 0, ends[step])
+        if part.start < part.stop:
+            mujoco.mj_getState(model, data, written_state, signature)
+            written_state[writes["indices"][part]] = writes["values"][part]
+            mujoco.mj_setState(model, data, written_state, signature)
         mujoco.mj_step(model, data)
         if first is None and _checksum(data) != sums[step]:
             first = step + 1
         if first is None or (step + 1) % run["stride"] or step >= horizon:
             continue
-        state = numpy.concatenate((data.qpos, data.qvel, data.act))
+        state = np.concatenate((data.qpos, data.qvel, data.act))
         recorded_state = states[(step + 1) // run["stride"] - 1]
-        difference = _relative_difference(numpy, state, recorded_state)
-        if difference > relative:
-            relative, at = difference, step + 1
+        difference = _relative_difference(state, recorded_state)
+        relative = max(relative, difference)
     return {
         "first": first,
         "relative": relative,
-        "at": at,
         "timestep": float(model.opt.timestep),
-        "exact": _is_exact(mujoco, model),
+        "exact": _is_exact(model),
     }
 
 
@@ -107,7 +112,7 @@ def _checksum(data: Any) -> int:
     return zlib.crc32(b"".join(part.tobytes() for part in (data.qpos, data.qvel, data.act)))
 
 
-def _is_exact(mujoco: Any, model: Any) -> bool:
+def _is_exact(model: Any) -> bool:
     """Whether a step surely calls no function of the C library but the square root.
 
     Turning joints take sines and cosines, wrapped tendons their inverses, muscles and motors powers
@@ -124,18 +129,18 @@ def _is_exact(mujoco: Any, model: Any) -> bool:
     )
 
 
-def _relative_difference(numpy: Any, native: Any, browser: Any) -> float:
+def _relative_difference(native: Any, browser: Any) -> float:
     """Return the largest difference over the largest number, or over 1 if that is larger."""
-    if not (numpy.isfinite(native).all() and numpy.isfinite(browser).all()):
-        is_equal = numpy.array_equal(native, browser, equal_nan=True)
+    if not (np.isfinite(native).all() and np.isfinite(browser).all()):
+        is_equal = np.array_equal(native, browser, equal_nan=True)
         return 0.0 if is_equal else 1e300  # JSON has no infinity
     if native.size == 0:
         return 0.0
-    largest = max(float(numpy.abs(native).max()), 1.0)
-    return float(numpy.abs(native / largest - browser / largest).max())
+    largest = max(float(np.abs(native).max()), 1.0)
+    return float(np.abs(native / largest - browser / largest).max())
 
 
-def _script(mujoco: Any, numpy: Any, request: Any) -> dict[str, Any]:
+def _script(request: Any) -> dict[str, Any]:
     """Run a script's `main`, then its buttons, then its variants with other values of controls."""
     if importlib.util.find_spec("mjcourse") is None:
         sys.path.append(request["library"])
@@ -195,31 +200,6 @@ def _take_steps(module: Any, button: str | None) -> None:
     for _ in range(10):
         module.step(*state)
     module.report(*state)
-
-
-class _Writes:
-    """What the lab's controller wrote into the state before each step."""
-
-    def __init__(self, mujoco: Any, numpy: Any, model: Any, run: Any, signature: int) -> None:
-        self.set_state, self.get_state = mujoco.mj_setState, mujoco.mj_getState
-        self.model, self.signature = model, signature
-        packed = run["writes"]
-        self.steps = _array(numpy, packed["steps"])
-        self.indices = _array(numpy, packed["indices"])
-        self.values = _array(numpy, packed["values"])
-        self.state = numpy.zeros(mujoco.mj_stateSize(model, signature))
-        self.next = 0
-
-    def apply(self, step: int, data: Any) -> None:
-        end = self.next
-        while end < len(self.steps) and self.steps[end] == step:
-            end += 1
-        if end == self.next:
-            return
-        self.get_state(self.model, data, self.state, self.signature)
-        self.state[self.indices[self.next : end]] = self.values[self.next : end]
-        self.set_state(self.model, data, self.state, self.signature)
-        self.next = end
 
 
 if __name__ == "__main__":
