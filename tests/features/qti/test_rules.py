@@ -39,7 +39,6 @@ BAD = (
     ("</itemBody>", "</itemBody><outcomeDeclaration/>"),
     ("<p>Which", '<p><textEntryInteraction responseIdentifier="RESPONSE"/>Which'),
     ("<p>Which", '<p><img src="a.png"/>Which'),
-    ("<p>Which", "<p><m:math><m:math/></m:math>Which"),
 )
 
 
