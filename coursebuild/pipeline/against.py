@@ -145,7 +145,7 @@ class _Comparison(Struct):
     def _line(
         self, extraction: Extraction, standing: RunStanding, status: str, reason: str
     ) -> ScriptComparison:
-        extractions = extract(self.course).value
+        scripts = {e.path: e for e in extract(self.course).value}
         return ScriptComparison(
             extraction.path,
             extraction.owner,
@@ -153,7 +153,7 @@ class _Comparison(Struct):
             reason,
             standing.changes,
             standing.diff,
-            failure_diagnostic(extraction, standing.run, extractions),
+            failure_diagnostic(extraction, standing.run, scripts),
         )
 
     def _run_control(self, scripts: Sequence[Extraction]) -> tuple[dict[str, RunStanding], str]:

@@ -190,12 +190,9 @@ def _outputs(session: Session, library: Library, document: Document) -> Iterator
 
 def _describe_drift(session: Session, library: Library, verdict: Verdict) -> dict[str, Any]:
     run = library.runs[verdict.recording.script or ""]
-    rows = diff_rows(verdict, library.course.filters, run.stdout)
     edit = new_output(session, library, verdict)
     return {
-        "rows": [
-            [row.mark, [[piece.text, piece.is_changed] for piece in row.pieces]] for row in rows
-        ],
+        "rows": diff_rows(verdict, library.course.filters, run.stdout),
         "offer": Offer.of(edit) if isinstance(edit, Edit) else None,
         "refused": edit.message if isinstance(edit, Diagnostic) else "",
     }

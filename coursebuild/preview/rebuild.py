@@ -37,8 +37,8 @@ from coursebuild.pipeline.scripts import run
 from coursebuild.pipeline.verify import verify
 from coursebuild.preview.messages import report_now
 from coursebuild.preview.session import Session, script_keys
-from coursebuild.report import Report, Style, diagnostic_text, summary_line
-from coursebuild.report.text import location
+from coursebuild.report import Report, Style, summary_line
+from coursebuild.report.text import diagnostic_paragraphs, location
 
 QUIET = 0.15
 """Seconds without a save after which the work begins."""
@@ -164,8 +164,8 @@ class BackgroundRebuild:
         self._printed = now
         new = subtract_diagnostics(now, before or ())
         resolved = subtract_diagnostics(before or (), now)
-        for diagnostic in new:
-            print(diagnostic_text(diagnostic, self._style) + "\n", file=sys.stderr, flush=True)
+        for paragraph in diagnostic_paragraphs(new, self._style):
+            print(paragraph, file=sys.stderr, flush=True)
         for diagnostic in resolved:
             self._progress.say(f"gone: {location(diagnostic.span)}: {diagnostic.message}")
         counts = [f"{len(new)} new"] if new else []

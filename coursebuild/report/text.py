@@ -1,6 +1,7 @@
 """Diagnostics as text for people: message, place, the line with the wrong part marked, help.
 
-Entry points: `to_text(report, style)`, `diagnostic_text(diagnostic, style)`; `sensitivity_text`.
+Entry points: `to_text(report, style)`, `diagnostic_paragraphs(diagnostics, style)`,
+`diagnostic_text(diagnostic, style)`; `sensitivity_text`.
 
 1. The frame shows the first line of the span; carets mark the part of it that is wrong.
 2. Columns are those of a terminal: tabs are expanded, wide characters take two cells, control
@@ -39,7 +40,7 @@ _MOST_OF_A_RULE = 20
 
 def to_text(report: Report, style: Style) -> str:
     """The report as text: diagnostics, the scripts, and a summary line."""
-    parts = list(_diagnostic_parts(report.diagnostics, style))
+    parts = list(diagnostic_paragraphs(report.diagnostics, style))
     lines = [script_line(line, style) for line in report.scripts]
     lines += [lab_line(line, style) for line in report.labs]
     if lines:
@@ -52,7 +53,7 @@ def to_text(report: Report, style: Style) -> str:
     return "\n".join(parts)
 
 
-def _diagnostic_parts(diagnostics: Sequence[Diagnostic], style: Style) -> Iterator[str]:
+def diagnostic_paragraphs(diagnostics: Sequence[Diagnostic], style: Style) -> Iterator[str]:
     """The first diagnostics of each rule in each file, then how many more there are."""
     counts: Counter[tuple[str, str, str]] = Counter()
     for d in diagnostics:

@@ -221,18 +221,14 @@ def _check_keyframe(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[D
 
 
 def _check_lengths(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
-    for name, values, count, noun in (
-        ("qpos", scenario.qpos, facts.nq, "positions (`nq`)"),
-        ("qvel", scenario.qvel, facts.nv, "velocities (`nv`)"),
-        ("controls", scenario.controls[0] if scenario.controls else (), facts.nu, "actuators"),
-    ):
-        if name == "controls" and scenario.controls:
-            is_wrong = len(values) != count
-            message = f"a command has {len(values)} numbers, and the model has {count} {noun}"
-        else:
-            is_wrong = bool(values) and len(values) != count
-            message = f"`{name}` has {len(values)} numbers, and the model has {count} {noun}"
-        if is_wrong:
+    rows = (
+        ("qpos", "`qpos`", scenario.qpos or None, facts.nq, "positions (`nq`)"),
+        ("qvel", "`qvel`", scenario.qvel or None, facts.nv, "velocities (`nv`)"),
+        ("controls", "a command", next(iter(scenario.controls), None), facts.nu, "actuators"),
+    )
+    for name, subject, values, count, noun in rows:
+        if values is not None and len(values) != count:
+            message = f"{subject} has {len(values)} numbers, and the model has {count} {noun}"
             yield diagnose(_RULE, scenario.place(name), message)
 
 

@@ -9,11 +9,9 @@ lines that a `...` stands for are left out. A row marks the parts of its line th
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from itertools import groupby
 from typing import Literal, TypeAlias
-
-from msgspec import Struct
 
 from coursebuild.core.model import Filter, Table
 from coursebuild.core.model.results import Verdict
@@ -26,18 +24,8 @@ Mark: TypeAlias = Literal[" ", "-", "+"]
 _LINES, _WIDTH = 12, 120
 
 
-class DiffPiece(Struct, frozen=True):
-    """A stretch of a line."""
-
-    text: str
-    is_changed: bool
-
-
-class DiffRow(Struct, frozen=True):
-    """A line: as recorded (`-`), as printed (`+`), or both (a space)."""
-
-    mark: Mark
-    pieces: tuple[DiffPiece, ...]
+DiffRow: TypeAlias = tuple[Mark, list[tuple[str, bool]]]
+"""A line as recorded (`-`), as printed (`+`), or both (a space): its parts, and which changed."""
 
 
 def shorten(text: str, width: int) -> str:
@@ -77,8 +65,8 @@ def diff_rows(verdict: Verdict, filters: tuple[Filter, ...], stdout: str) -> tup
     steps = align(recorded, printed, matcher)
     rows = (row for step in steps for row in _step_rows(step, recorded, printed, matcher))
     # Between two common lines, all removed lines come before all added ones.
-    hunks = (list(group) for _, group in groupby(rows, key=lambda row: row.mark == " "))
-    return tuple(row for hunk in hunks for row in sorted(hunk, key=lambda r: r.mark, reverse=True))
+    hunks = (list(group) for _, group in groupby(rows, key=lambda row: row[0] == " "))
+    return tuple(row for hunk in hunks for row in sorted(hunk, key=lambda r: r[0], reverse=True))
 
 
 def _cell_rows(recorded: str, printed: str) -> Iterator[DiffRow]:
@@ -96,11 +84,9 @@ def _step_rows(
         case StepKind.DIFFERS:
             recorded_line, printed_line = recorded.lines[step.recorded], printed.lines[step.printed]
             line_differences = find_differences(recorded_line, printed_line, matcher)
-            yield DiffRow("-", _pieces(recorded_line, [(d.start, d.end) for d in line_differences]))
-            yield DiffRow(
-                "+",
-                _pieces(printed_line, [(d.printed_start, d.printed_end) for d in line_differences]),
-            )
+            yield "-", _parts(recorded_line, ((d.start, d.end) for d in line_differences))
+            ranges = ((d.printed_start, d.printed_end) for d in line_differences)
+            yield "+", _parts(printed_line, ranges)
         case StepKind.MISSING:
             yield _row("-", recorded.lines[step.recorded])
         case StepKind.EXTRA:
@@ -110,14 +96,13 @@ def _step_rows(
 
 
 def _row(mark: Mark, text: str) -> DiffRow:
-    return DiffRow(mark, (DiffPiece(text, mark != " "),))
+    return mark, [(text, mark != " ")]
 
 
-def _pieces(text: str, ranges: Sequence[tuple[int, int]]) -> tuple[DiffPiece, ...]:
-    pieces: list[DiffPiece] = []
+def _parts(text: str, ranges: Iterable[tuple[int, int]]) -> list[tuple[str, bool]]:
+    parts: list[tuple[str, bool]] = []
     at = 0
     for start, end in ranges:
-        pieces += (DiffPiece(text[at:start], False), DiffPiece(text[start:end], True))
+        parts += ((text[at:start], False), (text[start:end], True))
         at = end
-    pieces.append(DiffPiece(text[at:], False))
-    return tuple(piece for piece in pieces if piece.text)
+    return [part for part in (*parts, (text[at:], False)) if part[0]]

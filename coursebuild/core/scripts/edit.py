@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from itertools import groupby
 
 from coursebuild.core.model import Comparison, Filter, Mode, Recording, Script, Table
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
@@ -103,7 +104,7 @@ def _new_lines(
     """The lines to record; they match the run."""
     candidates: list[list[str]] = []
     if filters or comparison.ellipsis:
-        updated_lines = _LineUpdater(body, recorded, printed, LineMatcher(comparison)).lines()
+        updated_lines = _update_lines(body, recorded, printed, LineMatcher(comparison))
         if isinstance(updated_lines, Diagnostic):
             return updated_lines
         candidates.append(updated_lines)
@@ -119,84 +120,62 @@ def _new_lines(
     )
 
 
-class _LineUpdater:
-    """Builds new lines that keep what the author wrote on purpose: ellipses and filtered text."""
+def _update_lines(
+    body: Excerpt, recorded: Side, printed: Side, matcher: LineMatcher
+) -> list[str] | Diagnostic:
+    """New lines that keep what the author wrote on purpose: ellipses and filtered text."""
 
-    def __init__(self, body: Excerpt, recorded: Side, printed: Side, matcher: LineMatcher) -> None:
-        self.body, self.recorded, self.printed, self.matcher = body, recorded, printed, matcher
+    def refuse(line: int, label: str) -> Diagnostic:
+        span = body.span(*recorded.origin(line, 0, len(recorded.lines[line])))
+        message = f"an output with `{ELLIPSIS}` cannot be brought up to date here"
+        help = f"write the line anew by hand, or take the `{ELLIPSIS}` away and update again"
+        return refusal(span, message, help, label)
 
-    def lines(self) -> list[str] | Diagnostic:
-        steps = align(self.recorded, self.printed, self.matcher)
-        lines: list[str] = []
-        for index, step in enumerate(steps):
-            lines_of_step = self._lines_of_step(step, steps, index)
-            if isinstance(lines_of_step, Diagnostic):
-                return lines_of_step
-            lines += lines_of_step
-        return lines
-
-    def _lines_of_step(
-        self, step: Step, steps: Sequence[Step], index: int
-    ) -> Iterable[str] | Diagnostic:
-        match step.kind:
-            case StepKind.SAME:
-                if self._is_intended(step):
-                    return self.recorded.raw_lines(step.recorded)
-                return self.printed.raw_lines(step.printed)
-            case StepKind.DIFFERS:
-                if self.matcher.elides(self.recorded.lines[step.recorded]):
-                    return self._with_numbers(step)
-                return self.printed.raw_lines(step.printed)
-            case StepKind.MISSING:
-                if _has_elided_neighbours(steps, index):
-                    return self._refusal(step.recorded, "this line was not printed where `...` is")
-                return ()
-            case StepKind.EXTRA:
-                return self.printed.raw_lines(step.printed)
-            case StepKind.ELLIPSIS:
-                return self.recorded.raw_lines(step.recorded)
-            case StepKind.ELIDED:
-                return ()
-
-    def _is_intended(self, step: Step) -> bool:
-        """Whether a line that matches does so by an ellipsis or a filter."""
-        text = self.recorded.lines[step.recorded]
-        return (
-            self.matcher.elides(text)
-            or self.recorded.raw_lines(step.recorded) != (text,)
-            or self.printed.raw_lines(step.printed) != (self.printed.lines[step.printed],)
-        )
-
-    def _with_numbers(self, step: Step) -> Iterable[str] | Diagnostic:
-        """A line with `...` that fits except for its numbers, with the numbers of the run."""
-        text = self.recorded.lines[step.recorded]
-        pairs = self.matcher.pairs(text, self.printed.lines[step.printed])
-        if pairs is None or self.recorded.raw_lines(step.recorded) != (text,):
-            return self._refusal(step.recorded, "this line no longer fits what the script prints")
-        changes = (
-            (a.start, a.end, b.text) for a, b in pairs if not self.matcher.numbers_match(a, b)
-        )
-        return (replace_ranges(text, changes),)
-
-    def _refusal(self, line: int, label: str) -> Diagnostic:
-        start, end = self.recorded.origin(line, 0, len(self.recorded.lines[line]))
-        return refusal(
-            self.body.span(start, end),
-            f"an output with `{ELLIPSIS}` cannot be brought up to date here",
-            f"write the line anew by hand, or take the `{ELLIPSIS}` away and update again",
-            label,
-        )
+    lines: list[str] = []
+    pair_kinds = (StepKind.SAME, StepKind.DIFFERS)
+    for _, group in groupby(
+        align(recorded, printed, matcher), lambda step: step.kind in pair_kinds
+    ):
+        steps = tuple(group)
+        for step in steps:
+            match step.kind:
+                case StepKind.MISSING if any(s.kind is StepKind.ELIDED for s in steps):
+                    return refuse(step.recorded, "this line was not printed where `...` is")
+                case StepKind.DIFFERS if matcher.elides(recorded.lines[step.recorded]):
+                    line = _put_numbers(step, recorded, printed, matcher)
+                    if line is None:
+                        label = "this line no longer fits what the script prints"
+                        return refuse(step.recorded, label)
+                    lines.append(line)
+                case StepKind.SAME if _is_intended(step, recorded, printed, matcher):
+                    lines += recorded.raw_lines(step.recorded)
+                case StepKind.ELLIPSIS:
+                    lines += recorded.raw_lines(step.recorded)
+                case StepKind.SAME | StepKind.DIFFERS | StepKind.EXTRA:
+                    lines += printed.raw_lines(step.printed)
+                case StepKind.MISSING | StepKind.ELIDED:
+                    pass
+    return lines
 
 
-def _has_elided_neighbours(steps: Sequence[Step], index: int) -> bool:
-    """Whether lines are elided between the paired lines before and after a step."""
-    for places in (range(index - 1, -1, -1), range(index + 1, len(steps))):
-        for kind in (steps[at].kind for at in places):
-            if kind is StepKind.ELIDED:
-                return True
-            if kind in (StepKind.SAME, StepKind.DIFFERS):
-                break
-    return False
+def _is_intended(step: Step, recorded: Side, printed: Side, matcher: LineMatcher) -> bool:
+    """Whether a line that matches does so by an ellipsis or a filter."""
+    text = recorded.lines[step.recorded]
+    return (
+        matcher.elides(text)
+        or recorded.raw_lines(step.recorded) != (text,)
+        or printed.raw_lines(step.printed) != (printed.lines[step.printed],)
+    )
+
+
+def _put_numbers(step: Step, recorded: Side, printed: Side, matcher: LineMatcher) -> str | None:
+    """A line with `...` that fits except for its numbers, with the numbers of the run."""
+    text = recorded.lines[step.recorded]
+    pairs = matcher.pairs(text, printed.lines[step.printed])
+    if pairs is None or recorded.raw_lines(step.recorded) != (text,):
+        return None
+    changes = ((a.start, a.end, b.text) for a, b in pairs if not matcher.numbers_match(a, b))
+    return replace_ranges(text, changes)
 
 
 # ---------------------------------------------------------------------------------------- fences

@@ -17,8 +17,9 @@ from __future__ import annotations
 import posixpath
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import assert_never
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import TypeAlias, assert_never
 
 from coursebuild.core.model import Recording
 from coursebuild.core.model.results import Divergence, Effect, EffectKind, Outcome, ScriptRun, Sign
@@ -68,44 +69,38 @@ _TAIL_CHARACTERS = 4000
 _LABEL = 120
 
 
-class _LessonLines:
-    """Finds the lesson's line for a line of an extracted file, wherever the file lies."""
+Scripts: TypeAlias = Mapping[str, Extraction]
+"""All scripts of a course, by path."""
 
-    def __init__(self, extractions: Iterable[Extraction]) -> None:
-        self._by_path = {extraction.path: extraction for extraction in extractions}
 
-    def innermost(self, stderr: str) -> tuple[Extraction, Span] | None:
-        """The script and the lesson's line where a traceback or a crash dump ends."""
-        dump = stderr.rfind(_CRASH)
-        frames = list(_FRAME.finditer(stderr, max(0, dump)))
-        for match in frames if dump >= 0 else reversed(frames):
-            extraction, span = self._find(match)
-            if extraction is not None and span is not None:
-                return extraction, without_indentation(span)
+def _find_line(match: re.Match[str], scripts: Scripts) -> tuple[Extraction, Span] | None:
+    """The script and the lesson's line that a traceback names, wherever the file lies."""
+    parts = match["path"].replace("\\", "/").split("/")
+    if any(library in parts for library in _LIBRARIES):
         return None
+    paths = ("/".join(parts[first:]) for first in range(len(parts)))
+    extraction = next((scripts[path] for path in paths if path in scripts), None)
+    span = extraction and extraction.line_span(int(match["line"]))
+    return (extraction, without_indentation(span)) if extraction and span else None
 
-    def translate_paths(self, text: str) -> str:
-        """The text with paths and lines of extracted files replaced by those of lessons."""
 
-        def replace_frame(match: re.Match[str]) -> str:
-            _, span = self._find(match)
-            return match.group() if span is None else f'File "{span.path}", line {span.line}'
+def _find_innermost_line(stderr: str, scripts: Scripts) -> tuple[Extraction, Span] | None:
+    """The script and the lesson's line where a traceback or a crash dump ends."""
+    dump = stderr.rfind(_CRASH)
+    frames = list(_FRAME.finditer(stderr, max(0, dump)))
+    lines = (_find_line(match, scripts) for match in (frames if dump >= 0 else reversed(frames)))
+    return next(filter(None, lines), None)
 
-        def replace_warning(match: re.Match[str]) -> str:
-            _, span = self._find(match)
-            return match.group() if span is None else f"{span.path}:{span.line}"
 
-        return _WARNING.sub(replace_warning, _FRAME.sub(replace_frame, text))
+def _name_lesson_lines(text: str, scripts: Scripts) -> str:
+    """The text with paths and lines of extracted files replaced by those of lessons."""
 
-    def _find(self, match: re.Match[str]) -> tuple[Extraction | None, Span | None]:
-        parts = match["path"].replace("\\", "/").split("/")
-        if any(library in parts for library in _LIBRARIES):
-            return None, None
-        for first in range(len(parts)):
-            extraction = self._by_path.get("/".join(parts[first:]))
-            if extraction is not None:
-                return extraction, extraction.line_span(int(match["line"]))
-        return None, None
+    def translate(form: str, match: re.Match[str]) -> str:
+        line = _find_line(match, scripts)
+        return form.format(line[1].path, line[1].line) if line else match.group()
+
+    text = _FRAME.sub(partial(translate, 'File "{}", line {}'), text)
+    return _WARNING.sub(partial(translate, "{}:{}"), text)
 
 
 def without_indentation(span: Span) -> Span:
@@ -115,18 +110,18 @@ def without_indentation(span: Span) -> Span:
 
 
 def failure_diagnostic(
-    extraction: Extraction, run: ScriptRun, extractions: Iterable[Extraction]
+    extraction: Extraction, run: ScriptRun, scripts: Scripts
 ) -> Diagnostic | None:
     """What is wrong with a run; `None` where it ended well or the script was not run."""
     wording = _failure_wording(extraction, run)
     if wording is None:
         return None
     rule, message, help = wording
-    lessons, stderr = _LessonLines(extractions), _COLOURS.sub("", run.stderr)
+    stderr = _COLOURS.sub("", run.stderr)
     fence = extraction.script.span.first_line()
     source, span, label = extraction, fence, ""
     if run.outcome in (Outcome.FAILED, Outcome.KILLED, Outcome.TIMEOUT):
-        source, span = lessons.innermost(stderr) or (extraction, fence)
+        source, span = _find_innermost_line(stderr, scripts) or (extraction, fence)
         label = "" if span is fence else "it was here"
     if run.outcome is Outcome.FAILED:
         if not (_parses(source) and _parses(extraction)):
@@ -135,7 +130,7 @@ def failure_diagnostic(
         label = shorten(error, _LABEL)
         matches = ((pattern.match(error), advice) for pattern, advice in _HELPS)
         help = next((match.expand(advice) for match, advice in matches if match), "")
-    notes = _stderr_notes(run.outcome, lessons.translate_paths(stderr))
+    notes = _stderr_notes(run.outcome, _name_lesson_lines(stderr, scripts))
     if source.path != extraction.path:
         notes.insert(0, Note(f"`{extraction.path}` was running", fence))
     return diagnose(rule, span, message, label=label, help=help, notes=notes)
@@ -249,7 +244,7 @@ def is_lost(extraction: Extraction, run: ScriptRun) -> bool:
 
 
 def divergence_diagnostics(
-    extraction: Extraction, run: ScriptRun, extractions: Iterable[Extraction]
+    extraction: Extraction, run: ScriptRun, scripts: Scripts
 ) -> Iterator[Diagnostic]:
     """What is wrong with the simulations of a script that was run."""
     divergences = () if run.trace is None else run.trace.divergences
@@ -267,18 +262,14 @@ def divergence_diagnostics(
     lost = _lost_simulations(run)
     if lost:
         message = f"a simulation of `{script.path}` diverged"
-        yield _incident_diagnostic(
-            "script-diverged", extraction, lost, extractions, message, _DIVERGES
-        )
+        yield _incident_diagnostic("script-diverged", extraction, lost, scripts, message, _DIVERGES)
     elif deep and not script.deep:  # bodies of a lost simulation may lie anywhere
         message = f"bodies of `{script.path}` lie deep in each other"
-        yield _incident_diagnostic(
-            "script-penetration", extraction, deep, extractions, message, _DEEP
-        )
+        yield _incident_diagnostic("script-penetration", extraction, deep, scripts, message, _DEEP)
 
 
 def effect_diagnostics(
-    extraction: Extraction, run: ScriptRun, extractions: Iterable[Extraction]
+    extraction: Extraction, run: ScriptRun, scripts: Scripts
 ) -> Iterator[Diagnostic]:
     """A diagnostic if the script wrote outside its temporary folder, one if it used the network."""
     effects = () if run.trace is None else run.trace.effects
@@ -289,7 +280,7 @@ def effect_diagnostics(
                 name = posixpath.basename(target)
                 help = f"to show it, save it as `{name}`, and say `figure={name}` on the fence"
             yield _incident_diagnostic(
-                rule, extraction, selection, extractions, f"`{run.path}` {wording}", help
+                rule, extraction, selection, scripts, f"`{run.path}` {wording}", help
             )
 
 
@@ -308,29 +299,28 @@ def _incident_diagnostic(
     rule: str,
     extraction: Extraction,
     incidents: Sequence[Divergence | Effect],
-    extractions: Iterable[Extraction],
+    scripts: Scripts,
     message: str,
     help: str,
 ) -> Diagnostic:
     """A diagnostic at the first incident, with some more in notes."""
-    by_path = {extraction.path: extraction for extraction in extractions}
     fence = extraction.script.span.first_line()
     named_incidents = incidents[1 : _MAX_INCIDENTS + 1]
     rest_count = len(incidents) - 1 - _MAX_INCIDENTS
-    notes = [Note(_describe_incident(i), _place(i, by_path)) for i in named_incidents]
+    notes = [Note(_describe_incident(i), _place(i, scripts)) for i in named_incidents]
     if incidents[0].path not in ("", extraction.path):
         notes.insert(0, Note(f"`{extraction.path}` was running", fence))
     if rest_count > 0:
         notes.append(Note(f"and {rest_count} more like these"))
-    place = _place(incidents[0], by_path) or fence
+    place = _place(incidents[0], scripts) or fence
     return diagnose(
         rule, place, f"{message}: {_describe_incident(incidents[0])}", help=help, notes=notes
     )
 
 
-def _place(incident: Divergence | Effect, by_path: Mapping[str, Extraction]) -> Span | None:
+def _place(incident: Divergence | Effect, scripts: Scripts) -> Span | None:
     """The lesson's line where an incident was noticed."""
-    extraction = by_path.get(incident.path)
+    extraction = scripts.get(incident.path)
     span = None if extraction is None else extraction.line_span(incident.line)
     return None if span is None else without_indentation(span)
 

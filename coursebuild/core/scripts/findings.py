@@ -62,16 +62,16 @@ def script_findings(
             its failure is nothing new.
     """
     by_path = {run.path: run for run in runs}
-    all_extractions = extract(course).value if all_extractions is None else all_extractions
+    scripts = {e.path: e for e in all_extractions or extract(course).value}
     diagnostics: list[Diagnostic] = []
     for extraction in extractions:
         run = by_path.get(extraction.path)
         if run is not None and not (run.trace and {*run.trace.files}.intersection(broken)):
-            diagnostic = failure_diagnostic(extraction, run, all_extractions)
+            diagnostic = failure_diagnostic(extraction, run, scripts)
             diagnostics += [] if diagnostic is None else [diagnostic]
-            diagnostics += divergence_diagnostics(extraction, run, all_extractions)
-            diagnostics += effect_diagnostics(extraction, run, all_extractions)
-    outputs = PrintedOutputs(verdicts, runs, [extraction.path for extraction in all_extractions])
+            diagnostics += divergence_diagnostics(extraction, run, scripts)
+            diagnostics += effect_diagnostics(extraction, run, scripts)
+    outputs = PrintedOutputs(verdicts, runs, scripts)
     return (
         *diagnostics,
         *output_findings(course, course.owned_documents, outputs, evidence, repeated_runs),

@@ -16,8 +16,8 @@ def rows(recorded: str, printed: str) -> list[str]:
     block = recording(recorded)
     verdict = compare(block, DIGITS_ELLIPSIS, (), printed)
     return [
-        row.mark + "".join(f"[{p.text}]" if p.is_changed else p.text for p in row.pieces)
-        for row in diff_rows(verdict, (), printed)
+        mark + "".join(f"[{text}]" if is_changed else text for text, is_changed in parts)
+        for mark, parts in diff_rows(verdict, (), printed)
     ]
 
 
@@ -41,7 +41,7 @@ def test_rows(recorded: str, printed: str, expected: list[str]) -> None:
 def test_rows_of_a_table_are_the_cells_that_changed() -> None:
     block = table("| n | x |\n| --- | --- |\n| 1 | 2.5 |")
     verdict = compare(block, EXACT, (), "1 3.5\n")
-    cell_rows = [(row.mark, row.pieces[0].text) for row in diff_rows(verdict, (), "1 3.5\n")]
+    cell_rows = [(mark, parts[0][0]) for mark, parts in diff_rows(verdict, (), "1 3.5\n")]
     assert cell_rows == [("-", "2.5"), ("+", "3.5")]
 
 

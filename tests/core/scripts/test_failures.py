@@ -30,10 +30,9 @@ go()
 
 
 def describe_failure(stderr: str = "", outcome: Outcome = Outcome.FAILED, status: int = 1) -> str:
-    scripts = extractions()
-    diagnostic = failure_diagnostic(
-        scripts[0], make_run(outcome=outcome, status=status, stderr=stderr), scripts
-    )
+    scripts = {extraction.path: extraction for extraction in extractions()}
+    run = make_run(outcome=outcome, status=status, stderr=stderr)
+    diagnostic = failure_diagnostic(scripts["examples/a.py"], run, scripts)
     assert diagnostic is not None
     return f"{diagnostic.span.path}\n{describe(diagnostic)}"
 

@@ -25,7 +25,7 @@ from coursebuild.report.terminal import (
     table,
     visible,
 )
-from coursebuild.report.text import diagnostic_text
+from coursebuild.report.text import diagnostic_paragraphs
 from coursebuild.report.values import json_text, plural
 
 _T = TypeVar("_T")
@@ -53,7 +53,7 @@ class Measurement(Struct, Generic[_T], frozen=True):
 
 def measurement_text(reports: str, measurement: Measurement[_T], style: Style) -> str:
     """Write diagnostics, failures, the text of the reports, checks and remarks."""
-    parts = [diagnostic_text(diagnostic, style) + "\n" for diagnostic in measurement.diagnostics]
+    parts = list(diagnostic_paragraphs(measurement.diagnostics, style))
     parts += ["".join(failure_text(failure, style) for failure in measurement.failures), reports]
     parts += [format_checks(measurement.checked, style)]
     parts += ["".join(f"{visible(remark)}\n" for remark in measurement.remarks)]
