@@ -2,9 +2,9 @@
 
 1. The folder's map says which lessons there are: a `course.json`, the table of contents of Jupyter
    Book, MyST, Quarto or MkDocs, or the files themselves (`course_json`, `contents`).
-2. Each lesson is read as segments: prose, fences and cells of code (`segments`, `notebook`).
+2. Each lesson is read as segments: prose, fences and cells of code (`segments`).
 3. What differs between the dialects is written as coursebuild reads it (`prose`, `blocks`,
-   `cells`).
+   `cells`), and the lessons are put together (`convert`).
 4. The course is written to a new folder, each script runs once, and says by that which keys its
    fence needs (`commands`). Then all of it is checked.
 

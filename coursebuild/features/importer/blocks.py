@@ -41,27 +41,28 @@ _QUOTED_KIND = re.compile(r"^((?: {0,3}>)+[ \t]*\[!)([\w-]+)(\])", re.MULTILINE)
 
 def convert_segment(segment: Segment, context: LessonContext) -> str:
     """Return a segment outside cells, or a cell within another block, as Markdown."""
+    context = context.at(segment.place)
     if segment.kind == "prose":
-        text = rewrite_prose(segment.text, context, segment.place)
+        text = rewrite_prose(segment.text, context)
         return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
     if segment.kind == "cell":
-        context.add_leftover(segment.place, "a cell inside another block is shown and not run")
+        context.add_leftover("a cell inside another block is shown and not run")
         return fence("python fragment", code_for_readers(segment))
     directive = _DIRECTIVE.fullmatch(segment.head)
     if directive is not None:
-        return _convert_directive(directive["name"], directive["argument"], segment, context)
+        return _convert_directive(directive["name"], directive["argument"], segment.text, context)
     match segment.mark[0]:
         case ":":
             return _convert_div(segment, context)
         case "!" | "?":
             name, _, title = segment.head.partition(" ")
-            return _write_callout(name, title.strip().strip('"'), segment.text, segment, context)
+            return _write_callout(name, title.strip().strip('"'), segment.text, context)
         case _:
             return _convert_fence(segment, context)
 
 
-def _convert_nested(text: str, segment: Segment, context: LessonContext) -> str:
-    parts = read_markdown(text, place=segment.place)
+def _convert_nested(text: str, context: LessonContext) -> str:
+    parts = read_markdown(text, place=context.place)
     return "\n\n".join(convert_segment(part, context).strip("\n") for part in parts)
 
 
@@ -73,17 +74,11 @@ def _callout_kind(kind: str, context: LessonContext) -> str:
 
 
 def _write_callout(
-    kind: str,
-    title: str,
-    text: str,
-    segment: Segment,
-    context: LessonContext,
-    *,
-    fold_mark: str = "",
+    kind: str, title: str, text: str, context: LessonContext, *, fold_mark: str = ""
 ) -> str:
-    title = rewrite_prose(title, context, segment.place)
+    title = rewrite_prose(title, context)
     head = f"[!{_callout_kind(kind, context)}]{fold_mark} {title}".rstrip()
-    return block_quote(f"{head}\n{_convert_nested(text, segment, context)}".rstrip("\n"))
+    return block_quote(f"{head}\n{_convert_nested(text, context)}".rstrip("\n"))
 
 
 def _convert_div(segment: Segment, context: LessonContext) -> str:
@@ -91,14 +86,14 @@ def _convert_div(segment: Segment, context: LessonContext) -> str:
     kind = re.search(r"callout-(\w+)", segment.head)
     text = segment.text
     if kind is None:
-        return _convert_nested(text, segment, context)
+        return _convert_nested(text, context)
     attribute = _TITLE.search(segment.head)
     title = (attribute[1] or attribute[2] or "") if attribute else ""
     heading = re.match(r"\s*#{1,6}[ \t]+(.*)\n?", text)
     if not title and heading is not None:
         title, text = heading[1].strip(), text[heading.end() :]
     fold_mark = "-" if re.search(r"collapse=\"?true", segment.head) else ""
-    return _write_callout(kind[1], title, text, segment, context, fold_mark=fold_mark)
+    return _write_callout(kind[1], title, text, context, fold_mark=fold_mark)
 
 
 def _split_options(text: str) -> tuple[Mapping[str, str], str]:
@@ -115,36 +110,35 @@ def _split_options(text: str) -> tuple[Mapping[str, str], str]:
     return options, "\n".join(lines)
 
 
-def _convert_directive(name: str, argument: str, segment: Segment, context: LessonContext) -> str:
-    options, text = _split_options(segment.text)
-    place = segment.place
+def _convert_directive(name: str, argument: str, text: str, context: LessonContext) -> str:
+    options, text = _split_options(text)
     match name:
         case "math":
             tex = "\n".join(part for part in (argument, text) if part.strip())
             return display_formula(tex, options.get("label", options.get("name", "")))
         case "figure" | "image":
-            caption = "\n\n" + _convert_nested(text, segment, context) if text.strip() else ""
+            caption = "\n\n" + _convert_nested(text, context) if text.strip() else ""
             alt = options.get("alt", "")
-            return rewrite_prose(f"![{alt}]({argument.strip()})", context, place) + caption
+            return rewrite_prose(f"![{alt}]({argument.strip()})", context) + caption
         case "code" | "code-block" | "sourcecode":
             return fence(argument or "text", text)
         case "tableofcontents" | "toctree" | "contents":
             return ""  # the map says it
         case "epigraph" | "pull-quote" | "blockquote":
-            return block_quote(_convert_nested(text, segment, context))
+            return block_quote(_convert_nested(text, context))
         case "div" | "container" | "card" | "grid" | "grid-item" | "tab-set" | "tab-item":
-            return _convert_nested(text, segment, context)
+            return _convert_nested(text, context)
         case _ if name in _CALLOUTS:
             fold_mark = "-" if "dropdown" in options.get("class", name) else ""
             title = argument if name in _TITLED_DIRECTIVES else ""
             text = text if title else f"{argument}\n{text}"
-            return _write_callout(name, title, text, segment, context, fold_mark=fold_mark)
+            return _write_callout(name, title, text, context, fold_mark=fold_mark)
         case _ if name in _highlighted_languages():
-            context.add_leftover(place, f"a block of `{name}` is shown and not run")
+            context.add_leftover(f"a block of `{name}` is shown and not run")
             return fence(name, text)
         case _:
             message = f"the directive `{{{name}}}`, whose text is shown as it was written"
-            context.add_leftover(place, message)
+            context.add_leftover(message)
             return fence("text", f"{argument}\n{text}".strip("\n"))
 
 
@@ -164,7 +158,7 @@ def _convert_fence(segment: Segment, context: LessonContext) -> str:
     if kind not in (*CORE_FENCES, *fence_names()):
         head = head.strip("{}. ").partition(" ")[0].rstrip(",}")
         if head != "json" and _is_json(text):
-            context.add_leftover(segment.place, f"a block `{head}`, which is shown as JSON")
+            context.add_leftover(f"a block `{head}`, which is shown as JSON")
             head = "json"
     return fence(head, text)
 

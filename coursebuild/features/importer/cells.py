@@ -1,6 +1,6 @@
 """Cells of Python, which share their names, as one script of a lesson.
 
-Entry points: `build_script`, `code_for_readers`.
+Entry points: `runnable_code` of a cell, `join_cells`, `code_for_readers`.
 
 Scripts of coursebuild are complete. So all cells of a lesson become one script, which stands where
 the last of them stood; the ones before are shown where they stood, as parts of it.
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.values import Segment
@@ -23,22 +23,17 @@ _FIGURE = re.compile(r"\b(?:plt|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(
 _MAGIC = re.compile(r"^[ \t]*(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 
 
-def build_script(
-    cells: Sequence[Segment], title: str, context: LessonContext
-) -> tuple[str, list[int]]:
-    """Return the script, and the numbers of the cells that are part of it."""
-    codes = {number: _runnable_code(cell, context).strip() for number, cell in enumerate(cells)}
-    numbers = [number for number, code in codes.items() if code]
+def join_cells(codes: Iterable[str], title: str) -> str:
+    """Return the script of a lesson with this title, from the code of its cells."""
     summary = re.sub(r'[\\"]', "", title).strip().rstrip(".") or "The cells of this lesson"
     script = f'"""{summary}."""\n'
     before = ""
-    for number in numbers:
-        code = codes[number]
+    for code in codes:
         ends_indented = before.split("\n")[-1].startswith((" ", "\t"))
         is_apart = ends_indented or _DEFINITION.match(code)
         script += ("\n\n" if before and is_apart else "\n") + code + "\n"
         before = code
-    return script, numbers
+    return script
 
 
 def code_for_readers(cell: Segment) -> str:
@@ -46,35 +41,36 @@ def code_for_readers(cell: Segment) -> str:
     return _MAGIC.sub("", _OPTION.sub("", cell.text)).strip("\n")
 
 
-def _runnable_code(cell: Segment, context: LessonContext) -> str:
+def runnable_code(cell: Segment, context: LessonContext) -> str:
     """Return what the script runs of a cell; empty where that is nothing."""
+    context = context.at(cell.place)
     options = {quarto or myst: value.strip() for quarto, myst, value in _OPTION.findall(cell.text)}
     text = _OPTION.sub("", cell.text)
     if "raises-exception" in cell.head + options.get("tags", ""):
-        context.add_leftover(cell.place, "a cell that is to fail is shown and not run")
+        context.add_leftover("a cell that is to fail is shown and not run")
         return ""
     if options.get("eval") == "false":
         return ""
     first, _, rest = text.lstrip("\n").partition("\n")
     if _TIMING.fullmatch(first):
         text = rest
-        context.add_leftover(cell.place, f"`{first}`, which is for Jupyter alone")
+        context.add_leftover(f"`{first}`, which is for Jupyter alone")
     elif first.startswith("%%"):
-        context.add_leftover(cell.place, f"a cell of `{first.split()[0]}` is shown and not run")
+        context.add_leftover(f"a cell of `{first.split()[0]}` is shown and not run")
         return ""
     for magic in _MAGIC.findall(text):
-        context.add_leftover(cell.place, f"`{magic.strip()}`, which is for Jupyter alone")
+        context.add_leftover(f"`{magic.strip()}`, which is for Jupyter alone")
     text = _MAGIC.sub("", text)
     if _FIGURE.search(text):
-        context.add_leftover(
-            cell.place, "a figure: save it by `plt.savefig`, and name it by `figure=`"
-        )
+        context.add_leftover("a figure: save it by `plt.savefig`, and name it by `figure=`")
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError, RecursionError) as error:
-        context.add_leftover(cell.place, f"a cell that is no Python is shown and not run: {error}")
+        context.add_leftover(f"a cell that is no Python is shown and not run: {error}")
         return ""
-    return _print_last_value(cell, text, tree, context) if cell.shows_value is not False else text
+    if cell.shows_value is not False:
+        text = _print_last_value(cell, text, tree, context)
+    return text.strip()
 
 
 def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: LessonContext) -> str:
@@ -87,8 +83,7 @@ def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: Lesso
             return text
         if not cell.shows_value:
             name = ast.unparse(last.value.func)
-            message = f"the value of `{name}(…)` is shown there if it has one"
-            context.add_leftover(cell.place, message)
+            context.add_leftover(f"the value of `{name}(…)` is shown there if it has one")
             return text
     lines = text.split("\n")
     before = "\n".join(lines[: last.lineno - 1])

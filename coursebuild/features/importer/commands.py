@@ -15,8 +15,8 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_running, available_cores
 from coursebuild.cli.output import print_report
+from coursebuild.core.files.changes import FileChange, change_files
 from coursebuild.core.files.errors import UsageError
-from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Course, Recording, Script
 from coursebuild.core.model.results import Outcome, ScriptRun, Sign
 from coursebuild.core.pages.marks import fence
@@ -104,10 +104,11 @@ def _try_scripts(options: Options, progress: Progress) -> tuple[str, ...]:
         if script_run.outcome is Outcome.OK:
             script_recordings = [r for r in recordings if r.script == script.path]
             changes += _output_edits(script, script_recordings, course, script_run.stdout)
-    for source, changes in edits.items():
-        new = apply_edits(source.text, changes)
-        if new != source.text:
-            write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
+    file_changes = (
+        FileChange(source.path, source.text.encode(), apply_edits(source.text, changes).encode())
+        for source, changes in edits.items()
+    )
+    change_files(options.root, [change for change in file_changes if change.new != change.old])
     return tuple(remarks)
 
 

@@ -1,4 +1,4 @@
-"""What the conversion of one lesson needs to know of the whole course.
+"""What the conversion of a lesson needs to know of the whole course.
 
 Entry point: `LessonContext`.
 """
@@ -11,47 +11,59 @@ from collections.abc import Mapping
 from urllib.parse import unquote, urlsplit
 
 from msgspec import Struct, field
+from msgspec.structs import replace
 
-from coursebuild.features.importer.values import Leftover, stem_of
+from coursebuild.features.importer.values import Files, Leftover, stem_of
 
 
-class LessonContext(Struct):
-    """Resolves what a lesson names while it is converted, and collects files and leftovers."""
+class LessonContext(Struct, frozen=True, kw_only=True):
+    """Resolves what a lesson names while it is converted, and collects files and leftovers.
 
-    path: str
-    """Its file, relative to the folder that is imported."""
+    Lessons of a course, and places in a lesson, have contexts that collect together.
+    """
+
     targets: Mapping[str, str]
     """New addresses of lessons and pages, by the path of the old file without extension."""
     ids: Mapping[str, str]
     """New ids of lessons, by the old ones."""
     labels: Mapping[str, str]
     """The address of the lesson or page that sets an anchor, by the anchor."""
-    files: frozenset[str]
-    """Paths of all files of the folder."""
-    folder: str
-    """The folder of the new file, such as `content/lessons`."""
+    files: Files
     camera_is_position: bool
+    path: str = ""
+    """The lesson's file, relative to the folder that is imported."""
+    pictures: Mapping[str, bytes] = {}
+    """Pictures that this file contains, by name."""
+    folder: str = ""
+    """The folder of the new file, such as `content/lessons`."""
+    place: str = ""
+    """The place in the lesson that is converted, as `line 12` or `cell 3`."""
     leftovers: list[Leftover] = field(default_factory=list)
-    file_paths: dict[str, str] = field(default_factory=dict)
-    """New paths of the files that the lesson uses, by the old ones."""
-    picture_paths: dict[str, str] = field(default_factory=dict)
-    """New paths of the pictures that its file contains, by their names."""
+    copies: dict[str, bytes] = field(default_factory=dict)
+    """The files and pictures that the lesson uses, by their new paths."""
     callouts: dict[str, str] = field(default_factory=dict)
     """Labels of kinds of callouts that coursebuild does not have, by kind."""
 
-    def add_leftover(self, place: str, message: str) -> None:
-        """Note that something has no counterpart."""
-        self.leftovers.append(Leftover(self.path, place, message))
+    def at(self, place: str) -> LessonContext:
+        """Return the context of a place in the lesson."""
+        return replace(self, place=place)
 
-    def resolve_link(self, address: str, place: str) -> str:
+    def line_below(self, lines: int) -> LessonContext:
+        """Return the context of so many lines further down; a cell is a single place."""
+        kind, _, number = self.place.partition(" ")
+        return self.at(f"line {int(number) + lines}") if kind == "line" else self
+
+    def add_leftover(self, message: str) -> None:
+        """Note that something has no counterpart."""
+        self.leftovers.append(Leftover(self.path, self.place, message))
+
+    def resolve_link(self, address: str) -> str:
         """Return the new address of a link; empty where nothing in the course has it."""
         route = re.fullmatch(r"#?/lessons?/([^#?/]+)/?(#.*)?", address)
         if route is not None:
             id = self.ids.get(unquote(route[1]))
             if id is None:
-                self.add_leftover(
-                    place, f"a link to `{address}`, a lesson that the map does not have"
-                )
+                self.add_leftover(f"a link to `{address}`, a lesson that the map does not have")
             return "" if id is None else f"lesson:{id}{route[2] or ''}"
         parts = urlsplit(address)
         if parts.scheme or parts.netloc or not parts.path:
@@ -63,7 +75,7 @@ class LessonContext(Struct):
             return target + anchor
         if path in self.files:
             return self.add_file(path)
-        self.add_leftover(place, f"a link to `{address}`, which is not in the folder")
+        self.add_leftover(f"a link to `{address}`, which is not in the folder")
         return ""
 
     def resolve_anchor(self, anchor: str) -> str:
@@ -88,10 +100,13 @@ class LessonContext(Struct):
 
     def add_picture(self, name: str) -> str:
         """Copy a picture that the lesson's file contains, and return its new address."""
-        self.picture_paths[name] = f"content/files/{stem_of(self.path)}/{name}"
-        return posixpath.relpath(self.picture_paths[name], self.folder).replace(" ", "%20")
+        return self._add_copy(f"{stem_of(self.path)}/{name}", self.pictures[name])
 
     def add_file(self, path: str) -> str:
         """Copy a file of the folder, and return its new address."""
-        self.file_paths[path] = f"content/files/{path}"
-        return posixpath.relpath(self.file_paths[path], self.folder).replace(" ", "%20")
+        return self._add_copy(path, self.files[path].read_bytes())
+
+    def _add_copy(self, name: str, data: bytes) -> str:
+        path = f"content/files/{name}"
+        self.copies[path] = data
+        return posixpath.relpath(path, self.folder).replace(" ", "%20")

@@ -11,14 +11,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.files.changes import FileChange, change_files, undo_changes
 from coursebuild.core.files.errors import EffectError, UsageError, reason
+from coursebuild.core.pages.marks import fence
+from coursebuild.features.importer.blocks import convert_segment
+from coursebuild.features.importer.cells import code_for_readers, join_cells, runnable_code
 from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.course_json import read_course_json
 from coursebuild.features.importer.course_map import map_lines, read_texts
-from coursebuild.features.importer.lesson import write_lesson
 from coursebuild.features.importer.prose import find_anchors
 from coursebuild.features.importer.values import (
     TEXTS,
@@ -26,6 +29,7 @@ from coursebuild.features.importer.values import (
     ImportedCourse,
     ImportedText,
     Leftover,
+    Segment,
     list_files,
     stem_of,
 )
@@ -107,34 +111,57 @@ def _convert_texts(
     course: ImportedCourse, texts: Sequence[ImportedText], ids: Mapping[str, str], files: Files
 ) -> tuple[dict[str, bytes], list[Leftover], dict[str, str]]:
     """Return the files of lessons and pages, the leftovers, and the course's own callouts."""
-    texts_with_files = [text for text in texts if text.path]
-    targets = {stem_of(text.file): text.link for text in texts_with_files}
-    anchors = {
-        anchor: text.link
-        for text in reversed(texts_with_files)
-        for segment in text.segments
-        for anchor in find_anchors(segment.text)
+    texts = [text for text in texts if text.path]
+    context = LessonContext(
+        targets={stem_of(text.file): text.link for text in texts},
+        ids=ids,
+        labels={
+            anchor: text.link
+            for text in reversed(texts)
+            for segment in text.segments
+            for anchor in find_anchors(segment.text)
+        },
+        files=files,
+        camera_is_position=course.camera_is_position,
+    )
+    out = {text.path: _convert_text(text, context).encode() for text in texts}
+    return {**out, **context.copies}, context.leftovers, context.callouts
+
+
+def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
+    """Return a lesson or page in Markdown of coursebuild, with its cells as one script.
+
+    The script takes the place of its last cell. Earlier cells are shown where they stood, except
+    for those directly before the script, which would only repeat it.
+    """
+    folder = posixpath.dirname(text.path)
+    context = replace(course_context, path=text.file, folder=folder, pictures=text.pictures)
+    codes = {
+        number: code
+        for number, segment in enumerate(text.segments)
+        if segment.kind == "cell" and (code := runnable_code(segment, context))
     }
-    out: dict[str, bytes] = {}
-    leftovers: list[Leftover] = []
-    callouts: dict[str, str] = {}
-    for text in texts_with_files:
-        context = LessonContext(
-            text.file,
-            targets,
-            ids,
-            anchors,
-            frozenset(files),
-            posixpath.dirname(text.path),
-            camera_is_position=course.camera_is_position,
-        )
-        script = _script_path(text)
-        out[text.path] = write_lesson(text.segments, text.title, script, context).encode()
-        out |= {place: files[path].read_bytes() for path, place in context.file_paths.items()}
-        out |= {place: text.pictures[name] for name, place in context.picture_paths.items()}
-        leftovers += context.leftovers
-        callouts |= context.callouts
-    return out, leftovers, callouts
+    last = max(codes, default=None)
+    parts: list[str] = []
+    shown_end = 0
+    for number, segment in enumerate(text.segments):
+        if number == last:
+            script = join_cells(codes.values(), text.title)
+            parts[shown_end:] = [fence(f"python file={_script_path(text)}", script)]
+            continue
+        is_cell = segment.kind == "cell"
+        parts.append(_write_cell(segment) if is_cell else convert_segment(segment, context))
+        shown_end = shown_end if number in codes else len(parts)
+    return "\n\n".join(part.strip("\n") for part in parts if part.strip()) + "\n"
+
+
+def _write_cell(cell: Segment) -> str:
+    """Return a cell to be read: a part of the script below, or code that is not run."""
+    magic = re.match(r"\s*%%(\w+).*\n", cell.text)
+    if magic is not None:
+        return fence(magic[1], cell.text[magic.end() :].strip("\n"))
+    text = code_for_readers(cell)
+    return fence("python fragment", text) if text else ""
 
 
 def _script_path(text: ImportedText) -> str:

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.toml_text import toml_string
-from coursebuild.features.importer.lesson import read_segments
+from coursebuild.features.importer.segments import read_segments
 from coursebuild.features.importer.values import Files, ImportedCourse, ImportedText, title_of_file
 
 _COMPLETE = ("", "complete", "completed", "done", "published", "final", "ready")

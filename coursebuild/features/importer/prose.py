@@ -49,24 +49,23 @@ _FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
 _COMMENT = re.compile(r"^%[^\n]*\n?", re.MULTILINE)
 
 
-def rewrite_prose(text: str, context: LessonContext, place: str) -> str:
+def rewrite_prose(text: str, context: LessonContext) -> str:
     """Return prose of any dialect as Markdown of coursebuild."""
     text = normalize_formulas(_COMMENT.sub("", text))
     text = _TARGET.sub(_write_target, text)
-    first = int(place.removeprefix("line ")) if place.startswith("line ") else 0
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
         fence_line = _FENCE.match(line)
         if fence_line is None and not mark:
-            line = _rewrite_line(line, context, f"line {first + number}" if first else place)
+            line = _rewrite_line(line, context.line_below(number))
         elif fence_line is not None and fence_line[1].startswith(mark):
             mark = "" if mark else fence_line[1]
         out.append(line)
     return "\n".join(out)
 
 
-def _rewrite_line(line: str, context: LessonContext, place: str) -> str:
-    return _LINE.sub(lambda match: _rewrite_match(match, context, place), line)
+def _rewrite_line(line: str, context: LessonContext) -> str:
+    return _LINE.sub(lambda match: _rewrite_match(match, context), line)
 
 
 def normalize_formulas(text: str) -> str:
@@ -117,32 +116,30 @@ def find_anchors(text: str) -> set[str]:
     return anchors | {f"eq:{formula_anchor(label)}" for label in labels}
 
 
-def _rewrite_match(match: re.Match[str], context: LessonContext, place: str) -> str:
+def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
     whole = match[0]
     match match.lastgroup:
         case "role":
-            return _convert_role(match["name"], match["body"], context, place)
+            return _convert_role(match["name"], match["body"], context)
         case "image":
-            return _convert_image(match["alt"], match["source"], context, place)
+            return _convert_image(match["alt"], match["source"], context)
         case "link":
-            text = _rewrite_line(match["text"], context, place)
-            return _write_link(
-                text, context.resolve_link(match["address"], place), match["title"] or ""
-            )
+            text = _rewrite_line(match["text"], context)
+            return _write_link(text, context.resolve_link(match["address"]), match["title"] or "")
         case "paren":
             return f"${match['inner'].strip()}$"
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
         case "cross":
-            return _convert_reference(match["kind"], match["label"], whole, context, place)
+            return _convert_reference(match["kind"], match["label"], whole, context)
         case "cite" | "substitution":
-            context.add_leftover(place, f"`{whole}`, which is shown as code")
+            context.add_leftover(f"`{whole}`, which is shown as code")
             return f"`{whole}`"
         case "mention":
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"
         case "route":
-            return context.resolve_link(whole, place) or whole
+            return context.resolve_link(whole) or whole
         case _:
             return whole
 
@@ -151,7 +148,7 @@ def _write_link(text: str, address: str, title: str = "") -> str:
     return f"[{text}]({address}{title})" if address else text
 
 
-def _convert_role(name: str, body: str, context: LessonContext, place: str) -> str:
+def _convert_role(name: str, body: str, context: LessonContext) -> str:
     parts = re.fullmatch(r"(?P<words>.*\S)\s*<(?P<target>[^<>]+)>", body)
     words, target = (parts["words"], parts["target"]) if parts else ("", body)
     match name:
@@ -160,41 +157,39 @@ def _convert_role(name: str, body: str, context: LessonContext, place: str) -> s
         case "eq":
             return _write_link(words, context.resolve_anchor(f"eq:{formula_anchor(target)}"))
         case "doc":
-            return _write_link(
-                words or title_of_file(target), context.resolve_link(f"{target}.md", place)
-            )
+            return _write_link(words or title_of_file(target), context.resolve_link(f"{target}.md"))
         case "ref" | "numref":
             return _write_link(
                 words or title_of_file(target), context.resolve_anchor(to_anchor(target))
             )
         case "download":
-            return _write_link(words or target, context.resolve_link(target, place))
+            return _write_link(words or target, context.resolve_link(target))
         case "term" | "abbr" | "kbd" | "sub" | "sup":
             return body
         case "code" | "file" | "command" | "func" | "class" | "mod" | "py:func" | "py:class":
             return f"`{body}`"
         case _:
-            context.add_leftover(place, f"the role `{{{name}}}`; its text is shown as code")
+            context.add_leftover(f"the role `{{{name}}}`; its text is shown as code")
             return f"`{body}`"
 
 
-def _convert_image(alt: str, source: str, context: LessonContext, place: str) -> str:
+def _convert_image(alt: str, source: str, context: LessonContext) -> str:
     if re.match("[a-z]+://|//", source):
-        context.add_leftover(place, f"a picture from another host, `{source}`; it is a link now")
+        context.add_leftover(f"a picture from another host, `{source}`; it is a link now")
         return f"[{alt or source}]({source})"
-    if source.startswith("attachment:"):
-        return f"![{alt}]({context.add_picture(source.removeprefix('attachment:'))})"
-    path = context.resolve_path(source)
-    if path not in context.files:
-        context.add_leftover(place, f"the picture `{source}`, which is not in the folder")
-        return alt
-    return f"![{alt}]({context.add_file(path)})"
+    name, path = source.removeprefix("attachment:"), context.resolve_path(source)
+    if name in context.pictures:
+        return f"![{alt}]({context.add_picture(name)})"
+    if path in context.files:
+        return f"![{alt}]({context.add_file(path)})"
+    context.add_leftover(f"the picture `{source}`, which is not in the folder")
+    return alt
 
 
-def _convert_reference(kind: str, label: str, text: str, context: LessonContext, place: str) -> str:
+def _convert_reference(kind: str, label: str, text: str, context: LessonContext) -> str:
     if kind == "eq":
         return _write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
     if kind == "sec":
         return _write_link("this section", context.resolve_anchor(f"sec-{to_anchor(label)}"))
-    context.add_leftover(place, f"the reference `{text}`: figures and tables have no numbers")
+    context.add_leftover(f"the reference `{text}`: figures and tables have no numbers")
     return {"fig": "the figure", "tbl": "the table", "lst": "the listing"}[kind]

@@ -1,13 +1,17 @@
-"""Split a text into segments: prose, fences, directives of MyST, Quarto or MkDocs.
+"""A file as segments: prose, cells of code, fences and directives of MyST, Quarto or MkDocs.
 
-Entry points: `read_markdown`, `read_front_matter`, `split_title`.
+Entry points: `read_segments`, for a file of Markdown or a notebook; `read_markdown`, for a text.
 """
 
 from __future__ import annotations
 
+import base64
+import binascii
+import json
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from markdown_it import MarkdownIt
@@ -15,7 +19,8 @@ from markdown_it.rules_block import StateBlock
 from mdit_py_plugins.admon import admon_plugin
 from msgspec.structs import replace
 
-from coursebuild.features.importer.values import Segment, read_yaml
+from coursebuild.core.files.errors import UsageError
+from coursebuild.features.importer.values import Segment, read_text, read_yaml
 
 _COLONS = re.compile(r" {0,3}(:{3,})[ \t]*(.*?)[ \t]*\n?")
 _CELL = re.compile(r"\{code-cell\b.*|\{(?:python|ipython3?)[^}]*\}")
@@ -24,7 +29,25 @@ _TITLE = re.compile(r"^#[ \t]+(.*?)(?:[ \t]+#+)?(?:[ \t]*\{[^{}]*\})?[ \t]*$", r
 """A heading of level 1."""
 
 
-def read_front_matter(text: str) -> tuple[Mapping[str, Any], int]:
+def read_segments(path: Path, name: str) -> tuple[str, list[Segment], dict[str, bytes]]:
+    """Return the title that a file states, its segments, and the pictures in it.
+
+    Raises:
+        UsageError: it cannot be read.
+    """
+    text = read_text(path, name)
+    pictures: dict[str, bytes] = {}
+    metadata: Mapping[str, object] = {}
+    if name.endswith(".ipynb"):
+        segments, pictures = _read_notebook(text, name)
+    else:
+        metadata, size = _read_front_matter(text)
+        segments = list(read_markdown(text[size:], 1 + text.count("\n", 0, size)))
+    title, segments = _split_title(segments)
+    return str(metadata.get("title") or title), segments, pictures
+
+
+def _read_front_matter(text: str) -> tuple[Mapping[str, Any], int]:
     """Return the YAML values at the beginning of a text, and the length of that part."""
     match = _FRONT_MATTER.match(text)
     if match is None:
@@ -89,7 +112,7 @@ _PARSER = MarkdownIt("commonmark").use(admon_plugin)
 _PARSER.block.ruler.before("fence", "div", _parse_div, {"alt": ["paragraph", "list", "blockquote"]})
 
 
-def split_title(segments: Sequence[Segment]) -> tuple[str, list[Segment]]:
+def _split_title(segments: Sequence[Segment]) -> tuple[str, list[Segment]]:
     """Return the first heading of level 1, and the segments without it; later ones get level 2."""
     titles: list[str] = []
 
@@ -104,3 +127,57 @@ def split_title(segments: Sequence[Segment]) -> tuple[str, list[Segment]]:
         for segment in segments
     ]
     return (titles or [""])[0], shifted
+
+
+# --- notebooks
+
+
+def _read_notebook(text: str, name: str) -> tuple[list[Segment], dict[str, bytes]]:
+    """Return its cells as segments, and the pictures that are attached to them, by name.
+
+    Raises:
+        UsageError: it is no notebook of format 4.
+    """
+    try:
+        return _read_cells(json.loads(text)["cells"])
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        raise UsageError(f"{name} is no notebook of format 4") from None
+
+
+def _read_cells(cells: list[dict[str, Any]]) -> tuple[list[Segment], dict[str, bytes]]:
+    segments: list[Segment] = []
+    attachments: dict[str, bytes] = {}
+    for number, cell in enumerate(cells, 1):
+        place, source = f"cell {number}", _join_lines(cell.get("source", ""))
+        if cell.get("cell_type") == "markdown":
+            pictures = _decode_attachments(cell.get("attachments") or {})
+            for picture, data in pictures.items():
+                source = source.replace(f"attachment:{picture}", f"attachment:{number}-{picture}")
+                attachments[f"{number}-{picture}"] = data
+            segments += read_markdown(source, place=place)
+        elif cell.get("cell_type") == "code" and source.strip():
+            outputs = cell.get("outputs") or ()
+            tags = " ".join((cell.get("metadata") or {}).get("tags") or ())
+            shows_value = any(output.get("output_type") == "execute_result" for output in outputs)
+            cell_segment = Segment(
+                kind="cell", place=place, text=source, head=tags, shows_value=shows_value
+            )
+            segments.append(cell_segment)
+        elif source.strip():
+            segments.append(Segment(kind="block", place=place, text=source, head="text"))
+    return segments, attachments
+
+
+def _join_lines(source: str | list[str]) -> str:
+    return source if isinstance(source, str) else "".join(source)
+
+
+def _decode_attachments(attachments: Mapping[str, Any]) -> dict[str, bytes]:
+    pictures = {}
+    for name, kinds in attachments.items():
+        for data in kinds.values():
+            try:
+                pictures[name] = base64.b64decode(_join_lines(data))
+            except (binascii.Error, ValueError):
+                continue
+    return pictures
