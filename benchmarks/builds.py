@@ -102,7 +102,7 @@ def measure(arguments: argparse.Namespace, places: Places, work: Path) -> str:
             keep(arguments, report.as_json())
         if "serve" in parts:
             built_keys = {site.tool.key for site in sites}
-            unbuilt = [t for t in installed if t.serve is not None and t.key not in built_keys]
+            unbuilt = [t for t in installed if t.serve_command and t.key not in built_keys]
             sites += [make_site(tool, size, work, places) for tool in unbuilt]
             measure_serving(sites, min(turns, 2), 5, say)
         report.add_sites(sites, size)

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from benchmarks.courses import write_course
 from benchmarks.measure.process import CommandError, peak_memory, time_command
-from benchmarks.measure.tools import Places, Tool, environment
+from benchmarks.measure.tools import Places, Tool, environment, lesson_place
 
 COLD_BUILD, UNCHANGED_BUILD, EDIT_BUILD, PEAK_MEMORY = (
     "cold build",
@@ -51,7 +51,7 @@ class Site:
     @property
     def source(self) -> Path:
         """The file of that lesson."""
-        return self.folder / self.tool.source(self.name)
+        return self.folder / lesson_place(self.tool.source, self.name)
 
     def edit(self) -> str:
         """Add a sentence to the lesson, a new one each time; gives a word of it."""
@@ -86,12 +86,7 @@ class Site:
     @property
     def command(self) -> list[str]:
         """The command for a build."""
-        assert self.tool.build is not None
-        return self.fill_in(self.tool.build)
-
-    def fill_in(self, command: list[str]) -> list[str]:
-        """A command with the folder of the course filled in."""
-        return [part.replace("{folder}", str(self.folder)) for part in command]
+        return self.tool.build_command(self.folder)
 
     def build(self) -> float:
         """Build; gives seconds."""
@@ -99,7 +94,11 @@ class Site:
 
     def page(self) -> str:
         """The built page of the lesson that is edited."""
-        return (self.folder / self.tool.page(self.name)).read_text(encoding="utf-8")
+        return self.page_of(self.name).read_text(encoding="utf-8")
+
+    def page_of(self, name: str) -> Path:
+        """The built page of a lesson."""
+        return self.folder / lesson_place(self.tool.page, name)
 
     def note(self, quantity: str, figure: float) -> None:
         """Record a figure."""
@@ -124,7 +123,7 @@ def make_site(tool: Tool, lessons: int, work: Path, places: Places) -> Site:
         assert places.node is not None
         (folder / "node_modules").symlink_to(places.node)
     name = names[lessons // 2]
-    original = (folder / tool.source(name)).read_text(encoding="utf-8")
+    original = (folder / lesson_place(tool.source, name)).read_text(encoding="utf-8")
     return Site(tool, folder, names, name, original, places)
 
 
@@ -137,7 +136,7 @@ def measure_builds(
     say: Callable[[str], None],
 ) -> list[Site]:
     """Measure all tools that build."""
-    sites = [make_site(tool, lessons, work, places) for tool in tools if tool.build is not None]
+    sites = [make_site(tool, lessons, work, places) for tool in tools if tool.build]
     for site in sites:
         say(f"{lessons} lessons, first build: {site.tool.title}")
         attempt(site, COLD_BUILD, first_build, say)
@@ -168,7 +167,7 @@ def attempt(
 def first_build(site: Site) -> None:
     """Build once without measuring, and count the pages."""
     site.build()
-    pages = sum((site.folder / site.tool.page(name)).exists() for name in site.names)
+    pages = sum(site.page_of(name).exists() for name in site.names)
     if pages != len(site.names):
         raise CommandError(f"{pages} pages of {len(site.names)} were built")
 

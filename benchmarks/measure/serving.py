@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 from benchmarks.measure.building import Site, attempt
 from benchmarks.measure.process import CommandError, stop
-from benchmarks.measure.tools import environment
+from benchmarks.measure.tools import environment, lesson_place
 
 EDIT_TO_SERVED = "edit to served"
 START_LIMIT = 120.0
@@ -28,18 +28,17 @@ def measure_serving(sites: list[Site], rounds: int, edits: int, say: Callable[[s
     """Note the seconds of each edit, in rounds over all tools."""
     for turn in range(rounds):
         for site in sites:
-            if site.tool.serve is not None:
+            if site.tool.serve_command:
                 say(f"preview, round {turn + 1} of {rounds}: {site.tool.title}")
                 attempt(site, EDIT_TO_SERVED, functools.partial(one_server, edits=edits), say)
 
 
 def one_server(site: Site, edits: int) -> None:
     """Start the preview, edit a few times, stop it. The first edit is not counted."""
-    assert site.tool.serve is not None
     port = free_port()
     with tempfile.TemporaryFile() as output:
         process = subprocess.Popen(
-            site.fill_in(site.tool.serve(port)),
+            site.tool.preview_command(site.folder, port),
             cwd=site.folder,
             env=environment(site.places),
             stdin=subprocess.DEVNULL,
@@ -48,7 +47,7 @@ def one_server(site: Site, edits: int) -> None:
             start_new_session=True,
         )
         try:
-            reader = Reader(process, port, site.tool.address(site.name))
+            reader = Reader(process, port, lesson_place(site.tool.address, site.name))
             reader.until("", START_LIMIT)
             time.sleep(1)
             for i in range(edits + 1):

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote, unquote, urlsplit
 
 from msgspec import Struct
 
@@ -138,6 +138,19 @@ class Place(Struct, frozen=True):
         if path == self.path:
             return fragment or encode(posixpath.basename(path))
         return encode(_relative(path, self.path)) + fragment
+
+    def target(self, address: str) -> tuple[str | None, str]:
+        """The site path and anchor of an address on the page; `None` if it leads elsewhere."""
+        try:
+            parts = urlsplit(address)
+        except ValueError:  # it is no address
+            return None, ""
+        if parts.scheme or parts.netloc or not parts.path:
+            return None, ""
+        path = posixpath.normpath(posixpath.join(posixpath.dirname(self.path), unquote(parts.path)))
+        if parts.path.endswith("/"):
+            path = posixpath.join(path, "index.html")
+        return (None, "") if path.startswith(("../", "/")) else (path, unquote(parts.fragment))
 
 
 def _relative(path: str, start: str) -> str:

@@ -154,7 +154,8 @@ class _Epub:
     # --- pages
 
     def _chapter(self, lesson: Lesson) -> bytes:
-        rules = RewriteRules(urls.lesson_path(lesson), self._address, self._picture, xml_id)
+        place = urls.Place(urls.lesson_path(lesson))
+        rules = RewriteRules(place, self._address, self._picture, xml_id)
         text = render_lesson(self._context, lesson, rules, to_xml, "_top")
         return self._page(f"{lesson.id} {lesson.title}", text, "bodymatter")
 

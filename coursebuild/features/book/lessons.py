@@ -53,7 +53,7 @@ def render_lesson(
     top: str,
 ) -> Markup:
     """Render a lesson for use elsewhere; `write` writes its tree, `top` is its own id there."""
-    page = context.site()[rules.path].make().decode()
+    page = context.site()[rules.place.path].make().decode()
     text = page.partition(_TEXT_START)[2].rpartition(_TEXT_END)[0]
     return context.library.render(
         "book/lesson.html",

@@ -50,7 +50,7 @@ def page_file(context: ExportContext) -> OutputFile:
 
     def text(lesson: Lesson) -> Markup:
         rules = RewriteRules(
-            urls.lesson_path(lesson),
+            urls.Place(urls.lesson_path(lesson)),
             address,
             picture,
             functools.partial(_anchor, lesson.id),

@@ -5,10 +5,9 @@ Entry point: `rewrite(content, rules)`.
 
 from __future__ import annotations
 
-import posixpath
 import re
 from collections.abc import Callable, Iterable, Iterator
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote
 
 from msgspec import Struct
 
@@ -39,8 +38,8 @@ _IN_SVG = re.compile(r"url\(#([^)]+)\)")
 class RewriteRules(Struct, frozen=True):
     """How a lesson is rewritten."""
 
-    path: str
-    """The site path of its page."""
+    place: urls.Place
+    """Its page."""
     address: Callable[[str, str], str]
     """Return the address for a site path and an anchor; empty if the link has no target."""
     picture: Callable[[str], str]
@@ -67,7 +66,7 @@ def rewrite(content: Iterable[HtmlContent], rules: RewriteRules) -> Iterator[Htm
 def _rewrite_element(element: HtmlElement, rules: RewriteRules) -> HtmlContent:
     name, old_attributes = element.name, element.attributes
     if name == "img":
-        path, _ = site_target(rules.path, old_attributes.get("src", ""))
+        path, _ = rules.place.target(old_attributes.get("src", ""))
         address = rules.picture(path) if path is not None else ""
         if not address:
             return old_attributes.get("alt", "")
@@ -111,19 +110,5 @@ def _rewrite_attribute(
 def _rewrite_address(url: str, rules: RewriteRules) -> str | None:
     if url.startswith("#"):
         return f"#{urls.quote_anchor(rules.id(unquote(url[1:])))}" if len(url) > 1 else "#"
-    path, anchor = site_target(rules.path, url)
+    path, anchor = rules.place.target(url)
     return url if path is None else rules.address(path, anchor) or None
-
-
-def site_target(page: str, url: str) -> tuple[str | None, str]:
-    """Return the site path and anchor of an address on a page; `None` if it leads elsewhere."""
-    try:
-        parts = urlsplit(url)
-    except ValueError:  # it is no address
-        return None, ""
-    if parts.scheme or parts.netloc or not parts.path:
-        return None, ""
-    path = posixpath.normpath(posixpath.join(posixpath.dirname(page), unquote(parts.path)))
-    if parts.path.endswith("/"):
-        path = posixpath.join(path, "index.html")
-    return (None, "") if path.startswith(("../", "/")) else (path, unquote(parts.fragment))

@@ -5,10 +5,10 @@ Entry point: `weight_section(old, new)`.
 
 from __future__ import annotations
 
-import posixpath
 from pathlib import Path
 
 from coursebuild.core.pages.html_tree import elements_with
+from coursebuild.core.pages.urls import Place
 from coursebuild.features.diff.report import section
 
 _SHARE = 0.01
@@ -49,9 +49,10 @@ def _weights(site: Path) -> dict[str, int]:
 
 def _find_assets(site: Path, page: str) -> set[str]:
     html = (site / page).read_text(encoding="utf-8", errors="replace")
-    urls = {
+    addresses = {
         attributes.get("src") or attributes.get("href") or ""
         for name, attributes in elements_with(html, ("src", "href"))
         if name in ("script", "img") or attributes.get("rel") == "stylesheet"
     }
-    return {posixpath.normpath(posixpath.join(posixpath.dirname(page), url)) for url in urls}
+    targets = (Place(page).target(address)[0] for address in addresses)
+    return {path for path in targets if path is not None}

@@ -10,10 +10,9 @@ measured figures) are written from their HTML, so that both say the same.
 from __future__ import annotations
 
 import functools
-import posixpath
 from collections.abc import Callable, Iterator
 from typing import TypeAlias
-from urllib.parse import unquote, urlsplit
+from urllib.parse import urlsplit
 
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
@@ -57,15 +56,11 @@ def note_markdown(inputs: PageInputs, page: PageContext | None, body: str) -> by
 
 def markdown_href(place: urls.Place, href: str) -> str:
     """Return the address for a link in a page's copy: links to pages lead to their copies."""
-    try:
-        parts = urlsplit(href)
-    except ValueError:  # it is no address
+    path, _ = place.target(href)
+    if path is None or path.startswith("files/") or not urls.has_copies(path):
         return href
-    if parts.scheme or parts.netloc or not parts.path.endswith(".html"):
-        return href
-    folder = posixpath.dirname(place.path)
-    target = posixpath.normpath(posixpath.join(folder, unquote(parts.path)))
-    if target.startswith(("files/", "../")) or not urls.has_copies(target):
+    parts = urlsplit(href)
+    if not parts.path.endswith(".html"):
         return href
     return parts._replace(path=urls.copy_path(parts.path, _EXTENSION)).geturl()
 

@@ -10,10 +10,9 @@ option that was chosen, and the explanation.
 
 from __future__ import annotations
 
-import posixpath
 from pathlib import Path
 from typing import Any, assert_never
-from urllib.parse import unquote, urlsplit
+from urllib.parse import urlsplit
 
 from markupsafe import Markup
 from msgspec import Struct
@@ -137,24 +136,19 @@ class _Writer:
             return address if parts.scheme in ("http", "https", "mailto") else None
         if not self.course.base_url:
             return None
-        path = self._site_path(parts.path) if parts.path else self.page.place.path
+        path = self.page.place.target(address)[0] or self.page.place.path
         rest = address[len(address.split("#", 1)[0].split("?", 1)[0]) :]
         return f"{self.course.base_url.rstrip('/')}/{urls.encode(path)}{rest}"
 
     def _picture(self, address: str) -> str | None:
         """Turn a picture's address on the page into one in the package; `None` if there is none."""
-        parts = urlsplit(address)
-        if parts.scheme == "data":
+        if address.startswith("data:"):
             return address
-        path = self._site_path(parts.path)
-        if parts.scheme or parts.netloc or not path.startswith(("files/", "models/")):
+        path, _ = self.page.place.target(address)
+        if path is None or not path.startswith(("files/", "models/")):
             return None
         self.pictures[path] = None
         return f"../{urls.encode(path)}"
-
-    def _site_path(self, path: str) -> str:
-        folder = posixpath.dirname(self.page.place.path)
-        return posixpath.normpath(posixpath.join(folder, unquote(path)))
 
     # --- kinds of questions
 

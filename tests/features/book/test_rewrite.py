@@ -14,11 +14,12 @@ from coursebuild.core.pages.html_tree import (
     to_html,
     to_xml,
 )
+from coursebuild.core.pages.urls import Place
 from coursebuild.features.book.epub import xml_id
 from coursebuild.features.book.rewrite import RewriteRules, rewrite
 from support.hostile_html import PAGES
 
-PAGE = "lessons/1.1-one.html"
+PAGE = Place("lessons/1.1-one.html")
 
 
 def picture(path: str) -> str:
