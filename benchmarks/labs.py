@@ -19,28 +19,28 @@ and bring the derived quantities of each eighth step up to date for a plot.
 from __future__ import annotations
 
 import argparse
-import functools
-import http.server
 import json
 import os
 import platform
 import re
-import shutil
 import statistics
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+from playwright.sync_api import sync_playwright  # noqa: E402
+
+from support.chromium import Browsers  # noqa: E402
+from support.static_host import Host  # noqa: E402
 
 PENDULUM = """<mujoco><option timestep="0.002" integrator="RK4"/><worldbody>
 <body pos="0 0 1"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -.5" size=".02"/>
@@ -201,25 +201,6 @@ def run_in_worker(page: Any, mode: str, steps: int) -> Callable[[], float]:
     return lambda: float(page.evaluate("([mode, n]) => window.pass(mode, n)", [mode, steps]))
 
 
-@contextmanager
-def serve(folder: Path) -> Iterator[str]:
-    """Serve a folder on this machine."""
-
-    class Quiet(http.server.SimpleHTTPRequestHandler):
-        protocol_version = "HTTP/1.1"
-
-        def log_message(self, *_: Any) -> None:
-            pass
-
-    handler = functools.partial(Quiet, directory=str(folder))
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    try:
-        yield f"http://127.0.0.1:{server.server_address[1]}"
-    finally:
-        server.shutdown()
-
-
 WORKER = """async (config) => {
   const base = new URL(config, document.baseURI)
   const lab = await (await fetch(base)).json()
@@ -276,19 +257,6 @@ WATCH = """() => {
 }"""
 
 
-@contextmanager
-def open_browser() -> Iterator[Any]:
-    """Headless Chromium, drawing without a GPU."""
-    from playwright.sync_api import sync_playwright
-
-    chromium = shutil.which("chromium-headless-shell")
-    flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=flags)
-        yield browser
-        browser.close()
-
-
 def run_race(folder: Path, browser: Any, url: str, rounds: int) -> Iterator[str]:
     """A line for each model."""
     from coursebuild.core.syntax.document import parse_document
@@ -305,7 +273,7 @@ def run_race(folder: Path, browser: Any, url: str, rounds: int) -> Iterator[str]
             (lab,) = (block for block in document.blocks if isinstance(block, Lab))
             mjb = saver.save(f"models/{name}.xml", text)
             page = browser.new_page()
-            page.goto(f"{url}/lessons/1.0-plain.html")  # where nothing runs besides
+            page.goto(f"{url}lessons/1.0-plain.html")  # where nothing runs besides
             html = (folder / "public" / "lessons" / f"{address(i, name)}.html").read_text()
             page.evaluate(WORKER, re.findall('data-config="([^"]+)"', html)[0])
             runners = [
@@ -399,7 +367,8 @@ def main() -> None:
         make_course(folder)
         report = json.loads(run(folder, "check", "--quiet", "--format", "json"))
         run(folder, "build", "--quiet")
-        with serve(folder / "public") as url, open_browser() as browser:
+        with sync_playwright() as playwright, Host(folder / "public") as host:
+            browser, url = Browsers(playwright)["webgl"], host.url
             print(f"Chromium {browser.version}")
             if arguments.only != "pages":
                 print("\nsteps a second, as `coursebuild check` tells them")
@@ -413,7 +382,7 @@ def main() -> None:
             if arguments.only != "speed":
                 print("\npages")
                 for name, page in PAGES.items():
-                    print(page_cost(browser, f"{url}/lessons/{page}.html", name))
+                    print(page_cost(browser, f"{url}lessons/{page}.html", name))
 
 
 if __name__ == "__main__":

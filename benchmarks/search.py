@@ -33,15 +33,18 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+from playwright.sync_api import sync_playwright  # noqa: E402
 
 from benchmarks.generate.wordy import vocabulary, write_wordy  # noqa: E402
+from support.chromium import Browsers  # noqa: E402
 
 QUERIES = ("inertia tensor", "gyroscope", "energy drift", "model", "quaternion rotation")
 WITHOUT_SEARCH = """
@@ -180,7 +183,7 @@ def measure_queries(
     browser: Any,
     address: str,
     sent: list[tuple[str, int, int]],
-    is_index_file: Callable[[str], bool],
+    index_path: str,
     item: str,
     rounds: int,
 ) -> dict[str, Any]:
@@ -194,7 +197,7 @@ def measure_queries(
         page.goto(address + query.replace(" ", "%20"), wait_until="commit")
         elapsed = page.evaluate(FIRST, item)
         page.wait_for_timeout(300)
-        fetched = [entry for entry in sent if is_index_file(entry[0])]
+        fetched = [e for e in sent if index_path in e[0] and not e[0].endswith(".html")]
         tools = context.new_cdp_session(page)
         tools.send("HeapProfiler.collectGarbage")
         heap = tools.send("Runtime.getHeapUsage")["usedSize"]
@@ -226,16 +229,18 @@ def misspell(word: str, chance: random.Random) -> str:
     )
 
 
-def share_of_misspellings_found(
-    page: Any, query: Callable[[Any, str], list[str]], count: int = 40
-) -> float:
-    """The share of misspelt words whose first result is among the first three of the right word."""
+def share_of_misspellings_found(page: Any, ask: str, count: int = 40) -> float:
+    """The share of misspelt words whose first result is among the first three of the right word.
+
+    `ask` is a function of the page that gives the results of a query.
+    """
     chance = random.Random(5)
     words = [word for word in vocabulary()[300:8000] if len(word) >= 6]
     right = 0
     for word in chance.sample(words, count):
         misspelling = misspell(word, chance)
-        right += bool(set(query(page, word)[:3]) & set(query(page, misspelling)[:1]))
+        expected, results = (page.evaluate(ask, query) for query in (word, misspelling))
+        right += bool(set(expected[:3]) & set(results[:1]))
     return right / count
 
 
@@ -255,39 +260,21 @@ PEER_ASK = """async (query) => (await find(query, 3)).pages.map((p) => p.url)"""
 
 def measure_searches(work: Path, pagefind: Path | None, rounds: int) -> dict[str, Any]:
     """Measure the searches of coursebuild and Pagefind in the same browser."""
-    from playwright.sync_api import sync_playwright
-
-    chromium = shutil.which("chromium-headless-shell")
-    assert chromium is not None, "install Debian's package `chromium-headless-shell`"
     site, result = work / "with" / "public", {}
+    searches = {"coursebuild": (site, "search/index.html", "search", ".found-pages > li", TYPE)}
     if pagefind is not None:
         result["pagefind_indexing"] = peer_index(site, work / "peer", pagefind)
+        searches["pagefind"] = (work / "peer", "peer.html", "/pagefind/", "li", PEER_ASK)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        with serve(site) as (base, sent):
-            address = f"{base}search/index.html?q="
-            is_index_file = lambda path: "search" in path and not path.endswith(".html")  # noqa: E731
-            row = measure_queries(
-                browser, address, sent, is_index_file, ".found-pages > li", rounds
-            )
-            page = browser.new_context(service_workers="block").new_page()
-            page.goto(address + "model", wait_until="networkidle")
-            row["misspelt_found"] = share_of_misspellings_found(
-                page, lambda p, q: p.evaluate(TYPE, q)
-            )
-            result["coursebuild"] = row
-        if pagefind is not None:
-            with serve(work / "peer") as (base, sent):
-                address = f"{base}peer.html?q="
-                is_index_file = lambda path: "/pagefind/" in path  # noqa: E731
-                row = measure_queries(browser, address, sent, is_index_file, "li", rounds)
-                page = browser.new_context().new_page()
+        browser = Browsers(playwright)["plain"]
+        for name, (folder, path, index_path, item, ask) in searches.items():
+            with serve(folder) as (base, sent):
+                address = f"{base}{path}?q="
+                row = measure_queries(browser, address, sent, index_path, item, rounds)
+                page = browser.new_context(service_workers="block").new_page()
                 page.goto(address + "model", wait_until="networkidle")
-                row["misspelt_found"] = share_of_misspellings_found(
-                    page, lambda p, q: p.evaluate(PEER_ASK, q)
-                )
-                result["pagefind"] = row
-        browser.close()
+                row["misspelt_found"] = share_of_misspellings_found(page, ask)
+                result[name] = row
     return result
 
 

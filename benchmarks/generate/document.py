@@ -7,29 +7,7 @@ bound to an output as `` `4.91`{out} ``; a flavor replaces the last two.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
-
-
-@dataclass(frozen=True, slots=True)
-class Heading:
-    """A heading below the lesson's title."""
-
-    level: int
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Prose:
-    """A paragraph, a list or a table."""
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Display:
-    """A displayed formula."""
-
-    tex: str
+from typing import Any, TypeAlias
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +17,7 @@ class Callout:
     kind: str
     title: str
     folded: bool
-    body: tuple[Prose | Display, ...]
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,43 +40,13 @@ class InOut:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
-    """A question with options."""
+class Question:
+    """A question of a quiz."""
 
-    text: str
-    options: tuple[str, ...]
-    answer: int
-    explain: str
-
-
-@dataclass(frozen=True, slots=True)
-class Number:
-    """A question whose answer is a number."""
-
-    text: str
-    answer: float
-    explain: str
-
-
-@dataclass(frozen=True, slots=True)
-class Open:
-    """A question that is answered in words."""
-
-    text: str
-    reference: str
-
-
-@dataclass(frozen=True, slots=True)
-class OutputQuestion:
-    """A question about one line of the output of the lesson's script."""
-
-    text: str
-    line: int
-    """From 1."""
+    data: dict[str, Any]
+    """As the JSON of coursebuild has it."""
     answer: str
-
-
-Question: TypeAlias = Choice | Number | Open | OutputQuestion
+    """In words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +56,8 @@ class Quiz:
     questions: tuple[Question, ...]
 
 
-Piece: TypeAlias = Heading | Prose | Display | Callout | Script | InOut | Quiz
+Piece: TypeAlias = str | Callout | Script | InOut | Quiz
+"""A text is a heading, a paragraph, a list, a table or a displayed formula."""
 
 
 @dataclass(frozen=True, slots=True)

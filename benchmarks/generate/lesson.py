@@ -14,22 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.generate.document import (
-    Callout,
-    Choice,
-    Display,
-    Heading,
-    InOut,
-    Lesson,
-    Number,
-    Open,
-    OutputQuestion,
-    Piece,
-    Prose,
-    Question,
-    Quiz,
-    Script,
-)
+from benchmarks.generate.document import Callout, InOut, Lesson, Piece, Question, Quiz, Script
 from benchmarks.generate.scripts import duration_of, make_script, step_counts
 from benchmarks.generate.topics import Fill, Topic, all_topics, pick, topic_of
 
@@ -82,17 +67,18 @@ class Writer:
         """The text with the numbers of the run in it."""
         return Fill(text).substitute(self.values)
 
-    def prose(self, key: str) -> Prose:
-        """One variant of a shared text, as a paragraph."""
-        return Prose(self.say(key))
-
-    def shared_formula(self, index: int) -> Display:
+    def shared_formula(self, index: int) -> str:
         """A displayed formula that all lessons share, but for its numbers."""
-        return Display(self.fill(shared_texts()["displays"][index]))
+        return display(self.fill(shared_texts()["displays"][index]))
 
-    def topic_formula(self, name: str) -> Display:
+    def topic_formula(self, name: str) -> str:
         """A displayed formula of the topic."""
-        return Display(self.topic.text("formulas", name))
+        return display(self.topic.text("formulas", name))
+
+
+def display(tex: str) -> str:
+    """A formula on lines of its own."""
+    return f"$$\n{tex}\n$$"
 
 
 def make_lesson(number: int, count: int, scripts: str = "python") -> Lesson:
@@ -136,47 +122,49 @@ def concept(writer: Writer) -> tuple[Piece, ...]:
     first, second = writer.topic.texts("text", "intro")
     rows = "\n".join(f"| {name} | {value} |" for name, value in writer.topic.values.items())
     return (
-        Heading(2, "Core concept"),
-        Prose(first),
+        "## Core concept",
+        first,
         writer.topic_formula("equation"),
-        Prose(second),
-        writer.prose("intro"),
-        Prose(f"| constant | value |\n| --- | --- |\n{rows}\n| duration | {writer.values['T']} |"),
-        Callout("established", "What is compared", False, (writer.prose("established"),)),
+        second,
+        writer.say("intro"),
+        f"| constant | value |\n| --- | --- |\n{rows}\n| duration | {writer.values['T']} |",
+        Callout("established", "What is compared", False, writer.say("established")),
     )
 
 
 def mathematics(writer: Writer) -> tuple[Piece, ...]:
     """The solution, and what is known about the methods."""
     topic = writer.topic
-    derivation = (Prose("Separate what depends on the time:"), writer.topic_formula("derivation"))
-    limit = (Prose("A case that can be checked by hand is"), writer.topic_formula("special"))
+    origin = (
+        *("Separate what depends on the time:", writer.topic_formula("derivation")),
+        *("A case that can be checked by hand is", writer.topic_formula("special")),
+    )
     second = 2 + 6 * pick(writer.number, "second formula", 2)
     return (
-        Heading(2, "Mathematics"),
-        Heading(3, "The solution in closed form"),
-        *map(Prose, topic.texts("text", "model")),
+        "## Mathematics",
+        "### The solution in closed form",
+        *topic.texts("text", "model"),
         writer.topic_formula("solution"),
-        Callout("derivation", "Where it comes from", True, (*derivation, *limit)),
-        Prose("One more identity holds for every solution, and each method can be held to it:"),
+        Callout("derivation", "Where it comes from", True, "\n\n".join(origin)),
+        "One more identity holds for every solution, and each method can be held to it:",
         writer.topic_formula("balance"),
-        Heading(3, "Four methods"),
-        writer.prose("steps"),
+        "### Four methods",
+        writer.say("steps"),
         writer.shared_formula(0),
-        writer.prose("heun"),
-        writer.prose("rk4"),
+        writer.say("heun"),
+        writer.say("rk4"),
         writer.shared_formula((1, 8)[pick(writer.number, "tableau", 2)]),
-        Heading(3, "Errors and orders"),
-        writer.prose("local"),
+        "### Errors and orders",
+        writer.say("local"),
         writer.shared_formula((3, 4, 9)[pick(writer.number, "bound", 3)]),
-        writer.prose("whole"),
-        writer.prose("order"),
+        writer.say("whole"),
+        writer.say("order"),
         writer.shared_formula(5),
-        writer.prose("region"),
+        writer.say("region"),
         writer.shared_formula((6, second)[pick(writer.number, "last formula", 2)]),
-        Heading(3, "Cost"),
-        Prose(COSTS),
-        writer.prose("cost"),
+        "### Cost",
+        COSTS,
+        writer.say("cost"),
     )
 
 
@@ -186,15 +174,15 @@ def implementation(writer: Writer, script: Script) -> tuple[Piece, ...]:
     first = next(word for line in lines for word in line.split() if is_decimal(word))
     remark = f"The first number that the script prints is `{first}`{{out}}."
     return (
-        Heading(2, "Implementation"),
+        "## Implementation",
         InOut(*shared_texts()["io"]),
-        Callout("implementation", "How it is built", False, (writer.prose("implementation"),)),
+        Callout("implementation", "How it is built", False, writer.say("implementation")),
         script,
-        Prose(f"{remark} {writer.topic.text('text', 'close')}"),
-        writer.prose("units"),
-        writer.prose("reading"),
-        writer.prose("discuss"),
-        Callout("warning", "Before you trust a step", False, (writer.prose("warning"),)),
+        f"{remark} {writer.topic.text('text', 'close')}",
+        writer.say("units"),
+        writer.say("reading"),
+        writer.say("discuss"),
+        Callout("warning", "Before you trust a step", False, writer.say("warning")),
     )
 
 
@@ -209,35 +197,32 @@ def end(writer: Writer, script: Script) -> tuple[Piece, ...]:
     first = pick(writer.number, "points", len(points))
     selection = [points[(first + i) % len(points)] for i in range(4)]
     return (
-        Heading(2, "Summary"),
-        Prose("\n".join(f"- {point}" for point in selection)),
-        Prose(f"**To try.** {writer.say('try')}"),
-        Heading(2, "Check"),
-        Quiz(questions(writer, script.output.splitlines()[0])),
-        Heading(2, "Where to go from here"),
-        writer.prose("links"),
+        "## Summary",
+        "\n".join(f"- {point}" for point in selection),
+        f"**To try.** {writer.say('try')}",
+        "## Check",
+        Quiz(questions(writer, script.output.splitlines()[0], script.path)),
+        "## Where to go from here",
+        writer.say("links"),
     )
 
 
-def questions(writer: Writer, first_line: str) -> tuple[Question, ...]:
-    """Four questions."""
+def questions(writer: Writer, first_line: str, script: str) -> tuple[Question, ...]:
+    """Four questions; the last is about the output of a script."""
     topic = writer.topic
     numbers = {name: float(value) for name, value in topic.values.items()}
-    answer = eval(topic.raw("quiz", "value"), {"math": math}, numbers)
+    value = float(f"{eval(topic.raw('quiz', 'value'), {'math': math}, numbers):.4g}")
+    options, number = topic.texts("quiz", "options"), topic.raw("quiz", "answer")
+    explain, number_explain = topic.text("quiz", "explain"), topic.text("quiz", "number_explain")
+    choice = {"q": topic.text("quiz", "question"), "options": options, "answer": number}
+    quantity = {"q": topic.text("quiz", "number"), "answer": value, "explain": number_explain}
+    reference = topic.text("quiz", "reference")
+    text = "The script is run again without any change. What is its first line?"
     return (
-        Choice(
-            topic.text("quiz", "question"),
-            topic.texts("quiz", "options"),
-            topic.raw("quiz", "answer"),
-            topic.text("quiz", "explain"),
+        Question({"kind": "mcq", **choice, "explain": explain}, f"{options[number]}. {explain}"),
+        Question({"kind": "numeric", **quantity}, f"{value:g}. {number_explain}"),
+        Question(
+            {"kind": "open", "q": topic.text("quiz", "open"), "reference": reference}, reference
         ),
-        Number(
-            topic.text("quiz", "number"),
-            float(f"{answer:.4g}"),
-            topic.text("quiz", "number_explain"),
-        ),
-        Open(topic.text("quiz", "open"), topic.text("quiz", "reference")),
-        OutputQuestion(
-            "The script is run again without any change. What is its first line?", 1, first_line
-        ),
+        Question({"kind": "output", "q": text, "of": script, "line": 1}, f"`{first_line}`"),
     )

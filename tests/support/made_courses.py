@@ -53,22 +53,13 @@ def make_course(
     """
     course = parse_course_map(Source("content/course.toml", MAP)).value
     assert course is not None
-    (level,) = course.levels
-    first_lesson, second_lesson, planned = level.lessons
-    lessons = (
-        replace(first_lesson, document=document(first_lesson.path, first)),
-        replace(second_lesson, document=document(second_lesson.path, second)),
-        planned,
-    )
-    (page,) = course.pages
+    texts = {"1.1": first, "1.2": second, "about": page_text}
     declarations = [
         parse_declarations(Source(f"models/{name}.toml", text)).value
         for name, text in (declaration_texts or {}).items()
     ]
     return replace(
-        course,
-        levels=(replace(level, lessons=lessons),),
-        pages=(replace(page, document=document(page.path, page_text)),),
+        with_documents(course, documents_of(course, texts)),
         models=tuple(
             MjcfModel(name, Source(f"models/{name}.xml", text))
             for name, text in (models or {}).items()
@@ -78,9 +69,28 @@ def make_course(
     )
 
 
-def document(path: str, text: str) -> Document:
+def with_documents(course: Course, documents: Mapping[str, Document]) -> Course:
+    """The course with documents, by the ids of their lessons and pages, and with no others."""
+    levels = (
+        replace(
+            level, lessons=tuple(replace(x, document=documents.get(x.id)) for x in level.lessons)
+        )
+        for level in course.levels
+    )
+    pages = (replace(page, document=documents.get(page.id)) for page in course.pages)
+    return replace(course, levels=tuple(levels), pages=tuple(pages))
+
+
+def documents_of(course: Course, texts: Mapping[str, str]) -> dict[str, Document]:
+    """Parse the texts of lessons and pages, given and returned by their ids."""
+    kinds = KINDS | {kind.name for kind in course.callouts}
+    owners = (owner for owner in course.owners if owner.id in texts)
+    return {owner.id: document(owner.path, texts[owner.id], kinds) for owner in owners}
+
+
+def document(path: str, text: str, kinds: frozenset[str] = KINDS) -> Document:
     """Parse a document, which must give no diagnostics."""
-    result = parse_document(Source(path, text), KINDS, lesson="lessons" in path)
+    result = parse_document(Source(path, text), kinds, lesson="lessons" in path)
     assert result.diagnostics == (), [d.message for d in result.diagnostics]
     return result.value
 

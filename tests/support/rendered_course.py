@@ -14,7 +14,6 @@ from msgspec.structs import replace
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model import (
     Course,
-    Document,
     Math,
     MathBlock,
     MjcfModel,
@@ -33,19 +32,18 @@ from coursebuild.core.model.results import (
     ScriptRun,
     Verdict,
 )
-from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.urls import Place, lesson_path
 from coursebuild.core.syntax.coursemap import parse_course_map
-from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.site import SiteMaker
+from support.made_courses import documents_of, with_documents
 
 ROOT = Path(__file__).parents[2]
 
@@ -188,34 +186,10 @@ class Make(Struct, frozen=True):
         """A course with the text of lesson 0.1; `texts` are those of other documents by id."""
         map_result = parse_course_map(Source("content/course.toml", course))
         assert map_result.value is not None and not map_result.diagnostics, map_result.diagnostics
-        rendered = with_documents(
-            map_result.value, {"0.1": text, "1.1": "Text.", "about": "About it.", **texts}
-        )
+        texts = {"0.1": text, "1.1": "Text.", "about": "About it.", **texts}
+        rendered = with_documents(map_result.value, documents_of(map_result.value, texts))
+        rendered = replace(rendered, models=(MjcfModel("box", Source("models/box.xml", BOX)),))
         return RenderedCourse(rendered, results_of(rendered, runs or {}, status), self.assets)
-
-
-def with_documents(course: Course, texts: Mapping[str, str]) -> Course:
-    kinds = frozenset(kind.name for kind in (*CALLOUTS, *course.callouts))
-
-    def document(id: str, path: str, lesson: bool) -> Document | None:
-        if id not in texts:
-            return None
-        result = parse_document(Source(path, texts[id]), kinds, lesson=lesson)
-        assert not result.diagnostics, result.diagnostics
-        return result.value
-
-    levels = tuple(
-        replace(
-            level,
-            lessons=tuple(replace(x, document=document(x.id, x.path, True)) for x in level.lessons),
-        )
-        for level in course.levels
-    )
-    pages = tuple(
-        replace(page, document=document(page.id, page.path, False)) for page in course.pages
-    )
-    models = (MjcfModel("box", Source("models/box.xml", BOX)),)
-    return replace(course, levels=levels, pages=pages, models=models)
 
 
 def results_of(course: Course, runs: Mapping[str, ScriptRun], status: str) -> Results:

@@ -22,6 +22,7 @@ from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source, Span
+from support.made_courses import with_documents
 
 EXACT = Comparison()
 DIGITS = Comparison(Mode.DIGITS)
@@ -76,11 +77,9 @@ def course(
         text += LESSON.format(id, slug)
     course_map = parse_course_map(Source("content/course.toml", text)).value
     assert course_map is not None
-    (level,) = course_map.levels
-    pairs = zip(level.lessons, documents, strict=True)
-    lessons = tuple(replace(lesson, document=document) for lesson, document in pairs)
-    levels = (replace(level, lessons=lessons),)
-    return replace(course_map, levels=levels, comparison=comparison, filters=filters)
+    pairs = zip(course_map.lessons, documents, strict=True)
+    filled = with_documents(course_map, {lesson.id: document for lesson, document in pairs})
+    return replace(filled, comparison=comparison, filters=filters)
 
 
 def make_run(

@@ -5,22 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from benchmarks.generate.document import (
-    Callout,
-    Choice,
-    Display,
-    Heading,
-    InOut,
-    Lesson,
-    Number,
-    Open,
-    OutputQuestion,
-    Piece,
-    Prose,
-    Question,
-    Quiz,
-    Script,
-)
+from benchmarks.generate.document import Callout, InOut, Lesson, Piece, Quiz, Script
 from benchmarks.generate.flavors.common import quote, write_text
 
 HEAD = """[course]
@@ -57,43 +42,18 @@ def write(lessons: list[Lesson], folder: Path) -> None:
 def piece_text(piece: Piece, lesson: Lesson) -> str:
     """One piece in the format of lessons."""
     match piece:
-        case Heading(level, text):
-            return f"{'#' * level} {text}"
-        case Prose(text):
-            return text
-        case Display(tex):
-            return f"$${tex}$$"
-        case Callout(kind, title, folded, body):
-            inner = "\n\n".join(piece_text(part, lesson) for part in body)
-            return quote(f"[!{kind}]{'-' if folded else ''} {title}\n{inner}")
+        case str():
+            return piece
+        case Callout(kind, title, folded, text):
+            return quote(f"[!{kind}]{'-' if folded else ''} {title}\n{text}")
         case Script(path, code, output):
             return f"```python file={path}\n{code}```\n\nOutput:\n\n```text digits\n{output}```"
         case InOut(takes, does, gives):
             return f"```io\nINPUT: {takes}\nPROCESS: {does}\nOUTPUT: {gives}\n```"
         case Quiz(questions):
-            script = next(part.path for part in lesson.pieces if isinstance(part, Script))
-            value = {
+            data = {
                 "id": f"{lesson.id}-check",
                 "title": "Knowledge check",
-                "questions": [question_value(question, script) for question in questions],
+                "questions": [question.data for question in questions],
             }
-            return f"```quiz\n{json.dumps(value, indent=2, ensure_ascii=False)}\n```"
-
-
-def question_value(question: Question, script: str) -> dict[str, object]:
-    """One question as JSON takes it."""
-    match question:
-        case Choice(text, options, answer, explain):
-            return {
-                "kind": "mcq",
-                "q": text,
-                "options": list(options),
-                "answer": answer,
-                "explain": explain,
-            }
-        case Number(text, value, explain):
-            return {"kind": "numeric", "q": text, "answer": value, "explain": explain}
-        case Open(text, reference):
-            return {"kind": "open", "q": text, "reference": reference}
-        case OutputQuestion(text, line, _):
-            return {"kind": "output", "q": text, "of": script, "line": line}
+            return f"```quiz\n{json.dumps(data, indent=2, ensure_ascii=False)}\n```"

@@ -11,16 +11,9 @@ from dataclasses import dataclass
 
 from benchmarks.generate.document import (
     Callout,
-    Choice,
-    Display,
-    Heading,
     InOut,
     Lesson,
-    Number,
-    Open,
-    OutputQuestion,
     Piece,
-    Prose,
     Question,
     Quiz,
     Script,
@@ -45,16 +38,10 @@ class Dialect:
     def piece(self, piece: Piece) -> str:
         """One piece."""
         match piece:
-            case Heading(level, text):
-                return f"{'#' * level} {text}"
-            case Prose(text):
-                return plain(text, self.address)
-            case Display(tex):
-                return f"$$\n{tex}\n$$"
-            case Callout(kind, title, folded, body):
-                return self.callout(
-                    kind, title, folded, "\n\n".join(self.piece(part) for part in body)
-                )
+            case str():
+                return plain(piece, self.address)
+            case Callout(kind, title, folded, text):
+                return self.callout(kind, title, folded, plain(text, self.address))
             case Script(path, code, output):
                 output_block = self.code("text", output)
                 return f"`{path}`\n\n{self.code('python', code)}\n\nOutput:\n\n{output_block}"
@@ -66,17 +53,6 @@ class Dialect:
 
     def question(self, question: Question) -> str:
         """One question, and its answer in a folded callout."""
-        match question:
-            case Choice(text, options, answer, explain):
-                bullets = "\n".join(f"- {option}" for option in options)
-                return f"{text}\n\n{bullets}\n\n{self.answer(f'{options[answer]}. {explain}')}"
-            case Number(text, value, explain):
-                return f"{text}\n\n{self.answer(f'{value:g}. {explain}')}"
-            case Open(text, reference):
-                return f"{text}\n\n{self.answer(reference)}"
-            case OutputQuestion(text, _, line):
-                return f"{text}\n\n{self.answer(f'`{line}`')}"
-
-    def answer(self, text: str) -> str:
-        """An answer that is not seen at once."""
-        return self.callout("tip", "Answer", True, text)
+        options = "\n".join(f"- {option}" for option in question.data.get("options", ()))
+        answer = self.callout("tip", "Answer", True, question.answer)
+        return "\n\n".join(filter(None, (question.data["q"], options, answer)))

@@ -34,15 +34,14 @@ _FIELD_NAMES: dict[str, str] = {
     "state": "status",
     **dict.fromkeys(("units", "chapters"), "lessons"),
     **dict.fromkeys(("modules", "parts"), "levels"),
-    **dict.fromkeys(("module", "part"), "level"),
     **dict.fromkeys(("lang", "locale"), "language"),
 }
 """The names of fields here, by the names they have in other dialects."""
-_COURSE_FIELDS = ("id", "title", "summary", "levels", "lessons", "pages", "language")
+_COURSE_FIELDS = ("id", "title", "summary", "levels", "pages", "language")
 _LEVEL_FIELDS = ("id", "title", "summary", "lessons", "checkpoint")
 _LESSON_FIELDS = (
     *("id", "slug", "title", "summary", "file", "objectives", "prerequisites", "minutes"),
-    *("status", "checkpoint", "level"),
+    *("status", "checkpoint"),
 )
 
 
@@ -60,12 +59,9 @@ def read_course_json(path: str, files: Files) -> ImportedCourse:
         raise UsageError(f"{path} is no JSON: the text is nested too deeply") from None
     except ValueError as error:
         raise UsageError(f"{path} is no JSON: {error}") from None
-    if isinstance(data, dict) and isinstance(data.get("course"), dict):
-        data |= data.pop("course")
     reader = _Reader(files)
     course = reader.fields(data, _COURSE_FIELDS)
-    loose = [reader.fields(item, _LESSON_FIELDS) for item in _read_items(course, "lessons")]
-    levels = tuple(reader.level(item, loose) for item in _read_items(course, "levels"))
+    levels = tuple(map(reader.level, _read_items(course, "levels")))
     if not levels:
         raise UsageError(f"{path} has no `levels`")
     return ImportedCourse(
@@ -73,10 +69,7 @@ def read_course_json(path: str, files: Files) -> ImportedCourse:
         summary=_read_text(course, "summary"),
         language=_read_text(course, "language"),
         levels=levels,
-        pages=tuple(
-            reader.lesson(reader.fields(item, _LESSON_FIELDS))
-            for item in _read_items(course, "pages")
-        ),
+        pages=tuple(map(reader.lesson, _read_items(course, "pages"))),
         camera_is_position=True,
         leftovers=tuple(
             Leftover(path, "", f"`{key}` ({count} times), which a course map does not have")
@@ -100,22 +93,19 @@ class _Reader:
         self.unknown.update(key for key in value if _field_name(key) not in names)
         return {_field_name(key): item for key, item in value.items()}
 
-    def level(self, value: object, loose: list[dict[str, Any]]) -> ImportedLevel:
-        """Read a level with its lessons; `loose` are those listed elsewhere, which name theirs."""
+    def level(self, value: object) -> ImportedLevel:
+        """Read a level with its lessons."""
         level = self.fields(value, _LEVEL_FIELDS)
-        lessons = [self.fields(item, _LESSON_FIELDS) for item in _read_items(level, "lessons")]
-        lessons += [
-            lesson for lesson in loose if _read_text(lesson, "level") == _read_text(level, "id")
-        ]
         return ImportedLevel(
             id=_read_text(level, "id"),
             title=_read_text(level, "title"),
             summary=_read_summary(level),
-            lessons=tuple(map(self.lesson, lessons)),
+            lessons=tuple(map(self.lesson, _read_items(level, "lessons"))),
         )
 
-    def lesson(self, lesson: dict[str, Any]) -> ImportedText:
+    def lesson(self, value: object) -> ImportedText:
         """Read a lesson or a page."""
+        lesson = self.fields(value, _LESSON_FIELDS)
         minutes = re.search(r"\d+", _read_text(lesson, "minutes"))
         return ImportedText(
             old_id=_read_text(lesson, "id"),
@@ -160,8 +150,6 @@ def _read_text(fields: dict[str, Any], name: str) -> str:
 
 def _read_items(fields: dict[str, Any], name: str) -> list[Any]:
     value = fields.get(name)
-    if isinstance(value, dict):  # items by their ids
-        return [{"id": key, **item} for key, item in value.items() if isinstance(item, dict)]
     return value if isinstance(value, list) else []
 
 

@@ -46,6 +46,16 @@ class Section(Struct, frozen=True):
 _TAG = re.compile(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
 
 
+_HEADINGS = {f"h{level}": level for level in range(1, 7)}
+_SKIPPED_ELEMENTS = frozenset(
+    ("script", "style", "nav", "svg", "pre", "template", "button", "select")
+)
+"""Elements that are not searched; code comes from the page's inputs."""
+_LINES = frozenset(
+    "p li dt dd td th tr table ul ol dl div section article figure figcaption summary main".split()
+)
+
+
 def document_sections(
     document: model.Document,
     lead: Iterable[str],
@@ -69,13 +79,23 @@ def document_sections(
     return reader.end()
 
 
+def html_sections(body: str) -> tuple[Section, ...]:
+    """Return the sections of a page's body."""
+    reader = SectionReader({}, {})
+    reader.html(parse_html(body))
+    reader.end_line()
+    return reader.end()
+
+
 class SectionReader:
-    """Collects the sections of a document."""
+    """Collects the sections of a page, from a document (`blocks`) or from HTML (`html`)."""
 
     def __init__(self, labels: Mapping[str, str], block_values: Mapping[int, Struct]) -> None:
         self._labels = labels
         self._block_values = block_values
         self._sections: list[Section] = []
+        self._text = ""
+        """The text of HTML since its last line."""
         self._begin("", "", 0)
 
     def _begin(self, anchor: str, heading: str, level: int) -> None:
@@ -85,7 +105,7 @@ class SectionReader:
 
     def end(self) -> tuple[Section, ...]:
         """End the section, unless it has neither heading nor content, and return all sections."""
-        if self._head[0] or self._pieces or not self._sections:
+        if any(self._head) or self._pieces:
             section = Section(*self._head, tuple(self._pieces), tuple(self._names))
             self._sections.append(section)
         return tuple(self._sections)
@@ -117,11 +137,8 @@ class SectionReader:
                 heading = _line(self.text(block.children))
                 self.end()
                 self._begin(block.anchor, heading, block.level)
-            case model.ListBlock():
-                for item in block.items:
-                    self.blocks(item.blocks)
-            case model.BlockQuote():
-                self.blocks(block.blocks)
+            case model.ListBlock() | model.BlockQuote():
+                self.blocks(model.child_blocks(block))
             case model.Callout():
                 label = self._labels.get(block.kind, block.kind)
                 self.add("text", f"{label}: {self.text(block.title)}" if block.title else label)
@@ -176,66 +193,33 @@ class SectionReader:
             case _:
                 return ""
 
+    # --- HTML
 
-def _line(text: str) -> str:
-    return " ".join(text.split())
-
-
-_HEADINGS = {f"h{level}": level for level in range(1, 7)}
-_SKIPPED_ELEMENTS = frozenset(
-    ("script", "style", "nav", "svg", "pre", "template", "button", "select")
-)
-"""Elements that are not searched; code comes from the page's inputs."""
-_LINES = frozenset(
-    "p li dt dd td th tr table ul ol dl div section article figure figcaption summary main".split()
-)
-
-
-def html_sections(body: str) -> tuple[Section, ...]:
-    """Return the sections of a page's body."""
-    reader = _HtmlReader()
-    reader.read(parse_html(body))
-    reader.end_line()
-    reader.end_section()
-    return tuple(reader.sections)
-
-
-class _HtmlReader:
-    def __init__(self) -> None:
-        self.sections: list[Section] = []
-        self._head: tuple[str, str, int] = ("", "", 0)
-        self._pieces: list[SectionPiece] = []
-        self._text = ""
-
-    def read(self, content: Iterable[HtmlContent]) -> None:
+    def html(self, content: Iterable[HtmlContent]) -> None:
         """Read elements: headings begin sections, other blocks begin lines."""
         for child in content:
             if isinstance(child, str):
                 self._text += child
-            elif child.name in _SKIPPED_ELEMENTS:
-                continue
             elif child.name in _HEADINGS:
                 self.end_line()
-                self.read(child.children)
+                self.html(child.children)
                 heading, self._text = _line(self._text), ""
                 if child.name != "h1":  # the page's title
-                    self.end_section()
-                    self._head = child.attributes.get("id", ""), heading, _HEADINGS[child.name]
+                    self.end()
+                    id = child.attributes.get("id", "")
+                    self._begin(id, heading, _HEADINGS[child.name])
             elif child.name in _LINES:
                 self.end_line()
-                self.read(child.children)
+                self.html(child.children)
                 self.end_line()
-            else:
-                self.read(child.children)
+            elif child.name not in _SKIPPED_ELEMENTS:
+                self.html(child.children)
 
     def end_line(self) -> None:
         """Add the text since the last line as a piece."""
-        text, self._text = _line(self._text), ""
-        if text:
-            self._pieces.append(SectionPiece("text", text))
+        self.add("text", self._text)
+        self._text = ""
 
-    def end_section(self) -> None:
-        """Add what was read since the last heading as a section, unless it is empty."""
-        if self._head[1] or self._pieces:
-            self.sections.append(Section(*self._head, tuple(self._pieces)))
-        self._pieces = []
+
+def _line(text: str) -> str:
+    return " ".join(text.split())
