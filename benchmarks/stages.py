@@ -183,7 +183,7 @@ def typeset(course: Course) -> tuple[tuple[Formula, str | MathError], ...]:
 
 def measure_lessons(course: Course, results: Results, repeat: int) -> None:
     """The cost of each step for a lesson: time of one core, without caches between lessons."""
-    library = Library.of(course, results, Assets(template_texts(), Bundle()))
+    library = Library(course, results, Assets(template_texts(), Bundle()))
     texts = {document.source.path: document for document in course.documents}
     page_inputs = (page.inputs(library) for page in page_list(library))
     pages = [(inputs, texts[inputs.document]) for inputs in page_inputs if inputs.document]

@@ -98,7 +98,7 @@ def _find_surroundings(
     )
     style = tuple(OutputFile(path.name, path.read_bytes()) for path in root.glob("matplotlibrc"))
     surroundings = zips.Surroundings((), ours, meshes, style, imports)
-    modules = zips.foreign_modules(library.course, surroundings)
+    modules = zips.foreign_modules(library, surroundings)
     interpreter = course_environment(root, library.course).value
     installed_packages = distributions(
         store, modules, None if interpreter is None else interpreter.packages

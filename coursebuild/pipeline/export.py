@@ -99,7 +99,7 @@ def _make_files(
 ) -> Site:
     """Make the files of an export, in the place of those of a site."""
     assets = Assets(template_texts(), Bundle(), prepared_folder())
-    library = Library.of(course, results, assets, reports)
+    library = Library(course, results, assets, reports)
     entries = {
         document.source.path: entry
         for entry in page_list(library)

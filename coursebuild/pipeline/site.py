@@ -65,7 +65,7 @@ def site_files(
 ) -> Site:
     """Make the site of a course whose documents are summaries; its pages show the `reports`."""
     assets = Assets(template_texts(), Bundle(), prepared_folder())
-    library = Library.of(course, results, assets, reports)
+    library = Library(course, results, assets, reports)
     return SiteMaker(library, assets, documents, options).make_site()
 
 

@@ -300,7 +300,7 @@ class Session:
         runs = tuple(run for run in self._results.runs if run.path in unchanged_keys)
         results = replace(self._results, runs=runs, verdicts=compare(course, runs))
         self._template_diagnostics = ()
-        self.library = Library.of(course, results, self._assets, self._reports, trials=self._trials)
+        self.library = Library(course, results, self._assets, self._reports, self._trials)
         self._targets = link_targets(course)
         if self._site:
             self.files.show(self.library)

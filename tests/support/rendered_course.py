@@ -128,7 +128,7 @@ class RenderedCourse(Struct, frozen=True):
 
     def page(self, lesson: str = "0.1") -> PageContext:
         """The context of a lesson's page."""
-        library = Library.of(self.course, self.results, self.assets)
+        library = Library(self.course, self.results, self.assets)
         entry = library.lessons[lesson]
         assert entry.document is not None
         place = Place(lesson_path(entry))
@@ -150,7 +150,7 @@ class RenderedCourse(Struct, frozen=True):
                 (root / path).parent.mkdir(parents=True, exist_ok=True)
                 (root / path).write_bytes(data)
             course = replace(self.course, files=tuple(files))
-            library = Library.of(course, self.results, self.assets, reports or Reports())
+            library = Library(course, self.results, self.assets, reports or Reports())
             options = Options(root, 1, quiet=True, cache=Memo(Path(CACHE.name)))
             with Documents(options.store, 1) as documents:
                 site = SiteMaker(library, self.assets, documents, options).make_site()

@@ -1,6 +1,6 @@
 """The library: a course, its results, words and templates, arranged for pages to look up.
 
-Entry point: `Library.of(course, results, assets)`, made once for a site and only read afterwards.
+Entry point: `Library`, made once for a site and only read afterwards.
 """
 
 from __future__ import annotations
@@ -71,102 +71,158 @@ class ModelUse(Struct, frozen=True):
 
 
 class Library(Struct, frozen=True, dict=True):
-    """A course and its results, arranged by name."""
+    """A course and its results, arranged by name when something is first looked up."""
 
     course: Course
     results: Results
-    words: Strings
-    templates: Environment
-    lessons: Mapping[str, Lesson]
-    levels: Mapping[str, Level]
-    pages: Mapping[str, Page]
-    callouts: Mapping[str, CalloutKind]
-    facts: Mapping[str, ModelFacts]
-    """Facts about the models that compile, by name."""
-    scripts: Mapping[str, tuple[Script, Owner]]
-    """By path, in the order of the course."""
-    runs: Mapping[str, ScriptRun]
-    order: tuple[Lesson, ...]
-    """All lessons in the order of the course."""
-    positions: Mapping[str, int]
-    """The position of a lesson in the course, by id, from 0."""
-    leads: Mapping[str, tuple[Lesson, ...]]
-    """The lessons that build on a lesson, by its id."""
-    uses: Mapping[str, tuple[ModelUse, ...]]
-    """The documents that use a model, by its name, in the order of the course."""
-    referrers: Mapping[str, tuple[Owner, ...]]
-    """The lessons and pages that link to a lesson, by its id, in the order of the course."""
-    terms: Mapping[str, Owner]
-    """The lesson or page that defines a term, by its id."""
-    quiz_index: Mapping[str, str]
-    """The questions of documents that have any, by path; see `quiz_index`."""
-    trial_values: Mapping[tuple[str, int], Struct]
-    """The values that features publish of trials, by path and offset of the block."""
-    trial_files: tuple[OutputFile, ...]
-    """The files that features publish of trials."""
-    _formulas: Mapping[Formula, str | MathError]
-    verdicts: Mapping[tuple[str, int], Verdict]
-    """By path and offset of the recording."""
-    reports: Reports
+    assets: Assets
+    reports: Reports = Reports()
     """The reports on models and hard cases that fit the course."""
+    published_trials: PublishedTrials | None = None
+    """The published results of trials, if they are known already."""
 
-    @classmethod
-    def of(
-        cls,
-        course: Course,
-        results: Results,
-        assets: Assets,
-        reports: Reports | None = None,
-        *,
-        trials: PublishedTrials | None = None,
-    ) -> Library:
-        """Make the library of a course.
+    # --- interface
 
-        `trials` are the published results of trials, if they are known already.
-        """
-        questions: dict[str, str] = {}
+    @cached_property
+    def words(self) -> Strings:
+        """The words of the interface."""
+        return strings_for(self.assets.templates, self.course.language)
+
+    @cached_property
+    def templates(self) -> Environment:
+        """The templates, with the course's own."""
+        assets, theme = self.assets, self.course.theme
+        return templates_of(assets.templates, assets.compiled_templates, theme.template_texts)
+
+    # --- the course
+
+    @cached_property
+    def order(self) -> tuple[Lesson, ...]:
+        """All lessons in the order of the course."""
+        return self.course.lessons
+
+    @cached_property
+    def positions(self) -> Mapping[str, int]:
+        """The position of a lesson in the course, by id, from 0."""
+        return {lesson.id: position for position, lesson in enumerate(self.order)}
+
+    @cached_property
+    def lessons(self) -> Mapping[str, Lesson]:
+        """The lessons by id."""
+        return {lesson.id: lesson for lesson in self.order}
+
+    @cached_property
+    def levels(self) -> Mapping[str, Level]:
+        """The levels by id."""
+        return {level.id: level for level in self.course.levels}
+
+    @cached_property
+    def pages(self) -> Mapping[str, Page]:
+        """The pages of the map by id."""
+        return {page.id: page for page in self.course.pages}
+
+    @cached_property
+    def callouts(self) -> Mapping[str, CalloutKind]:
+        """The kinds of callouts by name."""
+        return {kind.name: kind for kind in self.course.callouts}
+
+    @cached_property
+    def scripts(self) -> Mapping[str, tuple[Script, Owner]]:
+        """The scripts by path, in the order of the course; of two with the same path, the first."""
+        scripts: dict[str, tuple[Script, Owner]] = {}
+        for owner, document in self.course.owned_documents:
+            for script in document_scripts(document):
+                scripts.setdefault(script.path, (script, owner))
+        return scripts
+
+    @cached_property
+    def terms(self) -> Mapping[str, Owner]:
+        """The lesson or page that defines a term, by its id."""
         terms: dict[str, Owner] = {}
-        referrers: dict[str, list[Owner]] = {}
-        for owner, document in course.owned_documents:
-            text = quiz_index(document)  # now, while its blocks are in memory
-            if text:
-                questions[document.source.path] = text
-            targets = links(course, document)
-            for id in {target.id for target in targets if isinstance(target, LessonTarget)}:
-                if not (isinstance(owner, Lesson) and owner.id == id):
-                    referrers.setdefault(id, []).append(owner)
+        for owner, document in self.course.owned_documents:
             for inline in document_inlines(document):
                 if isinstance(inline, Term):
                     terms.setdefault(inline.id, owner)
-        if trials is None:
-            trials = publish_trials(results, assets)
-        return cls(
-            course=course,
-            results=results,
-            words=strings_for(assets.templates, course.language),
-            templates=templates_of(
-                assets.templates, assets.compiled_templates, course.theme.template_texts
-            ),
-            lessons={lesson.id: lesson for lesson in course.lessons},
-            levels={level.id: level for level in course.levels},
-            pages={page.id: page for page in course.pages},
-            callouts={kind.name: kind for kind in course.callouts},
-            facts={name: result.facts for name, result in results.models if result.facts},
-            scripts=course_scripts(course),
-            runs={run.path: run for run in results.runs},
-            order=course.lessons,
-            positions={lesson.id: position for position, lesson in enumerate(course.lessons)},
-            leads=_leads(course),
-            uses=_uses(course),
-            referrers={id: tuple(owners) for id, owners in referrers.items()},
-            terms=terms,
-            quiz_index=questions,
-            trial_values=_trial_values(course, trials),
-            trial_files=trials.files,
-            _formulas=dict(results.formulas),
-            verdicts={(v.recording.span.path, v.recording.span.start): v for v in results.verdicts},
-            reports=reports or Reports(),
-        )
+        return terms
+
+    @cached_property
+    def quiz_index(self) -> Mapping[str, str]:
+        """The questions of documents that have any, by path; see `quiz_index`."""
+        indexes = ((d.source.path, quiz_index(d)) for d in self.course.documents)
+        return {path: index for path, index in indexes if index}
+
+    @cached_property
+    def leads(self) -> Mapping[str, tuple[Lesson, ...]]:
+        """The lessons that build on a lesson, by its id."""
+        leads: dict[str, tuple[Lesson, ...]] = dict.fromkeys(self.lessons, ())
+        for lesson in self.order:
+            for need in lesson.prerequisites:
+                leads[need] = (*leads[need], lesson)
+        return leads
+
+    @cached_property
+    def referrers(self) -> Mapping[str, tuple[Owner, ...]]:
+        """The lessons and pages that link to a lesson, by its id, in the order of the course."""
+        referrers: dict[str, tuple[Owner, ...]] = {}
+        for owner, document in self.course.owned_documents:
+            targets = links(self.course, document)
+            for id in {target.id for target in targets if isinstance(target, LessonTarget)}:
+                if not (isinstance(owner, Lesson) and owner.id == id):
+                    referrers[id] = (*referrers.get(id, ()), owner)
+        return referrers
+
+    @cached_property
+    def uses(self) -> Mapping[str, tuple[ModelUse, ...]]:
+        """The documents that use a model, by its name, in the order of the course."""
+        uses: dict[str, tuple[ModelUse, ...]] = {model.name: () for model in self.course.models}
+        for owner, document in self.course.owned_documents if uses else ():
+            for name, ways in _named_models(document).items():
+                if name in uses:
+                    use = ModelUse(owner, tuple(way for way in WAYS if way in ways))
+                    uses[name] = (*uses[name], use)
+        return uses
+
+    # --- results
+
+    @cached_property
+    def facts(self) -> Mapping[str, ModelFacts]:
+        """Facts about the models that compile, by name."""
+        return {name: result.facts for name, result in self.results.models if result.facts}
+
+    @cached_property
+    def runs(self) -> Mapping[str, ScriptRun]:
+        """The runs of scripts, by path."""
+        return {run.path: run for run in self.results.runs}
+
+    @cached_property
+    def formulas(self) -> Mapping[Formula, str | MathError]:
+        """The formulas that were typeset with the results."""
+        return dict(self.results.formulas)
+
+    @cached_property
+    def _verdicts(self) -> Mapping[tuple[str, int], Verdict]:
+        """By path and offset of the recording."""
+        verdicts = self.results.verdicts
+        return {(v.recording.span.path, v.recording.span.start): v for v in verdicts}
+
+    @cached_property
+    def _trials(self) -> PublishedTrials:
+        return self.published_trials or publish_trials(self.results, self.assets)
+
+    @property
+    def trial_files(self) -> tuple[OutputFile, ...]:
+        """The files that features publish of trials."""
+        return self._trials.files
+
+    @cached_property
+    def trial_values(self) -> Mapping[tuple[str, int], Struct]:
+        """The values that features publish of trials, by path and offset of the block."""
+        values = self._trials.values
+        trials = feature_trials(self.course) if values else {}
+        spans = {name: trial.block.span for name, (_, trial) in trials.items() if name in values}
+        return {(span.path, span.start): values[name] for name, span in spans.items()}
+
+    # --- pages
 
     @cached_property
     def added_pages(self) -> tuple[PageKind, ...]:
@@ -186,7 +242,7 @@ class Library(Struct, frozen=True, dict=True):
 
     def mathml(self, tex: str, display: bool) -> str:
         """A formula as MathML; empty for one with an error."""
-        return known_mathml(self._formulas)(tex, display)
+        return known_mathml(self.formulas)(tex, display)
 
     def summaries(self, feature: str) -> Iterator[tuple[Owner, Any]]:
         """A feature's summaries of documents (`Feature.summary`), in the order of the course."""
@@ -200,7 +256,7 @@ class Library(Struct, frozen=True, dict=True):
     @property
     def renderer(self) -> Renderer:
         """The renderer of pages."""
-        return Renderer(self.words, self.templates, self._formulas)
+        return Renderer(self.words, self.templates, self.formulas)
 
     def render(self, template: str, **values: object) -> Markup:
         """A filled-in template; see `Renderer`."""
@@ -208,7 +264,7 @@ class Library(Struct, frozen=True, dict=True):
 
     def verdict(self, recording: Recording) -> Verdict | None:
         """The verdict on a recorded output; `None` if it was not compared."""
-        return self.verdicts.get((recording.span.path, recording.span.start))
+        return self._verdicts.get((recording.span.path, recording.span.start))
 
     def callout(self, name: str) -> CalloutKind:
         """A kind of callout, with the course's own label and promise if it has any."""
@@ -223,17 +279,6 @@ class Library(Struct, frozen=True, dict=True):
         if custom is not None and (default is None or custom.promise != default.promise):
             promise = custom.promise
         return CalloutKind(name, label, promise)
-
-
-def _trial_values(course: Course, trials: PublishedTrials) -> dict[tuple[str, int], Struct]:
-    """The published values of trials, by the places of their blocks."""
-    trials_by_name = feature_trials(course) if trials.values else {}
-    spans = {
-        name: trial.block.span
-        for name, (_, trial) in trials_by_name.items()
-        if name in trials.values
-    }
-    return {(span.path, span.start): trials.values[name] for name, span in spans.items()}
 
 
 def links(course: Course, document: Document) -> Iterator[Target]:
@@ -284,32 +329,3 @@ def _model_names(document: Document) -> Iterator[tuple[str, str]]:
     for inline in document_inlines(document):
         if isinstance(inline, Link) and isinstance(inline.target, ModelTarget):
             yield BY_LINK, inline.target.name
-
-
-def course_scripts(course: Course) -> dict[str, tuple[Script, Owner]]:
-    """The scripts of a course by path, in order; of two with the same path, the first."""
-    scripts: dict[str, tuple[Script, Owner]] = {}
-    for owner, document in course.owned_documents:
-        for script in document_scripts(document):
-            scripts.setdefault(script.path, (script, owner))
-    return scripts
-
-
-def _leads(course: Course) -> dict[str, tuple[Lesson, ...]]:
-    lessons_by_need: dict[str, list[Lesson]] = {lesson.id: [] for lesson in course.lessons}
-    for lesson in course.lessons:
-        for need in lesson.prerequisites:
-            lessons_by_need[need].append(lesson)
-    return {id: tuple(lessons) for id, lessons in lessons_by_need.items()}
-
-
-def _uses(course: Course) -> dict[str, tuple[ModelUse, ...]]:
-    """The uses of each model."""
-    uses_by_model: dict[str, list[ModelUse]] = {model.name: [] for model in course.models}
-    for owner, document in course.owned_documents if uses_by_model else ():
-        for name, ways in _named_models(document).items():
-            if name in uses_by_model:
-                uses_by_model[name].append(
-                    ModelUse(owner, tuple(way for way in WAYS if way in ways))
-                )
-    return {name: tuple(uses) for name, uses in uses_by_model.items()}

@@ -19,11 +19,11 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
-from coursebuild.core.model import Course, Script, document_scripts
+from coursebuild.core.model import Script, document_scripts
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.folding import find_imports
-from coursebuild.core.pages.library import Library, course_scripts, models_named
+from coursebuild.core.pages.library import Library, models_named
 from coursebuild.core.text.source import Excerpt
 
 _NEVER_REQUIRED = sys.stdlib_module_names | {"mjcourse"}
@@ -105,9 +105,9 @@ def make_archives(library: Library, surroundings: Surroundings) -> Iterator[Arch
             yield Archive(urls.lesson_zip_path(lesson), files)
 
 
-def foreign_modules(course: Course, surroundings: Surroundings) -> tuple[str, ...]:
+def foreign_modules(library: Library, surroundings: Surroundings) -> tuple[str, ...]:
     """The top-level modules of other packages that scripts import, directly or not."""
-    scripts = [script for script, _ in course_scripts(course).values()]
+    scripts = [script for script, _ in library.scripts.values()]
     script_modules = {_module(script.path) for script in scripts}
     return tuple(sorted(_follow_imports(scripts, surroundings, script_modules)[1]))
 

@@ -68,7 +68,7 @@ def rendered(make: Make) -> Any:
 
 
 def packed_archives(rendered: Any) -> dict[str, bytes]:
-    library = Library.of(rendered.course, rendered.results, rendered.assets)
+    library = Library(rendered.course, rendered.results, rendered.assets)
     return {archive.path: archive.pack() for archive in make_archives(library, SURROUNDINGS)}
 
 

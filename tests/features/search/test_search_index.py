@@ -24,7 +24,7 @@ DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
 @pytest.fixture(scope="module")
 def library(make: Make) -> Library:
     rendered_course = make("Text.")
-    return Library.of(rendered_course.course, rendered_course.results, rendered_course.assets)
+    return Library(rendered_course.course, rendered_course.results, rendered_course.assets)
 
 
 class Cache(dict[str, bytes]):
