@@ -11,7 +11,7 @@ as a `Report`.
    - `verify`: course → results. `scripts` runs scripts without a remembered result, `trials` runs
      features' trials, such as those of labs; `shards` leaves out the work of other machines
    - `judge`: diagnostics → report, and the files that it depends on
-3. `build`, with `site` (and `pages`, `page_index`): course and results → the files of a site
+3. `build`, with `site` (and `pages`): course and results → the files of a site
 
 `coursebuild.preview` does the same in a process that goes on, and draws the open page first.
 """

@@ -5,8 +5,9 @@ Entry point: `Pages`.
 1. Every page has inputs, all that it shows of the course, and a key: a hash of its inputs, of its
    document's text, and of the tool. Where nothing has changed of what the inputs are made of, the
    key is that of the last build, and the inputs are not made.
-2. `page_index` has records of the pages of the last build. Records of pages that were drawn earlier
-   come from the store; a page that is not there is drawn.
+2. The records of the pages of the last build are stored together, so that unchanged pages need not
+   be loaded. Records of pages that were drawn earlier come from the store with their pages; a page
+   that is not there is drawn.
 3. The records say whether all links lead somewhere, and which characters and styles pages use.
 4. A page's body is loaded, and put into its frame, when its file is written: not all bodies of a
    large course may fit into memory.
@@ -17,6 +18,8 @@ from __future__ import annotations
 import functools
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
+
+from msgspec import Struct
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
@@ -32,8 +35,21 @@ from coursebuild.core.text.source import key_of
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.fingerprints import results_fingerprint
-from coursebuild.pipeline.page_index import PageIndex, SitePage
 from coursebuild.pipeline.reading import PAGES, DrawnPage, PageRequest, SourceText
+
+_INDEX = "index"
+"""The kind of the entry in the store that has the records of the last build's pages."""
+
+
+class SitePage(Struct, frozen=True, array_like=True):
+    """A page that was drawn, now or before."""
+
+    entry: PageEntry
+    key: str
+    origin: str
+    """A hash of all that its inputs are made from, and of its text; empty where that is unknown.
+    Where it is unchanged, so is the key."""
+    record: PageRecord
 
 
 class Pages:
@@ -57,19 +73,26 @@ class Pages:
         self._last_good = last_good or {}
         self._latest: tuple[str, DrawnPage] | None = None
         """The page that was loaded last: several files are made of it."""
-        index = PageIndex(store)
-        self._pages = self._draw_changed(page_list(library) if entries is None else entries, index)
-        if entries is None:
-            index.save(self._pages.values())
+        self.drawn_paths: list[str] = []
+        """Site paths of the pages that were drawn just now."""
+        index = step_key("index of pages")
+        stored_pages = store.get_value(_INDEX, index, tuple[SitePage, ...]) or ()
+        self._pages = self._draw_changed(
+            page_list(library) if entries is None else entries,
+            {page.entry.path: page for page in stored_pages},
+        )
+        all_pages = tuple(self._pages.values())
+        if entries is None and all_pages != stored_pages:
+            store.put_value(_INDEX, index, all_pages)
 
     @property
     def facts(self) -> PageFacts:
         """What the shared files must know of all pages together."""
-        pages = self._pages.values()
+        records = [page.record for page in self._pages.values()]
         return PageFacts(
-            frozenset[str]().union(*(page.text for page in pages)),
-            frozenset[str]().union(*(page.mathematics for page in pages)),
-            frozenset[str]().union(*(page.declarations for page in pages)),
+            frozenset[str]().union(*(record.text for record in records)),
+            frozenset[str]().union(*(record.mathematics for record in records)),
+            frozenset[str]().union(*(record.declarations for record in records)),
         )
 
     @property
@@ -80,12 +103,16 @@ class Pages:
     @property
     def indexed(self) -> Iterator[str]:
         """Site paths of the pages that search engines should list."""
-        return (path for path, page in self._pages.items() if page.indexed)
+        return (path for path, page in self._pages.items() if page.record.indexed)
 
     def noted_pages(self, feature: str) -> tuple[NotedPage, ...]:
         """The pages of which a feature has noted something, in order."""
-        pages = self._pages.values()
-        return tuple(note for page in pages for name, note in page.notes if name == feature)
+        return tuple(
+            NotedPage(path, page.record.kind, page.entry.id, page.record.title, digest)
+            for path, page in self._pages.items()
+            for name, digest in page.record.notes
+            if name == feature
+        )
 
     def note(self, feature: str, path: str) -> bytes:
         """What a feature has noted of one of these pages."""
@@ -93,14 +120,15 @@ class Pages:
 
     def are_sound(self, files: set[str]) -> bool:
         """Whether all links of the pages lead to pages, or to files among these."""
-        ids = {path: page.ids for path, page in self._pages.items()}
+        ids = {path: frozenset(page.record.ids) for path, page in self._pages.items()}
 
         def exists(path: str, anchor: str) -> bool:
-            return anchor == "" or has_anchor(ids[path], anchor) if path in ids else path in files
+            if path not in ids:
+                return path in files
+            return anchor in ("", "top") or has_anchor(ids[path], anchor)
 
-        pages = self._pages.values()
-        links = set[Reference]().union(*(page.links for page in pages))
-        return all(page.sound for page in pages) and all(exists(*link) for link in links)
+        links = set[Reference]().union(*(page.record.references for page in self._pages.values()))
+        return all(exists(*link) for link in links)
 
     def files(self, names: Names) -> Iterator[CachedFile]:
         """The pages in their frames."""
@@ -150,7 +178,9 @@ class Pages:
 
     # --- drawing
 
-    def _draw_changed(self, entries: Iterable[PageEntry], index: PageIndex) -> dict[str, SitePage]:
+    def _draw_changed(
+        self, entries: Iterable[PageEntry], last_pages: Mapping[str, SitePage]
+    ) -> dict[str, SitePage]:
         """Return the pages by site path, in order; draw those that are not stored."""
         pages: dict[str, SitePage | None] = {}
         pending: deque[tuple[PageEntry, str, str]] = deque()
@@ -160,52 +190,49 @@ class Pages:
             for entry in entries:
                 path, text = entry.path, text_of(entry, self._library)
                 origin = origin_of(entry, "" if text is None else text.key)
-                stays_as_it_was = path in self._last_good
-                key = self._last_good[path] if stays_as_it_was else index.key(path, origin)
-                request = None
+                last_page = last_pages.get(path)
+                key, request = self._last_good.get(path), None
+                if key is None and last_page is not None and origin and last_page.origin == origin:
+                    key = last_page.key
                 if key is None:
-                    request = page_request(entry, self._library, text)
+                    request = page_request(entry, self._library)
                     key = request.key
-                page = index.page(entry, key, origin) or self._find_drawn(entry, key, origin)
-                if page is not None:
-                    pages[path] = page
-                elif not stays_as_it_was:  # if it should, it is no longer in the store
+                if last_page is not None and (last_page.key, last_page.entry) == (key, entry):
+                    record: PageRecord | None = last_page.record
+                else:
+                    record = self._find_record(key)
+                if record is not None:
+                    pages[path] = SitePage(entry, key, origin, record)
+                elif path not in self._last_good:  # else it is no longer in the store
                     pages[path] = None
                     pending.append((entry, key, origin))
-                    yield request or page_request(entry, self._library, text)
+                    yield request or page_request(entry, self._library)
 
-        drawn_paths: list[str] = []
         for data in self._documents.draw(missing()):
             entry, key, origin = pending.popleft()
             record = decode(data, PageRecord)
             assert record is not None
-            pages[entry.path] = SitePage.of(entry, key, origin, record)
-            drawn_paths.append(entry.path)
-        self.drawn_paths = tuple(drawn_paths)
-        """Site paths of the pages that were drawn just now."""
+            pages[entry.path] = SitePage(entry, key, origin, record)
+            self.drawn_paths.append(entry.path)
         return {path: page for path, page in pages.items() if page is not None}
 
-    def _find_drawn(self, entry: PageEntry, key: str, origin: str) -> SitePage | None:
-        """Find a page that was drawn before the last build."""
+    def _find_record(self, key: str) -> PageRecord | None:
+        """Find the record of a page that was drawn before the last build."""
         page = self._store.get(PAGES, key, lambda data: decode(data, DrawnPage))
-        return None if page is None else SitePage.of(entry, key, origin, page.record)
+        return None if page is None else page.record
 
     def _load(self, path: str) -> DrawnPage:
         """Return a page of the site, from the store."""
         if self._latest is None or self._latest[0] != path:
             page = self._pages[path]
-
-            def make() -> PageRequest:
-                return page_request(page.entry, self._library, text_of(page.entry, self._library))
-
+            make = functools.partial(page_request, page.entry, self._library)
             self._latest = path, self._documents.get_or_draw(page.key, make)
         return self._latest[1]
 
 
 def frame_page(page: DrawnPage, frame: PageFrame) -> bytes:
     """Put a page into its frame, as it is published."""
-    record = page.record
-    return frame.render(record.head, record.parts, page.body.decode()).encode()
+    return frame.render(page.head, page.parts, page.body.decode()).encode()
 
 
 def text_of(entry: PageEntry, library: Library) -> SourceText | None:
@@ -219,9 +246,9 @@ def text_of(entry: PageEntry, library: Library) -> SourceText | None:
     return SourceText.of(document.source, callouts, lesson=is_lesson)
 
 
-def page_request(entry: PageEntry, library: Library, text: SourceText | None) -> PageRequest:
+def page_request(entry: PageEntry, library: Library) -> PageRequest:
     """Make the request to draw a page; its key is a hash of all that it shows and of its text."""
-    course = library.course
+    course, text = library.course, text_of(entry, library)
     inputs = encode(entry.inputs(library))
     text_key = "" if text is None else text.key
     templates = course.theme.template_texts

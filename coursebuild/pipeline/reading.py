@@ -32,7 +32,8 @@ from coursebuild.core.model.summary import without_prose
 from coursebuild.core.pages.assets import strings_for
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.folding import find_imports
-from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.core.pages.frame import parts_of
+from coursebuild.core.pages.page_inputs import PageHead, PageInputs
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.renderer import Renderer, known_mathml
 from coursebuild.core.pages.templates import Texts, templates_of
@@ -141,6 +142,9 @@ class PageRequest(Struct, frozen=True):
 class DrawnPage(Struct, frozen=True):
     """A page as it is stored."""
 
+    head: PageHead
+    parts: tuple[str, ...]
+    """See `frame.parts_of`."""
     record: PageRecord
     """What the site must know of it."""
     notes: dict[str, bytes]
@@ -318,7 +322,8 @@ class PageReader:
             notes = page_notes(inputs, context, body)
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
             page_record = replace(page_record, notes=tuple(digests))
-            page = DrawnPage(page_record, notes, body.encode())
+            parts = parts_of(body, head.kind)
+            page = DrawnPage(head, parts, page_record, notes, body.encode())
             self._store.put(PAGES, request.key, encode(page))
             return page
 

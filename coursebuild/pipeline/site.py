@@ -122,7 +122,7 @@ class SiteMaker:
         if entries is None and not pages.are_sound({file.path for file in files}):
             diagnostics = tuple(broken_links([*page_files, *files], self.course.base_url))
         all_files = tuple(sorted((*page_files, *files), key=lambda file: file.path))
-        return Site(all_files, file_list, diagnostics, pages.drawn_paths, names, pages.keys)
+        return Site(all_files, file_list, diagnostics, tuple(pages.drawn_paths), names, pages.keys)
 
     # --- what all pages share
 

@@ -25,7 +25,7 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.pages import frame_page, page_request, text_of
+from coursebuild.pipeline.pages import frame_page, page_request
 from coursebuild.pipeline.reading import DrawnPage
 from coursebuild.pipeline.site import Site, SiteMaker
 
@@ -155,7 +155,7 @@ class Files:
             document = self.document(path)
             if document is None or self._is_sound(document):
                 entry = self._entries[path]
-                request = page_request(entry, library, text_of(entry, library))
+                request = page_request(entry, library)
                 if served_page is None or served_page.key != request.key:
                     page = self._documents.get_or_draw(request.key, lambda: request)
                 else:

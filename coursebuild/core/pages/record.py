@@ -15,17 +15,18 @@ from msgspec import Struct
 from coursebuild.core.pages import fonts, formulas, styles
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.common_files import page_characters
-from coursebuild.core.pages.frame import parts_of
 from coursebuild.core.pages.links import Reference, ids_and_addresses, merge_line_ids, references
 from coursebuild.core.pages.page_inputs import PageHead
 
 
-class PageRecord(Struct, frozen=True):
+class PageRecord(Struct, frozen=True, array_like=True):
     """What the site must know of a page, without its body."""
 
-    head: PageHead
-    parts: tuple[str, ...]
-    """See `frame.parts_of`."""
+    kind: str
+    """See `PageHead`."""
+    title: str
+    indexed: bool
+    """Whether search engines should list it."""
     text: str
     """Characters of its text, as in `PageFacts`, sorted, like those of formulas."""
     mathematics: str
@@ -47,8 +48,9 @@ def record(head: PageHead, body: str, base_url: str) -> tuple[PageRecord, str]:
     html = visible(html)
     ids, addresses = ids_and_addresses(html)
     page_record = PageRecord(
-        head=head,
-        parts=parts_of(html, head.kind),
+        kind=head.kind,
+        title=head.title,
+        indexed=head.indexed,
         text="".join(sorted(text.union(head.title) - fonts.BASE)),
         mathematics="".join(sorted(mathematics)),
         declarations=tuple(sorted(declarations)),
