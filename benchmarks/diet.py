@@ -64,7 +64,7 @@ def main() -> None:
         (root / "models" / "arm.xml").write_text(arm().replace("RUBBLE", ""))
         field = arm().replace("RUBBLE", rubble(arguments.pieces))
         (root / "models" / "rubble.xml").write_text(field)
-        measurement = diet(Options(root, 1, quiet=True))
+        measurement = diet(Options(root, 1))
     for report in measurement.reports:
         show(report)
 

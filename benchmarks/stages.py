@@ -45,7 +45,6 @@ from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import extract_scripts, run
 from coursebuild.pipeline.site import site_files
 from coursebuild.pipeline.verify import verify
@@ -106,10 +105,9 @@ def measure_typing(root: Path, repeat: int) -> None:
     """The cost of one more word in the longest lesson for the language server: time of one core."""
     from markdown_it import MarkdownIt
 
-    quiet = Progress(quiet=True)
-    session = Session(Options(root, 1, quiet=True), site=False)
-    rebuild = BackgroundRebuild(session, quiet, Style())
-    session.start(quiet)
+    session = Session(Options(root, 1), site=False)
+    rebuild = BackgroundRebuild(session, Style())
+    session.start()
     rebuild.run_once()
     assert session.course is not None
     sources = [
@@ -136,7 +134,7 @@ def measure_typing(root: Path, repeat: int) -> None:
 
 def measure_scripts(root: Path, repeat: int) -> None:
     """Our runner compared with bare Python."""
-    options = Options(root, len(os.sched_getaffinity(0)), True)
+    options = Options(root, len(os.sched_getaffinity(0)))
     course = load(root).value
     assert course is not None
     runnable = extract_scripts(course, options).runnable
@@ -148,7 +146,7 @@ def measure_scripts(root: Path, repeat: int) -> None:
     candidates: dict[str, Callable[[], object]] = {
         "python, one after the other": bare,
         f"coursebuild, {options.jobs} at a time": lambda: run(
-            runnable, options, Progress(quiet=True), memory=options.memory(fresh=True)
+            runnable, options, memory=options.memory(fresh=True)
         ),
     }
     seconds = time_candidates(candidates, max(2, repeat // 3))
@@ -157,7 +155,7 @@ def measure_scripts(root: Path, repeat: int) -> None:
 
 def measure_stages(course: Course, results: Results, root: Path, repeat: int) -> None:
     """The other stages of a build."""
-    options = Options(root, 1, quiet=True)
+    options = Options(root, 1)
 
     def make_files() -> None:
         with Documents(options.store, 1) as documents:
@@ -236,7 +234,7 @@ def main() -> None:
     measure_scripts(root, arguments.repeat)
     course = load(root).value
     assert course is not None
-    results = verify(course, Options(root, 1, True), Progress(quiet=True)).results
+    results = verify(course, Options(root, 1)).results
     results = replace(results, formulas=typeset(course))
     measure_stages(course, results, root, arguments.repeat)
     measure_lessons(course, results, arguments.repeat)

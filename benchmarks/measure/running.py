@@ -39,16 +39,15 @@ from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.engine.memo import Memo
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import extract_scripts, run
 root = pathlib.Path.cwd()
 with ScriptServer() as server:
     store = Memo(root, fresh=True)
-    options = Options(root, int(sys.argv[1]), True, store, run_all=server.run)
+    options = Options(root, int(sys.argv[1]), cache=store, run_all=server.run)
     chosen = extract_scripts(load(root).value, options).runnable
     for _ in range(2):
         began = time.perf_counter()
-        runs = run(chosen, options, Progress(quiet=True))
+        runs = run(chosen, options)
         print(time.perf_counter() - began)
         assert len(runs) == len(chosen) and all(run.outcome.value == "ok" for run in runs)
 """

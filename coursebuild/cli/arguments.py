@@ -11,6 +11,7 @@ import os
 
 from coursebuild.core.run.sandbox import find_sandbox
 from coursebuild.pipeline.options import Options, find_course, open_store
+from coursebuild.pipeline.progress import Progress
 
 
 def options_of(arguments: argparse.Namespace) -> Options:
@@ -23,7 +24,7 @@ def options_of(arguments: argparse.Namespace) -> Options:
         store = open_store(root, arguments.cache, arguments.cache_size, fresh=fresh)
     sandbox = find_sandbox(root) if getattr(arguments, "sandbox", False) else None
     quiet, long, verbose = (getattr(arguments, n, False) for n in ("quiet", "long", "verbose"))
-    return Options(root, jobs, quiet, store, long, verbose, sandbox=sandbox)
+    return Options(root, jobs, Progress(quiet=quiet), store, long, verbose, sandbox=sandbox)
 
 
 def available_cores() -> int:

@@ -116,4 +116,4 @@ def _compare_with_version(arguments: argparse.Namespace) -> int:
         options.store.close()
     if arguments.format == "json":
         return write(comparison_json(report), CLEAN)
-    return write(comparison_text(report, style_of(sys.stdout), quiet=options.quiet), CLEAN)
+    return write(comparison_text(report, style_of(sys.stdout), quiet=options.progress.quiet), CLEAN)

@@ -69,7 +69,7 @@ def report_text(report: Report, form: str, options: Options) -> str:
 
     from coursebuild.report import render_report
 
-    if options.quiet and form == "text":
+    if options.progress.quiet and form == "text":
         if not report.diagnostics:
             return ""
         report = replace(report, scripts=(), labs=(), remarks=(), sensitivity=None)

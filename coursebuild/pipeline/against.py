@@ -39,7 +39,6 @@ from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import failure_diagnostic
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import extract_scripts, run
 from coursebuild.pipeline.verify import compile_models
 from coursebuild.report.against import ComparisonReport, ModelLine, ScriptComparison
@@ -62,9 +61,8 @@ def compare_with_version(
         if version == engine_version():
             return ComparisonReport(version, version, python_version(), (), ())
     version = check_other_version(version)
-    progress = Progress(quiet=options.quiet)
-    options.store.listen(progress.say)
-    with project_lock(options.root, progress.say):
+    options.store.listen(options.progress.say)
+    with project_lock(options.root, options.progress.say):
         parsed_course = load(options.root)
         course = parsed_course.value
         if course is not None and course.python is not None:
@@ -85,7 +83,7 @@ def compare_with_version(
             for e in extracted_scripts.runnable
             if (documents is None or e.document in documents) and not e.script.once
         )
-        work = _Comparison(course, options, progress, scripts, version)
+        work = _Comparison(course, options, scripts, version)
         blocked = tuple(
             ScriptComparison(b.path, "", "uncompared", "the file there is not what its lesson says")
             for b in extracted_scripts.blocked
@@ -98,7 +96,6 @@ class _Comparison(Struct):
 
     course: Course
     options: Options
-    progress: Progress
     scripts: tuple[Extraction, ...]
     version: str
     """The other version."""
@@ -106,9 +103,9 @@ class _Comparison(Struct):
 
     def report(self, blocked: tuple[ScriptComparison, ...]) -> ComparisonReport:
         """Run the scripts with both versions and compare what they do."""
-        runs = run(self.scripts, self.options, self.progress)
+        runs = run(self.scripts, self.options)
         self.runs_here = {r.path: r for r in runs}
-        interpreter = prepare_environment(self.options.root, self.version, self.progress.say)
+        interpreter = self._prepare(self.version)
         standings_here = run_standings(self.course, self.runs_here, runs)
         exclusions = {
             path: judge_comparability(standing) for path, standing in standings_here.items()
@@ -161,13 +158,14 @@ class _Comparison(Struct):
         if not scripts:
             return {}, ""
         try:
-            interpreter = prepare_environment(
-                self.options.root, engine_version(), self.progress.say
-            )
+            interpreter = self._prepare(engine_version())
         except EffectError as error:
             return {}, error.message
         stage = f"running scripts in a fresh environment with MuJoCo {engine_version()}"
         return self._run(scripts, interpreter, stage), ""
+
+    def _prepare(self, version: str) -> Interpreter:
+        return prepare_environment(self.options.root, version, self.options.progress.say)
 
     def _run(
         self,
@@ -184,7 +182,7 @@ class _Comparison(Struct):
         memory = options_there.memory(fresh=fresh)
         with ScriptServer() as server:
             server_options = replace(options_there, run_all=server.run)
-            runs = run(scripts, server_options, self.progress, stage, memory)
+            runs = run(scripts, server_options, stage, memory)
         return run_standings(self.course, self.runs_here, runs)
 
     def _compare_models(self, interpreter: Interpreter) -> tuple[ModelLine, ...]:
@@ -194,7 +192,7 @@ class _Comparison(Struct):
         texts = mjcf_texts(self.course)
         if not self.course.models and not texts:
             return ()
-        results, _ = compile_models(self.course, self.options, self.progress)
+        results, _ = compile_models(self.course, self.options)
         results_here = dict(results)
         models = [model for model in self.course.models if not results_here[model.name].error]
         root = self.options.root
@@ -202,7 +200,7 @@ class _Comparison(Struct):
         good = [t for t, result in zip(texts, texts_here, strict=True) if not result.error]
         texts_to_compile = [(model.source.path, model.source.text) for model in models]
         texts_to_compile += [(mjcf.TEXT_PATH, text.text) for text in good]
-        with self.progress.stage(f"compiling models with MuJoCo {self.version}"):
+        with self.options.progress.stage(f"compiling models with MuJoCo {self.version}"):
             results_there = mjcf.compile_all(root, texts_to_compile, python=interpreter.python)
         places = [(model.source.path, 1) for model in models]
         places += [(text.block.span.path, text.block.span.line) for text in good]

@@ -1,6 +1,6 @@
 """`coursebuild build`: verify the course, make its site, and publish it when nothing is wrong.
 
-Entry points: `build(options, out)`; `prepare(options, progress)`, what it would publish.
+Entry points: `build(options, out)`; `prepare(options)`, what it would publish.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from coursebuild.core.model.results import Results
 from coursebuild.pipeline.check import read_and_verify
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
 from coursebuild.report import Report
 
 if TYPE_CHECKING:
@@ -34,29 +33,27 @@ MakeSite: TypeAlias = "Callable[[Course, Results, Documents, Options, Reports], 
 
 def build(options: Options, out: Path) -> Report:
     """Publish the course into `out` (relative to the course's folder), or nothing."""
-    progress, place = Progress(quiet=options.quiet), options.root / out
+    place = options.root / out
     check_output_folder(options.root, place)
-    with project_lock(options.root, progress.say), prepare(options, progress) as (report, site):
+    with project_lock(options.root, options.progress.say), prepare(options) as (report, site):
         if site is None:
             stays = f"; {out} stays as it is" if place.exists() else ""
             return replace(report, remarks=(f"nothing was published{stays}",))
-        stage = functools.partial(progress.stage, "publishing")
+        stage = functools.partial(options.progress.stage, "publishing")
         publish(options.root, place, site.files, site.file_list, jobs=options.jobs, stage=stage)
     count = len(site.files) + (site.file_list is not None)
     return replace(report, remarks=(f"published {count} files in {out}",))
 
 
 @contextmanager
-def prepare(
-    options: Options, progress: Progress, make: MakeSite | None = None
-) -> Iterator[tuple[Report, Site | None]]:
+def prepare(options: Options, make: MakeSite | None = None) -> Iterator[tuple[Report, Site | None]]:
     """The report on a course, and its site where nothing is wrong.
 
     The caller holds the course's lock, and makes the files before the context ends. `make` makes
     other files than those of the site.
     """
-    with Documents(options.store, options.jobs, progress.stage) as documents:
-        checked_course = read_and_verify(options, progress, documents, static=True)
+    with Documents(options.store, options.jobs, options.progress.stage) as documents:
+        checked_course = read_and_verify(options, documents, static=True)
         if not checked_course.is_sound:
             yield checked_course.report(), None
             return

@@ -23,7 +23,6 @@ from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.judge import depends_on, judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verification, verify
 from coursebuild.report import Report
@@ -49,10 +48,9 @@ def check(
     it writes how long each took. `sensitivity`: say which printed digits repeat when initial states
     are moved a little. `truth`: list what nothing in the course proves.
     """
-    progress = Progress(quiet=options.quiet)
-    with project_lock(options.root, progress.say):
-        with Documents(options.store, options.jobs, progress.stage) as documents:
-            checked_course = read_and_verify(options, progress, documents, names, shard=shard)
+    with project_lock(options.root, options.progress.say):
+        with Documents(options.store, options.jobs, options.progress.stage) as documents:
+            checked_course = read_and_verify(options, documents, names, shard=shard)
         course, verification = checked_course.course, checked_course.verification
         if course is None or verification is None:
             return checked_course.report()
@@ -66,7 +64,7 @@ def check(
         sensitivities: tuple[Sensitivity, ...] | None = None
         if sensitivity:
             sensitivities, warnings = _measure_sensitivity(
-                course, options, progress, verification, checked_course.selection
+                course, options, verification, checked_course.selection
             )
             diagnostics += warnings
         if shard is not None:
@@ -116,7 +114,6 @@ class CheckedCourse(Struct, frozen=True):
 
 def read_and_verify(
     options: Options,
-    progress: Progress,
     documents: Documents,
     names: tuple[str, ...] = (),
     *,
@@ -134,9 +131,7 @@ def read_and_verify(
         return CheckedCourse(began, parsed_course.diagnostics, Selection((), (), None))
     selection = select(course, names, options.root)
     options = options.for_course(course)
-    verification = verify(
-        course, options, progress, selection.documents, static=static, shard=shard
-    )
+    verification = verify(course, options, selection.documents, static=static, shard=shard)
     reports = shown_reports(options.root, course)
     diagnostics = (*parsed_course.diagnostics, *verification.diagnostics, *reports.diagnostics)
     return CheckedCourse(
@@ -147,7 +142,6 @@ def read_and_verify(
 def _measure_sensitivity(
     course: Course,
     options: Options,
-    progress: Progress,
     verification: Verification,
     selection: Selection,
 ) -> tuple[tuple[Sensitivity, ...], list[Diagnostic]]:
@@ -159,9 +153,7 @@ def _measure_sensitivity(
     scripts = [extraction for extraction in extract(course).value if extraction.path in by_path]
     runs = [by_path[extraction.path] for extraction in scripts]
     options = options.for_course(course)
-    sensitivities = measure(
-        course, options, progress, scripts, runs, selection.documents, halve=True
-    )
+    sensitivities = measure(course, options, scripts, runs, selection.documents, halve=True)
     return sensitivities, [warning for s in sensitivities for warning in noise_warnings(s)]
 
 

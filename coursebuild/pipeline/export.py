@@ -34,7 +34,6 @@ from coursebuild.pipeline.build import prepare
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import MAP
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.site import Site, SiteMaker
 from coursebuild.report import Report
 
@@ -49,17 +48,16 @@ def export(options: Options, name: str, out: Path | None) -> Report:
     out = out or Path(exporter.file)
     place = options.root / out
     check_target(options.root, place, exporter.mark, archive=exporter.archive)
-    progress = Progress(quiet=options.quiet)
     make = functools.partial(_make_files, exporter)
     with (
-        project_lock(options.root, progress.say),
-        prepare(options, progress, make) as (report, exported_site),
+        project_lock(options.root, options.progress.say),
+        prepare(options, make) as (report, exported_site),
     ):
         if exported_site is None:
             return replace(report, remarks=("nothing was written",))
         if not exported_site.files:
             raise EffectError(f"the course has nothing that `export {name}` could write")
-        with progress.stage("packing"):
+        with options.progress.stage("packing"):
             size = write_export(place, exported_site.files, archive=exporter.archive)
     count = len(exported_site.files)
     remark = f"wrote {f'{count} files to ' if exporter.archive else ''}{out}, {_format_size(size)}"

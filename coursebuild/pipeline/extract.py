@@ -20,7 +20,6 @@ from coursebuild.core.text.source import Source
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import ExtractedScripts, extract_scripts
 from coursebuild.pipeline.update import changed_text
 from coursebuild.report import Report
@@ -28,7 +27,7 @@ from coursebuild.report import Report
 
 def extract(options: Options, *, adopt: bool = False) -> Report:
     """Extract; with `adopt` the lessons take over what was edited by hand in `examples/`."""
-    with project_lock(options.root, Progress(quiet=options.quiet).say):
+    with project_lock(options.root, options.progress.say):
         return _extract(options, adopt=adopt)
 
 

@@ -10,7 +10,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msgspec import Struct
+from msgspec import Struct, field
 from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import SIZE, Memo
@@ -22,6 +22,7 @@ from coursebuild.core.model import Course, Lesson, Owner, Page
 from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.memory import Memory
 from coursebuild.core.text.diagnostics import did_you_mean, nearest
+from coursebuild.pipeline.progress import Progress
 
 if TYPE_CHECKING:
     from coursebuild.core.run.runner import RunAll
@@ -36,7 +37,8 @@ class Options(Struct, frozen=True):
     """Absolute, links resolved."""
     jobs: int
     """How many scripts run at a time."""
-    quiet: bool
+    progress: Progress = field(default_factory=lambda: Progress(quiet=True))
+    """Says what is done; by default nothing."""
     cache: Memo | None = None
     """Results made before; by default those in the course's folder."""
     long: bool = False

@@ -34,9 +34,10 @@ class Progress:
 
     def __init__(self, stream: TextIO | None = None, *, quiet: bool = False) -> None:
         self.stream = sys.stderr if stream is None else stream
+        self.quiet = quiet
         # The tool may have been started without a standard error.
-        self.quiet = quiet or self.stream is None
-        self.live = not self.quiet and self.stream.isatty() and os.environ.get("TERM") != "dumb"
+        self._has_readers = not quiet and self.stream is not None
+        self.live = self._has_readers and self.stream.isatty() and os.environ.get("TERM") != "dumb"
         self._lock = threading.Lock()
         self._running_since: dict[str, float] = {}
         self._activities: dict[str, str] = {}
@@ -118,13 +119,13 @@ class Progress:
         return f"{self._stage} {self._ended_count}/{self._total}  {', '.join(names)}"
 
     def _write(self, text: str) -> None:
-        if self.quiet:
+        if not self._has_readers:
             return
         try:
             self.stream.write(text)
             self.stream.flush()
         except (OSError, ValueError):  # nobody reads any more; the work goes on
-            self.quiet = True
+            self._has_readers = False
 
 
 def _columns(stream: TextIO) -> int:

@@ -23,7 +23,6 @@ from coursebuild.core.scripts.extract import Extraction, extract, jobs
 from coursebuild.core.scripts.failures import is_lost
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recorded_runs import recorded_runs
 from coursebuild.report import ScriptLine
 
@@ -117,7 +116,6 @@ def _diagnose_blocked(
 def run(
     scripts: Iterable[Extraction],
     options: Options,
-    progress: Progress,
     stage: str = "running scripts",
     memory: Memory | None = None,
     perturbation: int = 0,
@@ -142,7 +140,7 @@ def run(
     if inputs:
         runs |= memory.recall(tuple(inputs.values()))
     jobs_to_run = [job for job in all_jobs if job.path not in runs]
-    for script_run in _run(jobs_to_run, inputs, options, progress, stage, memory):
+    for script_run in _run(jobs_to_run, inputs, options, stage, memory):
         runs[script_run.path] = script_run
     return tuple(runs[job.path] for job in all_jobs)
 
@@ -151,7 +149,6 @@ def _run(
     jobs_to_run: Sequence[ScriptJob],
     inputs: Mapping[str, Inputs],
     options: Options,
-    progress: Progress,
     stage: str,
     memory: Memory,
 ) -> tuple[ScriptRun, ...]:
@@ -160,6 +157,7 @@ def _run(
         return ()
     from coursebuild.core.run.runner import ScriptServer
 
+    progress = options.progress
     last_runs = (memory.last_record(job.path) for job in jobs_to_run)
     seconds = {last.inputs.path: last.stored_run.seconds for last in last_runs if last is not None}
 

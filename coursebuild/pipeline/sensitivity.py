@@ -1,6 +1,6 @@
 """Which printed digits repeat when initial states move: for `check --sensitivity` and `update`.
 
-Entry point: `measure(course, options, progress, scripts, runs, documents)`.
+Entry point: `measure(course, options, scripts, runs, documents)`.
 
 Scripts that use MuJoCo and print what is recorded run four times with their initial states moved
 (`core.run.initial_state_perturbation`), each with three times the time limit. `check` runs them a
@@ -20,7 +20,6 @@ from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.sensitivity import is_worth_moving, sensitivity
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import recorded_outputs, run
 
 _NOT_RUN = (Outcome.NORUN, Outcome.SKIPPED)
@@ -29,7 +28,6 @@ _NOT_RUN = (Outcome.NORUN, Outcome.SKIPPED)
 def measure(
     course: Course,
     options: Options,
-    progress: Progress,
     scripts: Sequence[Extraction],
     runs: Sequence[ScriptRun],
     documents: Collection[str] | None = None,
@@ -56,7 +54,7 @@ def measure(
         if is_worth_moving(course, recordings.get(script.path, ()), base)
     ]
     numbers = (*range(1, RUNS + 1), *((HALVED_RUN,) if halve else ()))
-    perturbed_runs = _run_perturbed(moved_scripts, options, progress, numbers)
+    perturbed_runs = _run_perturbed(moved_scripts, options, numbers)
     return tuple(
         sensitivity(
             course,
@@ -72,7 +70,7 @@ def measure(
 
 
 def _run_perturbed(
-    scripts: Sequence[Extraction], options: Options, progress: Progress, numbers: Sequence[int]
+    scripts: Sequence[Extraction], options: Options, numbers: Sequence[int]
 ) -> dict[str, list[ScriptRun]]:
     """Run scripts with moved states or halved timesteps; return the runs by path."""
     runs: dict[str, list[ScriptRun]] = {script.path: [] for script in scripts}
@@ -84,8 +82,6 @@ def _run_perturbed(
         for number in numbers:
             halving = number == HALVED_RUN
             stage = "halving timesteps" if halving else f"moving initial states, {number} of {RUNS}"
-            for script_run in run(
-                scripts, server_options, progress, stage, memory, perturbation=number
-            ):
+            for script_run in run(scripts, server_options, stage, memory, perturbation=number):
                 runs[script_run.path].append(script_run)
     return runs

@@ -37,7 +37,6 @@ from coursebuild.pipeline.figures import find_figures, write_figures
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Selection, select
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recorded_runs import check_recorded_runs, record_runs
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
@@ -51,14 +50,11 @@ from coursebuild.report import Report
 
 def update(options: Options, names: tuple[str, ...] = (), *, dry_run: bool = False) -> Report:
     """Record what the scripts of the chosen lessons print now."""
-    progress = Progress(quiet=options.quiet)
-    with project_lock(options.root, progress.say):
-        return _update(options, names, progress, dry_run=dry_run)
+    with project_lock(options.root, options.progress.say):
+        return _update(options, names, dry_run=dry_run)
 
 
-def _update(
-    options: Options, names: tuple[str, ...], progress: Progress, *, dry_run: bool
-) -> Report:
+def _update(options: Options, names: tuple[str, ...], *, dry_run: bool) -> Report:
     began = time.monotonic()
     parsed_course = load(options.root)
     course = parsed_course.value
@@ -70,8 +66,8 @@ def _update(
     scripts = _recorded_scripts(course, selection, extracted_scripts.runnable)
     with ScriptServer() as server:  # it keeps what scripts import from one run to the next
         server_options = replace(options, run_all=server.run)
-        first_runs = run(scripts, server_options, progress)
-        second_runs = _run_again(course, selection, scripts, first_runs, server_options, progress)
+        first_runs = run(scripts, server_options)
+        second_runs = _run_again(course, selection, scripts, first_runs, server_options)
     edits, refusals = _make_edits(
         course, selection, first_runs, second_runs, _repeated_paths(extracted_scripts)
     )
@@ -99,9 +95,7 @@ def _update(
             for r in recorded_outputs(course, selection.documents)
             if _is_touched(r, edits, ())
         }
-        diagnostics += _find_noise(
-            now.value, selection, changed_scripts, first_runs, options, progress
-        )
+        diagnostics += _find_noise(now.value, selection, changed_scripts, first_runs, options)
     if not remarks and all(not d.is_error for d in diagnostics):
         remarks = ("every recorded output is up to date",)
     return judge(
@@ -121,7 +115,6 @@ def _run_again(
     scripts: Sequence[Extraction],
     first_runs: Sequence[ScriptRun],
     options: Options,
-    progress: Progress,
 ) -> tuple[ScriptRun, ...]:
     """Run scripts again; a remembered first run that is recorded already stands for both."""
     edits, refusals = _make_edits(course, selection, first_runs, first_runs, frozenset())
@@ -136,7 +129,7 @@ def _run_again(
         if (not first_run.cached or first_run.path in outdated) and not extraction.script.once
     ]
     memory = options.memory(fresh=True)
-    runs = run(scripts_to_run, options, progress, "running scripts again", memory)
+    runs = run(scripts_to_run, options, "running scripts again", memory)
     runs_by_path = {r.path: r for r in runs}
     return tuple(runs_by_path.get(first_run.path, first_run) for first_run in first_runs)
 
@@ -159,7 +152,6 @@ def _find_noise(
     changed_scripts: Collection[str | None],
     first_runs: Sequence[ScriptRun],
     options: Options,
-    progress: Progress,
 ) -> list[Diagnostic]:
     """Find recorded digits that are noise, in the outputs that have changed."""
     from coursebuild.core.scripts.sensitivity import noise_warnings
@@ -172,7 +164,7 @@ def _find_noise(
     }
     scripts = [extraction for extraction in extract(now).value if extraction.path in runs_by_path]
     runs = [runs_by_path[extraction.path] for extraction in scripts]
-    sensitivities = measure(now, options, progress, scripts, runs, selection.documents)
+    sensitivities = measure(now, options, scripts, runs, selection.documents)
     return [warning for sensitivity in sensitivities for warning in noise_warnings(sensitivity)]
 
 

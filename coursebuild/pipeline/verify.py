@@ -1,6 +1,6 @@
 """Course → Results: run the scripts, compare, compile the models, try the labs.
 
-Entry point: `verify(course, options, progress, documents)`.
+Entry point: `verify(course, options, documents)`.
 
 1. Scripts are written to `examples/`, and those of the chosen documents run (`scripts`).
 2. Recorded outputs and bound numbers are compared with the runs.
@@ -42,7 +42,6 @@ from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.figures import read_recorded
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recorded_runs import check_recorded_runs
 from coursebuild.pipeline.scripts import extract_scripts, run, script_lines
 from coursebuild.pipeline.trials import run_with_trials
@@ -68,7 +67,6 @@ class Verification(Struct, frozen=True):
 def verify(
     course: Course,
     options: Options,
-    progress: Progress,
     documents: frozenset[str] | None = None,
     *,
     static: bool = False,
@@ -82,15 +80,13 @@ def verify(
     the scripts and labs. `evidence`: the lines by which bound numbers held before. `known_runs`:
     runs, by path, that are known to hold.
     """
-    options.store.listen(progress.say)
+    options.store.listen(options.progress.say)
     options = options.for_course(course)
     extracted_scripts = extract_scripts(course, options)
     extractions, trials = _select(course, extracted_scripts.runnable, documents, shard)
-    models, model_diagnostics = compile_models(course, options, progress)
+    models, model_diagnostics = compile_models(course, options)
     memory = options.memory()
-    scripts = functools.partial(
-        run, extractions, options, progress, memory=memory, known_runs=known_runs
-    )
+    scripts = functools.partial(run, extractions, options, memory=memory, known_runs=known_runs)
     trial_results: tuple[TrialResult, ...] = ()
     diagnostics = [*extracted_scripts.diagnostics, *model_diagnostics]
     if trials:
@@ -99,7 +95,7 @@ def verify(
             options.root, course, dict(models), trial_memory, model_diagnostics, static
         )
         runs, (trial_results, trial_diagnostics) = run_with_trials(
-            scripts, trials, context, progress
+            scripts, trials, context, options.progress
         )
         diagnostics += trial_diagnostics
     else:
@@ -107,9 +103,7 @@ def verify(
     diagnostics += check_recorded_runs(extractions, options)
     verdicts = compare_all(course, runs)
     second_runs = (
-        _repeat_drifted(extractions, runs, verdicts, options, progress)
-        if known_runs is None
-        else {}
+        _repeat_drifted(extractions, runs, verdicts, options) if known_runs is None else {}
     )
     broken_models = [f"models/{name}.xml" for name, model in models if model.error]
     all_scripts = extracted_scripts.extractions
@@ -137,7 +131,6 @@ def _repeat_drifted(
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
     options: Options,
-    progress: Progress,
 ) -> dict[str, ScriptRun]:
     """Run quick scripts again whose output has drifted, by path: does it vary by itself?"""
     drifted_paths = {verdict.recording.script for verdict in verdicts if verdict.status == "drift"}
@@ -146,7 +139,7 @@ def _repeat_drifted(
     if not scripts:
         return {}
     memory = options.memory(fresh=True)
-    repeated_runs = run(scripts, options, progress, "running again what differs", memory)
+    repeated_runs = run(scripts, options, "running again what differs", memory)
     return {script_run.path: script_run for script_run in repeated_runs}
 
 
@@ -202,7 +195,7 @@ def _quoted_scripts(course: Course, documents: Collection[str]) -> set[str]:
 
 
 def compile_models(
-    course: Course, options: Options, progress: Progress
+    course: Course, options: Options
 ) -> tuple[tuple[tuple[str, CompileResult], ...], tuple[Diagnostic, ...]]:
     """Compile the models and MJCF blocks of a course; diagnose what is wrong with them."""
     texts = mjcf_texts(course)
@@ -211,7 +204,7 @@ def compile_models(
     from coursebuild.core.run import mjcf
     from coursebuild.core.run.model_memory import compile_or_recall
 
-    stage = functools.partial(progress.stage, "compiling models")
+    stage = functools.partial(options.progress.stage, "compiling models")
     texts_to_compile = [(model.source.path, model.source.text) for model in course.models]
     texts_to_compile += [(mjcf.TEXT_PATH, text.text) for text in texts]
     results = compile_or_recall(

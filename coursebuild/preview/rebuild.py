@@ -55,12 +55,12 @@ class SupersededError(Exception):
 class BackgroundRebuild:
     """Does the rest of a build after each save; see the module."""
 
-    def __init__(self, session: Session, progress: Progress, style: Style) -> None:
+    def __init__(self, session: Session, style: Style) -> None:
         self._session = session
-        self._options = session.options
-        self._progress = progress
+        self._progress = session.options.progress
         # Only a terminal shows which scripts run, in a line that is erased at their end.
-        self._stages = progress if progress.live else Progress(quiet=True)
+        shown_progress = self._progress if self._progress.live else Progress(quiet=True)
+        self._options = replace(session.options, progress=shown_progress)
         self._edits = -1
         """The session's `edits` when the work began last."""
         self._evidence: BindingEvidence = {}
@@ -186,7 +186,6 @@ class BackgroundRebuild:
             verification = verify(
                 course,
                 replace(self._options, run_all=self._make_run_all(course)),
-                self._stages,
                 static=True,
                 evidence=self._evidence,
                 known_runs=known_runs,
@@ -249,7 +248,7 @@ class BackgroundRebuild:
             self._begin_step("running scripts again")
             memory = options.memory(fresh=True)
             server_options = replace(options, run_all=self._run_unless_edited(course))
-            runs = run(scripts, server_options, self._stages, "running scripts again", memory)
+            runs = run(scripts, server_options, "running scripts again", memory)
             session.take_second_runs(runs)
 
 

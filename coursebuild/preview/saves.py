@@ -1,6 +1,6 @@
 """Turns events of the file system into saves, and saves into pages.
 
-Entry point: `follow(session, watcher, progress)`, which a thread of its own runs.
+Entry point: `follow(session, watcher)`, which a thread of its own runs.
 
 1. An editor may save in several steps: empty the file, then fill it; or write a new file, then move
    it to the place of the old one. They count as one save, which is complete when nothing has
@@ -15,7 +15,6 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from coursebuild.pipeline.progress import Progress
 from coursebuild.preview.session import MAX_SINGLE_READS, Session
 from coursebuild.preview.watcher import FolderWatcher
 
@@ -29,7 +28,7 @@ LONGEST = 0.250
 """Seconds after which a save is taken in any case; with many files, four times that."""
 
 
-def follow(session: Session, watcher: FolderWatcher, progress: Progress) -> None:
+def follow(session: Session, watcher: FolderWatcher) -> None:
     """Take saves until the watcher is stopped.
 
     Each is printed, with the milliseconds from its first event until it was taken.
@@ -50,7 +49,8 @@ def follow(session: Session, watcher: FolderWatcher, progress: Progress) -> None
             session.calm.set()
         if has_changed is not False:
             names = ", ".join(sorted(paths)[:3]) + (" …" if len(paths) > 3 else "")
-            progress.say(f"changed: {names} ({1e3 * (time.monotonic() - began):.0f} ms)")
+            milliseconds = 1e3 * (time.monotonic() - began)
+            session.options.progress.say(f"changed: {names} ({milliseconds:.0f} ms)")
 
 
 def _wait_until_complete(

@@ -19,7 +19,6 @@ from typing import NoReturn
 import segno
 
 from coursebuild.pipeline.options import Options, UsageError
-from coursebuild.pipeline.progress import Progress
 from coursebuild.preview.rebuild import BackgroundRebuild
 from coursebuild.preview.saves import follow
 from coursebuild.preview.server import PreviewServer
@@ -42,7 +41,6 @@ def serve(
     `embed`: origins whose pages may show the preview in a frame. `style`: how mistakes are printed.
     `browse`: open a browser.
     """
-    progress = Progress(quiet=options.quiet)
     session = Session(options)
     try:
         server = PreviewServer(host, port, session, embed)
@@ -50,19 +48,19 @@ def serve(
         reason = error.strerror or error
         raise UsageError(f"port {port} of {host} cannot be used: {reason}") from None
     watcher = FolderWatcher(options.root)
-    rebuild = BackgroundRebuild(session, progress, style)
+    rebuild = BackgroundRebuild(session, style)
 
     def take_saves() -> None:
         try:
-            follow(session, watcher, progress)
+            follow(session, watcher)
         except BaseException as error:  # raised again in the main thread
             rebuild.fail(error)
 
     try:
-        session.start(progress)
+        session.start()
         server.start()
         watcher.start()
-        _announce(server.links, browse=browse, draw=progress.live)
+        _announce(server.links, browse=browse, draw=options.progress.live)
         threading.Thread(target=take_saves, name="saves", daemon=True).start()
         rebuild.follow()
     finally:

@@ -42,7 +42,6 @@ from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import MAP, load
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.theme import template_diagnostic
 from coursebuild.pipeline.verify import Verification
@@ -106,10 +105,10 @@ class Session:
         self.files = Files(options, self._assets, self._documents, self._is_sound)
         self._site = site
 
-    def start(self, progress: Progress) -> None:
+    def start(self) -> None:
         """Read the course on all cores, while this process has no threads and can be copied."""
         options = self.options
-        with Documents(options.store, options.jobs, progress.stage) as documents:
+        with Documents(options.store, options.jobs, options.progress.stage) as documents:
             self.read(documents)
         sys.setswitchinterval(_SWITCH)
         gc.freeze()  # what was read lives as long as the process: do not look through it again

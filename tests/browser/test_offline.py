@@ -363,7 +363,7 @@ def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
     host = Host(tmp_path / "site")
     page, _ = settled_page(context, host)
     host.stop()
-    session = FolderSession(Options(host.folder, 1, True))
+    session = FolderSession(Options(host.folder, 1))
     preview = PreviewServer("127.0.0.1", int(host.url.split(":")[2].strip("/")), session)
     preview.answers = OneScript(session, script)
     preview.start()

@@ -11,7 +11,6 @@ import pytest
 from coursebuild.core.model.results import CachedFile
 from coursebuild.pipeline import reading
 from coursebuild.pipeline.build import build, prepare
-from coursebuild.pipeline.progress import Progress
 from support.scratch_course import Folder, block
 
 pytestmark = pytest.mark.slow
@@ -52,7 +51,7 @@ def peak(folder: Folder) -> int:
     gc.freeze()  # else the garbage of other tests decides when the collector runs
     tracemalloc.start()
     try:
-        with prepare(folder.options(), Progress(quiet=True)) as (report, site):
+        with prepare(folder.options()) as (report, site):
             assert site is not None, report.diagnostics
             for file in site.files:
                 if file.path.endswith((".html", ".md", ".ipynb", ".epub")):

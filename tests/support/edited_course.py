@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable
 
 from coursebuild.pipeline.build import prepare
-from coursebuild.pipeline.progress import Progress
 from support.scratch_course import Folder, block
 
 HEAD = """
@@ -91,7 +90,7 @@ class Course:
 
 def drawn_pages(folder: Folder) -> set[str]:
     """Return the pages that a build draws anew."""
-    with prepare(folder.options(), Progress(quiet=True)) as (report, site):
+    with prepare(folder.options()) as (report, site):
         assert site is not None, report.diagnostics
         assert len(set(site.drawn_pages)) == len(site.drawn_pages)
         return set(site.drawn_pages)

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
 from coursebuild.preview.rebuild import BackgroundRebuild
 from coursebuild.preview.session import Session
 from coursebuild.report import Style
@@ -27,10 +26,9 @@ class Live:
 
     def __init__(self, folder: Folder) -> None:
         self.folder = folder
-        options, quiet = Options(folder.root.resolve(), 2, True), Progress(quiet=True)
-        self.session = Session(options)
-        self.rebuild = BackgroundRebuild(self.session, quiet, Style())
-        self.session.start(quiet)
+        self.session = Session(Options(folder.root.resolve(), 2))
+        self.rebuild = BackgroundRebuild(self.session, Style())
+        self.session.start()
 
     def save(self, *paths: str) -> bool:
         """Apply saved files; returns whether the fast path handled them."""

@@ -35,7 +35,6 @@ from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.verify import compile_models
 from support.fixture_cases import text_lines
 from support.lab_values import OpenEngines, try_labs
@@ -190,7 +189,7 @@ class Workshop:
     def options(self, root: Path, *, fresh: bool = False) -> Options:
         """For a command on a course; `fresh`: all is to be made again."""
         store = Memo(root, shared=self._results, fresh=fresh)
-        return Options(root, jobs=1, quiet=True, cache=store, run_all=self._scripts.run)
+        return Options(root, jobs=1, cache=store, run_all=self._scripts.run)
 
     def try_labs(
         self, root: Path, wrap: Callable[[LabEngine], Any] = lambda engine: engine
@@ -199,7 +198,7 @@ class Workshop:
         course_load = load(root)
         assert course_load.value is not None
         options = self.options(root)
-        models, model_diagnostics = compile_models(course_load.value, options, Progress(quiet=True))
+        models, model_diagnostics = compile_models(course_load.value, options)
         engines = copy.copy(self._engines)
         engines.browser = wrap(engines.browser)
         # What labs did is not shared: it would not be tried by another engine.

@@ -144,7 +144,7 @@ class Folder:
 
     def options(self, jobs: int = 1) -> Options:
         """To call a command as a function."""
-        return Options(self.root.resolve(), jobs, quiet=True)
+        return Options(self.root.resolve(), jobs)
 
     def main(self, *arguments: str, cwd: Path | None = None) -> CommandResult:
         """Run a command in this process."""

@@ -68,11 +68,12 @@ def run(arguments: argparse.Namespace) -> int:
     source = Path(arguments.folder)
     out = Path(arguments.out or source.resolve().name).absolute()
     store = open_store(out, arguments.cache, arguments.cache_size, fresh=arguments.no_cache)
-    options = Options(out, arguments.jobs or available_cores(), arguments.quiet, store)
+    progress = Progress(quiet=arguments.quiet)
+    options = Options(out, arguments.jobs or available_cores(), progress, store)
     converted = convert(source)
     write_course(converted, out, source)
     remarks = [f"wrote {plural(len(converted.files), 'file')} to {out}"]
-    remarks += _try_scripts(options, Progress(quiet=options.quiet))
+    remarks += _try_scripts(options)
     for leftover in converted.leftovers:
         place = f", {leftover.place}" if leftover.place else ""
         remarks.append(f"left: {leftover.path}{place}: {leftover.message}")
@@ -84,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
 # --- scripts
 
 
-def _try_scripts(options: Options, progress: Progress) -> tuple[str, ...]:
+def _try_scripts(options: Options) -> tuple[str, ...]:
     """Run each script and add keys and outputs to its lesson; return remarks on the new keys."""
     course = load(options.root).value
     if course is None:
@@ -93,7 +94,7 @@ def _try_scripts(options: Options, progress: Progress) -> tuple[str, ...]:
     edits: dict[Source, list[Edit]] = {}
     remarks = []
     scripts = extract_scripts(course, options).runnable
-    for extraction, script_run in _run_scripts(scripts, options, progress):
+    for extraction, script_run in _run_scripts(scripts, options):
         script = extraction.script
         changes = edits.setdefault(script.span.source, [])
         keys = " ".join(_missing_keys(script, script_run))
@@ -113,15 +114,13 @@ def _try_scripts(options: Options, progress: Progress) -> tuple[str, ...]:
 
 
 def _run_scripts(
-    scripts: Sequence[Extraction], options: Options, progress: Progress
+    scripts: Sequence[Extraction], options: Options
 ) -> list[tuple[Extraction, ScriptRun]]:
     """Run the scripts, those that took too long once more with more time."""
-    runs = list(zip(scripts, run_scripts(scripts, options, progress), strict=True))
+    runs = list(zip(scripts, run_scripts(scripts, options), strict=True))
     slow = [extraction for extraction, run in runs if run.outcome is Outcome.TIMEOUT]
     retried = [replace(e, script=replace(e.script, timeout=_LONG_TIMEOUT)) for e in slow]
-    reruns = {
-        run.path: run for run in run_scripts(retried, options, progress, "running slow scripts")
-    }
+    reruns = {run.path: run for run in run_scripts(retried, options, "running slow scripts")}
     return [(extraction, reruns.get(extraction.path, run)) for extraction, run in runs]
 
 

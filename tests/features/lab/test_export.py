@@ -140,7 +140,7 @@ def test_script_is_offered_where_it_does_what_the_lab_does_and_a_reason_where_no
     usual = {"xml": PENDULUM, "verify": {"seconds": 1}}
     labs = [{**usual, **lab} for lab in (*EXPORTED_LABS, *(lab for lab, _ in REFUSED_LABS))]
     fences = (f"```lab\n{json.dumps(lab, ensure_ascii=False)}\n```\n\n" for lab in labs)
-    options = Options(root=tmp_path, jobs=1, quiet=True)
+    options = Options(root=tmp_path, jobs=1)
     engines = Engines(tmp_path)
     engines.native = NativeEngine(tmp_path, seconds=2.0)
     results, diagnostics = try_labs(make_course("".join(fences)), options, engines)

@@ -20,7 +20,6 @@ from coursebuild.core.values import fingerprint
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
-from coursebuild.pipeline.progress import Progress
 
 _T = TypeVar("_T")
 _A = TypeVar("_A")
@@ -53,7 +52,7 @@ class MeasuringRun:
         self.diagnostics = list(diagnostics)
         self.failures: list[ReportFailure] = []
         self.remarks: list[str] = []
-        self.progress = Progress(quiet=options.quiet)
+        self.progress = options.progress
         options.store.listen(self.progress.say)
 
     def measure_each(

@@ -17,6 +17,8 @@ from collections.abc import Callable
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
+from msgspec.structs import replace
+
 from coursebuild.cli.arguments import add_cache, options_of
 from coursebuild.cli.output import CLEAN
 from coursebuild.core.files.errors import UsageError
@@ -50,16 +52,15 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("the language server needs pygls: `pip install 'coursebuild[lsp]'`")
     from coursebuild.features.language_server.commands.server import Server
 
-    options = options_of(arguments)
+    options = replace(options_of(arguments), progress=Progress(quiet=True))
     stdin, stdout = _take_streams()
     session, watcher = Session(options, site=False), FolderWatcher(options.root)
-    quiet = Progress(quiet=True)
-    rebuild = BackgroundRebuild(session, quiet, Style())
+    rebuild = BackgroundRebuild(session, Style())
     server = Server(session, options.store)
     try:
-        session.start(quiet)
+        session.start()
         watcher.start()
-        _start_thread(lambda: follow(session, watcher, quiet))
+        _start_thread(lambda: follow(session, watcher))
         _start_thread(server.read_edits)
         _start_thread(server.publish)
         threading.Thread(target=_answer, args=(server, stdin, stdout), daemon=True).start()

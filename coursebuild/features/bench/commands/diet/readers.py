@@ -101,7 +101,7 @@ class Reruns:
     """Runs the users of a model, in the course and in copies of it."""
 
     def __init__(self, options: Options, course: Course, scene: CourseScene) -> None:
-        self.options = replace(options, quiet=True)
+        self.options = replace(options, progress=Progress(quiet=True))
         self.course = course
         self.scene = scene
         self._original_outputs: dict[str, object] | None = None
@@ -131,7 +131,7 @@ class Reruns:
         """Run the users of the model in the course, and return their outputs by name."""
         source = self.scene.model.source
         model_paths = {source.path, *model_files(self.options.root, source.path, source.text)}
-        results = verify(self.course, self.options, Progress(quiet=True)).results
+        results = verify(self.course, self.options).results
         paths = {
             run.path
             for run in results.runs
@@ -157,7 +157,7 @@ class Reruns:
         self, course: Course, options: Options, documents: frozenset[str]
     ) -> dict[str, object]:
         """Run documents, and return what scripts print and labs record."""
-        results = verify(course, options, Progress(quiet=True), documents, static=True).results
+        results = verify(course, options, documents, static=True).results
         outputs: dict[str, object] = {
             run.path: (run.outcome, run.status, run.stdout, run.figures) for run in results.runs
         }
