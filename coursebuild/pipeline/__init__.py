@@ -8,8 +8,8 @@ as a `Report`.
 2. `check`: the stages that `check`, `build` and `export` share:
    - `load`: disk → course. Its parser is `documents` (with `reading`, `fingerprints`), which parses
      only texts that were not parsed before
-   - `verify`: course → results. `scripts` runs scripts without a remembered result, `trials` runs
-     features' trials, such as those of labs; `shards` leaves out the work of other machines
+   - `verify`: course → results, with features' trials, such as those of labs. `scripts` runs
+     scripts without a remembered result; `shards` leaves out the work of other machines
    - `judge`: diagnostics → report, and the files that it depends on
 3. `build`, with `site` (and `pages`): course and results → the files of a site
 

@@ -63,10 +63,12 @@ def check(
         remarks = [claim for claim in claims if isinstance(claim, str)]
         sensitivities: tuple[Sensitivity, ...] | None = None
         if sensitivity:
-            sensitivities, warnings = _measure_sensitivity(
-                course, options, verification, checked_course.selection
-            )
-            diagnostics += warnings
+            from coursebuild.core.scripts.sensitivity import noise_warnings
+            from coursebuild.pipeline.sensitivity import measure
+
+            runs, selected = verification.results.runs, checked_course.selection.documents
+            sensitivities = measure(course, options.for_course(course), runs, selected, halve=True)
+            diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
         if shard is not None:
             remarks.append(_describe_part(shard, verification))
         report = checked_course.report(diagnostics)
@@ -137,24 +139,6 @@ def read_and_verify(
     return CheckedCourse(
         began, diagnostics, selection, course, verification, reports.value, options.interpreter
     )
-
-
-def _measure_sensitivity(
-    course: Course,
-    options: Options,
-    verification: Verification,
-    selection: Selection,
-) -> tuple[tuple[Sensitivity, ...], list[Diagnostic]]:
-    """Which printed digits hold, and warnings of those that do not."""
-    from coursebuild.core.scripts.sensitivity import noise_warnings
-    from coursebuild.pipeline.sensitivity import measure
-
-    by_path = {run.path: run for run in verification.results.runs}
-    scripts = [extraction for extraction in extract(course).value if extraction.path in by_path]
-    runs = [by_path[extraction.path] for extraction in scripts]
-    options = options.for_course(course)
-    sensitivities = measure(course, options, scripts, runs, selection.documents, halve=True)
-    return sensitivities, [warning for s in sensitivities for warning in noise_warnings(s)]
 
 
 def _describe_part(shard: Shard, verification: Verification) -> str:

@@ -1,6 +1,6 @@
 """Which printed digits repeat when initial states move: for `check --sensitivity` and `update`.
 
-Entry point: `measure(course, options, scripts, runs, documents)`.
+Entry point: `measure(course, options, runs, documents)`.
 
 Scripts that use MuJoCo and print what is recorded run four times with their initial states moved
 (`core.run.initial_state_perturbation`), each with three times the time limit. `check` runs them a
@@ -9,7 +9,7 @@ fifth time, with halved timesteps (`core.run.half_steps`). All runs are remember
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from msgspec.structs import replace
 
@@ -17,7 +17,7 @@ from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.model.sensitivity import HALVED_RUN, RUNS, Sensitivity
 from coursebuild.core.run.runner import ScriptServer
-from coursebuild.core.scripts.extract import Extraction
+from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.sensitivity import is_worth_moving, sensitivity
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scripts import recorded_outputs, run
@@ -28,26 +28,22 @@ _NOT_RUN = (Outcome.NORUN, Outcome.SKIPPED)
 def measure(
     course: Course,
     options: Options,
-    scripts: Sequence[Extraction],
-    runs: Sequence[ScriptRun],
+    runs: Iterable[ScriptRun],
     documents: Collection[str] | None = None,
     *,
     halve: bool = False,
 ) -> tuple[Sensitivity, ...]:
     """Measure how sensitive the recorded outputs of those scripts are that were run.
 
-    `runs` are the scripts' runs, in the same order. `documents`: only recorded outputs in documents
+    `documents`: only recorded outputs in documents
     with these paths count. `halve`: run the scripts with half the timestep, too.
     """
     recordings: dict[str, list[Recording]] = {}
     for recording in recorded_outputs(course, documents):
         assert recording.script is not None
         recordings.setdefault(recording.script, []).append(recording)
-    pairs = [
-        (script, base)
-        for script, base in zip(scripts, runs, strict=True)
-        if base.outcome not in _NOT_RUN
-    ]
+    bases = {run.path: run for run in runs if run.outcome not in _NOT_RUN}
+    pairs = [(e, bases[e.path]) for e in extract(course).value if e.path in bases]
     moved_scripts = [
         script
         for script, base in pairs

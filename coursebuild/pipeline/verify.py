@@ -6,7 +6,7 @@ Entry point: `verify(course, options, documents)`.
 2. Recorded outputs and bound numbers are compared with the runs.
 3. Models and MJCF blocks are compiled in a child process, which is not started for a course that
    has none.
-4. Labs are tried while the scripts run.
+4. Features' trials, such as those of labs, are run while the scripts run.
 
 Documents may be summaries. Formulas are not checked here: see `pipeline.documents`.
 """
@@ -14,13 +14,16 @@ Documents may be summaries. Formulas are not checked here: see `pipeline.documen
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
-from coursebuild.core.features import Trial, TrialContext, Trials
+from coursebuild.core.features import Trial, TrialContext, TrialOutcome, Trials
 from coursebuild.core.model import Course, FeatureBlock, document_blocks
 from coursebuild.core.model.results import (
     CompileResult,
@@ -28,7 +31,6 @@ from coursebuild.core.model.results import (
     Results,
     ScriptRun,
     TrialLine,
-    TrialResult,
     Verdict,
 )
 from coursebuild.core.registry import check_runs, feature_trials
@@ -39,12 +41,13 @@ from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
+from coursebuild.core.scripts.repeat import repeat_findings
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.figures import read_recorded
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recorded_runs import check_recorded_runs
 from coursebuild.pipeline.scripts import extract_scripts, run, script_lines
-from coursebuild.pipeline.trials import run_with_trials
 from coursebuild.report import ScriptLine
 
 if TYPE_CHECKING:
@@ -86,44 +89,72 @@ def verify(
     extractions, trials = _select(course, extracted_scripts.runnable, documents, shard)
     models, model_diagnostics = compile_models(course, options)
     memory = options.memory()
-    scripts = functools.partial(run, extractions, options, memory=memory, known_runs=known_runs)
-    trial_results: tuple[TrialResult, ...] = ()
-    diagnostics = [*extracted_scripts.diagnostics, *model_diagnostics]
-    if trials:
-        trial_memory = Memory(options.root, options.store)  # another thread uses it
-        context = TrialContext(
-            options.root, course, dict(models), trial_memory, model_diagnostics, static
-        )
-        runs, (trial_results, trial_diagnostics) = run_with_trials(
-            scripts, trials, context, options.progress
-        )
-        diagnostics += trial_diagnostics
-    else:
-        runs = scripts()
-    diagnostics += check_recorded_runs(extractions, options)
+    run_scripts = functools.partial(run, extractions, options, memory=memory, known_runs=known_runs)
+    trial_memory = Memory(options.root, options.store)  # another thread uses it
+    context = TrialContext(
+        options.root, course, dict(models), trial_memory, model_diagnostics, static
+    )
+    runs, (trial_results, trial_diagnostics) = _run_with_trials(
+        run_scripts, trials, context, options.progress
+    )
     verdicts = compare_all(course, runs)
-    second_runs = (
-        _repeat_drifted(extractions, runs, verdicts, options) if known_runs is None else {}
+    is_first = known_runs is None
+    second_runs = _repeat_drifted(extractions, runs, verdicts, options) if is_first else {}
+    diagnostics = (
+        *extracted_scripts.diagnostics,
+        *model_diagnostics,
+        *trial_diagnostics,
+        *check_recorded_runs(extractions, options),
+        *script_findings(
+            course,
+            extractions,
+            runs,
+            verdicts,
+            evidence,
+            extracted_scripts.extractions,
+            second_runs,
+            [f"models/{name}.xml" for name, model in models if model.error],
+        ),
+        *repeat_findings(course, extractions, memory.differing_runs),
+        *check_runs(course, runs),
+        *_diagnose_nothing(course, () if shard is not None else runs),
+        *figure_findings(course, runs, functools.partial(read_recorded, options.root)),
     )
-    broken_models = [f"models/{name}.xml" for name, model in models if model.error]
-    all_scripts = extracted_scripts.extractions
-    diagnostics += script_findings(
-        course, extractions, runs, verdicts, evidence, all_scripts, second_runs, broken_models
-    )
-    if memory.differing_runs:
-        from coursebuild.core.scripts.repeat import repeat_findings
-
-        diagnostics += repeat_findings(course, extractions, memory.differing_runs)
-    diagnostics += check_runs(course, runs)
-    diagnostics += _diagnose_nothing(course, () if shard is not None else runs)
-    diagnostics += figure_findings(course, runs, functools.partial(read_recorded, options.root))
     interpreter = options.interpreter
     python = python_version() if interpreter is None else interpreter.version
     engine = engine_version() if interpreter is None else interpreter.engine
     results = Results(runs, verdicts, (), models, python, engine, trial_results)
     lines = script_lines(extractions, runs, verdicts)
-    labs = tuple(trial.line for trial in trial_results)
-    return Verification(results, tuple(diagnostics), lines, labs)
+    return Verification(results, diagnostics, lines, tuple(trial.line for trial in trial_results))
+
+
+def _run_with_trials(
+    run_scripts: Callable[[], tuple[ScriptRun, ...]],
+    trials: Sequence[tuple[Trials, Trial]],
+    context: TrialContext,
+    progress: Progress,
+) -> tuple[tuple[ScriptRun, ...], TrialOutcome]:
+    """Run scripts here and trials in a thread meanwhile; return the results of both."""
+    if not trials:
+        return run_scripts(), ((), ())
+    groups = groupby(trials, key=itemgetter(0))
+    trial_runs = [(kind.start(context), [trial for _, trial in group]) for kind, group in groups]
+
+    def try_all() -> TrialOutcome:
+        outcomes = [run.run(trials_of_kind) for run, trials_of_kind in trial_runs]
+        results = tuple(result for results, _ in outcomes for result in results)
+        return results, tuple(d for _, diagnostics in outcomes for d in diagnostics)
+
+    with ThreadPoolExecutor(1, "trials") as thread:
+        future = thread.submit(try_all)
+        try:
+            runs = run_scripts()
+            with progress.stage("trying labs"):
+                return runs, future.result()
+        except BaseException:  # Ctrl-C does not wait for a lab
+            for trial_run, _ in trial_runs:
+                trial_run.stop()
+            raise
 
 
 def _repeat_drifted(
