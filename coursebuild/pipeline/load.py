@@ -12,7 +12,7 @@ the texts; `documents.Documents` is one that keeps what it parsed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -28,15 +28,19 @@ from coursebuild.core.model import (
     Lesson,
     Level,
     Limits,
+    Link,
     Owner,
     Page,
+    UrlTarget,
+    document_inlines,
+    local_file,
 )
 from coursebuild.core.model.theme import TEMPLATES, Theme
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.versions import engine_version
-from coursebuild.core.scripts.source_parts import check_source_parts
+from coursebuild.core.scripts.source_parts import check_source_parts, shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source
 
@@ -178,6 +182,7 @@ class _Loader:
         if course.python is None or environment.value is not None:
             self.diagnostics += _check_engine(course, environment.value)
         self.diagnostics += check_source_parts(course, self._read_text)
+        self.diagnostics += _check_unlisted_files(course)
         for package in course.packages:
             if not (self.root / package.path).is_dir():
                 message = f"there is no folder `{package.path}`"
@@ -350,6 +355,23 @@ def _refuse_code(root: Path, course: Course) -> None:
             "run",
             help="look at what it does, and run the command without `--sandbox`",
         )
+
+
+def _check_unlisted_files(course: Course) -> Iterator[Diagnostic]:
+    """Warn of Markdown files outside the folders of lessons and pages that nothing uses."""
+    folders = ("content/lessons/", "content/pages/")  # files in these have rules of their own
+    paths = [path for path in course.files if path.startswith("content/") and path.endswith(".md")]
+    paths = [path for path in paths if not path.startswith(folders)]
+    used_paths = {*shown_files(course)} if paths else set()
+    for document in course.documents if paths else ():
+        for inline in document_inlines(document):
+            if isinstance(inline, Link) and isinstance(inline.target, UrlTarget):
+                used_paths.add(local_file(inline.target.url, document.source.path))
+    for path in paths:
+        if path not in used_paths:
+            message = f"the course map does not name {path}, and nothing links to it"
+            help = f"add a [[page]] to {MAP}, or move the file out of content/"
+            yield diagnose("file-unlisted", Source(path, "").span(0, 0), message, help=help)
 
 
 def _check_engine(course: Course, interpreter: Interpreter | None) -> list[Diagnostic]:

@@ -39,6 +39,8 @@ _SUMMARIES = {
     "id-repeated": "A level, lesson or page id occurs twice in the course map.",
     "lesson-unlisted": "A file in content/lessons is not named by the course map.",
     "page-unlisted": "A file in content/pages is not named by the course map.",
+    "file-unlisted": "A Markdown file elsewhere in content is not named by the course map, and "
+    "nothing shows it or links to it.",
     "lesson-missing": "The course map names a lesson whose file is missing.",
     "lesson-planned-file": "A lesson that the map calls planned has a file.",
     "lesson-empty": "A complete lesson has nothing to read in its file.",
@@ -217,10 +219,10 @@ _SUMMARIES = {
 """The meaning of each rule in one sentence."""
 _WARNINGS = frozenset(
     """
-    no-scripts theme-contrast template-outdated heading-skip fence-kind-near fence-unread
-    math-unread markup-foreign symbol-repeated footnote-unused image-alt recording-caption
-    script-unrepeatable script-penetration script-writes script-connects output-noise
-    report-stale bench-unrecorded lab-penetration lab-far lab-reset package-reduced
+    file-unlisted no-scripts theme-contrast template-outdated heading-skip fence-kind-near
+    fence-unread math-unread markup-foreign symbol-repeated footnote-unused image-alt
+    recording-caption script-unrepeatable script-penetration script-writes script-connects
+    output-noise report-stale bench-unrecorded lab-penetration lab-far lab-reset package-reduced
     """.split()
 )
 
