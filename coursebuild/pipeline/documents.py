@@ -11,9 +11,8 @@ Entry point: `Documents`, a context manager and the `Parser` of a course, which 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from functools import partial
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
@@ -66,7 +65,7 @@ class Documents(Parser):
         self._jobs = jobs
         self._texts: dict[str, SourceText] = {}
         self._summaries: dict[str, DocumentSummary] = {}
-        self._fingerprints: tuple[Course, str | None, str | None] | None = None
+        self._fingerprints: tuple[Course, tuple[str | None, str | None]] | None = None
         self._readers: dict[str, int] = {}
         """The number of the worker that has read a text, by the text's path."""
         self._reader = PageReader(store)
@@ -98,31 +97,30 @@ class Documents(Parser):
         imports = (pair for summary in self._summaries.values() for pair in summary.imports)
         return {path: frozenset(modules) for path, modules in imports}
 
-    def fingerprint(self, course: Course, *, notes: bool = True) -> str | None:
-        """The fingerprint of a course whose documents these are; `None` for any other course.
+    def fingerprints(self, course: Course) -> tuple[str | None, str | None]:
+        """The fingerprints of a course whose documents these are; `None` for any other course.
 
-        `notes`: of what features note of its documents, too, which few pages show.
+        The first is of the course without what features note of its documents, which few pages
+        show.
         """
         if self._fingerprints is None or self._fingerprints[0] is not course:
             summaries = self._summaries
             bare = course_fingerprint(
                 course, ((s.document, s.fingerprint) for s in summaries.values())
             )
-            note_fingerprints = (
-                summaries[d.source.path].notes_fingerprint for d in course.documents
-            )
-            self._fingerprints = (
-                course,
-                bare,
-                None if bare is None else key_of(bare, *note_fingerprints),
-            )
-        _, bare, whole = self._fingerprints
-        return whole if notes else bare
+            whole = None
+            if bare is not None:
+                documents = course.documents
+                whole = key_of(
+                    bare, *(summaries[d.source.path].notes_fingerprint for d in documents)
+                )
+            self._fingerprints = course, (bare, whole)
+        return self._fingerprints[1]
 
     def check(self, course: Course) -> tuple[Diagnostic, ...]:
         """What `check_course` finds; a course that was found clean is not checked again."""
         key = step_key("checked course")
-        state = (self.fingerprint(course) or "").encode()
+        state = (self.fingerprints(course)[1] or "").encode()
         if state and self._store.get(_CLEAN_COURSES, key, bytes) == state:
             return ()
         diagnostics = super().check(course)
@@ -157,14 +155,7 @@ class Documents(Parser):
     def _add_summary(self, text: SourceText, summary: DocumentSummary | None) -> None:
         assert summary is not None, "what was just encoded can be decoded"
         self._texts[text.source.path] = text
-        self._summaries[text.source.path] = summary.with_notes(partial(self._remake_notes, text))
-
-    def _remake_notes(self, text: SourceText) -> Mapping[str, bytes]:
-        """Make the notes of a text again, since those in the store are damaged."""
-        self._store.peek(SUMMARIES, text.key, lambda _: None)  # this reports the damaged entry
-        summary = decode(self._reader.read(text), DocumentSummary, text.source)
-        assert summary is not None, "what was just encoded can be decoded"
-        return summary.notes
+        self._summaries[text.source.path] = summary.with_notes()
 
     def read_document(
         self, source: Source, callouts: frozenset[str], *, lesson: bool
@@ -220,8 +211,11 @@ class Documents(Parser):
 
     def get_or_draw(self, key: str, request: Callable[[], PageRequest]) -> DrawnPage:
         """Return the page stored under a key; draw it here where there is none."""
-        entry = self._store.peek(PAGES, key, lambda data: decode(data, DrawnPage))
-        return entry or self._reader.draw(request())
+        return self.find_page(key) or self._reader.draw(request())
+
+    def find_page(self, key: str) -> DrawnPage | None:
+        """Return the page stored under a key, if there is one."""
+        return self._store.peek(PAGES, key, lambda data: decode(data, DrawnPage))
 
     def page_context(self, path: str, inputs: PageInputs, course: Course) -> PageContext:
         """What is needed to draw parts of the document at a path, with all its text."""

@@ -166,9 +166,7 @@ class Pages:
         """Return a function that hashes all that a page is made of: see `SitePage.origin`."""
         library = self._library
         results = results_fingerprint(library.results, library.reports)
-        bare, with_notes = (
-            self._documents.fingerprint(library.course, notes=notes) for notes in (False, True)
-        )
+        bare, with_notes = self._documents.fingerprints(library.course)
 
         def origin(entry: PageEntry, text_key: str) -> str:
             course = with_notes if entry.may_show_notes(library) else bare

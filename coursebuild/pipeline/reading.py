@@ -15,7 +15,7 @@ import hashlib
 import importlib
 import threading
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from msgspec import Struct
@@ -89,30 +89,21 @@ class DocumentSummary(Struct, frozen=True):
     """What features note of it (`Feature.summary`), by their names; encoded."""
     notes_fingerprint: str
 
-    def with_notes(self, remake: Callable[[], Mapping[str, bytes]]) -> DocumentSummary:
-        """The same with the notes in its document; `remake` makes damaged notes again."""
-        notes = _Notes(self.notes, self.document.source, remake)
+    def with_notes(self) -> DocumentSummary:
+        """The same with the notes in its document."""
+        notes = _Notes(self.notes, self.document.source)
         return replace(self, document=replace(self.document, summaries=notes))
 
 
 class _Notes(Mapping[str, Struct]):
     """What features note of a document, decoded on demand: after an edit few notes are needed."""
 
-    def __init__(
-        self,
-        encoded_notes: Mapping[str, bytes],
-        source: Source,
-        remake: Callable[[], Mapping[str, bytes]],
-    ) -> None:
+    def __init__(self, encoded_notes: Mapping[str, bytes], source: Source) -> None:
         self._encoded_notes = encoded_notes
         self._source = source
-        self._remake = remake
 
     def __getitem__(self, feature: str) -> Struct:
         note = decode(self._encoded_notes[feature], Struct, self._source)
-        if note is None:
-            self._encoded_notes = self._remake()
-            note = decode(self._encoded_notes[feature], Struct, self._source)
         assert note is not None, "what was just encoded can be decoded"
         return note
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.files.errors import EffectError
@@ -30,19 +29,9 @@ from coursebuild.pipeline.reading import DrawnPage
 from coursebuild.pipeline.site import Site, SiteMaker
 
 _MOST_PAGES = 64
-"""How many pages are kept in memory."""
+"""How many pages are kept in memory with their frames."""
 _MOST_SITES = 3
 """Sites whose shared files stay available: a browser may still ask for those of an older page."""
-
-
-class ServedPage(Struct, frozen=True):
-    """The text of a page, and what it was made from."""
-
-    frame: PageFrame
-    """There is a new frame after each change of the course or of what pages share."""
-    key: str
-    page: DrawnPage
-    text: bytes
 
 
 class Files:
@@ -62,10 +51,12 @@ class Files:
         self._is_sound = is_sound
         self._library: Library | None = None
         self._entries: dict[str, PageEntry] = {}
-        self._pages: dict[str, ServedPage] = {}
         self._last_good: dict[str, str] = {}
-        """Keys of the pages of the site that was made last, by site path."""
+        """The key of each page when it was last drawn without mistakes, by site path."""
         self._frame: PageFrame | None = None
+        """There is a new frame after each change of the course or of what pages share."""
+        self._framed_pages: dict[str, bytes] = {}
+        """Pages in this frame, by site path."""
         self._sites: list[tuple[Site, Mapping[str, SiteFile]]] = []
         self._trial_files: Mapping[str, OutputFile] = {}
         """Features' files that pages may show before a site was made with them."""
@@ -75,7 +66,6 @@ class Files:
         self._library = library
         self._trial_files = {file.path: file for file in library.trial_files}
         self._entries = {entry.path: entry for entry in page_list(library)}
-        self._pages = {p: page for p, page in self._pages.items() if p in self._entries}
         self._last_good = {p: key for p, key in self._last_good.items() if p in self._entries}
         if self._sites:
             self._set_frame()
@@ -111,6 +101,7 @@ class Files:
         names = self._sites[-1][0].names
         assert self._library is not None and names is not None
         self._frame = PageFrame(self._library, names)
+        self._framed_pages.clear()
 
     # --- lookup
 
@@ -126,8 +117,8 @@ class Files:
     def is_outdated(self, path: str) -> bool:
         """Whether a page is older than its document, which has mistakes."""
         document = self.document(path)
-        has_text = path in self._pages or path in self._last_good
-        return document is not None and has_text and not self._is_sound(document)
+        is_drawn = path in self._last_good
+        return document is not None and is_drawn and not self._is_sound(document)
 
     def document(self, path: str) -> Document | None:
         """The document that a page shows, as it was last read."""
@@ -149,29 +140,24 @@ class Files:
 
     def _find_page(self, path: str) -> bytes | None:
         """Return a page as it is now, or as it was before its document had a mistake."""
-        library, frame, served_page = self._library, self._frame, self._pages.pop(path, None)
-        assert library is not None and frame is not None
-        if served_page is None or served_page.frame is not frame:
-            document = self.document(path)
-            if document is None or self._is_sound(document):
-                entry = self._entries[path]
-                request = page_request(entry, library)
-                if served_page is None or served_page.key != request.key:
-                    page = self._documents.get_or_draw(request.key, lambda: request)
-                else:
-                    page = served_page.page
-                served_page = ServedPage(frame, request.key, page, frame_page(page, frame))
-            elif served_page is None:
-                files = self._sites[-1][1]
-                return _data(files[path]) if path in files else None
-            else:
-                served_page = replace(
-                    served_page, frame=frame, text=frame_page(served_page.page, frame)
-                )
-        self._pages[path] = served_page  # last in the dictionary, as it was used last
-        if len(self._pages) > _MOST_PAGES:
-            del self._pages[next(iter(self._pages))]
-        return served_page.text
+        if path not in self._framed_pages:
+            page = self._find_drawn(path)
+            if page is None:
+                return None
+            assert self._frame is not None
+            if len(self._framed_pages) == _MOST_PAGES:
+                self._framed_pages.clear()
+            self._framed_pages[path] = frame_page(page, self._frame)
+        return self._framed_pages[path]
+
+    def _find_drawn(self, path: str) -> DrawnPage | None:
+        assert self._library is not None
+        document = self.document(path)
+        if document is not None and not self._is_sound(document):
+            return self._documents.find_page(self._last_good.get(path, ""))
+        request = page_request(self._entries[path], self._library)
+        self._last_good[path] = request.key
+        return self._documents.get_or_draw(request.key, lambda: request)
 
 
 def _data(file: SiteFile) -> bytes | None:

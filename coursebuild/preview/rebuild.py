@@ -104,8 +104,9 @@ class BackgroundRebuild:
                 lambda: session.edits != self._edits or self._failure is not None,
                 RETRY if session.trouble else None,
             )
-            if self._failure is not None:
-                raise self._failure
+            failure, self._failure = self._failure, None
+            if failure is not None:
+                raise failure
             began = time.monotonic()
             while time.monotonic() < began + LONGEST:
                 edits = session.edits

@@ -3,7 +3,7 @@
 Entry point: `serve`.
 
 1. The course is read; its pages are drawn on demand.
-2. A thread takes saves (`saves`): the page that was saved is new within milliseconds.
+2. A thread takes saves (`live_course`): the page that was saved is new within milliseconds.
 3. The main thread does the rest in the background (`rebuild`): scripts, labs, fonts, whole checks.
 
 While something is wrong, the last good page stays, with the mistakes shown over it.
@@ -19,11 +19,8 @@ from typing import NoReturn
 import segno
 
 from coursebuild.pipeline.options import Options, UsageError
-from coursebuild.preview.rebuild import BackgroundRebuild
-from coursebuild.preview.saves import follow
+from coursebuild.preview.live_course import LiveCourse
 from coursebuild.preview.server import PreviewServer
-from coursebuild.preview.session import Session
-from coursebuild.preview.watcher import FolderWatcher
 from coursebuild.report import Style
 
 
@@ -41,34 +38,20 @@ def serve(
     `embed`: origins whose pages may show the preview in a frame. `style`: how mistakes are printed.
     `browse`: open a browser.
     """
-    session = Session(options)
+    live_course = LiveCourse(options, style)
     try:
-        server = PreviewServer(host, port, session, embed)
+        server = PreviewServer(host, port, live_course.session, embed)
     except OSError as error:
         reason = error.strerror or error
         raise UsageError(f"port {port} of {host} cannot be used: {reason}") from None
-    watcher = FolderWatcher(options.root)
-    rebuild = BackgroundRebuild(session, style)
-
-    def take_saves() -> None:
-        try:
-            follow(session, watcher)
-        except BaseException as error:  # raised again in the main thread
-            rebuild.fail(error)
-
     try:
-        session.start()
+        live_course.start()
         server.start()
-        watcher.start()
         _announce(server.links, browse=browse, draw=options.progress.live)
-        threading.Thread(target=take_saves, name="saves", daemon=True).start()
-        rebuild.follow()
+        live_course.rebuild()
     finally:
-        watcher.stop()
         server.stop()
-        rebuild.close()
-        session.close()
-        options.store.close()
+        live_course.close()
 
 
 def _announce(links: list[str], *, browse: bool, draw: bool) -> None:

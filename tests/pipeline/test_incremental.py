@@ -154,14 +154,6 @@ def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Cou
             packed[-1] = 7
             path.write_bytes(sealed(name, msgspec.msgpack.encode((names, packed))))
     assert build(course) == before, "a field of another type"
-    for path in sorted((folder / "summaries").iterdir()):
-        name = f"summaries/{path.name}"
-        names, packed = msgspec.msgpack.decode(unsealed(name, path.read_bytes()))
-        packed[-2] = [b"junk" if isinstance(item, bytes) else item for item in packed[-2]]
-        path.write_bytes(sealed(name, msgspec.msgpack.encode((names, packed))))
-    for kind in ("pages", "index"):
-        shutil.rmtree(folder / kind)
-    assert build(course) == before, "notes of features"
 
 
 def test_a_mistake_that_an_edit_makes_elsewhere_is_found(course: Course) -> None:

@@ -133,7 +133,7 @@ def test_fingerprint_changes_with_what_others_see_and_not_with_prose(
         with Documents(Memo(folder.root), 1) as documents:
             course = load(folder.root, documents).value
             assert isinstance(course, Course)
-            return documents.fingerprint(course)
+            return documents.fingerprints(course)[1]
 
     plain = of(TEXT)
     assert of("Plain words.\n\n" + TEXT) == plain == of(TEXT + "Plain words.\n")

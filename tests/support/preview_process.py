@@ -18,9 +18,9 @@ from support.scratch_course import Folder, kill_at_end, wait_until_alone
 PATIENT = """
 import sys
 from coursebuild.cli import main
-from coursebuild.preview import saves
-saves.QUIET_MANY = saves.QUIET_GONE = 3.0
-saves.LONGEST = 120.0
+from coursebuild.preview import live_course
+live_course.LONG_QUIET = 3.0
+live_course.LONGEST = 120.0
 sys.exit(main(sys.argv[1:]))
 """
 """The command with longer waits for the rest of a save, so that it arrives in time on any machine.

@@ -1,7 +1,7 @@
 """`coursebuild lsp`: a language server on standard input and output.
 
 1. The course is read before anything is answered, and then followed as in the preview: a thread
-   handles saves (`preview.saves`), the main thread runs scripts and labs (`preview.rebuild`).
+   takes saves, the main thread runs scripts and labs (`preview.live_course`).
 2. A thread answers the client, another reads what is typed, another publishes diagnostics.
 3. Authors' files are only read: the client edits them.
 """
@@ -23,10 +23,7 @@ from coursebuild.cli.arguments import add_cache, options_of
 from coursebuild.cli.output import CLEAN
 from coursebuild.core.files.errors import UsageError
 from coursebuild.pipeline.progress import Progress
-from coursebuild.preview.rebuild import BackgroundRebuild
-from coursebuild.preview.saves import follow
-from coursebuild.preview.session import Session
-from coursebuild.preview.watcher import FolderWatcher
+from coursebuild.preview.live_course import LiveCourse
 from coursebuild.report import Style
 
 if TYPE_CHECKING:
@@ -54,24 +51,18 @@ def run(arguments: argparse.Namespace) -> int:
 
     options = replace(options_of(arguments), progress=Progress(quiet=True))
     stdin, stdout = _take_streams()
-    session, watcher = Session(options, site=False), FolderWatcher(options.root)
-    rebuild = BackgroundRebuild(session, Style())
-    server = Server(session, options.store)
+    live_course = LiveCourse(options, Style(), site=False)
+    server = Server(live_course.session, options.store)
     try:
-        session.start()
-        watcher.start()
-        _start_thread(lambda: follow(session, watcher))
+        live_course.start()
         _start_thread(server.read_edits)
         _start_thread(server.publish)
         threading.Thread(target=_answer, args=(server, stdin, stdout), daemon=True).start()
-        _repeat(rebuild.follow)
+        _repeat(live_course.rebuild)
     except KeyboardInterrupt:  # raised when `_answer` ends
         return CLEAN
     finally:
-        watcher.stop()
-        rebuild.close()
-        session.close()
-        options.store.close()
+        live_course.close()
 
 
 def _take_streams() -> tuple[BinaryIO, BinaryIO]:
