@@ -7,6 +7,8 @@ Entry points: `Grid`, a table; `power`, `bounded`, `percent`, `factor`, `size`, 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from typing import TypeAlias
 
 from markupsafe import Markup, escape
 from msgspec import Struct
@@ -83,17 +85,31 @@ def grid(
     )
 
 
+NamedRow: TypeAlias = tuple[str, tuple[str, ...]]
+"""The name of a row, and its other cells."""
+
+
+def merge_rows(rows: Iterable[NamedRow]) -> list[NamedRow]:
+    """Join rows with the same cells under all of their names."""
+    names_by_cells: dict[tuple[str, ...], list[str]] = {}
+    for name, cells in rows:
+        names_by_cells.setdefault(cells, []).append(name)
+    return [(", ".join(names), cells) for cells, names in names_by_cells.items()]
+
+
 def power(value: float | None, digits: int = 3) -> Markup:
     """Write a number in so many digits, with a power of ten if it is very large or small."""
     if value is None:
         return Markup()
     if not value or not math.isfinite(value):
         return Markup("0" if not value else f"{value}")
-    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
+    mantissa, _, digits_of_exponent = f"{value:.{digits - 1}e}".partition("e")
+    exponent = int(digits_of_exponent)
     if -3 <= exponent < 5:
         places = max(0, digits - 1 - exponent)
         return Markup(f"{value:.{places}f}".replace("-", _MINUS))
-    return _scientific(f"{value:.{digits - 1}e}")
+    text = f"{mantissa}{_THIN}×{_THIN}10<sup>{exponent}</sup>"
+    return Markup(text.replace("-", _MINUS))
 
 
 def bounded(value: float | None, least: float) -> Markup:
@@ -101,13 +117,6 @@ def bounded(value: float | None, least: float) -> Markup:
     if value is not None and least > 0.0 and value <= least * (1 + 1e-9):
         return Markup("&lt; ") + power(least, 2)
     return power(value)
-
-
-def _scientific(text: str) -> Markup:
-    """Write a number of Python's with a power of ten in place of its `e`."""
-    mantissa, mark, exponent = text.partition("e")
-    tens = f"{_THIN}×{_THIN}10<sup>{int(exponent)}</sup>" if mark else ""
-    return Markup((mantissa + tens).replace("-", _MINUS))
 
 
 def percent(value: float | None) -> Markup:

@@ -1,22 +1,26 @@
 """The report on a scenario as pages show it: the page of a model, and a lesson's `bench`.
 
-Entry points: `scenario_view(words, report, anchor)`, `plots`; `stable_title`, `stable_cells` and
+Entry points: `scenario_view(words, report, anchor)`, `plots`; `orders_table`, and
+`integrator_table`, of what else is known of integrators; `stable_title`, `stable_cells` and
 `stable_again`, for largest stable timesteps; `lost_runs`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.pages.strings import Strings
 from coursebuild.features.bench.figures import (
+    FigurePart,
     Grid,
+    NamedRow,
     bounded,
     factor,
     grid,
+    merge_rows,
     percent,
     phrase,
     power,
@@ -49,11 +53,11 @@ _QUANTITIES = {
     "attitude": "measured.attitude",
     "velocity": "measured.velocity",
 }
-ORDERS = (
-    ("position", "measured.order_position"),
-    ("attitude", "measured.order_attitude"),
-    ("velocity", "measured.order_velocity"),
-)
+_ORDERS = {
+    "position": "measured.order_position",
+    "attitude": "measured.order_attitude",
+    "velocity": "measured.order_velocity",
+}
 """Fitted orders, with the keys of their titles."""
 
 
@@ -89,7 +93,7 @@ def scenario_view(
         verdict=sentence(report.verdict.text),
         settings=_settings_table(words, report),
         notes=tuple(_notes(words, report)),
-        orders=_orders_table(words, report.orders),
+        orders=orders_table(words, words("measured.orders"), report.orders),
         stable=_stability_table(words, report),
         report=report,
     )
@@ -183,22 +187,40 @@ def lost_runs(runs: Iterable[tuple[str, MeasuredRun | SweepRow]]) -> list[str]:
     return [f"{'; '.join(names)}: {'; '.join(reasons)}." for reasons, names in groups]
 
 
-def _orders_table(words: Strings, orders: tuple[OrderRow, ...]) -> Grid | None:
-    rows = [row for row in orders if row.has_orders]
+def orders_table(
+    words: Strings, label: str, orders: Iterable[OrderRow], *, merge: bool = False
+) -> Grid | None:
+    """Make a table of fitted orders; `None` if there are none."""
+    rows = []
+    for row in orders:
+        fits: list[FittedOrder | None] = [getattr(row, name) for name in _ORDERS]
+        if row.has_orders:
+            rows.append((row.integrator, tuple("" if fit is None else fit.text for fit in fits)))
+    return integrator_table(words, label, tuple(_ORDERS.values()), rows, merge=merge)
+
+
+def integrator_table(
+    words: Strings,
+    label: str,
+    titles: Sequence[str],
+    rows: Sequence[NamedRow],
+    *,
+    merge: bool = False,
+    parts: tuple[FigurePart, ...] = (),
+) -> Grid | None:
+    """Make a table of integrators; `None` without rows.
+
+    `titles`: keys of the columns' titles; `merge`: integrators with the same cells share a row.
+    """
     if not rows:
         return None
-    columns = [(words("measured.integrator"), [row.integrator for row in rows])]
-    for name, key in ORDERS:
-        fits: list[FittedOrder | None] = [getattr(row, name) for row in rows]
-        cells = ["" if fit is None else fit.text for fit in fits]
-        columns.append((words(key), cells))
-    return grid(words("measured.orders"), columns)
+    rows = merge_rows(rows) if merge else rows
+    columns = [(words("measured.integrator"), [name for name, _ in rows])]
+    columns += [(words(key), [cells[n] for _, cells in rows]) for n, key in enumerate(titles)]
+    return grid(label, columns, words=(words("measured.remark"),), parts=parts)
 
 
 def _stability_table(words: Strings, report: ScenarioReport) -> Grid | None:
-    rows = report.stable
-    if not rows:
-        return None
     short = is_cut_short(report)
 
     def remark(row: StableRow) -> str:
@@ -206,12 +228,9 @@ def _stability_table(words: Strings, report: ScenarioReport) -> Grid | None:
             return words("measured.stable_short", steps=FEWEST_STEPS)
         return stable_again(words, row)
 
-    names = [row.integrator for row in rows]
-    cells = [stable_cells(words, row) for row in rows]
-    titles = ("measured.integrator", *STABLE, "measured.remark")
-    texts = (names, *map(list, zip(*cells, strict=True)), [remark(row) for row in rows])
-    columns = [(words(key), column) for key, column in zip(titles, texts, strict=True)]
-    return grid(stable_title(words, rows[0]), columns, words=(words("measured.remark"),))
+    rows = [(row.integrator, (*stable_cells(words, row), remark(row))) for row in report.stable]
+    label = stable_title(words, report.stable[0]) if rows else ""
+    return integrator_table(words, label, (*STABLE, "measured.remark"), rows)
 
 
 STABLE = ("measured.largest", "measured.steps", "measured.tried")

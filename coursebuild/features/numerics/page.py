@@ -19,17 +19,19 @@ from coursebuild.core.pages.strings import Strings
 from coursebuild.features.bench.figures import (
     FigurePart,
     Grid,
-    grid,
+    NamedRow,
     machine_text,
+    merge_rows,
     percent,
     phrase,
     power,
     sentence,
 )
 from coursebuild.features.bench.scenarios import (
-    ORDERS,
     STABLE,
+    integrator_table,
     lost_runs,
+    orders_table,
     stable_again,
     stable_cells,
     stable_title,
@@ -37,10 +39,8 @@ from coursebuild.features.bench.scenarios import (
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
-    Cells,
     FigureLine,
     course_cases,
-    merge_rows,
 )
 from coursebuild.numerics.reports.plot import case_quantities, case_svg
 from coursebuild.numerics.reports.records import STABILITY
@@ -58,8 +58,6 @@ _BOUNDARY = (
     "measured.remark",
 )
 _FIGURE = ("numerics.measured", "numerics.spread", "numerics.exact", "measured.difference")
-_Rows = list[tuple[str, Cells]]
-"""Integrators, each with its cells."""
 
 
 class CaseView(Struct, frozen=True):
@@ -141,7 +139,9 @@ def _limit(words: Strings, line: BoundaryLine | None) -> str:
 def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
     """A case as the page shows it."""
     model = "" if report.case else report.name.rpartition("/")[0]
-    grids = (_boundaries(words, report), _figures(words, report), _orders(words, report))
+    label = words("numerics.orders", title=report.title)
+    orders = orders_table(words, label, report.orders, merge=True)
+    grids = (_boundaries(words, report), _figures(words, report), orders)
     quantities = case_quantities(report)
     name = urls.encode(report.name)
     return CaseView(
@@ -177,22 +177,10 @@ def _describe(words: Strings, report: CaseReport, quantities: Sequence[Quantity]
         yield sentence(report.note)
 
 
-def _grid(
-    words: Strings, label: str, titles: Sequence[str], rows: _Rows, *, left: str = ""
-) -> Grid | None:
-    if not rows:
-        return None
-    merged_rows = merge_rows(rows)
-    columns = [(words("measured.integrator"), list(merged_rows.values()))]
-    columns += [(title, [row[n] for row in merged_rows]) for n, title in enumerate(titles)]
-    return grid(label, columns, words=(left,))
-
-
 def _boundaries(words: Strings, report: CaseReport) -> Grid | None:
     rows = [(line.integrator, _boundary(words, line)) for line in report.boundaries]
-    titles = [words(key) for key in _BOUNDARY]
     label = f"{report.title}: {stable_title(words, report.boundaries[0])}" if rows else ""
-    return _grid(words, label, titles, rows, left=words("measured.remark"))
+    return integrator_table(words, label, _BOUNDARY, rows, merge=True)
 
 
 def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
@@ -211,27 +199,18 @@ def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
 
 def _figures(words: Strings, report: CaseReport) -> Grid | None:
     """Quantities that are known."""
-    if not report.figures:
-        return None
-    names: list[str] = []
-    cells: list[tuple[str, ...]] = []
+    named_rows: list[NamedRow] = []
     parts: list[FigurePart] = []
     for name in dict.fromkeys(line.name for line in report.figures):
         lines = [line for line in report.figures if line.name == name]
         rows = merge_rows((line.integrator, _figure(words, line)) for line in lines)
-        names += rows.values()
-        cells += rows
-        unit, sources = (
-            lines[0].unit,
-            dict.fromkeys(figure.source for figure in lines if figure.source),
-        )
+        named_rows += rows
+        unit = lines[0].unit
+        sources = dict.fromkeys(figure.source for figure in lines if figure.source)
         title = sentence(f"{name} ({unit})" if unit else name).removesuffix(".")
         parts.append(FigurePart(title, "; ".join(sources), len(rows)))
-    columns = [(words("measured.integrator"), names)]
-    for n, key in enumerate(_FIGURE):
-        columns.append((words(key), [row[n] for row in cells]))
     label = words("numerics.figures", title=report.title)
-    return grid(label, columns, parts=tuple(parts))
+    return integrator_table(words, label, _FIGURE, named_rows, parts=tuple(parts))
 
 
 def _figure(words: Strings, line: FigureLine) -> tuple[str, ...]:
@@ -241,16 +220,6 @@ def _figure(words: Strings, line: FigureLine) -> tuple[str, ...]:
         difference = power(line.measured - line.exact, 2)
     spread = "" if line.spread is None else " … ".join(map(power, line.spread))
     return measured_text, spread, power(line.exact), difference
-
-
-def _orders(words: Strings, report: CaseReport) -> Grid | None:
-    rows: _Rows = []
-    for row in report.orders:
-        fits = (row.position, row.attitude, row.velocity)
-        if row.has_orders:
-            rows.append((row.integrator, tuple("" if fit is None else fit.text for fit in fits)))
-    titles = [words(key) for _, key in ORDERS]
-    return _grid(words, words("numerics.orders", title=report.title), titles, rows)
 
 
 def _notes(words: Strings, report: CaseReport) -> list[str]:

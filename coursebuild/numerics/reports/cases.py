@@ -1,16 +1,13 @@
 """The report on a hard case.
 
-Entry points: `CaseReport`; `merge_rows`, to join integrators with the same cells;
-`course_cases(report)`, the hard cases of a course's own: scenarios of models whose exact motion
-stands in `exact_file`.
+Entry points: `CaseReport`; `course_cases(report)`, the hard cases of a course's own: scenarios of
+models whose exact motion stands in `exact_file`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from itertools import pairwise
-from typing import TypeAlias
 
 from msgspec.structs import asdict
 
@@ -129,17 +126,6 @@ class CaseReport(Record, frozen=True):
                 part = math.log(high_error / error) / math.log(high_error / low_error)
                 return float(low_cost * (high_cost / low_cost) ** part)
         return None
-
-
-Cells: TypeAlias = tuple[str, ...]
-
-
-def merge_rows(rows: Iterable[tuple[str, Cells]]) -> dict[Cells, str]:
-    """Join rows with the same cells: the cells, and the names of their integrators."""
-    names_by_cells: dict[Cells, list[str]] = {}
-    for integrator, cells in rows:
-        names_by_cells.setdefault(cells, []).append(integrator)
-    return {cells: ", ".join(names) for cells, names in names_by_cells.items()}
 
 
 def exact_file(model: str) -> str:

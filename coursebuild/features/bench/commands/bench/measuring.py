@@ -65,7 +65,7 @@ def compile_scene(root: Path, scene: CourseScene, *, quick: bool) -> CompiledSce
     Raises:
         CannotMeasureError: this is not possible.
     """
-    with _report_errors(scene):
+    with report_errors(scene):
         model = _compile_model(root, scene)
         exact = _exact_motion(root, scene)
         scenarios = scenes(model, scene.declarations, quick=quick)
@@ -88,7 +88,7 @@ def run_scenario(
         CannotMeasureError: this is not possible.
     """
     clock = time.thread_time_ns if timed else None
-    with _report_errors(compiled_scene.scene), one_processor():
+    with report_errors(compiled_scene.scene), one_processor():
         scenario = compiled_scene.scenarios[number]
         return measure_scenario(compiled_scene.model, scenario, quick=quick, clock=clock, tell=tell)
 
@@ -109,14 +109,22 @@ def run_sweep(
     tell(sweep.name)
     clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
     scenarios = (s for s in compiled_scene.scenarios if sweep.scenario in (None, s.name))
-    with _report_errors(compiled_scene.scene):
+    with report_errors(compiled_scene.scene):
         return measure_sweep(compiled_scene.spec, next(scenarios), sweep, clocks, quick=quick)
 
 
 @contextmanager
-def _report_errors(scene: CourseScene) -> Iterator[None]:
-    """Turn errors into diagnostics at their places, and silence MuJoCo's warnings."""
-    source = scene.model.source
+def report_errors(
+    scene: CourseScene, failure: str = "the model `{}` cannot be measured", *errors: type[Exception]
+) -> Iterator[None]:
+    """Turn errors into diagnostics at their places, and silence MuJoCo's warnings.
+
+    `failure` says what is not possible because of one of `errors`, or of what MuJoCo refuses to
+    run, such as a model that asks for less memory than it needs.
+
+    Raises:
+        CannotMeasureError: there was one.
+    """
     try:
         with silent():
             yield
@@ -124,9 +132,10 @@ def _report_errors(scene: CourseScene) -> Iterator[None]:
         place = error.span or scene.declarations.source.span(0, 0)
         diagnostic = diagnose("scenario-model", place, error.message, help=error.help)
         raise CannotMeasureError(diagnostic) from None
-    except mujoco.FatalError as error:  # such as a model that asks for less memory than it needs
-        message = f"the model `{scene.name}` cannot be measured: {' '.join(str(error).split())}"
-        raise CannotMeasureError(diagnose("model-error", source.span(0, 0), message)) from None
+    except (mujoco.FatalError, *errors) as error:
+        message = f"{failure.format(scene.name)}: {' '.join(str(error).split())}"
+        place = scene.model.source.span(0, 0)
+        raise CannotMeasureError(diagnose("model-error", place, message)) from None
 
 
 def _compile_model(root: Path, scene: CourseScene) -> Any:

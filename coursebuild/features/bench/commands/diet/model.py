@@ -25,6 +25,7 @@ from coursebuild.core.model.results import Machine
 from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
+from coursebuild.features.bench.commands.bench.measuring import report_errors
 from coursebuild.features.bench.commands.diet.readers import readers_of
 from coursebuild.features.bench.commands.runs import CannotMeasureError
 from coursebuild.numerics.pruning.compare import pruning_scenes
@@ -32,7 +33,6 @@ from coursebuild.numerics.pruning.markup import MarkupError
 from coursebuild.numerics.pruning.model_text import ModelTextError, model_bytes, open_model
 from coursebuild.numerics.pruning.readers import Reader
 from coursebuild.numerics.pruning.survey import Order, Rerun, Survey, survey
-from coursebuild.numerics.scene import SceneError
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
 
 _TEXT = ".coursebuild-text.xml"
@@ -80,13 +80,20 @@ class DietModel:
         Raises:
             CannotMeasureError: the model cannot be looked at.
         """
-        source = self.scene.model.source
-        try:
-            text = open_model(self.path, self.read, self.compile)
-            declarations = self.scene.declarations
+        scene, declarations = self.scene, self.scene.declarations
+        failure = "the diet cannot look at the model `{}`"
+        with report_errors(scene, failure, ModelTextError, ValueError):
+            try:
+                text = open_model(self.path, self.read, self.compile)
+            except MarkupError as error:
+                message = f"{error.path}:{error.line}:{error.column} is no XML: {error.message}"
+                help = "MuJoCo reads it all the same; other tools do not"
+                place = scene.model.source.span(0, 0)
+                diagnostic = diagnose("model-error", place, message, help=help)
+                raise CannotMeasureError(diagnostic) from None
             order = Order(
-                self.scene.name,
-                self.scene.digest,
+                scene.name,
+                scene.digest,
                 machine,
                 text,
                 pruning_scenes(text.model, declarations, quick=quick),
@@ -100,20 +107,6 @@ class DietModel:
                 rerun,
             )
             return survey(order)
-        except MarkupError as error:
-            message = f"{error.path}:{error.line}:{error.column} is no XML: {error.message}"
-            help = "MuJoCo reads it all the same; other tools do not"
-            diagnostic = diagnose("model-error", source.span(0, 0), message, help=help)
-            raise CannotMeasureError(diagnostic) from None
-        except SceneError as error:
-            span = error.span or source.span(0, 0)
-            diagnostic = diagnose("scenario-model", span, error.message, help=error.help)
-            raise CannotMeasureError(diagnostic) from None
-        except (ModelTextError, ValueError, mujoco.FatalError) as error:
-            words = " ".join(str(error).split())
-            message = f"the diet cannot look at the model `{self.scene.name}`: {words}"
-            diagnostic = diagnose("model-error", source.span(0, 0), message)
-            raise CannotMeasureError(diagnostic) from None
 
     def write(self, survey: Survey) -> None:
         """Write the changes that were found; all of them, or none.
