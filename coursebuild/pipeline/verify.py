@@ -233,12 +233,11 @@ def compile_models(
     if not course.models and not texts:
         return (), ()
     from coursebuild.core.run import mjcf
-    from coursebuild.core.run.model_memory import compile_or_recall
 
     stage = functools.partial(options.progress.stage, "compiling models")
     texts_to_compile = [(model.source.path, model.source.text) for model in course.models]
     texts_to_compile += [(mjcf.TEXT_PATH, text.text) for text in texts]
-    results = compile_or_recall(
+    results = mjcf.compile_or_recall(
         options.root, options.store, texts_to_compile, stage, course.limits.memory
     )
     models = tuple(zip((model.name for model in course.models), results, strict=False))

@@ -34,7 +34,7 @@ from coursebuild.core.engine.manifest import (
     foreign_files,
     holds,
 )
-from coursebuild.core.engine.slot import NewSite, open_slot, put_away, remove, with_keys
+from coursebuild.core.engine.slot import NewSite, new_site, open_slot, put_away, remove
 from coursebuild.core.files.errors import EffectError, PublishRefusedError, reason
 from coursebuild.core.files.locks import folder_lock
 from coursebuild.core.model.results import FileList, SiteFile
@@ -88,12 +88,12 @@ def publish(
     """
     place = check_output_folder(root, out)
     root = Path(os.path.realpath(root))
-    keyed = with_keys(files, file_list)
+    files = tuple(files)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         with folder_lock(place.parent):
             _check_place(root, out, place)
-            site = NewSite(Manifest.read(root, place), keyed, file_list)
+            site = new_site(Manifest.read(root, place), files, file_list)
             if site.is_there():
                 return ()
             return _replace(root, place, site, jobs, stage)

@@ -1,7 +1,6 @@
 """The slot: a folder that is filled with the files of a new site, beside the site's place.
 
-Entry points: `NewSite`, whose `fill` fills a slot; `with_keys`, which gives its files their keys;
-`open_slot`, `put_away` and `remove`.
+Entry points: `new_site`, whose `fill` fills a slot; `open_slot`, `put_away` and `remove`.
 
 A slot holds the site before the last one, or nothing. A file stays in it, or is linked from the old
 site, if the manifest lists it under the same key and it has not changed; all others are made.
@@ -39,23 +38,22 @@ class NewSite(Struct, frozen=True):
     """The site to be published, and the manifest of the one that is there."""
 
     old: Manifest
-    files: Mapping[str, tuple[SiteFile, str]]
-    """By path, each with its key."""
+    files: Mapping[str, SiteFile]
+    """By path, without the file list."""
     file_list: FileList | None
+    keys: Mapping[str, str]
+    """The key of each file by its path, that of the file list included."""
 
     def is_there(self) -> bool:
         """Whether the published site is already this one, whole and without other files."""
-        keys = {path: key for path, (_, key) in self.files.items()}
-        if self.file_list is not None:
-            keys[self.file_list.path] = self._list_key(self.file_list)
-        if keys != {path: entry.key for path, entry in self.old.entries.items()}:
+        if self.keys != {path: entry.key for path, entry in self.old.entries.items()}:
             return False  # the usual case after an edit, found without looking at any file
         place = self.old.place
         try:
             return (
-                all(self.old.is_whole(path, key) for path, key in keys.items())
-                and holds(place, keys)
-                and (place / MARKER).read_bytes() == marker(keys)
+                all(self.old.is_whole(path, key) for path, key in self.keys.items())
+                and holds(place, self.keys)
+                and (place / MARKER).read_bytes() == marker(self.keys)
             )
         except OSError:
             return False
@@ -64,41 +62,24 @@ class NewSite(Struct, frozen=True):
         self, slot: Path, jobs: int, stage: Callable[[], AbstractContextManager[None]]
     ) -> tuple[dict[str, ManifestEntry], list[str]]:
         """Fill the slot with the site; return its entries and the paths that were written."""
-        folders = _folders([*self.files, *([self.file_list.path] if self.file_list else [])])
-        manifest_entries = {p: e for p, (_, k) in self.files.items() if (e := self.old.entry(p, k))}
-        entries = _remove_stale(f"{slot}/", "", manifest_entries, frozenset(folders))
+        folders = _folders(self.keys)
+        old_entries = {p: e for p, k in self.keys.items() if (e := self.old.entry(p, k))}
+        entries = _remove_stale(f"{slot}/", "", old_entries, frozenset(folders))
         for folder in folders:
             (slot / folder).mkdir(exist_ok=True)
             (slot / folder).chmod(0o755)  # whatever the umask is
-        for path, entry in manifest_entries.items():
+        for path, entry in old_entries.items():
             if path not in entries and self._link(path, entry, slot):
                 entries[path] = entry
-        new = [keyed_file for path, keyed_file in self.files.items() if path not in entries]
-        entries |= _write_files(slot, new, jobs, stage)
-        new_paths = [file.path for file, _ in new]
-        if self.file_list is not None and self._add_list(self.file_list, slot, entries):
-            new_paths.append(self.file_list.path)
+        new_paths = [path for path in self.keys if path not in entries]
+        new_files = [self.files[path] for path in new_paths if path in self.files]
+        entries |= self._write_all(slot, new_files, jobs, stage)
+        if self.file_list is not None and self.file_list.path not in entries:
+            facts = [FileFacts(path, e.digest, e.size) for path, e in sorted(entries.items())]
+            path = self.file_list.path
+            entries[path] = self._write(slot, OutputFile(path, self.file_list.make(facts)))
         _write_file(f"{slot}/{MARKER}", marker(entries))
         return entries, new_paths
-
-    def _add_list(self, file_list: FileList, slot: Path, entries: dict[str, ManifestEntry]) -> bool:
-        """Add the list of all files; return whether it had to be written."""
-        key = self._list_key(file_list)
-        entry = self.old.entry(file_list.path, key)
-        if entry is not None and self._link(file_list.path, entry, slot):
-            entries[file_list.path] = entry
-            return False
-        facts = [FileFacts(path, e.digest, e.size) for path, e in sorted(entries.items())]
-        target = f"{slot}/{file_list.path}"
-        digest = _write_file(target, file_list.make(facts))
-        entries[file_list.path] = ManifestEntry.of(key, digest, os.lstat(target))
-        return True
-
-    def _list_key(self, file_list: FileList) -> str:
-        """The list's key: a hash of the keys of all files, since the list names all of them."""
-        lines = (f"{key} {path}" for path, (_, key) in self.files.items())
-        text = "\n".join((file_list.key, *lines))
-        return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
     def _link(self, path: str, entry: ManifestEntry, slot: Path) -> bool:
         """Link a file of the old site into the slot, if it has not changed."""
@@ -113,33 +94,29 @@ class NewSite(Struct, frozen=True):
         Path(target).unlink()
         return False
 
+    def _write_all(
+        self,
+        slot: Path,
+        files: Sequence[SiteFile],
+        jobs: int,
+        stage: Callable[[], AbstractContextManager[None]],
+    ) -> dict[str, ManifestEntry]:
+        """Make files and write them, whose folders are there already; return their entries."""
 
-def _write_files(
-    folder: Path,
-    files: Sequence[tuple[SiteFile, str]],
-    jobs: int,
-    stage: Callable[[], AbstractContextManager[None]],
-) -> dict[str, ManifestEntry]:
-    """Make files, which come with their keys, and write them; return their entries.
+        def share(start: int) -> list[ManifestEntry]:
+            return [self._write(slot, file) for file in files[start : start + _TASK_SIZE]]
 
-    Their folders are there already.
-    """
+        can_share = jobs > 1 and len(files) >= _MIN_FOR_COPIES and can_fork()
+        with Workers(share, min(jobs, _MAX_COPIES) if can_share else 0) as workers, stage():
+            parts = workers.map((None, start) for start in range(0, len(files), _TASK_SIZE))
+            entries = (entry for part, _ in parts for entry in part)
+            return {file.path: entry for file, entry in zip(files, entries, strict=True)}
 
-    def write(file: SiteFile, key: str) -> ManifestEntry:
-        target = f"{folder}/{file.path}"
+    def _write(self, slot: Path, file: SiteFile) -> ManifestEntry:
+        target = f"{slot}/{file.path}"
         Path(target).unlink(missing_ok=True)  # half a file, if a copy died
-        return ManifestEntry.of(key, _write_file(target, file.make()), os.lstat(target))
-
-    def share(start: int) -> list[ManifestEntry]:
-        return [write(*keyed_file) for keyed_file in files[start : start + _TASK_SIZE]]
-
-    count = (
-        min(jobs, _MAX_COPIES) if jobs > 1 and len(files) >= _MIN_FOR_COPIES and can_fork() else 0
-    )
-    with Workers(share, count) as workers, stage():
-        parts = workers.map((None, start) for start in range(0, len(files), _TASK_SIZE))
-        entries = (entry for part, _ in parts for entry in part)
-        return {file.path: entry for (file, _), entry in zip(files, entries, strict=True)}
+        digest = _write_file(target, file.make())
+        return ManifestEntry.of(self.keys[file.path], digest, os.lstat(target))
 
 
 def _write_file(path: str, data: bytes) -> str:
@@ -150,26 +127,32 @@ def _write_file(path: str, data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def with_keys(
-    files: Iterable[SiteFile], file_list: FileList | None
-) -> dict[str, tuple[SiteFile, str]]:
-    """The files by path, each with its key.
+def new_site(old: Manifest, files: Iterable[SiteFile], file_list: FileList | None) -> NewSite:
+    """The site of these files, to be published over the one of a manifest.
 
     Raises:
         ValueError: a path is not valid in a site, or two files have the same.
     """
-    keyed: dict[str, tuple[SiteFile, str]] = {}
+    by_path: dict[str, SiteFile] = {}
     for file in files:
         path = file.path
         if _NO_PATH.search(path) or path == MARKER:
             raise ValueError(f"{path!r} is no path that a site may have")
-        if path in keyed or (file_list is not None and path == file_list.path):
+        if path in by_path or (file_list is not None and path == file_list.path):
             raise ValueError(f"the site has two files {path}")
-        if isinstance(file, OutputFile):
-            keyed[path] = file, f"={hashlib.sha256(file.data).hexdigest()}"
-        else:
-            keyed[path] = file, file.key
-    return keyed
+        by_path[path] = file
+    keys = {path: _key(file) for path, file in by_path.items()}
+    if file_list is not None:
+        # Of the keys of all files, since the list names all of them.
+        text = "\n".join((file_list.key, *(f"{key} {path}" for path, key in keys.items())))
+        keys[file_list.path] = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+    return NewSite(old, by_path, file_list, keys)
+
+
+def _key(file: SiteFile) -> str:
+    if isinstance(file, OutputFile):
+        return f"={hashlib.sha256(file.data).hexdigest()}"
+    return file.key
 
 
 def _folders(paths: Iterable[str]) -> list[str]:
@@ -204,14 +187,14 @@ def put_away(root: Path, slot: Path) -> None:
 
 
 def _remove_stale(
-    folder: str, prefix: str, manifest_entries: Mapping[str, ManifestEntry], folders: Container[str]
+    folder: str, prefix: str, old_entries: Mapping[str, ManifestEntry], folders: Container[str]
 ) -> dict[str, ManifestEntry]:
     """Remove everything from a folder but intact files and needed folders; return these files.
 
     Args:
         folder: its path, with a slash behind it.
         prefix: its path in the site, likewise.
-        manifest_entries: the entries of the files that may stay, by path.
+        old_entries: the entries of the files that may stay, by path.
         folders: the folders that may stay.
     """
     intact: dict[str, ManifestEntry] = {}
@@ -219,7 +202,7 @@ def _remove_stale(
         contents = list(entries)
     for entry in contents:
         path = prefix + entry.name
-        expected = manifest_entries.get(path)
+        expected = old_entries.get(path)
         if not entry.is_dir(follow_symlinks=False):
             if expected is not None and expected.fits(entry.stat(follow_symlinks=False)):
                 intact[path] = expected
@@ -227,7 +210,7 @@ def _remove_stale(
                 os.unlink(entry.path)  # noqa: PTH108 - thousands of them
         elif path in folders:
             os.chmod(entry.path, 0o755)  # noqa: PTH101
-            intact |= _remove_stale(f"{entry.path}/", f"{path}/", manifest_entries, folders)
+            intact |= _remove_stale(f"{entry.path}/", f"{path}/", old_entries, folders)
         else:
             remove(Path(entry.path))
     return intact

@@ -6,11 +6,10 @@
   `worker_main`
 - what a script looks at: `tracing` (with `mujoco_tracing`, `mujoco_files`) notes it,
   `trace_records` makes a trace of the notes, `dependencies` what a result depends on
-- `memory`: results stored with these (`run_record`), and found again; `model_memory` is the same
-  for compiled models
+- `memory`: results stored with these (`run_record`), and found again
 - `script_environment`, `packages`, `versions`: what results depend on, as it is now;
   `interpreter`: where scripts run, if the map names an environment for them
 - `v8` (with `typeset.js`): scripts with limits on time and memory; formulas to MathML
-- `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler
+- `mjcf` (with its child `mjcf_worker`): MuJoCo's compiler, and a memory of what it said
 - `child`: processes that answer requests
 """

@@ -17,7 +17,7 @@ import hashlib
 import math
 import os
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import assert_never
 
@@ -57,7 +57,7 @@ from coursebuild.core.run.run_record import (
 )
 from coursebuild.core.run.script_environment import Interpreter, conditions, places
 
-_RESULTS, _LAST = "scripts", "last"
+_RESULTS, _LAST = "scripts", "lastruns"
 _MOST_SHARED = 32
 """The most results of one group that are fetched from the shared cache."""
 _FETCHERS = 16
@@ -154,25 +154,22 @@ class Memory:
 
     def find_record(self, inputs: Inputs) -> RunRecord | None:
         """The result kept on this machine that holds now."""
-        group = group_key(inputs)
-        for key in self.store.group(_RESULTS, group):
-            record = self.store.peek(_RESULTS, key, from_bytes)
-            if record is not None and self._holds(record, inputs):
-                self._note(record, key)
-                return record
-        return None
+        records = (record for record in self.results(inputs) if self._holds(record))
+        record = next(records, None)
+        if record is not None:
+            self._note(record)
+        return record
 
-    def results(self, inputs: Inputs) -> list[RunRecord]:
+    def results(self, inputs: Inputs) -> Iterator[RunRecord]:
         """All results kept on this machine for these inputs, newest first."""
-        keys = self.store.group(_RESULTS, group_key(inputs))
-        records = (self.store.peek(_RESULTS, key, from_bytes) for key in keys)
-        return [record for record in records if record is not None and _fits(record, inputs)]
+        for key in self.store.group(_RESULTS, group_key(inputs)):
+            record = self.store.peek(_RESULTS, key, from_bytes)
+            if record is not None and _fits(record, inputs):
+                yield record
 
     def last_record(self, path: str) -> RunRecord | None:
         """The record of a script's last run, without what it printed."""
-        record = self.store.peek(
-            _LAST, _last_key(path), lambda data: from_bytes(data.partition(b"\n")[2])
-        )
+        record = self.store.peek(_LAST, _last_key(path), from_bytes)
         return record if record is not None and record.inputs.path == path else None
 
     def reasons(self, inputs: Inputs) -> list[str]:
@@ -224,14 +221,13 @@ class Memory:
         dependencies = dependencies_of(run, inputs.requires, states.places, states.now)
         reason = reason_forgotten(run) or self._reason_disturbed(inputs, dependencies)
         record = record_of(inputs, dependencies, int(time.time()), reason, run)
-        key = ""
         if not reason:
             assert run.outcome in STORABLE_OUTCOMES
             if self.fresh:
                 self._compare(record, run)
             key = f"{group_key(inputs)}/{result_key(dependencies)}"
             self.store.put(_RESULTS, key, to_bytes(record, self.states.places), shared=True)
-        self._note(record, key)
+        self._note(record)
 
     def _reason_disturbed(self, inputs: Inputs, dependencies: Iterable[Dependency]) -> str:
         """Why the states read now may differ from what the script saw, in words; else empty."""
@@ -254,53 +250,42 @@ class Memory:
                 return _REASON.format(path.removeprefix(f"{self.states.root}/"))
         return ""
 
-    def _holds(self, record: RunRecord, inputs: Inputs) -> bool:
-        changes = state_changes(record.dependencies, self.states)
-        return _fits(record, inputs) and next(changes, None) is None
+    def _holds(self, record: RunRecord) -> bool:
+        return next(state_changes(record.dependencies, self.states), None) is None
 
     def _fetch(self, all_inputs: Sequence[Inputs]) -> list[RunRecord]:
         """Results from the shared cache that hold."""
         if self.store.shared is None or not all_inputs:
             return []
 
-        def fetch(inputs: Inputs) -> list[tuple[str, RunRecord | None]]:
+        def fetch(inputs: Inputs) -> list[RunRecord]:
             group = group_key(inputs)
             local_keys = set(self.store.group(_RESULTS, group))
-            keys = [
-                key for key in self.store.shared_group(_RESULTS, group) if key not in local_keys
-            ]
-            return [
-                (key, self.store.get(_RESULTS, key, from_bytes, shared=True))
-                for key in keys[:_MOST_SHARED]
-            ]
+            all_keys = self.store.shared_group(_RESULTS, group)
+            new_keys = [key for key in all_keys if key not in local_keys]
+            records = (
+                self.store.get(_RESULTS, key, from_bytes, shared=True)
+                for key in new_keys[:_MOST_SHARED]
+            )
+            return [record for record in records if record is not None and _fits(record, inputs)]
 
-        records: list[RunRecord] = []
         from concurrent.futures import ThreadPoolExecutor
 
         with ThreadPoolExecutor(_FETCHERS, "cache") as pool:
-            for inputs, entries in zip(all_inputs, pool.map(fetch, all_inputs), strict=True):
-                for key, record in entries:
-                    if record is not None and self._holds(record, inputs):
-                        self._note(record, key)
-                        records.append(record)
-                        break
+            groups = [filter(self._holds, group) for group in pool.map(fetch, all_inputs)]
+        records = [record for group in groups if (record := next(group, None)) is not None]
+        for record in records:
+            self._note(record)
         return records
 
-    def _note(self, record: RunRecord, result: str = "") -> None:
-        """Note a script's last run under its path.
-
-        `result` is the key of the result, where it is remembered.
-        """
+    def _note(self, record: RunRecord) -> None:
+        """Note a script's last run under its path."""
         if self.is_elsewhere or is_perturbed(record.inputs):
             return
         key = _last_key(record.inputs.path)
-        head = f"{result}\n".encode()
-        before = self.store.peek(_LAST, key, bytes)
-        if result and before is not None and before.startswith(head):
-            return
         run = replace(record.stored_run, stdout="", stderr="", trace=None, figures=())
-        data = head + to_bytes(replace(record, stored_run=run), ())
-        if before != data:
+        data = to_bytes(replace(record, stored_run=run), ())
+        if self.store.peek(_LAST, key, bytes) != data:
             self.store.put(_LAST, key, data)
 
     def _compare(self, record: RunRecord, run: ScriptRun) -> None:

@@ -1,32 +1,43 @@
 """Compile MJCF with MuJoCo itself, in a child process.
 
-Entry points: `compile_all`; `model_files`, what a model is made of; `readable_error`, for people.
+Entry points: `compile_or_recall`, for results kept under a `model_key`; `compile_all`;
+`model_files`, what a model is made of; `readable_error`, for people.
 
 1. One child compiles everything; it starts again if a model crashes it or takes too long.
 2. A text is compiled as if it stood in `models/`, so that its includes and assets are found there.
 3. The messages are MuJoCo's own and whole, without the paths of this machine; a line is read from
    them if it is one of the compiled text, and not of a file that it includes.
+4. A result, also an error, is kept under a hash of the text, its place, and the state of every
+   other file that MuJoCo looks for. If one of these changed meanwhile, nothing is kept.
 """
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import msgspec
 
+from coursebuild.core.engine.digests import file_state
+from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model.results import CompileResult, ModelFacts
-from coursebuild.core.run import mjcf_worker
+from coursebuild.core.run import mjcf_worker, mujoco_files
 from coursebuild.core.run.child import MEMORY, JsonChild
 from coursebuild.core.run.mujoco_files import ModelFiles
+from coursebuild.core.run.versions import engine_version
+from coursebuild.core.values import fingerprint
 
 TIMEOUT = 60.0
 """Seconds that one model may take; large meshes take some."""
 OWN_FAULT = "MuJoCo's compiler "
 """How messages begin that are about the process that compiles."""
 _NO_MEMORY = re.compile(r"unknown exception|allocate memory|MemoryError|bad_alloc", re.IGNORECASE)
+_KIND = "models"
 _TEXT_NAME = ".coursebuild-text.xml"
 TEXT_PATH = f"models/{_TEXT_NAME}"
 """Where a text without a file would stand; no file has this name."""
@@ -56,6 +67,46 @@ def compile_all(
         return ()
     with _Compiler(root.resolve(), timeout, python, memory) as compiler:
         return tuple(compiler.compile(*text) for text in texts)
+
+
+def compile_or_recall(
+    root: Path,
+    store: Memo,
+    texts: Sequence[tuple[str, str]],
+    stage: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext,
+    memory: int = MEMORY,
+) -> tuple[CompileResult, ...]:
+    """A result for each text, see `compile_all`.
+
+    `stage` is entered only if anything has to be compiled.
+    """
+    keys = {model: model_key(root, *model) for model in texts}
+    entries = {model: store.get_value(_KIND, key, CompileResult) for model, key in keys.items()}
+    results = {model: result for model, result in entries.items() if result is not None}
+    uncompiled = [model for model in keys if model not in results]
+    if uncompiled:
+        with stage():
+            new_results = compile_all(root, uncompiled, memory=memory)
+        for model, result in zip(uncompiled, new_results, strict=True):
+            results[model] = result
+            if not result.error.startswith(OWN_FAULT) and model_key(root, *model) == keys[model]:
+                with contextlib.suppress(UnicodeEncodeError):  # a name of a file that is no text
+                    store.put_value(_KIND, keys[model], result)
+    return tuple(results[model] for model in texts)
+
+
+def model_key(root: Path, path: str, text: str) -> str:
+    """A hash of all that a compiled model depends on."""
+    files = model_files(root, path, text)
+    states = tuple((file, file_state(str(root / file))) for file in files)
+    return fingerprint((engine_version(), _code(), path, text, states))
+
+
+@functools.cache
+def _code() -> tuple[bytes, ...]:
+    """The code that compiles models and reads their facts."""
+    files = (__file__, mjcf_worker.__file__, mujoco_files.__file__)
+    return tuple(Path(file).read_bytes() for file in files)
 
 
 class _Compiler(JsonChild):

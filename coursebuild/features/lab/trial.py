@@ -29,8 +29,7 @@ from coursebuild.core.features import Trial, TrialContext, TrialOutcome
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model.results import TrialLine, TrialResult
 from coursebuild.core.run.child import MEMORY
-from coursebuild.core.run.mjcf import model_files
-from coursebuild.core.run.model_memory import model_key
+from coursebuild.core.run.mjcf import model_files, model_key
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import fingerprint
