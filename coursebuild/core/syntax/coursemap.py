@@ -59,7 +59,7 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
         *parsed_toml.diagnostics,
         *decoding.diagnostics,
         *_check_ids(root, nodes),
-        *_check_files(root, decoding),
+        *_check_files(decoding),
         *check_settings(root, decoding),
     ]
     unusable = bool(diagnostics)
@@ -127,11 +127,11 @@ def _read_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[L
     """The levels, with those of their lessons whose fields are right."""
     for node in root.objects("level"):
         name = _read_id(node.get("id"))
-        inner = decoding.valid_structs(node.objects("lesson"), LessonTable)
+        inner = decoding.each(LessonTable, node.objects("lesson"))
         lessons = tuple(_build_lesson(*lesson, name) for lesson in inner)
-        fields = next((fields for _, fields in decoding.valid_structs([node], LevelTable)), None)
-        title, summary = ("", "") if fields is None else (fields.title, fields.summary)
-        yield Level(node.span, name, title, summary, lessons)
+        fields = decoding.structs.get(node)
+        known = (fields.title, fields.summary) if isinstance(fields, LevelTable) else ("", "")
+        yield Level(node.span, name, *known, lessons)
 
 
 def _build_lesson(node: ObjectNode, table: LessonTable, level: str) -> Lesson:
@@ -182,16 +182,16 @@ def _check_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[
     """Check that each lesson stands in the level that its id begins with."""
     for level in root.objects("level"):
         name = _read_id(level.get("id"))
-        for node, fields in decoding.valid_structs(level.objects("lesson"), LessonTable):
+        for node, fields in decoding.each(LessonTable, level.objects("lesson")):
             if name and not fields.id.startswith(f"{name}."):
                 message = f"the lesson `{fields.id}` stands in the level `{shorten(name)}`"
                 help = f"an id in this level begins with `{shorten(name)}.`"
                 yield diagnose("field-value", node.place("id"), message, help=help)
 
 
-def _check_files(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
+def _check_files(decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
     files: list[tuple[str, Span]] = []
-    for node, fields in decoding.valid_structs(root.objects("page"), PageTable):
+    for node, fields in decoding.each(PageTable):
         place = node.place("file")
         files.append((fields.file, place))
         if fields.id in _RESERVED_IDS:

@@ -63,11 +63,11 @@ class Decoding(Struct, Generic[S], frozen=True):
     texts: tuple[tuple[StringNode, str], ...]
     """Every string that is Markdown, with `blocks` or `inlines`."""
 
-    def valid_structs(
-        self, nodes: Iterable[ObjectNode], type: type[T]
+    def each(
+        self, type: type[T], nodes: Iterable[ObjectNode] | None = None
     ) -> Iterator[tuple[ObjectNode, T]]:
-        """The objects whose own fields are right, each with its struct."""
-        for node in nodes:
+        """The objects, of all or of `nodes`, that are right and of a type, each with its struct."""
+        for node in self.structs if nodes is None else nodes:
             struct = self.structs.get(node)
             if isinstance(struct, type):
                 yield node, struct

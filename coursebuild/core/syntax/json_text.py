@@ -12,6 +12,8 @@ Entry points: `parse_json(body, place)`; `to_one_line`, a value without its layo
 
 from __future__ import annotations
 
+import contextlib
+import json
 import re
 from typing import NoReturn
 
@@ -50,7 +52,7 @@ _ESCAPE = re.compile(
     r"\\u[Dd][89ABab][0-9A-Fa-f]{2}\\u[Dd][C-Fc-f][0-9A-Fa-f]{2}"
     r"|\\u[0-9A-Fa-f]{4}|\\.|[\x00-\x1f\ud800-\udfff]"
 )
-_ESCAPES = {'"': '"', "\\": "\\", "/": "/", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t"}
+_SURROGATE = re.compile(r"[\ud800-\udfff]")
 _CURLY_QUOTES = "“”„‟‘’‚‛«»"
 _CONSTANTS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
 _CONSTANTS |= dict.fromkeys(("None", "NULL", "Null", "nil", "undefined"), "null")
@@ -246,16 +248,12 @@ class _Reader:
 
     def decode_escape(self, match: re.Match[str]) -> str:
         """The character that an escape stands for; a wrong one is reported."""
-        escape = match[0]
-        if len(escape) == 12:
-            high, low = int(escape[2:6], 16), int(escape[8:], 16)
-            return chr(0x10000 + ((high - 0xD800) << 10) + low - 0xDC00)
-        if escape[0] == "\\" and escape[1] in _ESCAPES:
-            return _ESCAPES[escape[1]]
-        code = int(escape[2:], 16) if len(escape) == 6 else ord(escape[0])
-        if len(escape) == 6 and not 0xD800 <= code < 0xE000:
-            return chr(code)
-        message, help = _escape_mistake(self.text, match, code)
+        char = ""
+        with contextlib.suppress(ValueError):
+            char = json.loads(f'"{match[0]}"')
+        if char and not _SURROGATE.match(char):
+            return char
+        message, help = _escape_mistake(self.text, match, char)
         self.report(match.start(), match.end(), message, help)
         return "\ufffd"
 
@@ -293,17 +291,20 @@ class _Reader:
         raise _UnreadableError
 
 
-def _escape_mistake(text: str, match: re.Match[str], code: int) -> tuple[str, str]:
-    """What is wrong with an escape or a character inside a string, and how to mend it."""
+def _escape_mistake(text: str, match: re.Match[str], char: str) -> tuple[str, str]:
+    """What is wrong with an escape or a character inside a string, and how to mend it.
+
+    `char` is the half of a character that an escape stands for, if it does.
+    """
     escape = match[0]
-    if 0xD800 <= code < 0xE000:
-        name = f"`{escape}`" if len(escape) > 1 else f"U+{code:04X}"
+    if char:
+        name = f"`{escape}`" if len(escape) > 1 else f"U+{ord(char):04X}"
         return f"{name} is half of a character", "write the character itself"
     if escape == "\t":
         return "a tab inside a string", "write `\\t`, or a space"
     if len(escape) == 1:
-        message = f"the control character U+{code:04X} inside a string"
-        return message, f"write `\\u{code:04x}`, or remove it"
+        message = f"the control character U+{ord(escape):04X} inside a string"
+        return message, f"write `\\u{ord(escape):04x}`, or remove it"
     word = tex_word(text, match.start() + 1)
     if escape != "\\u":
         return f"`{escape}` is not an escape of JSON", _backslash_help(word)

@@ -77,9 +77,9 @@ def parse_declarations(source: Source) -> Parsed[Declarations | None]:
     diagnostics = [
         *parsed_toml.diagnostics,
         *decoding.diagnostics,
-        *_check_scenarios(root, decoding),
-        *_check_sweeps(root, decoding),
-        *_check_names(root, decoding),
+        *_check_scenarios(decoding),
+        *_check_sweeps(decoding),
+        *_check_names(decoding),
     ]
     if diagnostics or decoding.value is None:
         return Parsed(None, sort_diagnostics(diagnostics))
@@ -126,22 +126,20 @@ def _build_scenario(node: ObjectNode, table: ScenarioTable) -> DeclaredScenario:
 # ---------------------------------------------------------------------------------------- checks
 
 
-def _check_names(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
-    for kind, table, field, message in (
-        ("scenario", ScenarioTable, "name", "two scenarios have the name `{}`"),
-        ("sweep", SweepTable, "name", "two sweeps have the name `{}`"),
-        ("keep", KeepTable, "finding", "the finding `{}` is kept twice"),
+def _check_names(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
+    for table, field, message in (
+        (ScenarioTable, "name", "two scenarios have the name `{}`"),
+        (SweepTable, "name", "two sweeps have the name `{}`"),
+        (KeepTable, "finding", "the finding `{}` is kept twice"),
     ):
-        structs = decoding.valid_structs(root.objects(kind), table)
+        structs = decoding.each(table)
         names = [(getattr(struct, field), node.place(field)) for node, struct in structs]
         yield from check_unique(names, "field-value", message)
 
 
-def _check_sweeps(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
-    names = [
-        table.name for _, table in decoding.valid_structs(root.objects("scenario"), ScenarioTable)
-    ]
-    for node, table in decoding.valid_structs(root.objects("sweep"), SweepTable):
+def _check_sweeps(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
+    names = [table.name for _, table in decoding.each(ScenarioTable)]
+    for node, table in decoding.each(SweepTable):
         if table.scenario is not None and table.scenario not in names:
             message = f"no scenario is called `{table.scenario}`"
             help = did_you_mean(table.scenario, names)
@@ -156,8 +154,8 @@ def _check_sweeps(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[D
             yield diagnose("field-value", node.object("vary").place("threads"), message)
 
 
-def _check_scenarios(root: ObjectNode, decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
-    for node, table in decoding.valid_structs(root.objects("scenario"), ScenarioTable):
+def _check_scenarios(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
+    for node, table in decoding.each(ScenarioTable):
         yield from _check_times(node, table)
         yield from _check_timesteps(node, table)
         yield from _check_controls(node, table)

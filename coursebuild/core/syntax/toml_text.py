@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import tree_sitter
 import tree_sitter_toml
@@ -37,7 +37,6 @@ from coursebuild.core.text.source import Excerpt, Source
 _LANGUAGE = tree_sitter.Language(tree_sitter_toml.language())
 _NOT_ASCII = re.compile(r"[^\x00-\x7f]")
 _ESCAPE = re.compile(r"\\(?:[ \t]*\n[ \t\n]*|u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|x[0-9A-Fa-f]{2}|.)")
-_ESCAPES = {"b": "\b", "t": "\t", "n": "\n", "f": "\f", "r": "\r", "e": "\x1b"}
 
 
 def parse_toml(text: Source | Excerpt, *, rule: str = "map-syntax") -> Parsed[ObjectNode | None]:
@@ -225,8 +224,7 @@ class _Reader:
             case "boolean":
                 return BoolNode(self.body, start, end, self.text[start:end] == "true")
             case "integer" | "float":
-                number = tomllib.loads("x = " + self.text[start:end])["x"]
-                return NumberNode(self.body, start, end, number)
+                return NumberNode(self.body, start, end, _value_of(self.text[start:end]))
             case _:
                 return DateNode(self.body, start, end)
 
@@ -238,17 +236,11 @@ class _Reader:
         if width == 3 and self.text[content[0]] == "\n":  # a line end here is no part of the text
             content = (content[0] + 1, content[1])
         escapes = _ESCAPE.finditer(self.text, *content) if quote == '"' else ()
-        replacements = ((escape, _decode_escape(escape)) for escape in escapes)
+        replacements = ((escape, _value_of(f'"""{escape[0]}"""')) for escape in escapes)
         value = replace_escapes(self.body, content, replacements)
         self.diagnostics += check_tex_escapes(value, double_backslash)
         return StringNode(self.body, start, end, value)
 
 
-def _decode_escape(escape: re.Match[str]) -> str:
-    """The text that an escape stands for."""
-    letter = escape[0][1]
-    if letter in "uUx":
-        return chr(int(escape[0][2:], 16))
-    if letter in " \t\n":  # the string goes on in the next line
-        return ""
-    return _ESCAPES.get(letter, letter)
+def _value_of(text: str) -> Any:
+    return tomllib.loads(f"x = {text}")["x"]

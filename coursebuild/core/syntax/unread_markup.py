@@ -22,8 +22,8 @@ _MATH_HELP = (
 )
 
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
-_FOREIGN_SIGNS = re.compile(r"[{\[\\$]|==|!!!|\?\?\?|:::")
-"""Characters of which markup of other tools has at least one."""
+_SIGNS = re.compile(r"[{\[\\$]|==|!!!|\?\?\?|:::")
+"""Characters of which unread markup has at least one."""
 _NUMBER = r"(?<![\w.])[-+\u2212]?\d[\w.,]*"
 _FOREIGN: dict[str, tuple[str, str, str]] = {
     "binding": (
@@ -101,44 +101,28 @@ def check_unread_markup(content: Excerpt, texts: Sequence[tuple[int, str]]) -> I
     `texts` are its texts that are neither code nor formulas nor escaped, in order, each with its
     offset in the content.
     """
-    dollar = _find_unread_formula(texts)
-    if dollar is not None:
-        message = "a dollar sign and TeX stand in the text: no formula was read here"
-        yield diagnose("math-unread", content.span(dollar, dollar + 1), message, help=_MATH_HELP)
-    yield from _find_foreign(content, texts)
-
-
-def _find_unread_formula(texts: Sequence[tuple[int, str]]) -> int | None:
-    """The offset of the first dollar sign of a formula that was not read.
-
-    `$5` is money and stays so. But a blank inside `$x = $`, or a list that begins in the middle of
-    a formula because a line of it starts with `+ `, leaves dollar signs and commands of TeX in the
-    text.
-    """
-    dollars = [text for _, text in texts if "$" in text]
-    if not any(_DOLLAR.search(text) for text in dollars):
-        return None
-    parts, end = list[str](), 0
-    for at, text in texts:
-        parts += ["\0"] * (at > end) + [text]  # other content lies between two texts
-        end = at + len(text)
-    if _TEX.search("".join(parts)) is None:
-        return None
-    return next(at + text.index("$") for at, text in texts if "$" in text)
-
-
-def _find_foreign(content: Excerpt, texts: Sequence[tuple[int, str]]) -> Iterator[Diagnostic]:
-    """Report markup that another tool would read."""
     whole = content.text
     has_escaped_bracket = "\\(" in whole or "\\[" in whole
-    if not has_escaped_bracket and not any(_FOREIGN_SIGNS.search(text) for _, text in texts):
+    if not has_escaped_bracket and not any(_SIGNS.search(text) for _, text in texts):
         return
     parts, end = list[str](), 0
     for at, text in texts:
         parts += [_mask(whole[end:at]), text]
         end = at + len(text)
-    parts.append(_mask(whole[end:]))
-    for match in _ANY_FOREIGN.finditer("".join(parts)):
+    masked = "".join([*parts, _mask(whole[end:])])
+    # `$5` is money and stays so. But a blank inside `$x = $`, or a list that begins in the middle
+    # of a formula because a line of it starts with `+ `, leaves dollars and TeX in the text.
+    if any(_DOLLAR.search(text) for _, text in texts) and _TEX.search(masked):
+        dollar = masked.index("$")
+        message = "a dollar sign and TeX stand in the text: no formula was read here"
+        yield diagnose("math-unread", content.span(dollar, dollar + 1), message, help=_MATH_HELP)
+    yield from _find_foreign(content, masked)
+
+
+def _find_foreign(content: Excerpt, masked: str) -> Iterator[Diagnostic]:
+    """Report markup that another tool would read."""
+    whole = content.text
+    for match in _ANY_FOREIGN.finditer(masked):
         start, kind = match.start(), match.lastgroup or ""
         markup = whole[start : match.end()].strip()
         start = whole.index(markup, start)
