@@ -16,7 +16,7 @@ from msgspec import Struct
 from coursebuild.core.model import CodeBlock
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.info import FenceKeys, kind_of, read_keys, split_words
-from coursebuild.core.syntax.spans import PositionedToken, locate, trim
+from coursebuild.core.syntax.spans import NO_TEXT, PositionedToken, trim
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -74,13 +74,13 @@ def is_known_kind(kind: str) -> bool:
 
 def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
     """The fence of a `fence` token of the text `base`."""
-    assert token.map is not None
     info_start = token.start + len(token.markup)
     info_end = info_start + len(token.info)
     info = trim(base.slice(info_start, info_end))
-    is_closed = len(token.rows) == token.map[1] - token.map[0] - 2
-    body = locate(base, token.rows) if token.rows else base.slice(info_end + 1, info_end + 1)
-    if token.rows and not body.text.endswith("\n"):
+    is_closed, body = token.meta["closed"], token.text
+    if body is NO_TEXT:
+        body = base.slice(info_end + 1, info_end + 1)
+    elif not body.text.endswith("\n"):
         body = Excerpt(base.source, body.text + "\n", body.pieces)
     span = base.span(token.start, token.end)
     head = base.span(token.start, info_start + len(token.info.rstrip()))

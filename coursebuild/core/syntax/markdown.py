@@ -20,11 +20,10 @@ from markdown_it.common.utils import MD_TRIM_CHARS
 from markdown_it.parser_block import ParserBlock
 from markdown_it.ruler import Ruler
 from markdown_it.rules_block import StateBlock, paragraph, reference
-from markdown_it.utils import EnvType
 from mdit_py_plugins.footnote.index import footnote_def
 
 from coursebuild.core.syntax.math import math_block
-from coursebuild.core.syntax.spans import BlockState, PositionedToken, SourceSlice
+from coursebuild.core.syntax.spans import BlockState, PositionedToken
 from coursebuild.core.text.source import Excerpt
 
 MAX_NESTING = 60
@@ -47,8 +46,7 @@ def block_tokens(base: Excerpt, references: References) -> list[PositionedToken]
 
     Its link definitions are added to `references`.
     """
-    env: EnvType = {"references": references, "base": base}
-    state = BlockState(base.text, _MARKDOWN, env)
+    state = BlockState(base, _MARKDOWN, {"references": references})
     state.lines_left = _MAX_READINGS * state.lineMax + _SPARE_LINES
     _MARKDOWN.block.tokenize(state, 0, state.lineMax)
     return cast(list[PositionedToken], state.tokens)
@@ -70,15 +68,15 @@ def _footnote_definition(state: StateBlock, start: int, end: int, silent: bool) 
 
 def _link_definition(state: StateBlock, start: int, end: int, silent: bool) -> bool:
     """The rule for a link definition, which also stores its place."""
+    assert isinstance(state, BlockState)
     references: References = state.env["references"]
     count = len(references)
     if not reference(state, start, end, silent):
         return False
     if not silent and len(references) > count:
-        base: Excerpt = state.env["base"]
         starts = (state.bMarks[line] + state.tShift[line] for line in range(start, state.line))
         ends = state.eMarks[start : state.line]
-        rows = [base.slice(at, end + 1) for at, end in zip(starts, ends, strict=True)]
+        rows = [state.base.slice(at, end + 1) for at, end in zip(starts, ends, strict=True)]
         references[next(reversed(references))]["place"] = Excerpt.join(rows)
     return True
 
@@ -144,10 +142,11 @@ def _set_place(state: BlockState, first_token: int, begin: int) -> None:
     while last > first and state.isEmpty(last):
         last -= 1
     opening.start, opening.end = begin, state.eMarks[last]
-    if opening.type in ("fence", "code_block", "html_block", "paragraph_open"):
-        opening.rows = state.rows
+    if opening.type in ("fence", "code_block", "html_block", "paragraph_open", "math_block"):
+        opening.text = state.text
+        opening.meta["closed"] = state.text_end < state.line  # by a line of its own
     elif opening.type == "heading_open":
-        opening.rows = _atx_row(state, begin) if opening.markup[0] == "#" else state.rows
+        opening.text = _atx_text(state, begin) if opening.markup[0] == "#" else state.text
     elif opening.type == "table_open":
         for token in state.tokens[first_token:]:
             if token.type == "tr_open" and isinstance(token, PositionedToken) and token.map:
@@ -156,13 +155,13 @@ def _set_place(state: BlockState, first_token: int, begin: int) -> None:
                 token.end = state.eMarks[row]
 
 
-def _atx_row(state: BlockState, begin: int) -> list[SourceSlice]:
-    """The row of a `#` heading's content, which its rule does not cut by `getLines`."""
+def _atx_text(state: BlockState, begin: int) -> Excerpt:
+    """The content of a `#` heading, which its rule does not cut by `getLines`."""
     content = state.tokens[-2].content
     at = state.skipCharsStr(begin, "#")
     while content and state.src[at] in MD_TRIM_CHARS:
         at += 1
-    return [SourceSlice(at, at + len(content))]
+    return state.base.slice(at, at + len(content))
 
 
 def _build_parser() -> MarkdownIt:

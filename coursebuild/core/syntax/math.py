@@ -17,7 +17,7 @@ from markdown_it.rules_block import StateBlock
 from markdown_it.rules_inline import StateInline
 
 from coursebuild.core.syntax.attributes import LABEL, SYMBOL
-from coursebuild.core.syntax.spans import BlockState, InlineState, PositionedToken
+from coursebuild.core.syntax.spans import BlockState, InlineState
 
 _TEX = re.compile(r"(?:[^\\`$]++|\\[\s\S])*+")
 _BLOCK_TEX = re.compile(r"(?:[^\\$]++|\\[\s\S]|\$(?!\$))*+")
@@ -105,9 +105,7 @@ def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) 
         return True
     state.line = line
     token = state.push("math_block", "", 0)
-    assert isinstance(token, PositionedToken)
     token.content = state.getLines(start_line, line, state.sCount[start_line], False)
-    token.rows = state.rows
     token.map = [start_line, line]
     token.info = "" if is_closed else "unclosed"
     return True

@@ -1,21 +1,19 @@
 """Tokens and parser states of markdown-it that keep positions.
 
 Entry points: `BlockState`, `InlineState` (markdown-it's parser states, whose tokens are
-`PositionedToken`s), `locate` (content rows into an `Excerpt`).
+`PositionedToken`s); `read_markdown`, `normalize`, `trim`.
 
-1. Block rules cut lines out of the text by `getLines`; `BlockState` keeps the position of each of
-   these rows.
-2. `locate` joins such rows of the parsed text, a whole file or a text in JSON, to an excerpt.
-3. Inline rules work on one block's content; `InlineState` keeps the start and the end of each token
+1. Block rules cut lines out of the text, a whole file or a text in JSON, by `getLines`;
+   `BlockState` cuts them as an excerpt.
+2. Inline rules work on one block's content; `InlineState` keeps the start and the end of each token
    in it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from markdown_it import MarkdownIt
 from markdown_it.common.utils import MD_TRIM_CHARS
@@ -26,14 +24,7 @@ from markdown_it.utils import EnvType
 
 from coursebuild.core.text.source import Excerpt, Source
 
-
-class SourceSlice(NamedTuple):
-    """The part `[start, end)` of the parsed text, which belongs to a block's content."""
-
-    start: int
-    end: int
-    padding: int = 0
-    """How many spaces are put before it, in place of the rest of a tab before `start`."""
+NO_TEXT = Excerpt(Source("", ""), "", ((0, 0),))
 
 
 @dataclass(slots=True)
@@ -42,16 +33,18 @@ class PositionedToken(Token):
 
     start: int = -1
     end: int = -1
-    rows: Sequence[SourceSlice] = ()
-    """The rows of a block's content, one for each line."""
+    text: Excerpt = NO_TEXT
+    """The content of a block."""
 
 
 class BlockState(StateBlock):
-    """The state of the block rules; `rows` are those that the last rule cut out."""
+    """The state of the block rules of the text `base`."""
 
-    def __init__(self, src: str, md: MarkdownIt, env: EnvType) -> None:
-        super().__init__(src, md, env, [])
-        self.rows: Sequence[SourceSlice] = ()
+    def __init__(self, base: Excerpt, md: MarkdownIt, env: EnvType) -> None:
+        super().__init__(base.text, md, env, [])
+        self.base = base
+        self.text, self.text_end = NO_TEXT, 0
+        """What the last rule cut out, and the line after it."""
         self.lines_left = 0
         """How many more lines containers may read."""
 
@@ -69,12 +62,21 @@ class BlockState(StateBlock):
 
     def getLines(self, begin: int, end: int, indent: int, keepLastLF: bool) -> str:  # noqa: N802
         """The lines from `begin` to `end` without `indent` columns of their indentation."""
-        self.rows = rows = [
-            self._row(line, indent, keepLastLF or line + 1 < end) for line in range(begin, end)
-        ]
-        return "".join([" " * row.padding + self.src[row.start : row.end] for row in rows])
+        rows = [self._row(line, indent, keepLastLF or line + 1 < end) for line in range(begin, end)]
+        if all(row[1] == after[0] and not after[2] for row, after in pairwise(rows)):
+            rows = [(rows[0][0], rows[-1][1], rows[0][2])] if rows else []
+        parts: list[Excerpt] = []
+        for start, stop, padding in rows:
+            if padding:
+                tab = self.base.offset(start - 1)
+                pieces = tuple((i, tab) for i in range(padding))
+                parts.append(Excerpt(self.base.source, " " * padding, pieces))
+            parts.append(self.base.slice(start, stop))
+        self.text, self.text_end = Excerpt.join(parts) if parts else NO_TEXT, end
+        return self.text.text
 
-    def _row(self, line: int, indent: int, line_end: bool) -> SourceSlice:
+    def _row(self, line: int, indent: int, line_end: bool) -> tuple[int, int, int]:
+        """The offsets of a line, and the spaces in place of the rest of a tab before it."""
         src, first = self.src, self.bMarks[line]
         last = self.eMarks[line] + 1 if line_end else self.eMarks[line]
         shift = self.tShift[line]
@@ -88,7 +90,7 @@ class BlockState(StateBlock):
             else:
                 break
             first += 1
-        return SourceSlice(first, last, max(0, column - max(0, indent)))
+        return first, last, max(0, column - max(0, indent))
 
 
 class InlineState(StateInline):
@@ -131,19 +133,6 @@ class InlineState(StateInline):
         self.tokens.append(token)
         self.tokens_meta.append(meta)
         return token
-
-
-def locate(base: Excerpt, rows: Sequence[SourceSlice]) -> Excerpt:
-    """The rows joined, each character with its place in the source of `base`."""
-    is_contiguous = all(row.end == after.start for row, after in pairwise(rows))
-    if rows and is_contiguous and not any(row.padding for row in rows):  # the usual case
-        return base.slice(rows[0].start, rows[-1].end)
-    parts: list[Excerpt] = []
-    for start, end, padding in rows:
-        for _ in range(padding):
-            parts.append(Excerpt(base.source, " ", ((0, base.offset(start - 1)),)))
-        parts.append(base.slice(start, end))
-    return Excerpt.join(parts)
 
 
 def trim(excerpt: Excerpt, chars: str = MD_TRIM_CHARS) -> Excerpt:

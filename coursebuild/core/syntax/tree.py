@@ -38,7 +38,7 @@ from coursebuild.core.syntax.recording import (
     record_table,
 )
 from coursebuild.core.syntax.safe_html import find_forbidden
-from coursebuild.core.syntax.spans import PositionedToken, locate, normalize, trim
+from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
 from coursebuild.core.syntax.tables import read_table
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
@@ -65,7 +65,7 @@ class TextReader:
         """Collect explicit ids and footnotes, and report what nests too deep."""
         for i, token in enumerate(self.tokens):
             if token.type == "heading_open" and self.tokens[i + 1].content.endswith("}"):
-                name = read_attributes(self._content(token)).value.id
+                name = read_attributes(trim(token.text)).value.id
                 if name is not None:
                     self.state.anchors.reserve(name.text[1:])
             elif token.type == "footnote_reference_open":
@@ -114,15 +114,11 @@ class TextReader:
     def _span(self, token: PositionedToken) -> Span:
         return self.base.span(token.start, token.end)
 
-    def _content(self, token: PositionedToken) -> Excerpt:
-        """The content of a block, without white space at its ends."""
-        return trim(locate(self.base, token.rows))
-
     # -- leaves
 
     def _read_paragraph(self, token: PositionedToken) -> model.Block:
         self.index += 2
-        content = self._content(token)
+        content = trim(token.text)
         children = self.inlines(content)
         span = content.span()
         if not self.nested and "Output" in content.text[:16] and is_caption(children):
@@ -149,7 +145,7 @@ class TextReader:
     def _read_heading(self, token: PositionedToken) -> model.Heading:
         self.index += 2
         span = self._span(token)
-        attributes = read_attributes(self._content(token))
+        attributes = read_attributes(trim(token.text))
         self.state.diagnostics += attributes.diagnostics
         children = self.inlines(attributes.value.title, mentions=False)
         level = int(token.tag[1:])
@@ -190,7 +186,7 @@ class TextReader:
         return block
 
     def _read_code(self, token: PositionedToken) -> model.CodeBlock:
-        code = locate(self.base, token.rows)
+        code = token.text
         self._check_indented_fence(code)
         return model.CodeBlock(
             self._span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
@@ -212,7 +208,7 @@ class TextReader:
 
     def _read_html(self, token: PositionedToken) -> model.HtmlBlock | model.HtmlFlow:
         """Raw HTML, read as inlines if it holds formulas or is nested."""
-        html = locate(self.base, token.rows)
+        html = token.text
         if self.nested or "$" in html.text:
             content = trim(html, " \t\n")
             children = self.inlines(content, html=True)
@@ -228,7 +224,7 @@ class TextReader:
         return model.ThematicBreak(self._span(token))
 
     def _read_math(self, token: PositionedToken) -> model.MathBlock:
-        text = locate(self.base, token.rows)
+        text = token.text
         start, end = text.text.index("$$") + 2, len(text.text)
         if token.info != "unclosed":
             end = text.text.rindex("$$")
@@ -254,7 +250,7 @@ class TextReader:
     def _read_quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
         span, first_token = self._span(token), self.tokens[self.index]
         if first_token.type == "paragraph_open":
-            head = read_head(self._content(first_token), self.state.callouts)
+            head = read_head(trim(first_token.text), self.state.callouts)
             if head is not None:
                 self.state.diagnostics += head.diagnostics
                 return self._read_callout(span, head.value)
