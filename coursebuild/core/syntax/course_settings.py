@@ -26,9 +26,9 @@ _CALLOUT = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
     """Check what the types of these tables cannot say."""
-    for node, fields in decoding.each(VerifyTable):
+    for node, fields in decoding.find_structs(VerifyTable):
         yield from _check_verify(node, fields)
-    for node, filter in decoding.each(Filter):
+    for node, filter in decoding.find_structs(Filter):
         yield from _check_filter(node, filter)
     for member in root.object("verify").object("env").members:
         if not _VARIABLE.fullmatch(member.key.value):
@@ -40,7 +40,7 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
             message = f"{format_name(member.key.value)} cannot be a kind of callout"
             help = "expected: lower-case letters and digits in words joined by single hyphens"
             yield diagnose("field-value", member.key.span, message, help=help)
-    for node, silence in decoding.each(Silence):
+    for node, silence in decoding.find_structs(Silence):
         yield from _check_silence(node, silence)
 
 

@@ -127,11 +127,11 @@ def _read_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[L
     """The levels, with those of their lessons whose fields are right."""
     for node in root.objects("level"):
         name = _read_id(node.get("id"))
-        inner = decoding.each(LessonTable, node.objects("lesson"))
+        inner = decoding.find_structs(LessonTable, node.objects("lesson"))
         lessons = tuple(_build_lesson(*lesson, name) for lesson in inner)
         fields = decoding.structs.get(node)
-        known = (fields.title, fields.summary) if isinstance(fields, LevelTable) else ("", "")
-        yield Level(node.span, name, *known, lessons)
+        texts = (fields.title, fields.summary) if isinstance(fields, LevelTable) else ("", "")
+        yield Level(node.span, name, *texts, lessons)
 
 
 def _build_lesson(node: ObjectNode, table: LessonTable, level: str) -> Lesson:
@@ -182,7 +182,7 @@ def _check_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[
     """Check that each lesson stands in the level that its id begins with."""
     for level in root.objects("level"):
         name = _read_id(level.get("id"))
-        for node, fields in decoding.each(LessonTable, level.objects("lesson")):
+        for node, fields in decoding.find_structs(LessonTable, level.objects("lesson")):
             if name and not fields.id.startswith(f"{name}."):
                 message = f"the lesson `{fields.id}` stands in the level `{shorten(name)}`"
                 help = f"an id in this level begins with `{shorten(name)}.`"
@@ -191,7 +191,7 @@ def _check_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[
 
 def _check_files(decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
     files: list[tuple[str, Span]] = []
-    for node, fields in decoding.each(PageTable):
+    for node, fields in decoding.find_structs(PageTable):
         place = node.place("file")
         files.append((fields.file, place))
         if fields.id in _RESERVED_IDS:

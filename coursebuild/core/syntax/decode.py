@@ -63,7 +63,7 @@ class Decoding(Struct, Generic[S], frozen=True):
     texts: tuple[tuple[StringNode, str], ...]
     """Every string that is Markdown, with `blocks` or `inlines`."""
 
-    def each(
+    def find_structs(
         self, type: type[T], nodes: Iterable[ObjectNode] | None = None
     ) -> Iterator[tuple[ObjectNode, T]]:
         """The objects, of all or of `nodes`, that are right and of a type, each with its struct."""

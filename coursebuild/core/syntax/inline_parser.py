@@ -49,8 +49,6 @@ def inline_tokens(src: str, env: EnvType, *, html: bool = False) -> list[Positio
 
     In `html` only tags, entities and formulas are read.
     """
-    if src and (_HTML_STOP if html else _STOP).search(src) is None:  # as most cells and labels are
-        return [PositionedToken("text", "", 0, content=src, start=0, end=len(src))]
     parser = _HTML if html else _MARKDOWN
     return cast(list[PositionedToken], parser.inline.parse(src, parser, env, []))
 

@@ -102,28 +102,12 @@ def _deep_paragraph(state: StateBlock, start: int, end: int, silent: bool) -> bo
     return True
 
 
-_FIRST_CHARACTERS = {
-    "fence": "`~",
-    "heading": "#",
-    "hr": "*-_",
-    "blockquote": ">",
-    "list": "*+-0123456789",
-    "html_block": "<",
-    "reference": "[",
-    "footnote": "[",
-    "math": "$",
-}
-"""The first characters of blocks, so that few rules are tried on most lines."""
-
-
-def _with_places(rule: BlockRule, first: str | None) -> BlockRule:
-    """Restrict a rule to blocks that begin with a character of `first`; give its tokens places."""
+def _with_places(rule: BlockRule) -> BlockRule:
+    """The rule, which also gives places to its tokens."""
 
     def run(state: StateBlock, start: int, end: int, silent: bool) -> bool:
-        begin = state.bMarks[start] + state.tShift[start]
-        if first is not None and state.src[begin : begin + 1] not in first:
-            return False
         assert isinstance(state, BlockState)
+        begin = state.bMarks[start] + state.tShift[start]
         token_count = len(state.tokens)
         applies = rule(state, start, end, silent)
         if applies and len(state.tokens) > token_count:
@@ -178,7 +162,7 @@ def _build_parser() -> MarkdownIt:
     }
     md.block.ruler = Ruler()
     for name, (rule, alt) in (ours | rules).items():
-        md.block.ruler.push(name, _with_places(rule, _FIRST_CHARACTERS.get(name)), {"alt": alt})
+        md.block.ruler.push(name, _with_places(rule), {"alt": alt})
     # Links with dangerous schemes stay links, so that they can be reported.
     md.validateLink = lambda url: True  # type: ignore[method-assign]
     return md

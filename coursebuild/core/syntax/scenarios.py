@@ -132,14 +132,14 @@ def _check_names(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
         (SweepTable, "name", "two sweeps have the name `{}`"),
         (KeepTable, "finding", "the finding `{}` is kept twice"),
     ):
-        structs = decoding.each(table)
+        structs = decoding.find_structs(table)
         names = [(getattr(struct, field), node.place(field)) for node, struct in structs]
         yield from check_unique(names, "field-value", message)
 
 
 def _check_sweeps(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
-    names = [table.name for _, table in decoding.each(ScenarioTable)]
-    for node, table in decoding.each(SweepTable):
+    names = [table.name for _, table in decoding.find_structs(ScenarioTable)]
+    for node, table in decoding.find_structs(SweepTable):
         if table.scenario is not None and table.scenario not in names:
             message = f"no scenario is called `{table.scenario}`"
             help = did_you_mean(table.scenario, names)
@@ -155,7 +155,7 @@ def _check_sweeps(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
 
 
 def _check_scenarios(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
-    for node, table in decoding.each(ScenarioTable):
+    for node, table in decoding.find_structs(ScenarioTable):
         yield from _check_times(node, table)
         yield from _check_timesteps(node, table)
         yield from _check_controls(node, table)
