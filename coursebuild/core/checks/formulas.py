@@ -1,22 +1,14 @@
 """The formulas of a course, and diagnostics of those that do not parse.
 
-Entry points: `course_formulas(course)`; `document_formulas`, `formula_texts` and
-`check_formulas` for one document.
+Entry points: `course_formulas(course)`; `document_formulas` and `check_formulas` for one
+document.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from coursebuild.core.model import (
-    Course,
-    Document,
-    Math,
-    MathBlock,
-    block_inlines,
-    document_blocks,
-    walk_inlines,
-)
+from coursebuild.core.model import Course, Document, block_formulas, document_blocks
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt
@@ -25,18 +17,9 @@ from coursebuild.core.text.source import Excerpt
 def _formula_uses(document: Document) -> Iterator[tuple[Formula, Excerpt]]:
     """Every formula with its TeX in the text; empty ones were reported by the parser."""
     for block in document_blocks(document):
-        if isinstance(block, MathBlock):
-            if block.tex.text.strip():
-                yield Formula(block.tex.text, True), block.tex
-            continue
-        for inline in walk_inlines(block_inlines(block)):
-            if isinstance(inline, Math) and inline.tex.text.strip():
-                yield Formula(inline.tex.text, inline.display), inline.tex
-
-
-def formula_texts(document: Document) -> Iterator[Excerpt]:
-    """The TeX of every formula of a document, in order."""
-    return (tex for _, tex in _formula_uses(document))
+        for formula in block_formulas(block):
+            if formula.tex.text.strip():
+                yield Formula(formula.tex.text, formula.display), formula.tex
 
 
 def course_formulas(course: Course) -> tuple[Formula, ...]:

@@ -9,7 +9,7 @@ import enum
 import re
 from collections.abc import Mapping
 from decimal import Decimal
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
@@ -120,6 +120,9 @@ class ThematicBreak(Struct, frozen=True):
 
 class MathBlock(Struct, frozen=True):
     """`$$…$$` on lines of its own."""
+
+    display: ClassVar[bool] = True
+    meaning: ClassVar[None] = None
 
     span: Span
     tex: Excerpt

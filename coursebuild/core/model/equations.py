@@ -12,15 +12,9 @@ from __future__ import annotations
 import hashlib
 from typing import NamedTuple
 
-from coursebuild.core.model.blocks import Block, Document, FeatureBlock, Heading, MathBlock
-from coursebuild.core.model.inlines import Label, Math
-from coursebuild.core.model.walk import (
-    block_inlines,
-    child_blocks,
-    document_blocks,
-    walk_blocks,
-    walk_inlines,
-)
+from coursebuild.core.model.blocks import Document, FeatureBlock, Heading
+from coursebuild.core.model.inlines import Label
+from coursebuild.core.model.walk import block_formulas, child_blocks, document_blocks, walk_blocks
 
 
 class DisplayFormula(NamedTuple):
@@ -52,7 +46,8 @@ def display_formulas(document: Document) -> tuple[DisplayFormula, ...]:
     candidates = [
         (formula, isinstance(block, Heading) or id(block) in in_features)
         for block in document_blocks(document)
-        for formula in _formulas_of(block)
+        for formula in block_formulas(block)
+        if formula.display
     ]
     used_ids = {formula.label.id for formula, _ in candidates if formula.label is not None}
     formulas: list[DisplayFormula] = []
@@ -63,13 +58,6 @@ def display_formulas(document: Document) -> tuple[DisplayFormula, ...]:
             used_ids.add(id_)
         formulas.append(DisplayFormula(formula.span.start, formula.tex.text, label, id_))
     return tuple(formulas)
-
-
-def _formulas_of(block: Block) -> list[MathBlock | Math]:
-    if isinstance(block, MathBlock):
-        return [block]
-    inlines = walk_inlines(block_inlines(block))
-    return [inline for inline in inlines if isinstance(inline, Math) and inline.display]
 
 
 def _make_id(tex: str, used_ids: set[str]) -> str:

@@ -1,7 +1,7 @@
 """Walking a document: every block and every inline in order.
 
 Entry points: `document_blocks`, `document_scripts`, `document_inlines`, `sibling_groups`;
-`walk_blocks` and `walk_inlines`; `is_blank`, `is_comment`.
+`walk_blocks`, `walk_inlines` and `block_formulas`; `is_blank`, `is_comment`.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from coursebuild.core.model.blocks import (
     HtmlBlock,
     HtmlFlow,
     ListBlock,
+    MathBlock,
     Paragraph,
     Recording,
     Script,
@@ -29,6 +30,7 @@ from coursebuild.core.model.inlines import (
     Emphasis,
     Inline,
     Link,
+    Math,
     RawInline,
     Strikethrough,
     Strong,
@@ -162,6 +164,15 @@ def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
         yield inline
         if type(inline) in _INLINE_CONTAINERS:
             yield from walk_inlines(inline.children)  # type: ignore[union-attr]
+
+
+def block_formulas(block: Block) -> Iterator[Math | MathBlock]:
+    """The formulas of a block; not those of blocks inside it."""
+    if isinstance(block, MathBlock):
+        yield block
+    for inline in walk_inlines(block_inlines(block)):
+        if isinstance(inline, Math):
+            yield inline
 
 
 def document_inlines(document: Document) -> Iterator[Inline]:

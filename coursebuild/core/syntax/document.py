@@ -16,10 +16,9 @@ from collections.abc import Iterator
 from coursebuild.core.model import (
     Document,
     Heading,
-    Math,
-    MathBlock,
     Paragraph,
     Term,
+    block_formulas,
     block_inlines,
     document_blocks,
     document_inlines,
@@ -89,16 +88,16 @@ def _check_placement(document: Document) -> tuple[Diagnostic, ...]:
     diagnostics = [*_check_ids_of_terms(document)]
     for block in document_blocks(document):
         is_elsewhere = id(block) in elsewhere
-        inlines = [*walk_inlines(block_inlines(block))]
         if is_elsewhere or not isinstance(block, Paragraph):
             message = "a term is not defined here"
             help = "define it in a paragraph of the text, whose sentence the glossary can show"
+            inlines = walk_inlines(block_inlines(block))
             terms = (term.span for term in inlines if isinstance(term, Term))
             diagnostics += [diagnose("term-place", span, message, help=help) for span in terms]
         if is_elsewhere or isinstance(block, Heading):
             message = "a formula has no label here"
             help = "label formulas of the text, but not those of quizzes, labs and headings"
-            formulas = (node for node in (block, *inlines) if isinstance(node, Math | MathBlock))
+            formulas = block_formulas(block)
             labels = (formula.label.span for formula in formulas if formula.label is not None)
             diagnostics += [diagnose("equation-label", span, message, help=help) for span in labels]
     return tuple(diagnostics)

@@ -8,16 +8,8 @@ from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
 
-from coursebuild.core.checks.formulas import formula_texts
 from coursebuild.core.features import Feature, Mathml
-from coursebuild.core.model import (
-    Course,
-    Document,
-    Math,
-    MathBlock,
-    document_blocks,
-    document_inlines,
-)
+from coursebuild.core.model import Course, Document, block_formulas, document_blocks
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Excerpt, Span
@@ -42,8 +34,11 @@ class FormulaSummary(Struct, frozen=True):
 def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]:
     """Summarize the formulas of a document; diagnostics are for numbers that are wrong."""
     unread: list[tuple[Span, str]] = []
+    symbols: list[tuple[str, str]] = []
+    identities: list[Excerpt] = []
     diagnostics: list[Diagnostic] = []
-    for tex in formula_texts(document):
+    for formula in (f for block in document_blocks(document) for f in block_formulas(block)):
+        tex = formula.tex
         for comparison in check_arithmetic(tex.text):
             span, message = tex.span(comparison.start, comparison.end), comparison.message
             if comparison.kind == "wrong":
@@ -51,29 +46,16 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
                 diagnostics.append(mistake)
             elif comparison.kind == "unread":
                 unread.append((span, message))
-    symbols = tuple(_read_symbols(document))
-    identities = tuple(_read_identities(document))
-    is_empty = not (unread or symbols or identities)
-    formulas = None if is_empty else FormulaSummary(tuple(unread), symbols, identities)
-    return Parsed(formulas, tuple(diagnostics))
-
-
-def _read_symbols(document: Document) -> Iterator[tuple[str, str]]:
-    for inline in document_inlines(document):
-        if isinstance(inline, Math) and inline.meaning is not None:
-            tex = inline.tex.text
+        if formula.meaning is not None:
             with contextlib.suppress(NotUnderstood):
-                expression = read_expression(tex, 0, len(tex))
+                expression = read_expression(tex.text, 0, len(tex.text))
                 if expression.kind == "symbol":
-                    yield expression.text, inline.meaning.unit
-
-
-def _read_identities(document: Document) -> Iterator[Excerpt]:
-    formulas: list[Math | MathBlock] = [i for i in document_inlines(document) if type(i) is Math]
-    formulas += [block for block in document_blocks(document) if isinstance(block, MathBlock)]
-    return (
-        math.tex for math in formulas if math.label is not None and math.label.check is not None
-    )
+                    symbols.append((expression.text, formula.meaning.unit))
+        if formula.label is not None and formula.label.check is not None:
+            identities.append(tex)
+    is_empty = not (unread or symbols or identities)
+    formulas = FormulaSummary(tuple(unread), tuple(symbols), tuple(identities))
+    return Parsed(None if is_empty else formulas, tuple(diagnostics))
 
 
 def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:

@@ -6,6 +6,7 @@ Entry point: `document_symbols`. Symbols are read from formulas as they are type
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TypeAlias
 
 from msgspec import Struct
 
@@ -13,6 +14,8 @@ from coursebuild.core import model
 from coursebuild.core.features import Mathml
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.features.symbols.mathml import only_symbol, symbols
+
+_Formula: TypeAlias = model.Math | model.MathBlock
 
 
 class SymbolUse(Struct, frozen=True):
@@ -36,39 +39,33 @@ class DocumentSymbols(Struct, frozen=True):
 def document_symbols(document: model.Document, mathml: Mathml) -> Parsed[DocumentSymbols | None]:
     """Return the symbols of a document; diagnostics are about its declarations."""
     uses: dict[str, SymbolUse] = {}
-    first_declarations: dict[str, model.Math] = {}
+    first_declarations: dict[str, _Formula] = {}
     diagnostics: list[Diagnostic] = []
     for formula, section in _formulas(document):
-        html = mathml(formula.tex.text, not isinstance(formula, model.Math) or formula.display)
-        meaning = formula.meaning if isinstance(formula, model.Math) else None
+        html, meaning = mathml(formula.tex.text, formula.display), formula.meaning
         only = only_symbol(html) if meaning is not None else None
         for symbol in (only,) if only is not None else symbols(html):
             use = uses.setdefault(symbol, SymbolUse(symbol, section))
             if meaning is not None and not use.meaning:
                 uses[symbol] = SymbolUse(symbol, use.section, meaning.text, meaning.unit)
-        if isinstance(formula, model.Math) and meaning is not None and html:
+        if meaning is not None and html:
             diagnostics += _check_declaration(formula, only, first_declarations)
     return Parsed(DocumentSymbols(tuple(uses.values())) if uses else None, tuple(diagnostics))
 
 
-def _formulas(
-    document: model.Document,
-) -> Iterator[tuple[model.Math | model.MathBlock, tuple[str, str]]]:
+def _formulas(document: model.Document) -> Iterator[tuple[_Formula, tuple[str, str]]]:
     """Yield all formulas, with the heading above; footnotes belong to none."""
     for blocks in (document.blocks, *(footnote.blocks for footnote in document.footnotes)):
         section = "", ""
         for block in model.walk_blocks(blocks):
             if isinstance(block, model.Heading) and block.level <= 3:
                 section = block.anchor, " ".join(model.plain_text(block.children).split())
-            if isinstance(block, model.MathBlock):
-                yield block, section
-            for inline in model.walk_inlines(model.block_inlines(block)):
-                if isinstance(inline, model.Math):
-                    yield inline, section
+            for formula in model.block_formulas(block):
+                yield formula, section
 
 
 def _check_declaration(
-    formula: model.Math, symbol: str | None, first_declarations: dict[str, model.Math]
+    formula: _Formula, symbol: str | None, first_declarations: dict[str, _Formula]
 ) -> Iterator[Diagnostic]:
     """Report a declaration of no symbol, or of one declared before."""
     if symbol is None:

@@ -227,8 +227,7 @@ class _Lookup:
         mathml_by_formula = kept_formulas(self.texts.store, self.document.source.path)
 
         def mathml(math: model.Math | model.MathBlock) -> str:
-            display = isinstance(math, model.MathBlock) or math.display
-            return mathml_by_formula.get(Formula(math.tex.text, display), "")
+            return mathml_by_formula.get(Formula(math.tex.text, math.display), "")
 
         formula_symbols = symbols(mathml(formula))
         declarations = [
