@@ -107,50 +107,36 @@ class _Comparison(Struct):
         self.runs_here = {r.path: r for r in runs}
         interpreter = self._prepare(self.version)
         standings_here = run_standings(self.course, self.runs_here, runs)
-        exclusions = {
-            path: judge_comparability(standing) for path, standing in standings_here.items()
-        }
-        comparable_scripts = [e for e in self.scripts if exclusions[e.path] is None]
+        judgements = {p: judge_comparability(standing) for p, standing in standings_here.items()}
+        comparable_scripts = [e for e in self.scripts if judgements[e.path] is None]
         standings_there = self._run(
             comparable_scripts, interpreter, f"running scripts with MuJoCo {self.version}"
         )
         differing_scripts = [e for e in comparable_scripts if not standings_there[e.path].holds]
         again = self._run(differing_scripts, interpreter, "running scripts there again", fresh=True)
         control, trouble = self._run_control(differing_scripts)
+        all_scripts = {e.path: e for e in extract(self.course).value}
         lines = []
         for extraction in self.scripts:
-            path, exclusion = extraction.path, exclusions[extraction.path]
-            if exclusion is not None:
-                status, reason = exclusion.status, exclusion.reason
-                lines.append(ScriptComparison(path, extraction.owner, status, reason))
+            path, owner = extraction.path, extraction.owner
+            if (judgement := judgements[path]) is not None:
+                lines.append(ScriptComparison(path, owner, *judgement))
                 continue
             standing = standings_there[path]
-            if standing.holds:
-                lines.append(ScriptComparison(path, extraction.owner, "same"))
-                continue
-            verdict = judge(standing, control.get(path), again[path], engine_version())
-            reason = verdict.reason + (f": {trouble}" if trouble and path not in control else "")
-            lines.append(self._line(extraction, standing, verdict.status, reason))
+            status, reason = "same", ""
+            if not standing.holds:
+                engine = engine_version()
+                status, reason = judge(standing, control.get(path), again[path], engine)
+                reason += f": {trouble}" if trouble and path not in control else ""
+            failure = failure_diagnostic(extraction, standing.run, all_scripts)
+            difference = standing.changes, standing.diff, failure
+            lines.append(ScriptComparison(path, owner, status, reason, *difference))
         return ComparisonReport(
             engine_version(),
             self.version,
             python_version(),
             (*lines, *blocked),
             self._compare_models(interpreter),
-        )
-
-    def _line(
-        self, extraction: Extraction, standing: RunStanding, status: str, reason: str
-    ) -> ScriptComparison:
-        scripts = {e.path: e for e in extract(self.course).value}
-        return ScriptComparison(
-            extraction.path,
-            extraction.owner,
-            status,
-            reason,
-            standing.changes,
-            standing.diff,
-            failure_diagnostic(extraction, standing.run, scripts),
         )
 
     def _run_control(self, scripts: Sequence[Extraction]) -> tuple[dict[str, RunStanding], str]:

@@ -5,6 +5,7 @@ Entry points: `ComparisonReport`, `comparison_text`, `comparison_json`.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 
 from msgspec import Struct
@@ -26,6 +27,15 @@ from coursebuild.report.terminal import (
 from coursebuild.report.text import location
 from coursebuild.report.values import json_text, plain, plural
 
+_STATUSES = {
+    "same": "the same",
+    "changed": "changed by MuJoCo {}",
+    "fails": "failing with MuJoCo {}",
+    "unclear": "different for a reason that is not clear",
+    "drifted": "drifted already",
+    "uncompared": "not compared",
+}
+"""In words, to which the other version is given."""
 _COLOURS = {"same": GREEN, "changed": RED, "fails": RED}
 _MOST_CHANGES = 20
 """Differences of one script that are listed."""
@@ -76,12 +86,9 @@ def comparison_json(report: ComparisonReport) -> str:
         {
             **plain(report, version="against"),
             "scripts": [_script_value(script) for script in report.scripts],
-            "summary": {**_counts(report.scripts), "models_lost": lost},
+            "summary": {**_count(report.scripts), "models_lost": lost},
         }
     )
-
-
-_STATUSES = ("same", "changed", "fails", "unclear", "drifted", "uncompared")
 
 
 def _script_value(script: ScriptComparison) -> dict[str, object]:
@@ -167,16 +174,11 @@ def _first_line(text: str) -> str:
 
 
 def _summary(report: ComparisonReport, lost: int) -> str:
-    counts = _counts(report.scripts)
-    words = {
-        "same": "the same",
-        "changed": f"changed by MuJoCo {report.version}",
-        "fails": f"failing with MuJoCo {report.version}",
-        "unclear": "different for a reason that is not clear",
-        "drifted": "drifted already",
-        "uncompared": "not compared",
-    }
-    parts = [f"{counts[status]} {words[status]}" for status in _STATUSES if counts[status]]
+    parts = [
+        f"{count} {_STATUSES[status].format(report.version)}"
+        for status, count in _count(report.scripts).items()
+        if count
+    ]
     lines = f"{plural(len(report.scripts), 'script')}: {', '.join(parts) or 'nothing to compare'}"
     if report.models:
         texts = plural(len(report.models), "MJCF text")
@@ -186,8 +188,7 @@ def _summary(report: ComparisonReport, lost: int) -> str:
     return f"{head}: {lines}"
 
 
-def _counts(scripts: Iterable[ScriptComparison]) -> dict[str, int]:
-    counts = dict.fromkeys(_STATUSES, 0)
-    for script in scripts:
-        counts[script.status] += 1
-    return counts
+def _count(scripts: Iterable[ScriptComparison]) -> dict[str, int]:
+    """How many scripts have each status."""
+    counts = Counter(script.status for script in scripts)
+    return {status: counts[status] for status in _STATUSES}

@@ -25,6 +25,9 @@ from coursebuild.core.scripts.mapped_text import Side
 Status: TypeAlias = Literal["same", "changed", "fails", "unclear", "drifted", "uncompared"]
 """`changed` and `fails` are caused by MuJoCo; of `unclear` that cannot be said."""
 
+Judgement: TypeAlias = tuple[Status, str]
+"""What became of a script with another version of MuJoCo; why, as a clause, if need be."""
+
 
 class RunStanding(Struct, frozen=True):
     """A run compared with what is recorded, or else with what the script prints here."""
@@ -40,14 +43,6 @@ class RunStanding(Struct, frozen=True):
     def holds(self) -> bool:
         """Whether it ran to its end and printed what it should."""
         return self.run.outcome is Outcome.OK and not (self.changes or self.diff)
-
-
-class Judgement(Struct, frozen=True):
-    """What became of a script with another version of MuJoCo."""
-
-    status: Status
-    reason: str = ""
-    """Why, as a clause, where that needs to be said."""
 
 
 def run_standings(
@@ -83,18 +78,17 @@ def judge_comparability(standing: RunStanding) -> Judgement | None:
     """Why a script, as it runs here, cannot be compared; `None` where it can."""
     match standing.run.outcome:
         case Outcome.NORUN:
-            return Judgement("uncompared", "its lesson says `norun`")
+            return "uncompared", "its lesson says `norun`"
         case Outcome.SKIPPED:
-            return Judgement("uncompared", f"it needs {', '.join(standing.run.missing)}")
+            return "uncompared", f"it needs {', '.join(standing.run.missing)}"
+        case Outcome.OK if not standing.is_compared:
+            return "uncompared", "its output is volatile"
+        case Outcome.OK if not standing.holds:
+            return "drifted", "what is recorded is not what it prints here"
         case Outcome.OK:
-            pass
+            return None
         case _:
-            return Judgement("uncompared", "it does not run to its end here")
-    if not standing.is_compared:
-        return Judgement("uncompared", "its output is volatile")
-    if not standing.holds:
-        return Judgement("drifted", "what is recorded is not what it prints here")
-    return None
+            return "uncompared", "it does not run to its end here"
 
 
 def judge(
@@ -109,10 +103,10 @@ def judge(
         engine: this version.
     """
     if (standing.run.outcome, standing.run.stdout) != (repeated.run.outcome, repeated.run.stdout):
-        return Judgement("unclear", "two runs of it there did not do the same")
+        return "unclear", "two runs of it there did not do the same"
     if control is None:
-        return Judgement("unclear", f"no fresh environment with MuJoCo {engine} could be made")
+        return "unclear", f"no fresh environment with MuJoCo {engine} could be made"
     if not control.holds:
         fresh = f"a fresh environment with MuJoCo {engine}"
-        return Judgement("unclear", f"it does not do in {fresh} what it does here either")
-    return Judgement("changed" if standing.run.outcome is Outcome.OK else "fails")
+        return "unclear", f"it does not do in {fresh} what it does here either"
+    return ("changed" if standing.run.outcome is Outcome.OK else "fails"), ""
