@@ -167,10 +167,8 @@ class _Updater:
         for recording in self.recordings:
             if recording.script not in printed or recording.script in doubtful_paths:
                 continue
-            comparison = recording.comparison or self.course.comparison
-            edit = update_body(
-                recording, comparison, self.course.filters, *printed[recording.script]
-            )
+            comparison = self.course.comparison_of(recording)
+            edit = update_body(recording, comparison, *printed[recording.script])
             if isinstance(edit, Edit):
                 edits.setdefault(recording.span.source, []).append(edit)
             elif edit is not None:

@@ -192,7 +192,7 @@ def _describe_drift(session: Session, library: Library, verdict: Verdict) -> dic
     run = library.runs[verdict.recording.script or ""]
     edit = new_output(session, library, verdict)
     return {
-        "rows": diff_rows(verdict, library.course.filters, run.stdout),
+        "rows": diff_rows(verdict, run.stdout),
         "offer": Offer.of(edit) if isinstance(edit, Edit) else None,
         "refused": edit.message if isinstance(edit, Diagnostic) else "",
     }
@@ -204,8 +204,7 @@ def new_output(session: Session, library: Library, verdict: Verdict) -> Edit | D
     second = session.second_output(run.path)
     if second is None:
         return None
-    filters = library.course.filters
-    return update_body(verdict.recording, verdict.comparison, filters, run.stdout, second)
+    return update_body(verdict.recording, verdict.comparison, run.stdout, second)
 
 
 # --- figures

@@ -63,8 +63,8 @@ def test_notebooks_of_course_run_in_an_empty_folder(
         document = parse_document(Source("a.md", text), callouts, lesson=True).value
         for recording in document_blocks(document):
             if isinstance(recording, Recording) and recording.script in printed:
-                comparison = recording.comparison or course.comparison
-                verdict = compare(recording, comparison, course.filters, printed[recording.script])
+                comparison = course.comparison_of(recording)
+                verdict = compare(recording, comparison, printed[recording.script])
                 assert verdict.status in ("verified", "volatile"), verdict.changes
                 compared += 1
     assert compared >= (2 if name != "unicode" else 1)

@@ -203,8 +203,7 @@ def results_of(course: Course, runs: Mapping[str, ScriptRun], status: str) -> Re
                 default_run = ScriptRun(block.path, Outcome.OK, 0, "one\ntwo\n", "", 0.1)
                 script_runs.append(runs.get(block.path, default_run))
             elif isinstance(block, Recording):
-                comparison = block.comparison or course.comparison
-                verdicts.append(Verdict(block, comparison, status))
+                verdicts.append(Verdict(block, course.comparison_of(block), status))
             elif isinstance(block, MathBlock):
                 formulas[Formula(block.tex.text, True)] = mathml(block.tex.text, "display")
         for inline in document_inlines(document):

@@ -120,7 +120,8 @@ def verdict(
     filters: tuple[Filter, ...] = (),
     **lesson: str,
 ) -> Verdict:
-    return compare(recording(recorded, **lesson), comparison, filters, printed)
+    comparison = replace(comparison, course_filters=filters)
+    return compare(recording(recorded, **lesson), comparison, printed)
 
 
 def matches(recorded: str, printed: str, comparison: Comparison = EXACT) -> bool:
@@ -148,17 +149,16 @@ def update(
     repeated: str | None = None,
 ) -> Recording:
     """The recording after its update; a second update has nothing to do."""
-    edit = update_body(
-        lesson, comparison, filters, printed, printed if repeated is None else repeated
-    )
+    comparison = replace(comparison, course_filters=filters)
+    edit = update_body(lesson, comparison, printed, printed if repeated is None else repeated)
     assert isinstance(edit, Edit), edit
     source = lesson.span.source
     text = apply_edits(source.text, [edit])
     assert text[: edit.span.start] == source.text[: edit.span.start]
     assert text[edit.span.start + len(edit.text) :] == source.text[edit.span.end :]
     (new,) = recordings(document(text, source.path))
-    assert update_body(new, comparison, filters, printed, printed) is None
-    assert compare(new, comparison, filters, printed).status in ("verified", "volatile")
+    assert update_body(new, comparison, printed, printed) is None
+    assert compare(new, comparison, printed).status in ("verified", "volatile")
     return new
 
 
@@ -177,6 +177,6 @@ def refusal_text(
     recorded: str, printed: str, comparison: Comparison = EXACT, repeated: str | None = None
 ) -> str:
     second = printed if repeated is None else repeated
-    refusal = update_body(recording(recorded), comparison, (), printed, second)
+    refusal = update_body(recording(recorded), comparison, printed, second)
     assert isinstance(refusal, Diagnostic), refusal
     return describe(refusal)

@@ -206,11 +206,18 @@ class Comparison(Struct, frozen=True):
     ellipsis: bool = False
     volatile: str = ""
     """A regular expression; text that matches it is not compared."""
+    course_filters: tuple[Filter, ...] = ()
+    """Those of the whole course; see `Course.comparison_of`."""
+
+    @property
+    def own_filters(self) -> tuple[Filter, ...]:
+        """The filter that removes volatile text from both sides, with the space around it."""
+        return (Filter(volatile_pattern(self.volatile), "…"),) if self.volatile else ()
 
     @property
     def filters(self) -> tuple[Filter, ...]:
-        """The filter that removes volatile text from both sides, with the space around it."""
-        return (Filter(volatile_pattern(self.volatile), "…"),) if self.volatile else ()
+        """Everything that is replaced in both texts before they are compared."""
+        return (*self.course_filters, *self.own_filters)
 
 
 def volatile_pattern(pattern: str) -> str:

@@ -10,9 +10,10 @@ import re
 from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
+from msgspec.structs import replace
 
 from coursebuild.core.model import fields
-from coursebuild.core.model.blocks import Comparison, Document, Filter
+from coursebuild.core.model.blocks import Comparison, Document, Filter, Recording
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.core.model.theme import Theme
 from coursebuild.core.text.source import Source, Span
@@ -220,6 +221,11 @@ class Course(Struct, frozen=True):
         words = re.findall(r"[a-z0-9]+", self.title.lower())
         digest = hashlib.sha256(self.title.encode("utf-8", "surrogatepass")).hexdigest()[:8]
         return self.id or "-".join((*words, digest))
+
+    def comparison_of(self, recording: Recording) -> Comparison:
+        """How a recorded output is compared."""
+        comparison = recording.comparison or self.comparison
+        return replace(comparison, course_filters=self.filters)
 
     @property
     def lessons(self) -> tuple[Lesson, ...]:

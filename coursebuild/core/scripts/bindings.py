@@ -129,7 +129,7 @@ class PrintedOutputs:
         """The lines of a recorded output."""
         key = _recording_key(verdict)
         if key not in self._lines:
-            self._lines[key] = printed_lines(verdict.recording, verdict.comparison.filters)
+            self._lines[key] = printed_lines(verdict.recording, verdict.comparison.own_filters)
         return self._lines[key]
 
 
@@ -200,7 +200,7 @@ def _check(
     partial = any(v.comparison.ellipsis or isinstance(v.recording.body, Table) for v in steady)
     drifted = any(v.status == "drift" for v in steady)
     if (partial or drifted or not verdicts) and run is not None and ran_well:
-        lines = lines_of_run(run.stdout, [f for v in steady for f in v.comparison.filters])
+        lines = lines_of_run(run.stdout, [f for v in steady for f in v.comparison.own_filters])
         if _holds(bound_text, lines):
             return lines
     varying = [v.recording for v in verdicts if v not in steady or v.comparison.volatile]

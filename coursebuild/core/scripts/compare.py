@@ -21,7 +21,6 @@ from msgspec import Struct
 from coursebuild.core.model import (
     Comparison,
     Course,
-    Filter,
     Mode,
     Recording,
     Script,
@@ -53,29 +52,27 @@ def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
                 script_above = block
                 first_by_path.setdefault(block.path, block)
             elif isinstance(block, Recording) and block.script is not None:
-                comparison, run = block.comparison or course.comparison, by_path.get(block.script)
+                comparison, run = course.comparison_of(block), by_path.get(block.script)
                 is_nearest = script_above is not None and script_above.path == block.script
                 is_run = not is_nearest or first_by_path[block.script] is script_above
                 is_comparable = block.readable and is_run
                 if is_comparable and run and run.outcome is Outcome.OK and run.stdout.strip():
-                    verdicts.append(compare(block, comparison, course.filters, run.stdout))
+                    verdicts.append(compare(block, comparison, run.stdout))
                 else:
                     verdicts.append(Verdict(block, comparison, "unchecked"))
     return tuple(verdicts)
 
 
-def compare(
-    recording: Recording, comparison: Comparison, filters: tuple[Filter, ...], stdout: str
-) -> Verdict:
+def compare(recording: Recording, comparison: Comparison, stdout: str) -> Verdict:
     """The verdict on one recording, given what its script printed."""
-    body, filters = recording.body, (*filters, *comparison.filters)
+    body = recording.body
     if comparison.mode is Mode.VOLATILE:
         return Verdict(recording, comparison, "volatile")
     if isinstance(body, Table):
-        return compare_table(recording, body, comparison, filters, Side.of(stdout, filters))
+        return compare_table(recording, body, comparison, stdout)
     if stdout in (body.text, f"{body.text}\n"):  # as it nearly always is
         return Verdict(recording, comparison, "verified")
-    recorded, printed = Side.of(body.text, filters), Side.of(stdout, filters)
+    recorded, printed = (Side.of(text, comparison.filters) for text in (body.text, stdout))
     if same_lines(recorded, printed, comparison):
         return Verdict(recording, comparison, "verified")
     matcher = LineMatcher(comparison)

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from itertools import groupby
 from typing import Literal, TypeAlias
 
-from coursebuild.core.model import Filter, Table
+from coursebuild.core.model import Table
 from coursebuild.core.model.results import Verdict
 from coursebuild.core.scripts.align import Step, StepKind, align
 from coursebuild.core.scripts.changes import find_differences
@@ -50,7 +50,7 @@ def text_diff(before: str, now: str) -> str:
     return "\n".join(lines)
 
 
-def diff_rows(verdict: Verdict, filters: tuple[Filter, ...], stdout: str) -> tuple[DiffRow, ...]:
+def diff_rows(verdict: Verdict, stdout: str) -> tuple[DiffRow, ...]:
     """The rows of a recording that a run differs from.
 
     Of a table only the cells that changed are shown, as one row each.
@@ -60,7 +60,7 @@ def diff_rows(verdict: Verdict, filters: tuple[Filter, ...], stdout: str) -> tup
         return tuple(
             row for change in verdict.changes for row in _cell_rows(change.recorded, change.printed)
         )
-    matcher, filters = LineMatcher(verdict.comparison), (*filters, *verdict.comparison.filters)
+    matcher, filters = LineMatcher(verdict.comparison), verdict.comparison.filters
     recorded, printed = Side.of(body.text, filters), Side.of(stdout, filters)
     steps = align(recorded, printed, matcher)
     rows = (row for step in steps for row in _step_rows(step, recorded, printed, matcher))

@@ -20,7 +20,7 @@ import re
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
-from coursebuild.core.model import Comparison, Filter, Mode, Recording, Script, Table
+from coursebuild.core.model import Comparison, Mode, Recording, Script, Table
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.core.scripts.lines import ELLIPSIS, LineMatcher
 from coursebuild.core.scripts.mapped_text import Side, replace_ranges
@@ -52,7 +52,6 @@ def apply_edits(text: str, edits: Iterable[Edit]) -> str:
 def update_body(
     recording: Recording,
     comparison: Comparison,
-    filters: tuple[Filter, ...],
     first: str,
     second: str,
 ) -> Edit | Diagnostic | None:
@@ -63,8 +62,8 @@ def update_body(
     if not first.strip():
         return refusal(recording.caption_span, "the script printed nothing to record", "")
     if isinstance(recording.body, Table):
-        return update_table(recording, recording.body, comparison, filters, first, second)
-    body, filters = recording.body, (*filters, *comparison.filters)
+        return update_table(recording, recording.body, comparison, first, second)
+    body, filters = recording.body, comparison.filters
     if comparison.mode is Mode.VOLATILE:
         before, now = Side.of(body.text).lines, Side.of(first).lines
         alike = LineMatcher(comparison).alike
@@ -77,7 +76,7 @@ def update_body(
         if same_lines(recorded, repeated, comparison):
             return None
         return instability_diagnostic(recording, recorded, repeated, comparison)
-    lines = _new_lines(body, recorded, printed, comparison, filters)
+    lines = _new_lines(body, recorded, printed, comparison)
     if isinstance(lines, Diagnostic):
         return lines
     new = Side.of("\n".join(lines), filters)
@@ -99,11 +98,10 @@ def _new_lines(
     recorded: Side,
     printed: Side,
     comparison: Comparison,
-    filters: tuple[Filter, ...],
 ) -> list[str] | Diagnostic:
     """The lines to record; they match the run."""
     candidates: list[list[str]] = []
-    if filters or comparison.ellipsis:
+    if comparison.filters or comparison.ellipsis:
         updated_lines = _update_lines(body, recorded, printed, LineMatcher(comparison))
         if isinstance(updated_lines, Diagnostic):
             return updated_lines
@@ -111,7 +109,7 @@ def _new_lines(
     if not comparison.ellipsis:
         candidates.append(list(Side.of(printed.raw).lines))
     for lines in candidates:
-        if same_lines(Side.of("\n".join(lines), filters), printed, comparison):
+        if same_lines(Side.of("\n".join(lines), comparison.filters), printed, comparison):
             return lines
     return refusal(
         body.span().first_line(),

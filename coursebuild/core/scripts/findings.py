@@ -113,12 +113,11 @@ def _find_instability(
     second = repeated_runs.get(recording.script or "")
     if first is None or second is None or second.outcome is not Outcome.OK:
         return None
-    changes = compare(recording, comparison, course.filters, second.stdout).changes
+    changes = compare(recording, comparison, second.stdout).changes
     if [(c.span, c.printed) for c in changes] == [(c.span, c.printed) for c in verdict.changes]:
         return None
-    filters = (*course.filters, *comparison.filters)
-    first_side, second_side = Side.of(first.stdout, filters), Side.of(second.stdout, filters)
-    return instability_diagnostic(recording, first_side, second_side, comparison)
+    before, now = (Side.of(run.stdout, comparison.filters) for run in (first, second))
+    return instability_diagnostic(recording, before, now, comparison)
 
 
 def collect_evidence(

@@ -48,7 +48,7 @@ def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
         if isinstance(block, Recording) and block.script == now.path and block.readable
     ]
     return bool(recordings) and all(
-        compare(r, r.comparison or course.comparison, course.filters, run.stdout).status != "drift"
+        compare(r, course.comparison_of(r), run.stdout).status != "drift"
         for r in recordings
         for run in (before, now)
     )

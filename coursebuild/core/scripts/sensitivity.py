@@ -77,7 +77,9 @@ def sensitivity(
         for recording, comparison in compared
         for finding in _find_doubts(course, recording, comparison, base, moved_runs, usable_halved)
     ]
-    numbers = sum(len(line.numbers) for r, c in compared for line in printed_lines(r, c.filters))
+    numbers = sum(
+        len(line.numbers) for r, c in compared for line in printed_lines(r, c.own_filters)
+    )
     doubts = tuple(finding for finding in findings if isinstance(finding, Doubt))
     flips = tuple(finding for finding in findings if isinstance(finding, Flip))
     size = amplification(moved_runs)
@@ -102,7 +104,7 @@ def _compared_recordings(
     course: Course, recordings: Iterable[Recording]
 ) -> list[tuple[Recording, Comparison]]:
     """The recorded outputs that are compared, and how."""
-    pairs = ((recording, recording.comparison or course.comparison) for recording in recordings)
+    pairs = ((recording, course.comparison_of(recording)) for recording in recordings)
     return [(r, comparison) for r, comparison in pairs if comparison.mode is not Mode.VOLATILE]
 
 
@@ -118,7 +120,7 @@ def _standing(
         return Standing.DRIFTED
     if not recordings:
         return Standing.UNRECORDED
-    if any(compare(*pair, course.filters, base.stdout).status == "drift" for pair in recordings):
+    if any(compare(*pair, base.stdout).status == "drift" for pair in recordings):
         return Standing.DRIFTED
     if moved_runs is None:
         return Standing.MEASURED
@@ -144,7 +146,7 @@ def _find_doubts(
     exact = replace(comparison, mode=Mode.EXACT)
 
     def find_changes(run: ScriptRun) -> dict[tuple[int, int], Change]:
-        changes = compare(recording, exact, course.filters, run.stdout).changes
+        changes = compare(recording, exact, run.stdout).changes
         return {(change.span.start, change.span.end): change for change in changes}
 
     changes_of_base = find_changes(base)

@@ -15,7 +15,7 @@ from itertools import zip_longest
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import Comparison, Filter, Mode, Recording, Table
+from coursebuild.core.model import Comparison, Mode, Recording, Table
 from coursebuild.core.scripts.lines import canonicalize, same_number
 from coursebuild.core.scripts.mapped_text import Side, replace_ranges
 from coursebuild.core.scripts.numbers import Number, round_like
@@ -32,11 +32,11 @@ def update_table(
     recording: Recording,
     table: Table,
     comparison: Comparison,
-    filters: tuple[Filter, ...],
     first: str,
     second: str,
 ) -> Edit | Diagnostic | None:
     """What to write into a recorded table; see `edit.update_body`."""
+    filters = comparison.filters
     printed, repeated = Side.of(first, filters), Side.of(second, filters)
     if comparison.mode is Mode.VOLATILE:
         comparison = Comparison()

@@ -87,13 +87,13 @@ def compare_table(
     recording: model.Recording,
     table: model.Table,
     comparison: model.Comparison,
-    filters: tuple[model.Filter, ...],
-    printed: Side,
+    stdout: str,
 ) -> Verdict:
     """The verdict on a recorded table."""
+    rows, printed = table_rows(table, comparison.filters), Side.of(stdout, comparison.filters)
     changes = tuple(
         change
-        for match in TableMatcher(table_rows(table, filters), printed, comparison).match()
+        for match in TableMatcher(rows, printed, comparison).match()
         for change in _row_changes(match, comparison)
     )
     return Verdict(recording, comparison, "drift" if changes else "verified", changes)

@@ -153,7 +153,7 @@ def _describe_script_change(before: ScriptState, now: ScriptState) -> str:
         if old is None or new is None:
             parts.append("an output removed" if new is None else "an output added")
             continue
-        changes = compare(old, Comparison(), (), _text(new)).changes
+        changes = compare(old, Comparison(), _text(new)).changes
         largest = max((change.relative_error or 0.0 for change in changes), default=0.0)
         suffix = f" (relative, up to {largest:.1e})" if largest else ""
         parts += [classes(changes) + suffix] if changes else []

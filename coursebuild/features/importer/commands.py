@@ -148,8 +148,8 @@ def _output_edits(
     """Yield edits that fill empty outputs with what was printed, or add one where there is none."""
     for recording in recordings:
         if isinstance(recording.body, Excerpt) and not recording.body.text.strip():
-            comparison = recording.comparison or course.comparison
-            edit = update_body(recording, comparison, course.filters, printed, printed)
+            comparison = course.comparison_of(recording)
+            edit = update_body(recording, comparison, printed, printed)
             if isinstance(edit, Edit):
                 yield edit
     if not recordings and printed.strip() and not script.prefix:

@@ -14,10 +14,10 @@ from support.sample_lessons import DIGITS_ELLIPSIS, EXACT, recording, table
 def rows(recorded: str, printed: str) -> list[str]:
     """Each row as text; what changed is in brackets."""
     block = recording(recorded)
-    verdict = compare(block, DIGITS_ELLIPSIS, (), printed)
+    verdict = compare(block, DIGITS_ELLIPSIS, printed)
     return [
         mark + "".join(f"[{text}]" if is_changed else text for text, is_changed in parts)
-        for mark, parts in diff_rows(verdict, (), printed)
+        for mark, parts in diff_rows(verdict, printed)
     ]
 
 
@@ -40,8 +40,8 @@ def test_rows(recorded: str, printed: str, expected: list[str]) -> None:
 
 def test_rows_of_a_table_are_the_cells_that_changed() -> None:
     block = table("| n | x |\n| --- | --- |\n| 1 | 2.5 |")
-    verdict = compare(block, EXACT, (), "1 3.5\n")
-    cell_rows = [(mark, parts[0][0]) for mark, parts in diff_rows(verdict, (), "1 3.5\n")]
+    verdict = compare(block, EXACT, "1 3.5\n")
+    cell_rows = [(mark, parts[0][0]) for mark, parts in diff_rows(verdict, "1 3.5\n")]
     assert cell_rows == [("-", "2.5"), ("+", "3.5")]
 
 
@@ -57,7 +57,7 @@ def test_the_rows_are_both_texts(recorded: list[str], printed: list[str]) -> Non
     recorded_text, printed_text = "\n".join(recorded).rstrip("\n"), "\n".join(printed).rstrip("\n")
     if (
         not recorded_text
-        or compare(recording(recorded_text), DIGITS_ELLIPSIS, (), printed_text).status != "drift"
+        or compare(recording(recorded_text), DIGITS_ELLIPSIS, printed_text).status != "drift"
     ):
         return
     lines = [row.replace("[", "").replace("]", "") for row in rows(recorded_text, printed_text)]

@@ -12,7 +12,7 @@ from support.sample_lessons import EXACT, recording
 
 
 def drift(recorded: str, printed: str, comparison: Comparison = EXACT) -> Diagnostic:
-    return drift_diagnostic(compare(recording(recorded), comparison, (), printed), "4.2")
+    return drift_diagnostic(compare(recording(recorded), comparison, printed), "4.2")
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ def test_what_matches_is_left_alone() -> None:
         ("took 1 s", "took  23 s", VOLATILE),
         ("took   1.5 s, E 2", "took 23.5 s, E 2", SECONDS),
     ):
-        assert update_body(recording(recorded), comparison, (), printed, printed) is None
+        assert update_body(recording(recorded), comparison, printed, printed) is None
 
 
 def test_volatile_text_is_refreshed_where_more_than_its_numbers_changed() -> None:
@@ -104,8 +104,8 @@ def test_outputs_that_match_by_the_comparison_are_stable() -> None:
     assert "output-unstable" in refusal_text("x 9.99", "x 1.500", DIGITS, repeated="x 1.501")
     new = update(recording("a 1\n..."), "a 2\n0x1", ELLIPSIS, repeated="a 2\n0x2")
     assert new.body_span.text == "a 2\n...\n"
-    filters = (Filter("0x.", "0x"),)
-    edit = update_body(recording("a"), EXACT, filters, "b 0x1", "b 0x2")
+    comparison = Comparison(course_filters=(Filter("0x.", "0x"),))
+    edit = update_body(recording("a"), comparison, "b 0x1", "b 0x2")
     assert isinstance(edit, Edit) and edit.text == "b 0x1\n"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Filter
 from coursebuild.core.model.results import Verdict
@@ -30,7 +31,8 @@ def verdict(
     comparison: Comparison = EXACT,
     filters: tuple[Filter, ...] = (),
 ) -> Verdict:
-    return compare(table(HEAD + rows), comparison, filters, printed)
+    comparison = replace(comparison, course_filters=filters)
+    return compare(table(HEAD + rows), comparison, printed)
 
 
 def test_rows_stand_in_lines() -> None:
