@@ -241,22 +241,19 @@ def _measure_setting(
     model, pilot, cone = basis.model, basis.pilot, basis.cones[setting.cone]
     variant = with_setting(model, setting)
     steps, energy = round(pilot.scene.scenario.duration / setting.timestep), basis.energy
-    no_figures = dict.fromkeys(
-        ("figure", "energy_drift", "momentum_drift", "slip", "cost", "seconds")
-    )
-    no_figures |= dict.fromkeys(("position", "attitude", "velocity", "growth", "dominated_by"))
-    row = WorkPrecisionRow(  # as of a run that MuJoCo refuses
-        **no_figures,
-        setting=setting,
-        status="diverged",
-        reasons=(),
-        penetration=0.0,
-        model_error=cone.model_error,
-        refsafe=pilot.constrained and refsafe_active(variant),
-        steps=steps,
-        own=setting == basis.baseline,
-        front=False,
-    )
+    figures: dict[str, Any] = dict.fromkeys(WorkPrecisionRow.__struct_fields__)
+    figures |= {  # as of a run that MuJoCo refuses
+        "setting": setting,
+        "status": "diverged",
+        "reasons": (),
+        "penetration": 0.0,
+        "model_error": cone.model_error,
+        "refsafe": pilot.constrained and refsafe_active(variant),
+        "steps": steps,
+        "own": setting == basis.baseline,
+        "front": False,
+    }
+    row = WorkPrecisionRow(**figures)
     try:
         run = simulate(pilot.setup, variant, thickness(model))
     except mujoco.FatalError as error:
@@ -265,8 +262,8 @@ def _measure_setting(
         row,
         status=run.judgement.status.value,
         reasons=run.judgement.reasons,
-        energy_drift=None if energy is None else energy_drift(run, energy),
-        momentum_drift=momentum_drift(run) if basis.momentum_conserved else None,
+        energy_drift=None if energy is None else energy_drift(run.energy, energy),
+        momentum_drift=momentum_drift(run.momentum) if basis.momentum_conserved else None,
         mean_energy=_mean_energy(run, cone.reference.horizon, basis.late_energy),
         penetration=run.penetration,
     )

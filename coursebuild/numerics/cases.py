@@ -147,8 +147,8 @@ def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorL
         timestep=timestep,
         status=run.judgement.status.value,
         reasons=run.judgement.reasons,
-        energy_drift=energy_drift(run) if problem.energy_conserved else None,
-        momentum_drift=momentum_drift(run) if problem.momentum_conserved else None,
+        energy_drift=energy_drift(run.energy) if problem.energy_conserved else None,
+        momentum_drift=momentum_drift(run.momentum) if problem.momentum_conserved else None,
         penetration=run.penetration,
         refsafe=refsafe_active(model),
     )

@@ -18,7 +18,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from coursebuild.numerics.engine import Run
 from coursebuild.numerics.problem import Array, Motion, Reference, Sizes
 from coursebuild.numerics.reports.bench import FLOORS, Errors, FittedOrder, OrderRow
 from mjcourse.spatial import angular_distance
@@ -124,28 +123,28 @@ def fit_orders(
     return OrderRow(integrator, fit("position"), fit("attitude"), fit("velocity"))
 
 
-def energy_drift(run: Run, scale: float | None = None) -> float | None:
+def energy_drift(energy: Array, scale: float | None = None) -> float | None:
     """The largest change of potential and kinetic energy together, with its sign.
 
-    Relative to `scale`, J; without one to `energy_scale`.
+    `energy`: both (n, 2), J. Relative to `scale`, J; without one to `energy_scale`.
     """
-    whole = run.energy.sum(axis=1)
+    whole = energy.sum(axis=1)
     if scale is None:
-        scale = energy_scale(run)
+        scale = energy_scale(energy)
     if not np.isfinite(whole).all() or scale == 0:
         return None
     changes = (whole - whole[0]) / scale
     return float(changes[np.argmax(np.abs(changes))])
 
 
-def energy_scale(run: Run) -> float:
+def energy_scale(energy: Array) -> float:
     """The kinetic energy at the beginning, J; where that is 0, its largest."""
-    return float(run.energy[0, 1]) or float(np.max(run.energy[:, 1]))
+    return float(energy[0, 1]) or float(np.max(energy[:, 1]))
 
 
-def momentum_drift(run: Run) -> float | None:
-    """The largest change of angular momentum, relative to its initial size."""
-    scale = float(np.linalg.norm(run.momentum[0]))
-    if not np.isfinite(run.momentum).all() or scale == 0:
+def momentum_drift(momentum: Array) -> float | None:
+    """The largest change of angular momentum (n, 3), relative to its initial size."""
+    scale = float(np.linalg.norm(momentum[0]))
+    if not np.isfinite(momentum).all() or scale == 0:
         return None
-    return float(np.max(np.linalg.norm(run.momentum - run.momentum[0], axis=1)) / scale)
+    return float(np.max(np.linalg.norm(momentum - momentum[0], axis=1)) / scale)

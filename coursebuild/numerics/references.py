@@ -32,10 +32,8 @@ from msgspec.structs import replace
 from coursebuild.core.model.scenarios import DeclaredScenario
 from coursebuild.core.text.source import Span
 from coursebuild.numerics.cases import closed_motion, floor
-from coursebuild.numerics.detector import RunJudgement, RunStatus
 from coursebuild.numerics.engine import (
     EngineStates,
-    Run,
     initial_data,
     invariants,
     motion_of,
@@ -311,14 +309,14 @@ def find_conserved(model: Any, pilot: Pilot, reference: KnownMotion) -> tuple[fl
         *zip(reference.states.qpos, reference.states.qvel, strict=True),
     ]
     table = np.array([invariants(model, scratch, qpos, qvel) for qpos, qvel in states])
-    run = Run(reference.states, table[:, :2], table[:, 2:], 0.0, RunJudgement(RunStatus.OK))
-    scale = energy_scale(run)
+    energies, momenta = table[:, :2], table[:, 2:]
+    scale = energy_scale(energies)
     if conserved is not None:
         energy = "energy" in conserved and scale > 0
         return scale if energy else None, "angular-momentum" in conserved
     if not pilot.smooth or reference.kind == "self":
         return None, False
-    drifts = energy_drift(run), momentum_drift(run)
+    drifts = energy_drift(energies), momentum_drift(momenta)
     is_conserved = [drift is not None and abs(drift) < CONSERVED for drift in drifts]
     return scale if is_conserved[0] else None, is_conserved[1]
 

@@ -201,6 +201,8 @@ class _Hit(Struct):
     """Speed with which they part at the end, m/s; 0 if they stay together."""
     distance: float = 0.0
     """Distance slid, m."""
+    depth: float = 0.0
+    """Deepest contact, m."""
 
 
 def _with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
@@ -212,7 +214,7 @@ def _with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
     data, scratch = initial_data(scenario, model_copy), initial_data(scenario, model_copy)
     current: dict[Pair, _Hit] = {}
     hits: list[_Hit] = []
-    deepest = residual = force = iterations = 0.0
+    residual = force = iterations = 0.0
     for command in scenario.commands(step):
         if command:
             data.ctrl[:] = command
@@ -223,30 +225,39 @@ def _with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
         scratch.qpos[:], scratch.qvel[:] = data.qpos, data.qvel
         mujoco.mj_fwdPosition(model_copy, scratch)
         mujoco.mj_fwdVelocity(model_copy, scratch)
-        previous, current = current, {}
-        for contact in touching_contacts(scratch):
-            pair = (int(contact.geom[0]), int(contact.geom[1]))
-            parting_speed, sliding = contact_speeds(model_copy, scratch, contact)
-            hit = previous.pop(pair, None) or current.get(pair)
-            if hit is None:
-                hit = _Hit(-parting_speed, contact)
-                hits.append(hit)
-            if pair not in current:
-                hit.distance += sliding * step
-            current[pair], hit.contact = hit, copy.copy(contact)
-            deepest = max(deepest, -float(contact.dist))
-        for hit in previous.values():
-            hit.parting = max(0.0, contact_speeds(model_copy, scratch, hit.contact)[0])
+        current = _follow_hits(model_copy, scratch, step, current, hits)
     closing = (hit for hit in hits if hit.closing > 0)
     hardest = max(closing, key=lambda hit: hit.closing, default=None)
     return replace(
         row,
-        penetration=deepest if hits else None,
-        slip=max(hit.distance for hit in hits) if hits else None,
+        penetration=max((hit.depth for hit in hits), default=None),
+        slip=max((hit.distance for hit in hits), default=None),
         restitution=hardest.parting / hardest.closing if hardest is not None else None,
         residual=residual / force if force else None,
         iterations=iterations / steps if force else None,
     )
+
+
+def _follow_hits(
+    model: Any, data: Any, step: float, previous: dict[Pair, _Hit], hits: list[_Hit]
+) -> dict[Pair, _Hit]:
+    """Note what happened to hits in a step, and add new ones; the pairs that touch now."""
+    current: dict[Pair, _Hit] = {}
+    for contact in touching_contacts(data):
+        pair = (int(contact.geom[0]), int(contact.geom[1]))
+        parting_speed, sliding = contact_speeds(model, data, contact)
+        hit = previous.get(pair) or current.get(pair)
+        if hit is None:
+            hit = _Hit(-parting_speed, contact)
+            hits.append(hit)
+        if pair not in current:
+            hit.distance += sliding * step
+        current[pair], hit.contact = hit, copy.copy(contact)
+        hit.depth = max(hit.depth, -float(contact.dist))
+    for pair in previous.keys() - current.keys():
+        hit = previous[pair]
+        hit.parting = max(0.0, contact_speeds(model, data, hit.contact)[0])
+    return current
 
 
 def _with_costs(

@@ -195,7 +195,11 @@ def last_velocity(
 
 def problems() -> tuple[Problem, ...]:
     """The impact and the cradles."""
-    impact = Problem(
+    return _impact_problem(), _cradle_problem(), _touching_problem()
+
+
+def _impact_problem() -> Problem:
+    return Problem(
         name="elastic-impact",
         title="Elastic impact on a wall",
         case=8,
@@ -218,28 +222,28 @@ def problems() -> tuple[Problem, ...]:
         smooth=False,
         note="an impact begins within a step: no order is to be expected",
     )
+
+
+def _cradle_problem() -> Problem:
     law = "equal masses exchange their velocities"
-    cradle = replace(
-        impact,
+    last_ball = partial(last_velocity, CRADLE, _CRADLE_SCENARIO, ball=2, steps=20)
+    name = "velocity of the last ball, 20 steps in a contact"
+    return replace(
+        _impact_problem(),
         name="newtons-cradle",
         title="Newton's cradle with gaps",
         mjcf=CRADLE,
         scenario=_CRADLE_SCENARIO,
         reference=Reference("closed", law, Cradle()),
-        checks=(
-            ScalarCheck(
-                "velocity of the last ball, 20 steps in a contact",
-                "m/s",
-                SPEED,
-                lambda integrator: last_velocity(CRADLE, _CRADLE_SCENARIO, integrator, 2, 20),
-                law,
-            ),
-        ),
+        checks=(ScalarCheck(name, "m/s", SPEED, last_ball, law),),
         note="a cradle whose balls touch is another problem: all contacts act at once",
     )
+
+
+def _touching_problem() -> Problem:
     source = "MuJoCo's soft contacts, Bulirsch–Stoer in small steps"
-    touching_cradle = replace(
-        impact,
+    return replace(
+        _impact_problem(),
         name="newtons-cradle-touching",
         title="Newton's cradle, two balls of which touch",
         mjcf=TOUCHING_BALLS,
@@ -252,7 +256,6 @@ def problems() -> tuple[Problem, ...]:
         ),
         note="all contacts act at once: the last ball does not take over the whole velocity",
     )
-    return impact, cradle, touching_cradle
 
 
 def _touching_check(ball: int, name: str) -> ScalarCheck:
@@ -260,6 +263,6 @@ def _touching_check(ball: int, name: str) -> ScalarCheck:
         f"velocity of the {name} ball, 80 steps in a contact",
         "m/s",
         lambda _: float(TouchingCradle().motion(np.array([0.06])).velocity[0, ball]),
-        lambda integrator: last_velocity(TOUCHING_BALLS, _TOUCHING_SCENARIO, integrator, ball, 80),
+        partial(last_velocity, TOUCHING_BALLS, _TOUCHING_SCENARIO, ball=ball, steps=80),
         "the soft contacts of MuJoCo, integrated",
     )

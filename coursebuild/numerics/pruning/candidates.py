@@ -25,7 +25,7 @@ from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.compare import WatchedRun
 from coursebuild.numerics.pruning.edits import ModelEdit, set_attributes, set_option
 from coursebuild.numerics.pruning.markup import Element, place_of
-from coursebuild.numerics.pruning.model_text import ModelText, section_of
+from coursebuild.numerics.pruning.model_text import ModelText, section_of, thing_kind
 from coursebuild.numerics.pruning.reachability import Pair, find_separate, iterate_pairs
 from coursebuild.numerics.reports.diet import name_list
 
@@ -165,16 +165,16 @@ def unread_elements(text: ModelText, scenarios: Collection[Scenario]) -> list[It
 
 def _unread_kind(text: ModelText, element: Element, scenarios: Collection[Scenario]) -> str:
     """The kind of an element in a finding; empty for one that a motion may depend on."""
-    thing, tag, section = text.ids(element), element.tag, section_of(element)
+    ids, tag, section = text.ids(element), element.tag, section_of(element)
     if section == "sensor" and tag not in ("user", "plugin"):
         return "sensor-unread"
-    if section == "actuator" and thing and _is_forceless_actuator(text.model, thing.ids, scenarios):
+    if section == "actuator" and ids and _is_forceless_actuator(text.model, ids, scenarios):
         return "actuator-idle"
-    if section == "tendon" and thing and _is_forceless_tendon(text.model, thing.ids):
+    if section == "tendon" and ids and _is_forceless_tendon(text.model, ids):
         return "tendon-idle"
     if section == "keyframe" and tag == "key":
         return "unused-keyframe"
-    if thing is not None and thing.kind == "site":
+    if ids and thing_kind(element) == "site":
         return "unused-site"
     if section == "asset" and element.get("type") != "skybox" and f"unused-{tag}" in KINDS:
         return f"unused-{tag}"

@@ -13,12 +13,12 @@ from __future__ import annotations
 
 import posixpath
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
-from msgspec import Struct
 
 from coursebuild.numerics.pruning.edits import ModelEdit, apply_edits, set_attributes
 from coursebuild.numerics.pruning.markup import Element, Markup, parse_markup, splice
@@ -51,14 +51,6 @@ _HOLDERS = frozenset(("worldbody", "body", "frame", "replicate"))
 _SECTIONS = frozenset(("sensor", "actuator", "tendon"))
 
 
-class Thing(Struct, frozen=True):
-    """What an element becomes in the compiled model."""
-
-    kind: str
-    """A key of `KINDS`."""
-    ids: tuple[int, ...]
-
-
 class ModelText:
     """A model and its files."""
 
@@ -69,7 +61,7 @@ class ModelText:
         """All of them, in the order in which MuJoCo meets them."""
         self._compile = compile
         self.model: Any = self._compile_checked() if check else self.compile()
-        self._things = self._name_things()
+        self._ids = self._find_ids()
 
     def compile(self, edits: Iterable[ModelEdit] = ()) -> Any:
         """A `mjModel` of the files with these changes.
@@ -87,20 +79,19 @@ class ModelText:
             for path, file_edits in _group_by_path(edits).items()
         }
 
-    def ids(self, element: Element) -> Thing | None:
-        """The thing that an element becomes; `None` where that is not known."""
-        return self._things.get(element)
+    def ids(self, element: Element) -> tuple[int, ...]:
+        """The numbers of the things that an element becomes; empty where that is not known."""
+        return self._ids.get(element, ())
 
     def things(self, kind: str) -> Iterator[tuple[Element, tuple[int, ...]]]:
         """The elements of a kind, with the numbers of the things that they become."""
-        for element, thing in self._things.items():
-            if thing.kind == kind:
-                yield element, thing.ids
+        for element, ids in self._ids.items():
+            if thing_kind(element) == kind:
+                yield element, ids
 
     def ids_of(self, elements: Iterable[Element], kind: str) -> frozenset[int]:
         """The numbers of the things of one kind that elements become."""
-        things = (self.ids(element) for element in elements)
-        return frozenset(i for thing in things if thing and thing.kind == kind for i in thing.ids)
+        return frozenset(i for e in elements if thing_kind(e) == kind for i in self.ids(e))
 
     def _compile_checked(self) -> Any:
         model = self._compile(self.main.data)
@@ -113,13 +104,12 @@ class ModelText:
                 raise ModelTextError("what it includes cannot be put into one text")
         return model
 
-    def _name_things(self) -> dict[Element, Thing]:
-        """The thing that each element becomes; empty where names cannot be given."""
-        names_by_element: dict[Element, tuple[str, str]] = {}
+    def _find_ids(self) -> dict[Element, tuple[int, ...]]:
+        """The things that each element becomes; empty where names cannot be given."""
+        names: dict[Element, str] = {}
         edits: list[ModelEdit] = []
         for number, element in enumerate(self.elements):
-            kind = thing_kind(element)
-            if kind is None:
+            if thing_kind(element) is None:
                 continue
             name = element.get("name")
             if not name:
@@ -127,18 +117,14 @@ class ModelText:
                 while any(name.encode() in document.data for document in self.documents):
                     name += "_"
                 edits += set_attributes(element, (("name", name),))
-            names_by_element[element] = kind, name
+            names[element] = name
         try:
             model = self.compile(edits) if edits else self.model
         except ValueError:
             return {}
         if any(getattr(model, size) != getattr(self.model, size) for _, size in KINDS.values()):
             return {}
-        names = {
-            kind: [mujoco.mj_id2name(model, code, i) or "" for i in range(getattr(model, size))]
-            for kind, (code, size) in KINDS.items()
-        }
-        return _assign_things(names_by_element, names)
+        return _find_names(names, model)
 
 
 def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -> ModelText:
@@ -231,28 +217,23 @@ def thing_kind(element: Element) -> str | None:
     return _IN_BODIES.get(element.tag) if is_in_holder else None
 
 
-def _assign_things(
-    names_by_element: Mapping[Element, tuple[str, str]], names: Mapping[str, Sequence[str]]
-) -> dict[Element, Thing]:
-    """Find the things of elements by their names; elements that may mean the same one get none."""
-    things: dict[Element, Thing] = {}
-    owners: dict[tuple[str, int], list[Element]] = {}
-    places = {kind: {name: i for i, name in enumerate(of_kind)} for kind, of_kind in names.items()}
-    for element, (kind, name) in names_by_element.items():
-        ids: tuple[int, ...]
+def _find_names(names: Mapping[Element, str], model: Any) -> dict[Element, tuple[int, ...]]:
+    """The things with the names of elements; elements that may mean the same one get none."""
+    known_names = {
+        kind: [mujoco.mj_id2name(model, code, i) or "" for i in range(getattr(model, size))]
+        for kind, (code, size) in KINDS.items()
+    }
+    ids: dict[Element, tuple[int, ...]] = {}
+    for element, name in names.items():
+        candidates = known_names[thing_kind(element) or ""]
         if any(node.tag == "replicate" for node in element.ancestors()):
             shape = re.compile(re.escape(name) + r".*\d", re.DOTALL)
-            ids = tuple(
-                i for i, known_name in enumerate(names[kind]) if shape.fullmatch(known_name)
-            )
+            ids[element] = tuple(i for i, text in enumerate(candidates) if shape.fullmatch(text))
         else:
-            ids = (places[kind][name],) if name in places[kind] else ()
-        if ids:
-            things[element] = Thing(kind, ids)
-            for number in ids:
-                owners.setdefault((kind, number), []).append(element)
-    for elements in owners.values():
-        if len(elements) > 1:
-            for element in elements:
-                things.pop(element, None)
-    return things
+            ids[element] = (candidates.index(name),) if name in candidates else ()
+    owners = Counter((thing_kind(e), i) for e, numbers in ids.items() for i in numbers)
+    return {
+        e: numbers
+        for e, numbers in ids.items()
+        if numbers and all(owners[thing_kind(e), i] == 1 for i in numbers)
+    }

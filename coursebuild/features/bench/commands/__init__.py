@@ -2,21 +2,20 @@
 
 `runs` measures one thing after the other into a `Measurement` (`measurement`), and records it.
 
-Entry points: `add_report_options`; `run_measurement`; `write_measurement`.
+Entry points: `add_report_options`; `run_measurement`.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from coursebuild.cli.arguments import options_of
 from coursebuild.cli.output import CLEAN, FAILURE, style_of, write
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
-    measurement_json,
     measurement_text,
 )
 from coursebuild.pipeline.options import Options
@@ -37,27 +36,25 @@ def add_report_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run_measurement(
-    arguments: argparse.Namespace, measure: Callable[[Options], Measurement[Any]]
-) -> Measurement[Any]:
-    """Measure with the options that the arguments give."""
-    options = options_of(arguments)
-    try:
-        return measure(options)
-    finally:
-        options.store.close()
-
-
-def write_measurement(
     arguments: argparse.Namespace,
-    measurement: Measurement[Any],
-    text: Callable[[Style], str],
-    values: Mapping[str, object],
+    measure: Callable[[Options], Measurement[Any]],
+    text: Callable[[Sequence[Any], Style], str],
+    json: Callable[[Measurement[Any]], str],
     *,
     empty: str = "",
 ) -> int:
-    """Print a measurement as text or as JSON, and return the exit status."""
+    """Measure with the options that the arguments give, print it, and return the exit status.
+
+    `text` is of the reports, `json` of the whole; `empty` is for no text at all.
+    """
+    options = options_of(arguments)
+    try:
+        measurement = measure(options)
+    finally:
+        options.store.close()
     status = CLEAN if measurement.ok else FAILURE
     if arguments.format == "json":
-        return write(measurement_json(values, measurement), status)
+        return write(json(measurement), status)
     style = style_of(sys.stdout)
-    return write(measurement_text(text(style), measurement, style) or empty, status)
+    reports = text(measurement.reports, style)
+    return write(measurement_text(reports, measurement, style) or empty, status)

@@ -6,13 +6,8 @@ import argparse
 from typing import Any
 
 from coursebuild.cli.arguments import add_cache, add_format, add_quiet
-from coursebuild.cli.output import CLEAN, write
-from coursebuild.features.bench.commands import (
-    add_report_options,
-    run_measurement,
-    write_measurement,
-)
-from coursebuild.features.bench.commands.measurement import Measurement
+from coursebuild.features.bench.commands import add_report_options, run_measurement
+from coursebuild.features.bench.commands.measurement import Measurement, measurement_json
 from coursebuild.features.numerics.commands.stability import check_stability, stability
 from coursebuild.features.numerics.commands.text import stability_text
 from coursebuild.pipeline.options import Options
@@ -47,11 +42,14 @@ def run(arguments: argparse.Namespace) -> int:
             return check_stability(options, names)
         return stability(options, names, record=arguments.record)
 
-    measurement = run_measurement(arguments, measure)
-    if arguments.format == "json" and measurement.ok and not (arguments.record or arguments.check):
-        return write(json_text(measurement.reports), CLEAN)
-    printed_reports = () if arguments.check else measurement.reports
-    values = {"cases": measurement.reports}
-    return write_measurement(
-        arguments, measurement, lambda style: stability_text(printed_reports, style), values
+    def as_json(measurement: Measurement[Any]) -> str:
+        if measurement.ok and not (arguments.record or arguments.check):
+            return json_text(measurement.reports)
+        return measurement_json({"cases": measurement.reports}, measurement)
+
+    return run_measurement(
+        arguments,
+        measure,
+        lambda reports, style: "" if arguments.check else stability_text(reports, style),
+        as_json,
     )

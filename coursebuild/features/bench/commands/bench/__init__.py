@@ -9,11 +9,10 @@ from coursebuild.cli.arguments import add_cache, add_format, add_quiet
 from coursebuild.features.bench.commands import (
     add_report_options,
     run_measurement,
-    write_measurement,
 )
 from coursebuild.features.bench.commands.bench.run import bench, check
 from coursebuild.features.bench.commands.bench.text import bench_text
-from coursebuild.features.bench.commands.measurement import Measurement
+from coursebuild.features.bench.commands.measurement import Measurement, measurement_json
 from coursebuild.pipeline.options import Options
 
 EXAMPLES = """\
@@ -46,12 +45,10 @@ def run(arguments: argparse.Namespace) -> int:
             return check(options, names, quick=quick)
         return bench(options, names, quick=quick, record=arguments.record)
 
-    measurement = run_measurement(arguments, measure)
-    reports = () if arguments.check else measurement.reports
-    return write_measurement(
+    return run_measurement(
         arguments,
-        measurement,
-        lambda style: bench_text(reports, style),
-        {"scenes": measurement.reports},
+        measure,
+        lambda reports, style: "" if arguments.check else bench_text(reports, style),
+        lambda measurement: measurement_json({"scenes": measurement.reports}, measurement),
         empty="there is no model to measure\n",
     )

@@ -7,10 +7,12 @@ import argparse
 from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_cache, add_format, add_quiet
-from coursebuild.cli.output import CLEAN
-from coursebuild.features.bench.commands import run_measurement, write_measurement
+from coursebuild.features.bench.commands import run_measurement
 from coursebuild.features.bench.commands.diet.run import diet
 from coursebuild.features.bench.commands.diet.text import diet_text, diet_values
+from coursebuild.features.bench.commands.measurement import Measurement, measurement_json
+from coursebuild.numerics.reports.diet import DietReport
+from coursebuild.pipeline.options import Options
 
 EXAMPLES = """\
 examples:
@@ -41,16 +43,21 @@ def run(arguments: argparse.Namespace) -> int:
     """Look at models, and mend them or record what was found."""
     settings = {name: getattr(arguments, name) for name in ("quick", "fix", "record")}
     names = tuple(arguments.models)
-    measurement = run_measurement(arguments, lambda options: diet(options, names, **settings))
-    if arguments.quiet and arguments.format == "text":
+    quiet = arguments.quiet and arguments.format == "text"
+
+    def measure(options: Options) -> Measurement[DietReport]:
+        measurement = diet(options, names, **settings)
+        if not quiet:
+            return measurement
         if measurement.ok:
-            return CLEAN
-        reports = tuple(report for report in measurement.reports if not report.ok)
-        measurement = replace(measurement, reports=reports)
-    return write_measurement(
+            return Measurement(())
+        return replace(measurement, reports=tuple(r for r in measurement.reports if not r.ok))
+
+    empty = "" if quiet else "there is no model to look at\n"
+    return run_measurement(
         arguments,
-        measurement,
-        lambda style: diet_text(measurement.reports, style),
-        diet_values(measurement.reports),
-        empty="there is no model to look at\n",
+        measure,
+        diet_text,
+        lambda measurement: measurement_json(diet_values(measurement.reports), measurement),
+        empty=empty,
     )
