@@ -1,6 +1,6 @@
 """Layouts of directed acyclic graphs in layers, with predecessors above.
 
-Entry points: `layered_layout(nodes, edges, …)`, `transitive_reduction(nodes, edges)`.
+Entry points: `layered_layout(count, edges, passing)`, `transitive_reduction(nodes, edges)`.
 
 The method is that of Sugiyama, Tagawa and Toda (IEEE Trans. Syst., Man, Cybern. 11(2), 1981):
 
@@ -17,15 +17,16 @@ The same graph gives the same layout: ties are broken by the order of the nodes.
 
 from __future__ import annotations
 
+import functools
 from bisect import bisect_right, insort
 from collections.abc import Iterable, Mapping, Sequence
+from graphlib import TopologicalSorter
 from itertools import pairwise
 from typing import TypeAlias
 
 from msgspec import Struct
 
-Edge: TypeAlias = tuple[str, str]
-_Point: TypeAlias = str | tuple[str, str, int]
+_Point: TypeAlias = int | tuple[int, int, int]
 """A node, or an edge where it crosses a layer."""
 
 _SWEEPS = 12
@@ -37,23 +38,21 @@ _STRAIGHT = 20.0
 
 
 class PlacedNode(Struct, frozen=True):
-    """A node with the middle of its place."""
+    """The place of a node: its middle, and its layer."""
 
-    id: str
     x: float
     layer: int
 
 
 class PlacedEdge(Struct, frozen=True):
-    """An edge, by its places from layer to layer."""
+    """An edge, by the layer where it starts and its places from layer to layer."""
 
-    start: str
-    end: str
+    layer: int
     xs: tuple[float, ...]
 
 
 class Layout(Struct, frozen=True):
-    """The layout of a graph; its left edge is at 0."""
+    """The layout of a graph, in widths of a node; its left edge is at 0."""
 
     nodes: tuple[PlacedNode, ...]
     edges: tuple[PlacedEdge, ...]
@@ -61,90 +60,71 @@ class Layout(Struct, frozen=True):
     layers: int
 
 
-def transitive_reduction(nodes: Sequence[str], edges: Iterable[Edge]) -> tuple[Edge, ...]:
-    """The edges without those that a longer path of others implies."""
-    node_set = set(nodes)
+def transitive_reduction(
+    nodes: Iterable[str], edges: Iterable[tuple[str, str]]
+) -> tuple[tuple[str, str], ...]:
+    """The edges between these nodes, without those that a longer path of others implies."""
     successors: dict[str, list[str]] = {node: [] for node in nodes}
-    known_edges = [(a, b) for a, b in dict.fromkeys(edges) if a in node_set and b in node_set]
+    known_edges = [e for e in dict.fromkeys(edges) if successors.keys() >= {*e}]
     for a, b in known_edges:
         successors[a].append(b)
     descendants: dict[str, set[str]] = {}
-
-    def find_descendants(node: str) -> set[str]:
-        stack = [node]
-        while stack:
-            top = stack[-1]
-            missing = [successor for successor in successors[top] if successor not in descendants]
-            if missing:
-                stack += missing
-                continue
-            stack.pop()
-            descendants[top] = set(successors[top]).union(
-                *(descendants[successor] for successor in successors[top])
-            )
-        return descendants[node]
-
+    for node in TopologicalSorter(successors).static_order():  # successors first
+        below = (descendants[successor] for successor in successors[node])
+        descendants[node] = set(successors[node]).union(*below)
     return tuple(
-        (a, b)
-        for a, b in known_edges
-        if not any(b in find_descendants(c) for c in successors[a] if c != b)
+        (a, b) for a, b in known_edges if not any(b in descendants[c] for c in successors[a])
     )
 
 
-def layered_layout(
-    nodes: Sequence[str], edges: Sequence[Edge], width: float, gap: float, passing: float
-) -> Layout:
-    """Lay out a graph.
+@functools.lru_cache(maxsize=256)
+def layered_layout(count: int, edges: tuple[tuple[int, int], ...], passing: float) -> Layout:
+    """Lay out a graph; layouts are kept, since many graphs are alike.
 
     Args:
-        nodes: the nodes, in the order that breaks ties.
-        edges: edges between these nodes, without cycles.
-        width: the width of a node, in the units of the drawing.
-        gap: the least room between neighbours in a layer.
-        passing: the room for an edge that crosses a layer.
+        count: how many nodes there are; their order breaks ties.
+        edges: edges between these nodes, by their numbers from 0, without cycles.
+        passing: the room for an edge that crosses a layer, in widths of a node.
     """
-    layers = _assign_layers(nodes, edges)
-    rows: list[list[_Point]] = [[] for _ in range(max(layers.values(), default=-1) + 1)]
-    for node in nodes:
-        rows[layers[node]].append(node)
-    routes: list[tuple[Edge, list[_Point]]] = []
+    layers = _assign_layers(count, edges)
+    rows: list[list[_Point]] = [[] for _ in range(max(layers, default=-1) + 1)]
+    for node, layer in enumerate(layers):
+        rows[layer].append(node)
+    routes: list[list[_Point]] = []
     for a, b in edges:
         passing_points: list[_Point] = [(a, b, level) for level in range(layers[a] + 1, layers[b])]
         for level, point in enumerate(passing_points, layers[a] + 1):
             rows[level].append(point)
-        routes.append(((a, b), [a, *passing_points, b]))
-    links = [pair for _, route in routes for pair in pairwise(route)]
+        routes.append([a, *passing_points, b])
+    links = [pair for route in routes for pair in pairwise(route)]
     parents = _neighbours(links, upwards=True)
     children = _neighbours(links, upwards=False)
     rows = _order_rows(rows, parents, children)
-    half_widths = {p: (width if isinstance(p, str) else passing) / 2 for row in rows for p in row}
-    x = _place_points(rows, parents, children, half_widths, gap)
+    half_widths = {p: (1.0 if isinstance(p, int) else passing) / 2 for row in rows for p in row}
+    x = _place_points(rows, parents, children, half_widths)
     left = min((x[point] - half_widths[point] for point in x), default=0.0)
     right = max((x[point] + half_widths[point] for point in x), default=0.0)
     return Layout(
-        tuple(PlacedNode(node, x[node] - left, layers[node]) for node in nodes),
-        tuple(PlacedEdge(*edge, tuple(x[p] - left for p in route)) for edge, route in routes),
+        tuple(PlacedNode(x[node] - left, layer) for node, layer in enumerate(layers)),
+        tuple(
+            PlacedEdge(layers[a], tuple(x[point] - left for point in route))
+            for (a, _), route in zip(edges, routes, strict=True)
+        ),
         right - left,
         len(rows),
     )
 
 
-def _assign_layers(nodes: Sequence[str], edges: Sequence[Edge]) -> dict[str, int]:
-    predecessors: dict[str, list[str]] = {node: [] for node in nodes}
-    successors: dict[str, list[str]] = {node: [] for node in nodes}
+def _assign_layers(count: int, edges: Iterable[tuple[int, int]]) -> list[int]:
+    predecessors: dict[int, list[int]] = {node: [] for node in range(count)}
+    successors: dict[int, list[int]] = {node: [] for node in range(count)}
     for a, b in edges:
         predecessors[b].append(a)
         successors[a].append(b)
-    unplaced = {node: len(predecessors[node]) for node in nodes}
-    ready = [node for node in nodes if not unplaced[node]]
-    layers: dict[str, int] = {}
-    for node in ready:  # grows in the loop
+    layers = [0] * count
+    for node in TopologicalSorter(predecessors).static_order():
         layers[node] = max((layers[b] + 1 for b in predecessors[node]), default=0)
-        for successor in successors[node]:
-            unplaced[successor] -= 1
-            if not unplaced[successor]:
-                ready.append(successor)
-    for node in nodes:
+    for node in range(count):
         if not predecessors[node] and successors[node]:
             layers[node] = min(layers[successor] for successor in successors[node]) - 1
     return layers
@@ -207,7 +187,6 @@ def _place_points(
     parents: Mapping[_Point, list[_Point]],
     children: Mapping[_Point, list[_Point]],
     half_widths: Mapping[_Point, float],
-    gap: float,
 ) -> dict[_Point, float]:
     x: dict[_Point, float] = {}
     steps: list[list[float]] = []
@@ -215,8 +194,8 @@ def _place_points(
         position, places = 0.0, []
         for point in row:
             places.append(position + half_widths[point])
-            position += 2 * half_widths[point] + gap
-        middle = (position - gap) / 2
+            position += 2 * half_widths[point]
+        middle = position / 2
         steps.append(places)
         x |= {point: place - middle for point, place in zip(row, places, strict=True)}
     weights = _weigh_neighbours(parents, children), _weigh_neighbours(children, parents)

@@ -10,7 +10,6 @@ longer path implies are left out, and so are nodes beyond a limit.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
@@ -115,17 +114,10 @@ def _graph(
 
 def drawings(graph: LessonGraph, words: Strings) -> tuple[Markup, Markup]:
     """The drawing with titles and the one without, both with the same layout."""
-    places = {node.id: str(number) for number, node in enumerate(graph.nodes)}
-    layout = _layout(len(places), tuple((places[a], places[b]) for a, b in graph.edges))
+    numbers = {node.id: number for number, node in enumerate(graph.nodes)}
+    edges = tuple((numbers[a], numbers[b]) for a, b in graph.edges)
+    layout = layered_layout(len(numbers), edges, _CROSSING_WIDTH)
     return _drawing(graph, layout, words, _WIDE), _drawing(graph, layout, words, _NARROW)
-
-
-@functools.lru_cache(maxsize=256)
-def _layout(count: int, edges: tuple[tuple[str, str], ...]) -> Layout:
-    """The layout of a graph with numbered nodes, kept because many graphs are alike."""
-    return layered_layout(
-        [str(number) for number in range(count)], edges, 1.0, 0.0, _CROSSING_WIDTH
-    )
 
 
 def _drawing(graph: LessonGraph, layout: Layout, words: Strings, look: _Look) -> Markup:
@@ -160,11 +152,10 @@ class _Box(Struct, frozen=True):
 
 def _edges(layout: Layout, look: _Look, unit: float) -> Iterator[str]:
     """Lines from box to box, and arrowheads."""
-    layer = {node.id: node.layer for node in layout.nodes}
     lines, heads = [], []
     for edge in layout.edges:
         xs = [_x(x, unit, look) for x in edge.xs]
-        top = _EDGE + layer[edge.start] * look.step
+        top = _EDGE + edge.layer * look.step
         path = [f"M{xs[0]:.1f} {top + look.height:.1f}"]
         for number, (x, following) in enumerate(pairwise(xs), 1):
             start, top = top + look.height, top + look.step
