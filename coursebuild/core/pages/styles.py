@@ -17,19 +17,11 @@ from html import escape, unescape
 
 _PIECE = re.compile(
     r"""<!--.*?-->"""
-    r"""|<(?P<raw>script|style|textarea|title)\b(?:[^"'>]|"[^"]*"|'[^']*')*>.*?</(?P=raw)\s*>"""
-    r"""|<(?P<tag>[a-zA-Z](?:[^"'>]|"[^"]*"|'[^']*')*)>""",
+    r"""|<(?P<raw>script|style|textarea|title)\b(?:[^"'>]++|"[^"]*"|'[^']*')*+>.*?</(?P=raw)\s*>"""
+    r"""|<(?P<tag>[a-zA-Z](?:[^"'>]++|"[^"]*"|'[^']*')*+)>""",
     re.DOTALL | re.IGNORECASE,
 )
 """A comment, an element of raw text, or a tag, so that only real attributes are found."""
-
-_WITHOUT_STYLE = re.compile(
-    r"""(?:[^<]++|<(?![a-z]|!--)"""
-    r"""|<(?!(?:script|style|textarea|title)\b|[^<>]*style)"""
-    r"""[a-z](?:[^"'<>]++|"[^"<>]*+"|'[^'<>]*+')*+>)*+""",
-    re.IGNORECASE,
-)
-"""Text, end tags and tags without a style, after which `_PIECE` may match."""
 
 _ATTRIBUTE = re.compile(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
 
@@ -37,22 +29,16 @@ _ATTRIBUTE = re.compile(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>
 def hoist_styles(html: str) -> tuple[str, frozenset[str]]:
     """Replace `style` attributes by classes; return the page and the declarations."""
     declarations: set[str] = set()
-    parts: list[str] = []
-    position = 0
-    while position < len(html):
-        gap = _WITHOUT_STYLE.match(html, position)
-        end = position if gap is None else gap.end()
-        piece = _PIECE.match(html, end)
-        if piece is None:
-            parts.append(html[position : end + 1])
-            position = end + 1
-        else:
-            tag, declaration = _without_style(piece["tag"]) if piece["tag"] else (piece[0], "")
-            if declaration:
-                declarations.add(declaration)
-            parts += (html[position:end], tag)
-            position = piece.end()
-    return "".join(parts), frozenset(declarations)
+
+    def replace(piece: re.Match[str]) -> str:
+        if not piece["tag"] or "style" not in piece["tag"].lower():  # as most
+            return piece[0]
+        tag, declaration = _without_style(piece["tag"])
+        if declaration:
+            declarations.add(declaration)
+        return tag
+
+    return _PIECE.sub(replace, html), frozenset(declarations)
 
 
 @functools.lru_cache(maxsize=4096)
