@@ -19,8 +19,8 @@ from coursebuild.core.model import (
     Document,
     Heading,
     ThematicBreak,
-    document_blocks,
     document_scripts,
+    find_blocks,
 )
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.syntax.json_text import parse_json
@@ -31,7 +31,7 @@ from coursebuild.features.quiz.model import ChoiceQuestion, Quiz
 
 
 def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
-    """Report repeated ids, anchors in use, and output questions about scripts that nothing runs.
+    """Report repeated ids, and output questions about scripts that nothing runs.
 
     Only `documents` are checked; ids are compared with those of the whole course.
     """
@@ -51,30 +51,11 @@ def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Dia
                     notes=[Note("the first one is here", first[quiz.id].id_span)],
                 )
             yield from _check_scripts(quiz, norun)
-        yield from _check_anchors(document)
 
 
 def quizzes(document: Document) -> Iterator[Quiz]:
     """The quizzes of a document."""
-    return (block for block in document_blocks(document) if isinstance(block, Quiz))
-
-
-def _check_anchors(document: Document) -> Iterator[Diagnostic]:
-    """Report questions whose anchor a heading or another quiz of the document has."""
-    named_quizzes = [quiz for quiz in quizzes(document) if quiz.id]
-    places = {b.anchor: b.span for b in document_blocks(document) if isinstance(b, Heading)}
-    places |= {quiz.id: quiz.id_span for quiz in named_quizzes}
-    for quiz in named_quizzes:
-        for key in quiz.keys:
-            first = places.get(quiz.anchor(key))
-            if first is not None:
-                yield diagnose(
-                    "anchor-repeated",
-                    first,
-                    f"the id `{quiz.anchor(key)}` is already used",
-                    help="it is the address of a question; choose another one here",
-                    notes=[Note("in this quiz", quiz.id_span)],
-                )
+    return find_blocks(document, Quiz)
 
 
 def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | None]:
