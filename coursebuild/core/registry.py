@@ -84,7 +84,7 @@ def features() -> tuple[Feature, ...]:
 def use_course_features(features: Iterable[Feature], digest: str) -> None:
     """Set the course's own features, and a hash of their code."""
     global _of_course, _digest
-    for name in _rules_of(_of_course):
+    for name in _names(_of_course, "rules"):
         RULES.pop(name, None)
     _of_course, _digest = _register(features), digest
     for table in (_by_fence, _by_block, page_kinds):
@@ -101,38 +101,25 @@ def find_clash(candidate: Feature, installed: Iterable[Feature]) -> str:
     installed = tuple(installed)
     if any(feature.name == candidate.name for feature in installed):
         return f"two features are called `{candidate.name}`"
-    rules = {rule.name for rule in candidate.rules} & (RULES.keys() - _rules_of(_of_course))
-    if rules:
-        return f"there is a rule `{min(rules)}` already"
     invisible = [kind for kind in candidate.fences if kind.block.summary is FeatureBlock.summary]
     if invisible and (
         candidate.check or candidate.check_runs or candidate.pages or candidate.exporters
     ):
         return f"it would see no `{invisible[0].name}` of the course: its block has no `summary`"
-    read = {*CORE_FENCES, *(kind.name for feature in installed for kind in feature.fences)}
-    twice = [kind.name for kind in candidate.fences if kind.name in read]
-    if twice:
-        return f"the fence `{twice[0]}` is read already"
-    pages = {
-        *CORE_PAGES,
-        *_FOLDERS,
-        *(kind.name for feature in installed for kind in feature.pages),
-    }
-    twice = [kind.name for kind in candidate.pages if kind.name in pages]
-    if twice:
-        return f"there is a page `{twice[0]}` already"
     odd = [kind.name for kind in candidate.pages if not _PAGE_NAME.fullmatch(kind.name)]
     if odd:
         return f"a page cannot be called `{odd[0]}`: use small letters, digits and `-`"
-    exporters = _exporter_names((candidate,)) & _exporter_names(installed)
-    if exporters:
-        return f"there is an export `{min(exporters)}` already"
-    commands = {
-        *CORE_COMMANDS,
-        *(command.name for feature in installed for command in feature.commands),
-    }
-    twice = [command.name for command in candidate.commands if command.name in commands]
-    return f"there is a command `{twice[0]}` already" if twice else ""
+    core_rules = RULES.keys() - _names(_of_course, "rules")
+    for field, core_names, message in (
+        ("rules", core_rules, "there is a rule `{}` already"),
+        ("fences", CORE_FENCES, "the fence `{}` is read already"),
+        ("pages", (*CORE_PAGES, *_FOLDERS), "there is a page `{}` already"),
+        ("exporters", (), "there is an export `{}` already"),
+        ("commands", CORE_COMMANDS, "there is a command `{}` already"),
+    ):
+        if twice := _names((candidate,), field) & _names(installed, field).union(core_names):
+            return message.format(min(twice))
+    return ""
 
 
 def fence_kind(name: str) -> FenceKind[Any] | None:
@@ -161,9 +148,8 @@ def find_exporter(name: str) -> Exporter | str:
                     return exporter
                 source = _INSTALLED_BY.get(missing[0], f"the feature `{missing[0]}`")
                 return f"`export {name}` needs {missing[0]}: install {source}"
-    return (
-        f"there is no export `{name}`: choose from {', '.join(sorted(_exporter_names(available)))}"
-    )
+    names = ", ".join(sorted(_names(available, "exporters")))
+    return f"there is no export `{name}`: choose from {names}"
 
 
 def missing_package(name: str) -> str:
@@ -284,12 +270,9 @@ def _package_lines() -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _exporter_names(features: Iterable[Feature]) -> set[str]:
-    return {exporter.name for feature in features for exporter in feature.exporters}
-
-
-def _rules_of(features: Iterable[Feature]) -> set[str]:
-    return {rule.name for feature in features for rule in feature.rules}
+def _names(features: Iterable[Feature], field: str) -> set[str]:
+    """The names of what features offer in one of their fields."""
+    return {offer.name for feature in features for offer in getattr(feature, field)}
 
 
 def _register(features: Iterable[Feature]) -> tuple[Feature, ...]:

@@ -127,7 +127,7 @@ class _Loader:
         self.files = read.value
         self.diagnostics = list(read.diagnostics)
         self.sources: Mapping[str, Source] = {}
-        self.callouts = frozenset(kind.name for kind in CALLOUTS)
+        self.callouts = frozenset(CALLOUTS)
         self.unlisted_lessons: dict[str, Source] = {}
         """Lesson files that the map does not name, by path; without one that is probably meant by
         an entry without a file."""
@@ -154,7 +154,7 @@ class _Loader:
                 for source in self.files.lessons:
                     self._parse_document(source, lesson=True)
             return None
-        self.callouts = frozenset(kind.name for kind in course.callouts)
+        self.callouts = course.callout_names
         self.unlisted_lessons = self._lessons_not_in(course)
         planned = {x.path for x in course.lessons if x.status == "planned"}
         page_paths = {page.path for page in course.pages}

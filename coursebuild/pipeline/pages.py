@@ -238,10 +238,9 @@ def text_of(entry: PageEntry, library: Library) -> SourceText | None:
     document = entry.document(library)
     if document is None:
         return None
-    callouts = frozenset(kind.name for kind in library.course.callouts)
     lesson = library.lessons.get(entry.id)
     is_lesson = lesson is not None and lesson.document is document
-    return SourceText.of(document.source, callouts, lesson=is_lesson)
+    return SourceText.of(document.source, library.course.callout_names, lesson=is_lesson)
 
 
 def page_request(entry: PageEntry, library: Library) -> PageRequest:

@@ -104,7 +104,7 @@ class SiteMaker:
         pages = Pages(self.library, self.documents, self.store, entries, last_good)
         self.documents.stop_workers()
         names, shared_files = self._make_shared_files(None if whole_fonts else pages.facts)
-        trial_files = self.library.trial_files
+        trial_files = self.library.trials.files
         downloads = Downloads.of(self.library, self.assets, self.documents, self.root, self.store)
         files: list[SiteFile] = [
             *shared_files,

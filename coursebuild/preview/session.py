@@ -225,7 +225,7 @@ class Session:
                 return None
             (source,) = sources
             if source != owner.document.source or self._diagnostics_by_file.get(path):
-                callouts, lesson = frozenset(self.library.callouts), isinstance(owner, Lesson)
+                callouts, lesson = self.library.course.callout_names, isinstance(owner, Lesson)
                 parsed_document = self._documents.read_document(source, callouts, lesson=lesson)
                 diagnostics = (*read.diagnostics, *parsed_document.diagnostics)
                 changed_owners.append((replace(owner, document=parsed_document.value), diagnostics))

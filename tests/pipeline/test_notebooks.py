@@ -12,7 +12,6 @@ import nbformat
 import pytest
 
 from coursebuild.core.model import Recording, document_blocks
-from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
@@ -55,7 +54,7 @@ def test_notebooks_of_course_run_in_an_empty_folder(
         Source("content/course.toml", folder.text("content/course.toml"))
     ).value
     assert course is not None
-    callouts = frozenset(kind.name for kind in (*CALLOUTS, *course.callouts))
+    callouts = course.callout_names
     compared = 0
     for number, path in enumerate(notebooks(folder)):
         printed = executed(path, tmp_path / f"{number}")

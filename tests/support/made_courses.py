@@ -19,7 +19,7 @@ from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
 
-KINDS = frozenset(kind.name for kind in CALLOUTS)
+KINDS = frozenset(CALLOUTS)
 LESSON = """
 [[level.lesson]]
 id = "{0}"

@@ -1,6 +1,6 @@
 """Documents as CommonMark's own HTML, without a course and without what is only ours.
 
-Entry points: `plain_html`, a document; `plain_blocks`, some blocks; `PlainContext`, a page that
+Entry points: `plain_html`, a document; `plain_blocks`, some blocks; `PlainWriter`, which
 knows no course.
 """
 
@@ -15,8 +15,7 @@ from typing import Literal
 from markupsafe import Markup
 
 from coursebuild.core import model
-from coursebuild.core.pages.html_context import Context, SpecialBlock
-from coursebuild.core.pages.markup import render_blocks, render_footnotes, render_inlines
+from coursebuild.core.pages.markup import HtmlWriter, SpecialBlock
 from coursebuild.core.pages.strings import Strings, parse_strings
 
 ENGLISH = Path(__file__).parents[2] / "templates/strings/en.toml"
@@ -38,12 +37,12 @@ MARKUP_RULES = (
 
 def plain_html(document: model.Document) -> str:
     """A document, its footnotes last."""
-    footnotes = render_footnotes(document.footnotes, PlainContext())
+    footnotes = PlainWriter().render_footnotes(document.footnotes)
     return plain_blocks(document.blocks) + str(footnotes)
 
 
 def plain_blocks(blocks: Iterable[model.Block]) -> str:
-    text = str(render_blocks(blocks, PlainContext()))
+    text = str(PlainWriter().render_blocks(blocks))
     for pattern, plain in MARKUP_RULES:
         text = re.sub(pattern, plain, text, flags=re.DOTALL)
     return text
@@ -53,7 +52,7 @@ def escape(text: str) -> str:
     return html.escape(text, quote=False).replace('"', "&quot;")
 
 
-class PlainContext(Context):
+class PlainWriter(HtmlWriter):
     """Shows what blocks of ours hold, and addresses as an author writes them."""
 
     words: Strings = WORDS
@@ -69,7 +68,7 @@ class PlainContext(Context):
         return f"{SCHEMES[type(target)]}:{name}" + (f"#{anchor}" if anchor else "")
 
     def figure(self, image: model.Image, caption: Markup) -> Markup:
-        return Markup(f"<p>{render_inlines((image,), self)}\n{caption}</p>\n")
+        return Markup(f"<p>{self.inlines((image,))}\n{caption}</p>\n")
 
     def code(self, language: str, text: str) -> Markup:
         name = f' class="language-{escape(language)}"' if language else ""
@@ -81,15 +80,15 @@ class PlainContext(Context):
     def block(self, block: SpecialBlock) -> Markup:
         match block:
             case model.Callout():
-                title = render_inlines(block.title, self)
-                inner = render_blocks(block.blocks, self)
+                title = self.inlines(block.title)
+                inner = self.render_blocks(block.blocks)
                 return Markup(f"<blockquote>\n<p>{title}</p>\n{inner}</blockquote>\n")
             case model.Recording():
-                caption = Markup(f"<p>{render_inlines(block.caption, self)}</p>\n")
+                caption = Markup(f"<p>{self.inlines(block.caption)}</p>\n")
                 if isinstance(block.body, model.Table):
-                    return caption + render_blocks((block.body,), self)
+                    return caption + self.render_blocks((block.body,))
                 return caption + self.code("text", block.body.text)
             case model.FeatureBlock():
-                return render_blocks(block.child_blocks(), self)
+                return self.render_blocks(block.child_blocks())
             case _:
                 return self.code(type(block).__name__, block.code.text)

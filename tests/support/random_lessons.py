@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model.vocabulary import CALLOUTS
 
-KINDS = frozenset(kind.name for kind in CALLOUTS)
+KINDS = frozenset(CALLOUTS)
 
 PIECES = [
     *("$", "$$", "`", "``", "*", "**", "_", "~~", "\\", "|", "[", "](", ")", "]", "![", "<", ">"),

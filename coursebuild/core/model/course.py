@@ -122,11 +122,12 @@ class MjcfModel(Struct, frozen=True):
 
 
 class CalloutKind(Struct, frozen=True):
-    """A kind of callout: its label, and what it promises the reader."""
+    """A kind of callout; a label or promise that is empty is that of the interface texts."""
 
     name: str
-    label: str
+    label: str = ""
     promise: str = ""
+    """What it promises the reader."""
 
 
 class Pace(Struct, frozen=True, forbid_unknown_fields=True):
@@ -226,6 +227,11 @@ class Course(Struct, frozen=True):
         """How a recorded output is compared."""
         comparison = recording.comparison or self.comparison
         return replace(comparison, course_filters=self.filters)
+
+    @property
+    def callout_names(self) -> frozenset[str]:
+        """The names of all kinds of callouts."""
+        return frozenset(kind.name for kind in self.callouts)
 
     @property
     def lessons(self) -> tuple[Lesson, ...]:

@@ -1,7 +1,8 @@
 """Walking a document: every block and every inline in order.
 
-Entry points: `document_blocks`, `document_scripts`, `document_inlines`, `sibling_groups`;
-`walk_blocks`, `walk_inlines` and `block_formulas`; `is_blank`, `is_comment`.
+Entry points: `document_blocks`, `document_inlines`, and `find_blocks`, `find_inlines` for those of
+one type; `document_scripts`, `sibling_groups`; `walk_blocks`, `walk_inlines` and `block_formulas`;
+`is_blank`, `is_comment`.
 """
 
 from __future__ import annotations
@@ -38,6 +39,8 @@ from coursebuild.core.model.inlines import (
 )
 
 Value = TypeVar("Value")
+AnyBlock = TypeVar("AnyBlock", bound=Block)
+AnyInline = TypeVar("AnyInline", bound=Inline)
 
 _BLOCK_CONTAINERS = (BlockQuote, Callout, ListBlock, FeatureBlock, Recording)
 """Blocks that may contain blocks."""
@@ -123,6 +126,11 @@ def document_blocks(document: Document) -> Iterator[Block]:
     return iter(computed_once(document, "all_blocks", walk))
 
 
+def find_blocks(document: Document, kind: type[AnyBlock]) -> Iterator[AnyBlock]:
+    """The blocks of a type in a document."""
+    return (block for block in document_blocks(document) if isinstance(block, kind))
+
+
 def sibling_groups(document: Document) -> Iterator[tuple[Block, ...]]:
     """The blocks of a document in groups of siblings."""
     groups = [document.blocks, *(footnote.blocks for footnote in document.footnotes)]
@@ -151,11 +159,7 @@ def is_comment(html: HtmlBlock | RawInline) -> bool:
 
 def document_scripts(document: Document) -> tuple[Script, ...]:
     """The complete scripts of a document."""
-
-    def walk() -> tuple[Script, ...]:
-        return tuple(block for block in document_blocks(document) if isinstance(block, Script))
-
-    return computed_once(document, "scripts", walk)
+    return computed_once(document, "scripts", lambda: tuple(find_blocks(document, Script)))
 
 
 def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
@@ -183,3 +187,8 @@ def document_inlines(document: Document) -> Iterator[Inline]:
         return tuple(inline for group in groups for inline in walk_inlines(group))
 
     return iter(computed_once(document, "all_inlines", walk))
+
+
+def find_inlines(document: Document, kind: type[AnyInline]) -> Iterator[AnyInline]:
+    """The inlines of a type in a document."""
+    return (inline for inline in document_inlines(document) if isinstance(inline, kind))

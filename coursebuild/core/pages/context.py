@@ -1,6 +1,6 @@
 """What the writer of HTML needs to know about a page: addresses, formulas, code, special blocks.
 
-Entry point: `PageContext`, the `Context` of one document on one page.
+Entry point: `PageContext`, the `HtmlWriter` of one document on one page.
 
 Recorded outputs that directly follow their script are drawn as one object with it:
 `script_outputs`. Nothing is drawn in their own place.
@@ -23,7 +23,6 @@ from coursebuild.core.model import (
     Equation,
     FeatureBlock,
     Image,
-    Inline,
     Mjcf,
     NumberBinding,
     PlainCode,
@@ -34,18 +33,18 @@ from coursebuild.core.model import (
     document_blocks,
     sibling_groups,
 )
-from coursebuild.core.pages import blocks, formulas, markup, urls
+from coursebuild.core.pages import blocks, formulas, urls
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.document_inputs import file_address
 from coursebuild.core.pages.equations import number_equations
-from coursebuild.core.pages.html_context import Context, SpecialBlock
+from coursebuild.core.pages.markup import HtmlWriter, SpecialBlock
 from coursebuild.core.pages.page_inputs import DocumentInputs
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.registry import kind_of_block
 
 
-class PageContext(Context, Struct, frozen=True, dict=True):
+class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     """One document on one page."""
 
     renderer: Renderer
@@ -127,10 +126,10 @@ class PageContext(Context, Struct, frozen=True, dict=True):
 
     def block(self, block: SpecialBlock) -> Markup:
         """A special block, with its line end."""
-        html = self._block(block)
+        html = self._draw(block)
         return html + Markup("\n") if html else html
 
-    def _block(self, block: SpecialBlock) -> Markup:
+    def _draw(self, block: SpecialBlock) -> Markup:
         match block:
             case Callout():
                 return blocks.callout(self, block)
@@ -152,15 +151,11 @@ class PageContext(Context, Struct, frozen=True, dict=True):
 
     def blocks(self, content: tuple[Block, ...]) -> Markup:
         """Blocks as HTML, without the last line end."""
-        return Markup(str.rstrip(markup.render_blocks(content, self), "\n"))
-
-    def inlines(self, content: tuple[Inline, ...]) -> Markup:
-        """Inlines as HTML."""
-        return markup.render_inlines(content, self)
+        return Markup(str.rstrip(self.render_blocks(content), "\n"))
 
     def footnotes(self) -> Markup:
         """The document's footnotes."""
-        return markup.render_footnotes(self.document.footnotes, self)
+        return self.render_footnotes(self.document.footnotes)
 
     def highlight(self, language: str, text: str) -> Markup:
         """Code with its syntax highlighted."""

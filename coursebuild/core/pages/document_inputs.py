@@ -30,16 +30,11 @@ def document_inputs(
     feature_blocks = [block for block in blocks if isinstance(block, model.FeatureBlock)]
     recordings = [block for block in blocks if isinstance(block, model.Recording)]
     models = dict.fromkeys(name for block in feature_blocks for name in block.models())
-    link_targets = (
-        link.target for link in model.document_inlines(document) if isinstance(link, model.Link)
-    )
+    link_targets = (link.target for link in model.find_inlines(document, model.Link))
     targets = dict.fromkeys((*link_targets, *map(model.ModelTarget, models)))
     names = {target: equation_name(library, path, target) for target in targets}
     verdicts = ((block.span.start, library.verdict(block)) for block in recordings)
-    trials = (
-        (b.span.start, library.trial_values.get((b.span.path, b.span.start)))
-        for b in feature_blocks
-    )
+    trials = ((block.span.start, library.trial_value(block)) for block in feature_blocks)
     values = ((block, kind_of_block(block).values) for block in feature_blocks)
     return DocumentInputs(
         engine=library.results.engine,

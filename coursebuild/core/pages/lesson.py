@@ -6,7 +6,6 @@ Entry points: `lesson_inputs`, and for a planned lesson `stub_inputs`.
 from __future__ import annotations
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from coursebuild.core.model import Document, Lesson, Level, document_scripts
 from coursebuild.core.pages import meta, urls
@@ -33,7 +32,7 @@ class LessonLink(Struct, frozen=True):
     aliases: tuple[str, ...] = ()
     """Other names, which no page shows."""
     quiz_index: str = ""
-    """Its questions; see `quiz_index`."""
+    """Its questions; see `Library.quiz_index`."""
 
 
 class LevelView(Struct, frozen=True):
@@ -51,7 +50,8 @@ def lesson_link(
     library: Library, place: urls.Place, lesson: Lesson, *, whole: bool = False
 ) -> LessonLink:
     """A lesson as a link from a place; with `whole`, with all its details."""
-    link = LessonLink(
+    needs = lesson.prerequisites if whole else ()
+    return LessonLink(
         lesson.id,
         lesson.title,
         place.href(urls.lesson_path(lesson)),
@@ -59,15 +59,10 @@ def lesson_link(
         lesson.minutes,
         lesson.further,
         lesson.summary,
-    )
-    if not whole:
-        return link
-    return replace(
-        link,
-        needs=tuple(lesson_link(library, place, library.lessons[n]) for n in lesson.prerequisites),
-        objectives=lesson.objectives,
-        aliases=lesson.aliases,
-        quiz_index=library.quiz_index.get(lesson.path, ""),
+        tuple(lesson_link(library, place, library.lessons[need]) for need in needs),
+        lesson.objectives if whole else (),
+        lesson.aliases if whole else (),
+        library.quiz_index.get(lesson.path, "") if whole else "",
     )
 
 

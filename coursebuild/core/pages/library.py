@@ -6,11 +6,12 @@ Entry point: `Library`, made once for a site and only read afterwards.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
+from urllib.parse import quote
 
-from jinja2 import Environment
 from markupsafe import Markup
 from msgspec import Struct
 
@@ -33,30 +34,21 @@ from coursebuild.core.model import (
     Term,
     computed_once,
     document_blocks,
-    document_inlines,
     document_scripts,
+    find_blocks,
+    find_inlines,
     resolve,
 )
-from coursebuild.core.model.results import (
-    Formula,
-    MathError,
-    ModelFacts,
-    OutputFile,
-    Results,
-    ScriptRun,
-    Verdict,
-)
-from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.model.results import ModelFacts, Results, ScriptRun, Verdict
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets, strings_for
-from coursebuild.core.pages.quiz_index import quiz_index
 from coursebuild.core.pages.renderer import Renderer, known_mathml
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.templates import templates_of
 from coursebuild.core.registry import feature_trials, page_kinds, publish_trials, summarize
 from coursebuild.numerics.reports import Reports
 
-_DEFAULT_CALLOUTS = {kind.name: kind for kind in CALLOUTS}
+Value = TypeVar("Value")
 
 BY_LAB, BY_SCRIPT, BY_LINK = WAYS = "model.by_lab", "model.by_script", "model.by_link"
 """How a document uses a model: keys of interface texts, in the order of pages."""
@@ -71,7 +63,7 @@ class ModelUse(Struct, frozen=True):
 
 
 class Library(Struct, frozen=True, dict=True):
-    """A course and its results, arranged by name when something is first looked up."""
+    """A course and its results, arranged by name; each arrangement is made when it is needed."""
 
     course: Course
     results: Results
@@ -80,19 +72,6 @@ class Library(Struct, frozen=True, dict=True):
     """The reports on models and hard cases that fit the course."""
     published_trials: PublishedTrials | None = None
     """The published results of trials, if they are known already."""
-
-    # --- interface
-
-    @cached_property
-    def words(self) -> Strings:
-        """The words of the interface."""
-        return strings_for(self.assets.templates, self.course.language)
-
-    @cached_property
-    def templates(self) -> Environment:
-        """The templates, with the course's own."""
-        assets, theme = self.assets, self.course.theme
-        return templates_of(assets.templates, assets.compiled_templates, theme.template_texts)
 
     # --- the course
 
@@ -108,27 +87,43 @@ class Library(Struct, frozen=True, dict=True):
 
     @cached_property
     def lessons(self) -> Mapping[str, Lesson]:
-        """The lessons by id."""
+        """By id, in the order of the course; likewise levels and pages."""
         return {lesson.id: lesson for lesson in self.order}
 
     @cached_property
     def levels(self) -> Mapping[str, Level]:
-        """The levels by id."""
+        """By id."""
         return {level.id: level for level in self.course.levels}
 
     @cached_property
     def pages(self) -> Mapping[str, Page]:
-        """The pages of the map by id."""
+        """By id."""
         return {page.id: page for page in self.course.pages}
 
+    @property
+    def menu(self) -> tuple[Page, ...]:
+        """The pages in the menu of every page, besides the home page."""
+        return tuple(page for page in self.course.pages if page.menu and not page.is_home)
+
     @cached_property
-    def callouts(self) -> Mapping[str, CalloutKind]:
-        """The kinds of callouts by name."""
-        return {kind.name: kind for kind in self.course.callouts}
+    def added_pages(self) -> tuple[PageKind, ...]:
+        """The pages that features add to this course, in their order."""
+        return tuple(kind for kind in page_kinds() if kind.exists(self))
+
+    @property
+    def gallery(self) -> str:
+        """The site path of the page of all models; empty without models, or with one `index`."""
+        names = {model.name for model in self.course.models}
+        return urls.MODELS if names and "index" not in names else ""
+
+    @cached_property
+    def leads(self) -> Mapping[str, tuple[Lesson, ...]]:
+        """The lessons that build on a lesson, by its id."""
+        return _group((need, lesson) for lesson in self.order for need in lesson.prerequisites)
 
     @cached_property
     def scripts(self) -> Mapping[str, tuple[Script, Owner]]:
-        """The scripts by path, in the order of the course; of two with the same path, the first."""
+        """By path, in the order of the course; of two with the same path, the first."""
         scripts: dict[str, tuple[Script, Owner]] = {}
         for owner, document in self.course.owned_documents:
             for script in document_scripts(document):
@@ -140,109 +135,41 @@ class Library(Struct, frozen=True, dict=True):
         """The lesson or page that defines a term, by its id."""
         terms: dict[str, Owner] = {}
         for owner, document in self.course.owned_documents:
-            for inline in document_inlines(document):
-                if isinstance(inline, Term):
-                    terms.setdefault(inline.id, owner)
+            for term in find_inlines(document, Term):
+                terms.setdefault(term.id, owner)
         return terms
-
-    @cached_property
-    def quiz_index(self) -> Mapping[str, str]:
-        """The questions of documents that have any, by path; see `quiz_index`."""
-        indexes = ((d.source.path, quiz_index(d)) for d in self.course.documents)
-        return {path: index for path, index in indexes if index}
-
-    @cached_property
-    def leads(self) -> Mapping[str, tuple[Lesson, ...]]:
-        """The lessons that build on a lesson, by its id."""
-        leads: dict[str, tuple[Lesson, ...]] = dict.fromkeys(self.lessons, ())
-        for lesson in self.order:
-            for need in lesson.prerequisites:
-                leads[need] = (*leads[need], lesson)
-        return leads
 
     @cached_property
     def referrers(self) -> Mapping[str, tuple[Owner, ...]]:
         """The lessons and pages that link to a lesson, by its id, in the order of the course."""
-        referrers: dict[str, tuple[Owner, ...]] = {}
-        for owner, document in self.course.owned_documents:
-            targets = links(self.course, document)
-            for id in {target.id for target in targets if isinstance(target, LessonTarget)}:
-                if not (isinstance(owner, Lesson) and owner.id == id):
-                    referrers[id] = (*referrers.get(id, ()), owner)
-        return referrers
+        return _group(
+            (id, owner)
+            for owner, document in self.course.owned_documents
+            for id in {t.id for t in links(self.course, document) if isinstance(t, LessonTarget)}
+            if self.lessons.get(id) is not owner
+        )
 
     @cached_property
     def uses(self) -> Mapping[str, tuple[ModelUse, ...]]:
         """The documents that use a model, by its name, in the order of the course."""
-        uses: dict[str, tuple[ModelUse, ...]] = {model.name: () for model in self.course.models}
-        for owner, document in self.course.owned_documents if uses else ():
-            for name, ways in _named_models(document).items():
-                if name in uses:
-                    use = ModelUse(owner, tuple(way for way in WAYS if way in ways))
-                    uses[name] = (*uses[name], use)
-        return uses
-
-    # --- results
-
-    @cached_property
-    def facts(self) -> Mapping[str, ModelFacts]:
-        """Facts about the models that compile, by name."""
-        return {name: result.facts for name, result in self.results.models if result.facts}
-
-    @cached_property
-    def runs(self) -> Mapping[str, ScriptRun]:
-        """The runs of scripts, by path."""
-        return {run.path: run for run in self.results.runs}
-
-    @cached_property
-    def formulas(self) -> Mapping[Formula, str | MathError]:
-        """The formulas that were typeset with the results."""
-        return dict(self.results.formulas)
-
-    @cached_property
-    def _verdicts(self) -> Mapping[tuple[str, int], Verdict]:
-        """By path and offset of the recording."""
-        verdicts = self.results.verdicts
-        return {(v.recording.span.path, v.recording.span.start): v for v in verdicts}
-
-    @cached_property
-    def _trials(self) -> PublishedTrials:
-        return self.published_trials or publish_trials(self.results, self.assets)
-
-    @property
-    def trial_files(self) -> tuple[OutputFile, ...]:
-        """The files that features publish of trials."""
-        return self._trials.files
-
-    @cached_property
-    def trial_values(self) -> Mapping[tuple[str, int], Struct]:
-        """The values that features publish of trials, by path and offset of the block."""
-        values = self._trials.values
-        trials = feature_trials(self.course) if values else {}
-        spans = {name: trial.block.span for name, (_, trial) in trials.items() if name in values}
-        return {(span.path, span.start): values[name] for name, span in spans.items()}
-
-    # --- pages
-
-    @cached_property
-    def added_pages(self) -> tuple[PageKind, ...]:
-        """The pages that features add to this course, in their order."""
-        return tuple(kind for kind in page_kinds() if kind.exists(self))
-
-    @property
-    def menu(self) -> tuple[Page, ...]:
-        """The pages in the menu of every page, besides the home page."""
-        return tuple(page for page in self.course.pages if page.menu and not page.is_home)
-
-    @property
-    def gallery(self) -> str:
-        """The site path of the page of all models; empty without models, or with one `index`."""
         names = {model.name for model in self.course.models}
-        return urls.MODELS if names and "index" not in names else ""
+        return _group(
+            (name, ModelUse(owner, tuple(way for way in WAYS if way in ways)))
+            for owner, document in (self.course.owned_documents if names else ())
+            for name, ways in _named_models(document).items()
+            if name in names
+        )
 
-    def mathml(self, tex: str, display: bool) -> str:
-        """A formula as MathML; empty for one with an error."""
-        return known_mathml(self.formulas)(tex, display)
+    @cached_property
+    def quiz_index(self) -> Mapping[str, str]:
+        """The questions of documents that have any, by path, for the scripts of other pages.
+
+        `ID:KEY,KEY ID:KEY`: each quiz with the keys of its questions; ids are percent-encoded. So a
+        script knows, without loading the lesson, how many questions it has, whether all were
+        answered right, and where to find one to review.
+        """
+        texts = ((d.source.path, " ".join(_quizzes(d))) for d in self.course.documents)
+        return {path: text for path, text in texts if text}
 
     def summaries(self, feature: str) -> Iterator[tuple[Owner, Any]]:
         """A feature's summaries of documents (`Feature.summary`), in the order of the course."""
@@ -253,39 +180,102 @@ class Library(Struct, frozen=True, dict=True):
             if feature in values:
                 yield owner, values[feature]
 
-    @property
+    # --- its results
+
+    @cached_property
+    def facts(self) -> Mapping[str, ModelFacts]:
+        """Facts about the models that compile, by name."""
+        return {name: result.facts for name, result in self.results.models if result.facts}
+
+    @cached_property
+    def runs(self) -> Mapping[str, ScriptRun]:
+        """By path of the script."""
+        return {run.path: run for run in self.results.runs}
+
+    @cached_property
+    def _verdicts(self) -> Mapping[tuple[str, int], Verdict]:
+        return {_place(verdict.recording): verdict for verdict in self.results.verdicts}
+
+    def verdict(self, recording: Recording) -> Verdict | None:
+        """The verdict on a recorded output; `None` if it was not compared."""
+        return self._verdicts.get(_place(recording))
+
+    @cached_property
+    def trials(self) -> PublishedTrials:
+        """The results of trials as a site needs them."""
+        return self.published_trials or publish_trials(self.results, self.assets)
+
+    @cached_property
+    def _trial_values(self) -> Mapping[tuple[str, int], Struct]:
+        values = self.trials.values
+        trials = feature_trials(self.course) if values else {}
+        return {
+            _place(trial.block): values[name]
+            for name, (_, trial) in trials.items()
+            if name in values
+        }
+
+    def trial_value(self, block: FeatureBlock) -> Struct | None:
+        """The value that a feature publishes of the trial of a block."""
+        return self._trial_values.get(_place(block))
+
+    # --- its words and looks
+
+    @cached_property
+    def words(self) -> Strings:
+        """The interface texts."""
+        return strings_for(self.assets.templates, self.course.language)
+
+    @cached_property
     def renderer(self) -> Renderer:
         """The renderer of pages."""
-        return Renderer(self.words, self.templates, self.formulas)
+        assets, theme = self.assets, self.course.theme
+        templates = templates_of(assets.templates, assets.compiled_templates, theme.template_texts)
+        return Renderer(self.words, templates, dict(self.results.formulas))
 
     def render(self, template: str, **values: object) -> Markup:
         """A filled-in template; see `Renderer`."""
         return self.renderer.render(template, **values)
 
-    def verdict(self, recording: Recording) -> Verdict | None:
-        """The verdict on a recorded output; `None` if it was not compared."""
-        return self._verdicts.get((recording.span.path, recording.span.start))
+    def mathml(self, tex: str, display: bool) -> str:
+        """A formula as MathML; empty for one with an error."""
+        return known_mathml(self.renderer.formulas)(tex, display)
 
     def callout(self, name: str) -> CalloutKind:
         """A kind of callout, with the course's own label and promise if it has any."""
-        default, custom = _DEFAULT_CALLOUTS.get(name), self.callouts.get(name)
-        label, promise = name.capitalize(), ""
-        if default is not None:
-            key = f"promise.{name}"
-            label = self.words(f"callout.{name}")
-            promise = self.words(key) if self.words.has(key) else default.promise
-        if custom is not None and (default is None or custom.label != default.label):
-            label = custom.label
-        if custom is not None and (default is None or custom.promise != default.promise):
-            promise = custom.promise
-        return CalloutKind(name, label, promise)
+        kind = next((kind for kind in self.course.callouts if kind.name == name), CalloutKind(name))
+        default_label, default_promise = (
+            self.words(key) if self.words.has(key) else ""
+            for key in (f"callout.{name}", f"promise.{name}")
+        )
+        label = kind.label or default_label or name.capitalize()
+        return CalloutKind(name, label, kind.promise or default_promise)
+
+
+def _quizzes(document: Document) -> Iterator[str]:
+    for block in find_blocks(document, FeatureBlock):
+        if (progress := block.progress_keys()) is not None:
+            id, keys = progress
+            yield f"{quote(id, safe='')}:{','.join(keys)}"
+
+
+def _place(block: Recording | FeatureBlock) -> tuple[str, int]:
+    """The path and offset of a block, by which the results of running it are found."""
+    return block.span.path, block.span.start
+
+
+def _group(pairs: Iterable[tuple[str, Value]]) -> Mapping[str, tuple[Value, ...]]:
+    """The values of each key; none for a key without any."""
+    groups = defaultdict[str, tuple[Value, ...]](tuple)
+    for key, value in pairs:
+        groups[key] += (value,)
+    return groups
 
 
 def links(course: Course, document: Document) -> Iterator[Target]:
     """The targets of the links in a document."""
-    for inline in document_inlines(document):
-        if isinstance(inline, Link):
-            yield resolve(inline.target, course, document.source.path)
+    for link in find_inlines(document, Link):
+        yield resolve(link.target, course, document.source.path)
 
 
 _MODEL_NAMED = re.compile(
@@ -307,25 +297,18 @@ def models_named(script: Script) -> frozenset[str]:
     return frozenset(names)
 
 
-def _named_models(document: Document) -> dict[str, set[str]]:
+def _named_models(document: Document) -> Mapping[str, tuple[str, ...]]:
     """The names in a document that may be models, with the ways in which it uses them."""
-
-    def collect() -> dict[str, set[str]]:
-        ways_by_name: dict[str, set[str]] = {}
-        for way, name in _model_names(document):
-            ways_by_name.setdefault(name, set()).add(way)
-        return ways_by_name
-
-    return computed_once(document, "models", collect)
+    return computed_once(document, "models", lambda: _group(_model_names(document)))
 
 
 def _model_names(document: Document) -> Iterator[tuple[str, str]]:
     for block in document_blocks(document):
         if isinstance(block, FeatureBlock):
-            yield from ((BY_LAB, name) for name in block.models())
-            yield from ((BY_LINK, name) for name in block.mentioned_models())
+            yield from ((name, BY_LAB) for name in block.models())
+            yield from ((name, BY_LINK) for name in block.mentioned_models())
         elif isinstance(block, Script):
-            yield from ((BY_SCRIPT, name) for name in models_named(block))
-    for inline in document_inlines(document):
-        if isinstance(inline, Link) and isinstance(inline.target, ModelTarget):
-            yield BY_LINK, inline.target.name
+            yield from ((name, BY_SCRIPT) for name in models_named(block))
+    for link in find_inlines(document, Link):
+        if isinstance(link.target, ModelTarget):
+            yield link.target.name, BY_LINK

@@ -1,10 +1,9 @@
 """Writing blocks and inlines as HTML.
 
-Entry points: `render_blocks`, `render_inlines`, `render_footnotes`.
+Entry points: `HtmlWriter`; `SpecialBlock`, the blocks beyond Markdown.
 
-What depends on the course (the address of a lesson, the look of a formula or a lab) comes from the
-context (`html_context.py`), which may call back to write the content of its blocks. Everything else
-is Markdown, and is written here.
+What depends on the course (the address of a lesson, the look of a formula or a lab) is a method of
+the writer that `PageContext` overrides; as it is here, text is written that is on no page.
 """
 
 from __future__ import annotations
@@ -12,14 +11,24 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from itertools import zip_longest
-from typing import assert_never
+from typing import Literal, TypeAlias, assert_never
 from urllib.parse import quote
 
 from markupsafe import Markup
 
 from coursebuild.core import model
-from coursebuild.core.pages.html_context import Context
 from coursebuild.core.pages.quantities import isolate_ltr, join_units, split_quantities, unit_length
+from coursebuild.core.pages.strings import Strings
+
+SpecialBlock: TypeAlias = (
+    model.Callout
+    | model.Mjcf
+    | model.PlainCode
+    | model.FeatureBlock
+    | model.Recording
+    | model.Script
+)
+"""The blocks beyond Markdown."""
 
 
 def escape(text: str) -> str:
@@ -33,21 +42,6 @@ def escape(text: str) -> str:
 
 _SIMPLE = re.compile('[^0-9&<>"]*+')
 """Text without quantities, and with nothing to escape."""
-
-
-def render_blocks(blocks: Iterable[model.Block], context: Context) -> Markup:
-    """Blocks one after the other, each with its line end."""
-    return Markup(_Writer(context).blocks(blocks))
-
-
-def render_inlines(inlines: Iterable[model.Inline], context: Context) -> Markup:
-    """Inlines one after the other."""
-    return Markup(_Writer(context).inlines(inlines))
-
-
-def render_footnotes(footnotes: Iterable[model.Footnote], context: Context) -> Markup:
-    """The footnotes of a document as a section; empty if there are none."""
-    return Markup(_Writer(context).footnotes(footnotes))
 
 
 def raw_html(node: model.HtmlBlock | model.RawInline, url: Callable[[str], str]) -> str:
@@ -70,18 +64,82 @@ def is_tight(block: model.Block) -> bool:
     return isinstance(block, model.Paragraph) and block.tight
 
 
-class _Writer:
-    """A writer in a context; every string that it returns is HTML."""
+class HtmlWriter:
+    """Writes blocks and inlines. A `Markup` is HTML already, a string is not."""
 
-    def __init__(self, context: Context) -> None:
-        self.context, self.words, self.direction = context, context.words, context.direction
+    @property
+    def words(self) -> Strings:
+        """The interface texts, which headings, tables, tasks and footnotes need."""
+        return Strings({})
 
-    def blocks(self, blocks: Iterable[model.Block]) -> str:
-        return "".join(map(self.block, blocks))
+    @property
+    def direction(self) -> Literal["", "ltr", "rtl"]:
+        """The direction of text, to keep numbers with their units; empty not to do that."""
+        return ""
 
-    def inlines(self, inlines: Iterable[model.Inline]) -> str:
+    def href(self, target: model.Target) -> str:
+        """The address of a link."""
+        return ""
+
+    def reference(self, target: model.Target) -> str:
+        """The text of a link that has none; perhaps empty."""
+        return ""
+
+    def url(self, url: str) -> str:
+        """The address of an image that is written as `url`."""
+        return url
+
+    def figure(self, image: model.Image, caption: Markup) -> Markup:
+        """An image with a caption, with its line end."""
+        return Markup()
+
+    def math(self, tex: str) -> Markup:
+        """An inline formula, typeset."""
+        return Markup(rf'<span class="math">\({escape(tex)}\)</span>')
+
+    def display(self, tex: str, start: int) -> Markup:
+        """A formula on a line of its own, at an offset in the document."""
+        return Markup(rf'<span class="math">\[{escape(tex)}\]</span>')
+
+    def code(self, language: str, text: str) -> Markup:
+        """A block of code that is only shown, not run."""
+        return Markup(f"<pre><code>{escape(text)}</code></pre>\n")
+
+    def binding(self, binding: model.NumberBinding) -> Markup:
+        """A number that is bound to an output."""
+        return Markup(escape(binding.text))
+
+    def block(self, block: SpecialBlock) -> Markup:
+        """A block beyond Markdown, with its line end."""
+        return Markup()
+
+    # -- what it writes
+
+    def render_blocks(self, blocks: Iterable[model.Block]) -> Markup:
+        """Blocks one after the other, each with its line end."""
+        return Markup(self._blocks(blocks))
+
+    def inlines(self, inlines: Iterable[model.Inline]) -> Markup:
+        """Inlines one after the other."""
+        return Markup(self._inlines(inlines))
+
+    def render_footnotes(self, footnotes: Iterable[model.Footnote]) -> Markup:
+        """The footnotes of a document as a section; empty if there are none."""
+        items = "".join(map(self._footnote, footnotes))
+        if not items:
+            return Markup()
+        label = escape(self.words("markup.footnotes"))
+        start = f'<section class="footnotes" role="doc-endnotes" aria-label="{label}">'
+        return Markup(f"{start}\n<ol>\n{items}</ol>\n</section>\n")
+
+    # -- the following methods return HTML as plain strings, which are joined faster
+
+    def _blocks(self, blocks: Iterable[model.Block]) -> str:
+        return "".join(map(self._block, blocks))
+
+    def _inlines(self, inlines: Iterable[model.Inline]) -> str:
         if not self.direction:
-            return "".join(map(self.inline, inlines))
+            return "".join(map(self._inline, inlines))
         return "".join(self._with_units(tuple(inlines)))
 
     def _with_units(self, inlines: tuple[model.Inline, ...]) -> list[str]:
@@ -93,7 +151,7 @@ class _Writer:
                 parts.append(self._text(inline.text[unit_end:]))
                 unit_end = 0
                 continue
-            html = self.inline(inline)
+            html = self._inline(inline)
             is_number = isinstance(inline, model.NumberBinding) or (
                 isinstance(inline, model.Math) and not inline.display
             )
@@ -122,47 +180,47 @@ class _Writer:
 
     # -- blocks
 
-    def block(self, block: model.Block) -> str:
+    def _block(self, block: model.Block) -> str:
         """A block, with its line end unless it is a paragraph of a tight list."""
         match block:
             case model.Paragraph() if block.figure:
                 return self._figure(block)
             case model.Paragraph():
-                inner = self.inlines(block.children)
+                inner = self._inlines(block.children)
                 return inner if block.tight else f"<p>{inner}</p>\n"
             case model.Heading():
                 return self._heading(block)
             case model.ListBlock():
                 return self._list(block)
             case model.BlockQuote():
-                return f"<blockquote>\n{self.blocks(block.blocks)}</blockquote>\n"
+                return f"<blockquote>\n{self._blocks(block.blocks)}</blockquote>\n"
             case model.CodeBlock():
-                return self.context.code(block.language, block.code.text)
+                return self.code(block.language, block.code.text)
             case model.HtmlBlock():
-                return raw_html(block, self.context.url)
+                return raw_html(block, self.url)
             case model.HtmlFlow():
-                return f"{self.inlines(block.children)}\n"
+                return f"{self._inlines(block.children)}\n"
             case model.ThematicBreak():
                 return "<hr>\n"
             case model.MathBlock():
-                return f"{self.context.display(block.tex.text, block.span.start)}\n"
+                return f"{self.display(block.tex.text, block.span.start)}\n"
             case model.Table():
-                return self.table(block)
+                return self._table(block)
             case model.Callout() | model.Mjcf() | model.PlainCode():
-                return self.context.block(block)
+                return self.block(block)
             case model.Recording() | model.Script() | model.FeatureBlock():
-                return self.context.block(block)
+                return self.block(block)
             case _:
                 assert_never(block)
 
     def _figure(self, paragraph: model.Paragraph) -> str:
         """An image with the rest of its paragraph as its caption."""
         image = next(inline for inline in paragraph.children if isinstance(inline, model.Image))
-        words = self.inlines(inline for inline in paragraph.children if inline is not image)
-        return self.context.figure(image, Markup(words.removeprefix("Figure:").strip()))
+        words = self._inlines(inline for inline in paragraph.children if inline is not image)
+        return self.figure(image, Markup(words.removeprefix("Figure:").strip()))
 
     def _heading(self, heading: model.Heading) -> str:
-        inner, name = self.inlines(heading.children), f"h{heading.level}"
+        inner, name = self._inlines(heading.children), f"h{heading.level}"
         anchor = escape(heading.anchor)
         kinds = f' class="{escape(" ".join(heading.classes))}"' if heading.classes else ""
         label = escape(self.words("markup.anchor"))
@@ -185,7 +243,7 @@ class _Writer:
         for block in item.blocks:
             if not (line_end or (is_tight(block) and len(parts) == 1 + (item.checked is not None))):
                 parts.append("\n")
-            parts.append(self.block(block))
+            parts.append(self._block(block))
             line_end = not is_tight(block)
         return "".join([*parts, "</li>\n"])
 
@@ -194,7 +252,7 @@ class _Writer:
         state = " checked" if is_done else ""
         return f'<input type="checkbox" disabled{state} aria-label="{label}"> '
 
-    def table(self, table: model.Table) -> str:
+    def _table(self, table: model.Table) -> str:
         """A table; its columns are aligned by class."""
         head = self._row(table.header, table, 'th scope="col"')
         rows = "".join(self._row(row, table, "td") for row in table.rows)
@@ -208,12 +266,12 @@ class _Writer:
         for cell, align in zip(cells, table.align, strict=True):
             mark = f' class="align-{align}"' if align else ""
             cell_tag = tag if cell.children else "td"  # an empty header is none
-            parts.append(f"<{cell_tag}{mark}>{self.inlines(cell.children)}</{cell_tag[:2]}>\n")
+            parts.append(f"<{cell_tag}{mark}>{self._inlines(cell.children)}</{cell_tag[:2]}>\n")
         return "".join([*parts, "</tr>\n"])
 
     # -- inlines
 
-    def inline(self, inline: model.Inline) -> str:
+    def _inline(self, inline: model.Inline) -> str:
         """One inline."""
         match inline:
             case model.Text():
@@ -224,27 +282,27 @@ class _Writer:
                 return f"<code>{escape(inline.text)}</code>"
             case model.Math():
                 if inline.display:
-                    return self.context.display(inline.tex.text, inline.span.start)
-                return self.context.math(inline.tex.text)
+                    return self.display(inline.tex.text, inline.span.start)
+                return self.math(inline.tex.text)
             case model.Term():
-                inner = self.inlines(inline.children)
+                inner = self._inlines(inline.children)
                 return f'<dfn id="{escape(inline.anchor)}">{inner}</dfn>'
             case model.Emphasis():
-                return f"<em>{self.inlines(inline.children)}</em>"
+                return f"<em>{self._inlines(inline.children)}</em>"
             case model.Strong():
-                return f"<strong>{self.inlines(inline.children)}</strong>"
+                return f"<strong>{self._inlines(inline.children)}</strong>"
             case model.Strikethrough():
-                return f"<del>{self.inlines(inline.children)}</del>"
+                return f"<del>{self._inlines(inline.children)}</del>"
             case model.Link():
                 return self._link(inline)
             case model.Image():
                 return self._image(inline)
             case model.RawInline():
-                return raw_html(inline, self.context.url)
+                return raw_html(inline, self.url)
             case model.HardBreak():
                 return "<br>\n"
             case model.NumberBinding():
-                return self.context.binding(inline)
+                return self.binding(inline)
             case model.FootnoteRef():
                 return self._reference(inline)
             case _:
@@ -252,14 +310,14 @@ class _Writer:
 
     def _link(self, link: model.Link) -> str:
         title = f' title="{escape(link.title)}"' if link.title else ""
-        href = escape(self.context.href(link.target))
-        inner = self.inlines(link.children) or escape(self.context.reference(link.target))
+        href = escape(self.href(link.target))
+        inner = self._inlines(link.children) or escape(self.reference(link.target))
         url_class = ' class="url"' if inner == href else ""  # an address as its own text
         return f'<a href="{href}"{title}{url_class}>{inner}</a>'
 
     def _image(self, image: model.Image) -> str:
         title = f' title="{escape(image.title)}"' if image.title else ""
-        url = escape(self.context.url(image.url))
+        url = escape(self.url(image.url))
         return f'<img src="{url}" alt="{escape(image.alt)}"{title}>'
 
     # -- footnotes
@@ -273,23 +331,15 @@ class _Writer:
             f' aria-label="{label}">{number}</a></sup>'
         )
 
-    def footnotes(self, footnotes: Iterable[model.Footnote]) -> str:
-        items = "".join(map(self._footnote, footnotes))
-        if not items:
-            return ""
-        label = escape(self.words("markup.footnotes"))
-        start = f'<section class="footnotes" role="doc-endnotes" aria-label="{label}">'
-        return f"{start}\n<ol>\n{items}</ol>\n</section>\n"
-
     def _footnote(self, footnote: model.Footnote) -> str:
         """A footnote; the links back are at the end of its last paragraph."""
         back = " ".join(self._back(footnote.number, k + 1) for k in range(footnote.references))
         last = footnote.blocks[-1] if footnote.blocks else None
-        inner = self.blocks(footnote.blocks[:-1])
+        inner = self._blocks(footnote.blocks[:-1])
         if isinstance(last, model.Paragraph):
-            inner += f"<p>{self.inlines(last.children)} {back}</p>\n"
+            inner += f"<p>{self._inlines(last.children)} {back}</p>\n"
         else:
-            inner += f"{'' if last is None else self.block(last)}<p>{back}</p>\n"
+            inner += f"{'' if last is None else self._block(last)}<p>{back}</p>\n"
         return f'<li id="fn:{footnote.number}">\n{inner}</li>\n'
 
     def _back(self, number: int, occurrence: int) -> str:

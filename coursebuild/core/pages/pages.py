@@ -10,10 +10,19 @@ from collections.abc import Mapping
 from msgspec import Struct
 
 from coursebuild.core.features import ModelPart
-from coursebuild.core.model import Document, Lesson, Level, MjcfModel, Page, listing_anchor
+from coursebuild.core.model import (
+    Document,
+    FeatureBlock,
+    Lesson,
+    Level,
+    MjcfModel,
+    Owner,
+    Page,
+    find_blocks,
+    listing_anchor,
+)
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.pages import meta, urls
-from coursebuild.core.pages.cards import PictureLink, lesson_cards, list_galleries
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.frame import place_of
 from coursebuild.core.pages.graph import level_graph
@@ -21,7 +30,7 @@ from coursebuild.core.pages.lesson import LessonLink, edit_address, lesson_link,
 from coursebuild.core.pages.library import Library, ModelUse
 from coursebuild.core.pages.page_inputs import AddedParts, HighlightedFile, PageHead, PageInputs
 from coursebuild.core.pages.quantities import number
-from coursebuild.core.registry import model_parts
+from coursebuild.core.registry import kind_of_block, model_parts
 
 
 class NamedLink(Struct, frozen=True):
@@ -30,6 +39,32 @@ class NamedLink(Struct, frozen=True):
     href: str
     text: str
     remark: str = ""
+
+
+class PictureLink(Struct, frozen=True):
+    """A picture of a block, with a link to the block."""
+
+    src: str
+    width: int
+    height: int
+    title: str
+    href: str
+
+
+class LessonCard(Struct, frozen=True):
+    """A written lesson as a card."""
+
+    link: LessonLink
+    level: str
+    picture: PictureLink | None
+
+
+class Gallery(Struct, frozen=True):
+    """A page with several pictures."""
+
+    title: str
+    href: str
+    pictures: tuple[PictureLink, ...]
 
 
 class ModelCard(Struct, frozen=True):
@@ -54,8 +89,8 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
     values = {
         "title": course.title,
         "summary": course.summary,
-        "cards": lesson_cards(library, place),
-        "galleries": list_galleries(library, place),
+        "cards": _lesson_cards(library, place),
+        "galleries": _list_galleries(library, place),
         "levels": tuple(level_view(library, place, level, whole=True) for level in course.levels),
         "start": lesson_link(library, place, written_lessons[0]) if written_lessons else None,
         "total": len(library.order),
@@ -71,6 +106,44 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
         return PageInputs(head, "home.html", {**values, "article": ""})
     inputs = document_inputs(library, place, document)
     return PageInputs(head, "home.html", values, document.source.path, inputs)
+
+
+def _pictures_of(library: Library, place: urls.Place, owner: Owner) -> tuple[PictureLink, ...]:
+    """The pictures of a document's blocks in order, with addresses relative to a place."""
+    links = []
+    for block in find_blocks(owner.document, FeatureBlock) if owner.document is not None else ():
+        picture = kind_of_block(block).picture(block, library.trial_value(block))
+        if picture is not None:
+            src = place.href(picture.path)
+            href = place.href(urls.owner_path(owner), picture.anchor)
+            links.append(PictureLink(src, picture.width, picture.height, picture.title, href))
+    return tuple(links)
+
+
+def _lesson_cards(library: Library, place: urls.Place) -> tuple[LessonCard, ...]:
+    """The cards of the written lessons, in the order of the course."""
+    return tuple(
+        _lesson_card(library, place, lesson)
+        for lesson in library.order
+        if lesson.document is not None
+    )
+
+
+def _lesson_card(library: Library, place: urls.Place, lesson: Lesson) -> LessonCard:
+    pictures = _pictures_of(library, place, lesson)
+    link = lesson_link(library, place, lesson, whole=True)
+    level = library.levels[lesson.level].title
+    return LessonCard(link, level, pictures[0] if pictures else None)
+
+
+def _list_galleries(library: Library, place: urls.Place) -> tuple[Gallery, ...]:
+    """The pages in the menu that have more than one picture."""
+    galleries = []
+    for page in library.menu:
+        pictures = _pictures_of(library, place, page)
+        if len(pictures) > 1:
+            galleries.append(Gallery(page.title, place.href(urls.page_path(page)), pictures))
+    return tuple(galleries)
 
 
 def level_inputs(library: Library, level: Level) -> PageInputs:

@@ -1,12 +1,13 @@
 """The interface texts: one file for each language.
 
-Entry point: `parse_strings(text, fallback, language)`, which returns `Strings`; templates call
-`t("lesson.minutes", n=25)`.
+Entry points: `parse_strings(text, fallback, language)`, which returns `Strings`; templates call
+`t("lesson.minutes", n=25)`. `category(language, n)`, the plural form that goes with a number.
 
 1. A file is TOML: tables of texts, addressed by dotted path. `{name}` in a text is replaced by a
    value.
 2. A text that depends on a number is a table with the plural forms of its language, `other` among
-   them; the value `n` selects one (`plurals`).
+   them; the value `n` selects one. The forms are the categories of CLDR 48 for whole numbers:
+   https://www.unicode.org/cldr/charts/48/supplemental/language_plural_rules.html
 3. A key missing in a language is taken from English; one missing in English is a programming error
    (`KeyError`). All forms of a text are of one language.
 """
@@ -14,12 +15,15 @@ Entry point: `parse_strings(text, fallback, language)`, which returns `Strings`;
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.pages.plurals import CATEGORIES, category
-
 DEFAULT_LANGUAGE = "en"
+Category: TypeAlias = Literal["zero", "one", "two", "few", "many", "other"]
+
+CATEGORIES: tuple[Category, ...] = ("zero", "one", "two", "few", "many", "other")
+"""All categories; every language has the last."""
 
 
 class Strings(Struct, frozen=True):
@@ -74,3 +78,30 @@ def _flatten(table: dict[str, object], prefix: str) -> Iterator[tuple[str, str]]
             yield prefix + name, value
         else:
             raise TypeError(f"interface text {prefix + name!r} is not a text")
+
+
+def category(language: str, n: float) -> Category:
+    """The form of a text that goes with a number; one with decimals takes `other`.
+
+    A language without interface texts follows English, whose texts it shows.
+    """
+    if n != int(n):
+        return "other"
+    n = abs(int(n))
+    match language.replace("_", "-").split("-")[0].lower():
+        case "ar":
+            return _arabic(n)
+        case "fr" | "es" if n and n % 1_000_000 == 0:
+            return "many"
+        case "fr":
+            return "one" if n <= 1 else "other"
+        case _:
+            return "one" if n == 1 else "other"
+
+
+def _arabic(n: int) -> Category:
+    if n <= 2:
+        return CATEGORIES[n]
+    if 3 <= n % 100 <= 10:
+        return "few"
+    return "many" if n % 100 >= 11 else "other"

@@ -90,12 +90,10 @@ def _place(node: ObjectNode, name: str, at: int | None) -> Span:
 
 def callout_kinds(tables: Mapping[str, str | CalloutTable]) -> tuple[CalloutKind, ...]:
     """The kinds that every course has, perhaps with labels of its own, and its further kinds."""
-    kinds = {kind.name: kind for kind in CALLOUTS}
+    kinds = {name: CalloutKind(name) for name in CALLOUTS}
     for name, table in tables.items():
-        label = table if isinstance(table, str) else table.label
-        promise = "" if isinstance(table, str) else table.promise
-        default = kinds.get(name)
-        kinds[name] = CalloutKind(name, label, promise or (default.promise if default else ""))
+        texts = (table,) if isinstance(table, str) else (table.label, table.promise)
+        kinds[name] = CalloutKind(name, *texts)
     return tuple(kinds.values())
 
 

@@ -30,8 +30,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.pages import formulas
 from coursebuild.core.pages.equations import number_equations
-from coursebuild.core.pages.html_context import Context
-from coursebuild.core.pages.markup import render_inlines
+from coursebuild.core.pages.markup import HtmlWriter
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.features.glossary.sentences import definition_of, runs_on
 
@@ -65,8 +64,8 @@ def document_terms(document: Document, mathml: Mathml) -> Parsed[DocumentTerms |
     return Parsed(DocumentTerms(terms) if terms else None)
 
 
-class _Excerpt(Context):
-    """The context of a sentence that is shown on another page."""
+class _ExcerptWriter(HtmlWriter):
+    """Writes a sentence that is shown on another page."""
 
     def __init__(self, mathml: Mathml) -> None:
         self._mathml = mathml
@@ -80,7 +79,7 @@ class _Excerpt(Context):
 
 
 def _find_terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
-    context = _Excerpt(mathml)
+    writer = _ExcerptWriter(mathml)
     equations = number_equations(document, mathml).values()
     names = {f"#{e.id}": f"({e.number})" for e in equations if e.number}
 
@@ -88,7 +87,7 @@ def _find_terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
         return names.get(unquote(target.url), "") if isinstance(target, UrlTarget) else ""
 
     def html(inlines: tuple[Inline, ...]) -> Markup:
-        return render_inlines(without_links(inlines, reference), context)
+        return writer.inlines(without_links(inlines, reference))
 
     for siblings in sibling_groups(document):
         for number, block in enumerate(siblings):
@@ -100,7 +99,7 @@ def _find_terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
                 following = siblings[number + 1] if number + 1 < len(siblings) else None
                 title = Markup.escape(term.name) if term.renamed else html(term.children)
                 definition = definition_of(block.children, term)
-                pieces = tuple(_split_definition(definition, following, html, context))
+                pieces = tuple(_split_definition(definition, following, html, writer))
                 yield DefinedTerm(term.id, term.name, title, pieces)
 
 
@@ -108,18 +107,18 @@ def _split_definition(
     definition: tuple[Inline, ...],
     following: Block | None,
     html: Callable[[tuple[Inline, ...]], Markup],
-    context: _Excerpt,
+    writer: _ExcerptWriter,
 ) -> Iterator[DefinitionPart]:
     """Split a definition at its displayed formulas."""
     line: list[Inline] = []
     for inline in definition:
         if isinstance(inline, Math) and inline.display:
             yield DefinitionPart(html(tuple(line)).strip())
-            yield DefinitionPart(context.display(inline.tex.text, 0), display=True)
+            yield DefinitionPart(writer.display(inline.tex.text, 0), display=True)
             line = []
         else:
             line.append(inline)
     if line:
         yield DefinitionPart(html(tuple(line)).strip())
     if isinstance(following, MathBlock) and following.tex.text and runs_on(definition):
-        yield DefinitionPart(context.display(following.tex.text, 0), display=True)
+        yield DefinitionPart(writer.display(following.tex.text, 0), display=True)

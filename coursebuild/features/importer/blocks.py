@@ -20,7 +20,7 @@ from coursebuild.features.importer.segments import read_markdown
 from coursebuild.features.importer.values import Segment, read_yaml
 
 _CALLOUTS = {
-    **{callout.name: callout.name for callout in CALLOUTS},
+    **{name: name for name in CALLOUTS},
     **dict.fromkeys(("hint",), "tip"),
     **dict.fromkeys(("attention", "failure", "bug"), "caution"),
     **dict.fromkeys(("danger", "error"), "warning"),

@@ -55,7 +55,7 @@ def _find_lab(library: Library, model: MjcfModel) -> tuple[Lab, PublishedLab | N
     documents = (use.owner.document for use in library.uses[model.name] if BY_LAB in use.ways)
     labs = (_labs_by_model(document).get(model.name) for document in documents if document)
     lab = next(filter(None, labs), None) or _gallery_lab(model)
-    publication = library.trial_values.get((lab.span.path, lab.span.start))
+    publication = library.trial_value(lab)
     return lab, publication if isinstance(publication, PublishedLab) else None
 
 

@@ -17,7 +17,6 @@ from collections.abc import Iterable
 from typing import assert_never
 
 from coursebuild.core import model
-from coursebuild.core.pages.html_context import SpecialBlock
 from coursebuild.core.pages.marks import (
     block_quote,
     code_span,
@@ -29,7 +28,7 @@ from coursebuild.core.pages.marks import (
     picture,
     table,
 )
-from coursebuild.core.pages.markup import escape, is_tight, raw_html
+from coursebuild.core.pages.markup import SpecialBlock, escape, is_tight, raw_html
 
 _SPACED_BLOCKS = (
     *(model.Callout, model.PlainCode, model.Script, model.Recording, model.Mjcf),

@@ -18,8 +18,8 @@ from markupsafe import Markup
 from coursebuild.core import model
 from coursebuild.core.pages.blocks import output_receipt, script_receipt
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.html_context import SpecialBlock
 from coursebuild.core.pages.marks import block_quote, code_span, escape_marks, fence, link
+from coursebuild.core.pages.markup import SpecialBlock
 from coursebuild.core.registry import kind_of_block
 from coursebuild.features.markdown.blocks import BlockWriter
 from coursebuild.features.markdown.from_html import html_to_markdown

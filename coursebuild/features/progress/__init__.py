@@ -13,7 +13,6 @@ from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.lesson import level_view
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.quiz_index import count
 
 _PROGRESS, _REVIEW = "progress/index.html", "review/index.html"
 STORAGE_PREFIX = "coursebuild.progress."
@@ -29,7 +28,7 @@ class QuestionPage(Struct, frozen=True):
     title: str
     href: str
     quiz_index: str
-    """See `quiz_index`."""
+    """See `Library.quiz_index`."""
     questions: int
 
 
@@ -60,8 +59,12 @@ def _question_pages(library: Library, place: urls.Place) -> tuple[QuestionPage, 
         if text:
             id = owner.id if isinstance(owner, Lesson) else ""
             href = place.href(urls.owner_path(owner))
-            pages.append(QuestionPage(id, owner.title, href, text, count(text)))
+            pages.append(QuestionPage(id, owner.title, href, text, _count_questions(text)))
     return tuple(pages)
+
+
+def _count_questions(quiz_index: str) -> int:
+    return sum(len(part.partition(":")[2].split(",")) for part in quiz_index.split(" "))
 
 
 _TROUBLE = "progress.trouble."

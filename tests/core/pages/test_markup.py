@@ -10,13 +10,12 @@ from hypothesis import strategies as st
 from markupsafe import Markup
 
 from coursebuild.core.model import Document, NumberBinding, Target, Text
-from coursebuild.core.pages.html_context import SpecialBlock
-from coursebuild.core.pages.markup import render_blocks, render_footnotes, render_inlines
+from coursebuild.core.pages.markup import SpecialBlock
 from coursebuild.core.pages.quantities import isolate_ltr, join_units, split_quantities
 from coursebuild.core.pages.strings import Strings, parse_strings
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source, Span
-from support.plain_html import WORDS, PlainContext
+from support.plain_html import WORDS, PlainWriter
 
 KINDS = frozenset({"note"})
 
@@ -25,8 +24,8 @@ def parse(text: str) -> Document:
     return parse_document(Source("x.md", text), KINDS, lesson=False).value
 
 
-class Page(PlainContext):
-    """A context whose answers show the question."""
+class Writer(PlainWriter):
+    """A writer whose answers show the question."""
 
     def __init__(self, words: Strings = WORDS, direction: Literal["", "ltr", "rtl"] = "") -> None:
         self.words, self.direction = words, direction
@@ -57,7 +56,7 @@ class Page(PlainContext):
 
 
 def html(text: str) -> str:
-    return str(render_blocks(parse(text).blocks, Page()))
+    return str(Writer().render_blocks(parse(text).blocks))
 
 
 @pytest.mark.parametrize(
@@ -119,14 +118,14 @@ def test_a_task_list_has_labelled_boxes() -> None:
 
 def test_footnotes_and_their_references_link_to_each_other() -> None:
     document = parse("a[^x] b[^y] c[^x]\n\n[^x]: *One*.\n[^y]: - item\n")
-    assert str(render_blocks(document.blocks, Page())) == (
+    assert str(Writer().render_blocks(document.blocks)) == (
         '<p>a<sup class="footnote-ref"><a href="#fn:1" id="fnref:1" role="doc-noteref"'
         ' aria-label="Footnote 1">1</a></sup> b<sup class="footnote-ref"><a href="#fn:2"'
         ' id="fnref:2" role="doc-noteref" aria-label="Footnote 2">2</a></sup> c'
         '<sup class="footnote-ref"><a href="#fn:1" id="fnref:1:2" role="doc-noteref"'
         ' aria-label="Footnote 1">1</a></sup></p>\n'
     )
-    assert str(render_footnotes(document.footnotes, Page())) == (
+    assert str(Writer().render_footnotes(document.footnotes)) == (
         '<section class="footnotes" role="doc-endnotes" aria-label="Footnotes">\n<ol>\n'
         '<li id="fn:1">\n<p><em>One</em>. <a href="#fnref:1" class="footnote-back"'
         ' role="doc-backlink" aria-label="Back to reference 1">↩</a> <a href="#fnref:1:2"'
@@ -145,10 +144,10 @@ def test_words_can_be_translated() -> None:
         footnotes = "Fußnoten"
         footnote = "Nr. {number}"
     """
-    page = Page(parse_strings(german, WORDS))
-    text = render_blocks(document.blocks, page)
+    writer = Writer(parse_strings(german, WORDS))
+    text = writer.render_blocks(document.blocks)
     assert 'aria-label="Zum &quot;Teil&quot;"' in text and 'aria-label="Nr. 1"' in text
-    assert 'aria-label="Fußnoten"' in render_footnotes(document.footnotes, page)
+    assert 'aria-label="Fußnoten"' in writer.render_footnotes(document.footnotes)
 
 
 def test_text_is_escaped_wherever_it_stands() -> None:
@@ -166,11 +165,11 @@ _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
 def test_text_has_its_quantities_kept_and_is_escaped(text: str) -> None:
     inlines = (Text(Span(Source("x.md", ""), 0, 0), text),)
     expected = join_units(text).translate(_ESCAPES)
-    assert render_inlines(inlines, Page(direction="ltr")) == expected
+    assert Writer(direction="ltr").inlines(inlines) == expected
     pieces = (
         (Markup(piece.translate(_ESCAPES)), is_quantity)
         for piece, is_quantity in split_quantities(join_units(text))
     )
     expected = "".join(isolate_ltr(html) if is_quantity else html for html, is_quantity in pieces)
-    assert render_inlines(inlines, Page(direction="rtl")) == expected
-    assert render_inlines(inlines, Page()) == text.translate(_ESCAPES)
+    assert Writer(direction="rtl").inlines(inlines) == expected
+    assert Writer().inlines(inlines) == text.translate(_ESCAPES)

@@ -40,6 +40,7 @@ def test_every_text_that_is_asked_for_exists_and_every_one_is_used(assets: Asset
     run_time_prefixes = (
         "callout.",
         "overlay.",
+        "promise.",
         "status.",
         "code.docstring",
         "code.imports",

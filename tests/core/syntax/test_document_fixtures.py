@@ -18,7 +18,7 @@ from support.tree_dump import dump
 
 FOLDER = Path(__file__).parents[2] / "fixtures" / "syntax"
 FILES = sorted(FOLDER.glob("*.md"))
-KINDS = frozenset(kind.name for kind in CALLOUTS)
+KINDS = frozenset(CALLOUTS)
 
 
 def dump_document(path: Path, case: Case) -> str:

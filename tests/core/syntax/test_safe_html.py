@@ -17,11 +17,10 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
-from coursebuild.core.pages.markup import render_blocks
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from support.hostile_html import PAGES
-from support.plain_html import PlainContext
+from support.plain_html import PlainWriter
 
 REFUSED_TAGS = (
     '<meta http-equiv=refresh content="0;url=https://evil.example">',
@@ -105,7 +104,7 @@ def check_page(text: str) -> tuple[list[str], str]:
         raw = [i for i in walk_inlines(block_inlines(block)) if isinstance(i, RawInline)]
         for node in [*raw, *([block] if isinstance(block, HtmlBlock) else ())]:
             messages += [part.message for part in node.forbidden]
-    return messages, str(render_blocks(parsed_page.value.blocks, PlainContext()))
+    return messages, str(PlainWriter().render_blocks(parsed_page.value.blocks))
 
 
 def find_active(content: list[HtmlContent]) -> list[str]:

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Callout, Document, PlainCode, Target
-from coursebuild.core.pages.html_context import SpecialBlock
 from coursebuild.core.pages.marks import (
     block_quote,
     code_span,
@@ -19,10 +18,11 @@ from coursebuild.core.pages.marks import (
     link,
     picture,
 )
+from coursebuild.core.pages.markup import SpecialBlock
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.markdown.blocks import BlockWriter
-from support.plain_html import PlainContext, plain_html
+from support.plain_html import PlainWriter, plain_html
 
 ROOT = Path(__file__).parents[3]
 SPECIFICATION = ROOT / "site" / "node_modules" / "commonmark-spec" / "spec.txt"
@@ -34,7 +34,7 @@ class Context(BlockWriter):
     """Addresses stay as they are written."""
 
     def href(self, target: Target) -> str:
-        return PlainContext().href(target)
+        return PlainWriter().href(target)
 
     def url(self, url: str) -> str:
         return url

@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _format_documents(course: Course, selection: Selection) -> Iterator[tuple[Source, Parsed[str]]]:
-    callouts = frozenset(kind.name for kind in course.callouts)
+    callouts = course.callout_names
     owners: tuple[Owner, ...] = (*selection.lessons, *selection.pages)
     for owner in owners:
         if owner.document is not None:

@@ -104,7 +104,9 @@ def _find_names(
             scripts = library.scripts.items()
             return {path: f"of {owner.id}: {owner.title}" for path, (_, owner) in scripts}
         case "callout":
-            return {name: library.callout(name).promise for name in library.callouts}
+            return {
+                kind.name: library.callout(kind.name).promise for kind in library.course.callouts
+            }
         case "fence":
             is_outside = fence_at(cursor.source, cursor.start) is None
             return dict.fromkeys((*CORE_FENCES, *fence_names()), "") if is_outside else {}

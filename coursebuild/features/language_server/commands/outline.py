@@ -74,7 +74,7 @@ def format_text(
     owner, width = texts.owner(source), texts.library.course.width
     if owner is None:
         return []
-    callouts, lesson = frozenset(texts.library.callouts), isinstance(owner, Lesson)
+    callouts, lesson = texts.library.course.callout_names, isinstance(owner, Lesson)
     new = format_document(source, callouts, lesson=lesson, width=width).value
     edit = types.TextEdit(texts.places.range(source.span()), new)
     return [] if new == source.text else [edit]

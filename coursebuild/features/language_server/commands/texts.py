@@ -36,7 +36,7 @@ class OpenTexts(Struct, frozen=True):
     def document(self, source: Source) -> Document | None:
         """Return the document of a lesson or page; `None` for other texts, and those too long."""
         owner = self.owner(source)
-        callouts = frozenset(self.library.callouts)
+        callouts = self.library.course.callout_names
         return None if owner is None else _parse(source, callouts, isinstance(owner, Lesson))
 
     def owner(self, source: Source) -> Owner | None:
