@@ -12,7 +12,6 @@ import difflib
 import os
 import sys
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from types import FrameType
 
@@ -25,16 +24,6 @@ _LIKENESS = 0.6
 
 class ModelNotFoundError(FileNotFoundError):
     """No such model in the course of the calling script, or no course around that script."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Start:
-    """A place to walk up from."""
-
-    folders: tuple[Path, ...]
-    """The folder as it was named, then with links resolved; each is tried."""
-    text: str
-    """How an error names the place."""
 
 
 def model_path(name: str) -> Path:
@@ -60,7 +49,7 @@ def model_path(name: str) -> Path:
     starts = tuple(_starts(sys._getframe(1)))
     root = next(filter(None, map(_find_root, starts)), None)
     if root is None:
-        places = " or ".join(start.text for start in starts) or "the current folder, which is gone"
+        places = " or ".join(map(str, starts)) or "the current folder, which is gone"
         raise ModelNotFoundError(
             f"no course for model {name!r}: no folder at or above {places} "
             "has content/course.toml, nor models/ beside examples/"
@@ -92,8 +81,11 @@ def _parts(name: object) -> tuple[str, ...]:
     return parts if name.endswith(_SUFFIX) else (*parts[:-1], parts[-1] + _SUFFIX)
 
 
-def _starts(frame: FrameType | None) -> Iterator[_Start]:
-    """The places to look for a course from: the calling code, outwards to the script itself."""
+def _starts(frame: FrameType | None) -> Iterator[Path]:
+    """The files to look for a course from: the calling code, outwards to the script itself.
+
+    Where there are none, the current folder.
+    """
     visited: set[str] = set()
     main = False
     while frame is not None and not main:
@@ -109,11 +101,11 @@ def _starts(frame: FrameType | None) -> Iterator[_Start]:
         yield from _start_at(command, visited)
     yield from _start_at(getattr(sys.modules.get("__main__"), "__file__", None), visited)
     if not visited:
-        yield from (_Start((folder,), str(folder)) for folder in _working_folders()[:1])
+        yield from _working_folders()[:1]
 
 
-def _start_at(file: object, visited: set[str]) -> Iterator[_Start]:
-    """The place of a `__file__`, unless it was visited before or belongs to a library."""
+def _start_at(file: object, visited: set[str]) -> Iterator[Path]:
+    """The path of a `__file__`, unless it was visited before or belongs to a library."""
     if not isinstance(file, str) or file in visited:
         return
     path = Path(file)
@@ -122,7 +114,7 @@ def _start_at(file: object, visited: set[str]) -> Iterator[_Start]:
     if not path.is_absolute() or _is_library(path):
         return
     visited.add(file)
-    yield _Start((Path(os.path.normpath(path)).parent, _resolve_links(path).parent), str(path))
+    yield path
 
 
 def _working_folders() -> tuple[Path, ...]:
@@ -138,9 +130,13 @@ def _is_library(path: Path) -> bool:
     )
 
 
-def _find_root(start: _Start) -> Path | None:
-    """The course root at or above a place: one with a map wins over one without."""
-    folders = [folder for base in start.folders for folder in (base, *base.parents)]
+def _find_root(start: Path) -> Path | None:
+    """The course root at or above a path, as it is named and then with links resolved.
+
+    One with a map wins over one without.
+    """
+    bases = (Path(os.path.normpath(start)), Path(os.path.realpath(start)))
+    folders = [folder for base in bases for folder in (base, *base.parents)]
     for is_root in (_has_map, _is_download):
         for folder in folders:
             if is_root(folder):
@@ -210,13 +206,6 @@ def _is_folder(path: Path) -> bool:
         return path.is_dir()
     except OSError:
         return False
-
-
-def _resolve_links(path: Path) -> Path:
-    try:
-        return path.resolve()
-    except (OSError, RuntimeError):
-        return path
 
 
 def _current_folder() -> Path | None:
