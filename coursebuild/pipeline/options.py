@@ -153,8 +153,7 @@ def select(course: Course, names: tuple[str, ...], root: Path) -> Selection:
         UsageError: a name means nothing, or a lesson that is not written yet.
     """
     if not names:
-        written_lessons = tuple(lesson for lesson in course.lessons if lesson.document is not None)
-        return Selection(written_lessons, course.pages, None)
+        return Selection(course.written_lessons, course.pages, None)
     owners = [_find_owner(course, name, root) for name in names]
     lessons = tuple(lesson for lesson in course.lessons if lesson in owners)
     pages = tuple(page for page in course.pages if page in owners)

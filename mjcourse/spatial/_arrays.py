@@ -1,6 +1,6 @@
 """Array helpers that all routines of `spatial` share.
 
-Entry points: `array` and `same_leading`, which check shapes; `split_exponent` and `norm`, which
+Entry points: `array` and `arrays`, which check shapes; `split_exponent` and `norm`, which
 neither overflow nor underflow; `dot2`, a dot product with twice the working precision.
 
 Vectors and matrices lie in the last one or two axes; every axis before them is leading, and leading
@@ -43,24 +43,23 @@ def _shape(core: tuple[int, ...]) -> str:
     return f"({', '.join(('...', *map(str, core)))})"
 
 
-def same_leading(*arguments: tuple[str, FloatArray, int]) -> tuple[int, ...]:
-    """The leading shape that arguments broadcast to.
-
-    Args:
-        arguments: each the name, the array, and how many of its last axes are not leading.
+def arrays(*arguments: tuple[str, ArrayLike, tuple[int, ...]]) -> tuple[FloatArray, ...]:
+    """Read arguments like `array`, whose leading shapes must broadcast.
 
     Raises:
-        ValueError: they do not broadcast.
+        ValueError: another shape, a ragged sequence, or leading shapes that do not broadcast.
+        TypeError: not real numbers.
     """
-    shapes = tuple(value.shape[: value.ndim - core] for _, value, core in arguments)
-    if all(shape == shapes[0] for shape in shapes):
-        return shapes[0]
+    values = tuple(array(*argument) for argument in arguments)
+    pairs = zip(values, arguments, strict=True)
+    shapes = [value.shape[: value.ndim - len(core)] for value, (_, _, core) in pairs]
     try:
-        return np.broadcast_shapes(*shapes)
+        np.broadcast_shapes(*shapes)
     except ValueError:
-        pairs = zip(arguments, shapes, strict=True)
-        shapes_text = ", ".join(f"{name} {shape}" for (name, _, _), shape in pairs)
-        raise ValueError(f"leading shapes do not broadcast: {shapes_text}") from None
+        names = (name for name, _, _ in arguments)
+        text = ", ".join(f"{name} {shape}" for name, shape in zip(names, shapes, strict=True))
+        raise ValueError(f"leading shapes do not broadcast: {text}") from None
+    return values
 
 
 def reject(bad: BoolArray | np.bool_, subject: str, complaint: str) -> None:

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 from mjcourse.spatial._arrays import (
     FloatArray,
     array,
+    arrays,
     components,
     matrix,
     reject,
-    same_leading,
     symmetric,
 )
 from mjcourse.spatial.rotations import quat_to_mat, skew, unskew
@@ -40,9 +40,9 @@ def parallel_axis(inertia: ArrayLike, mass: ArrayLike, offset: ArrayLike) -> Flo
     Raises:
         ValueError: a bad shape, or leading shapes that do not broadcast.
     """
-    inertia, mass = array("inertia", inertia, (3, 3)), array("mass", mass, ())
-    offset = array("offset", offset, (3,))
-    same_leading(("inertia", inertia, 2), ("mass", mass, 0), ("offset", offset, 1))
+    inertia, mass, offset = arrays(
+        ("inertia", inertia, (3, 3)), ("mass", mass, ()), ("offset", offset, (3,))
+    )
     return inertia + _point_inertia(mass, offset)
 
 
@@ -69,8 +69,9 @@ def compose_inertia(
         ValueError: a bad shape, leading shapes that do not broadcast, no part, or a total mass that
             is not positive.
     """
-    com, inertia = array("com", com, (3,)), array("inertia", inertia, (3, 3))
-    mass = array("mass", mass, ())
+    mass, com, inertia = arrays(
+        ("mass", mass, ()), ("com", com, (3,)), ("inertia", inertia, (3, 3))
+    )
     for name, value, core, shape in (
         ("mass", mass, 0, "(..., n)"),
         ("com", com, 1, "(..., n, 3)"),
@@ -78,7 +79,7 @@ def compose_inertia(
     ):
         if value.ndim == core:
             raise ValueError(f"{name} must have shape {shape}, got {value.shape}")
-    lead = same_leading(("mass", mass, 0), ("com", com, 1), ("inertia", inertia, 2))
+    lead = np.broadcast_shapes(mass.shape, com.shape[:-1], inertia.shape[:-2])
     if lead[-1] == 0:
         raise ValueError("a body needs at least one part, got none")
     mass, com = np.broadcast_to(mass, lead), np.broadcast_to(com, (*lead, 3))
@@ -107,8 +108,7 @@ def rotate_inertia(inertia: ArrayLike, rot: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, or leading shapes that do not broadcast.
     """
-    inertia, rot = array("inertia", inertia, (3, 3)), array("rot", rot, (3, 3))
-    same_leading(("inertia", inertia, 2), ("rot", rot, 2))
+    inertia, rot = arrays(("inertia", inertia, (3, 3)), ("rot", rot, (3, 3)))
     return symmetric(rot @ inertia @ np.swapaxes(rot, -1, -2))
 
 
@@ -128,8 +128,7 @@ def inertia_from_principal(moments: ArrayLike, quat: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, leading shapes that do not broadcast, or a zero quaternion.
     """
-    moments, quat = array("moments", moments, (3,)), array("quat", quat, (4,))
-    same_leading(("moments", moments, 1), ("quat", quat, 1))
+    moments, quat = arrays(("moments", moments, (3,)), ("quat", quat, (4,)))
     axes = quat_to_mat(quat)
     return symmetric((axes * moments[..., None, :]) @ np.swapaxes(axes, -1, -2))
 
@@ -152,9 +151,10 @@ def spatial_inertia(mass: ArrayLike, com: ArrayLike, inertia: ArrayLike) -> Floa
     Raises:
         ValueError: a bad shape, or leading shapes that do not broadcast.
     """
-    mass, com = array("mass", mass, ()), array("com", com, (3,))
-    inertia = array("inertia", inertia, (3, 3))
-    lead = same_leading(("mass", mass, 0), ("com", com, 1), ("inertia", inertia, 2))
+    mass, com, inertia = arrays(
+        ("mass", mass, ()), ("com", com, (3,)), ("inertia", inertia, (3, 3))
+    )
+    lead = np.broadcast_shapes(mass.shape, com.shape[:-1], inertia.shape[:-2])
     first = np.broadcast_to(skew(mass[..., None] * com), (*lead, 3, 3))
     angular = np.broadcast_to(inertia + _point_inertia(mass, com), (*lead, 3, 3))
     linear = np.broadcast_to(mass[..., None, None] * np.eye(3), (*lead, 3, 3))
@@ -198,9 +198,8 @@ def transform_spatial_inertia(spatial: ArrayLike, rot: ArrayLike, pos: ArrayLike
     Raises:
         ValueError: a bad shape, or leading shapes that do not broadcast.
     """
-    whole = array("spatial", spatial, (6, 6))
-    dual = force_transform(rot, pos)
-    same_leading(("spatial", whole, 2), ("pose", dual, 2))
+    pose = force_transform(rot, pos)
+    whole, dual = arrays(("spatial", spatial, (6, 6)), ("pose", pose, (6, 6)))
     return symmetric(dual @ whole @ np.swapaxes(dual, -1, -2))
 
 

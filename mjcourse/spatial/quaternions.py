@@ -19,10 +19,10 @@ from numpy.typing import ArrayLike
 from mjcourse.spatial._arrays import (
     FloatArray,
     array,
+    arrays,
     components,
     cross,
     reject,
-    same_leading,
     split_exponent,
     square_sum,
 )
@@ -49,8 +49,7 @@ def quat_mul(a: ArrayLike, b: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a shape that is not (..., 4), or leading shapes that do not broadcast.
     """
-    a, b = array("a", a, (4,)), array("b", b, (4,))
-    same_leading(("a", a, 1), ("b", b, 1))
+    a, b = arrays(("a", a, (4,)), ("b", b, (4,)))
     aw, ax, ay, az = components(a)
     bw, bx, by, bz = components(b)
     return np.stack(
@@ -110,9 +109,8 @@ def quat_rotate(quat: ArrayLike, vector: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, leading shapes that do not broadcast, or a zero quaternion.
     """
-    part = scale_to_one("quat", array("quat", quat, (4,)))
-    vector = array("vector", vector, (3,))
-    same_leading(("quat", part, 1), ("vector", vector, 1))
+    quat, vector = arrays(("quat", quat, (4,)), ("vector", vector, (3,)))
+    part = scale_to_one("quat", quat)
     axis = part[..., 1:]
     twice = cross(axis, vector) * (2.0 / square_sum(part))[..., None]
     return vector + part[..., :1] * twice + cross(axis, twice)
@@ -132,8 +130,8 @@ def axis_angle_to_quat(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, leading shapes that do not broadcast, or a zero axis.
     """
-    axis, angle = unit("axis", array("axis", axis, (3,))), array("angle", angle, ())
-    same_leading(("axis", axis, 1), ("angle", angle, 0))
+    axis, angle = arrays(("axis", axis, (3,)), ("angle", angle, ()))
+    axis = unit("axis", axis)
     with np.errstate(invalid="ignore"):
         half, tiny = 0.5 * angle, np.abs(angle) < TINY_ANGLE
         # Half of a denormal angle would lose its last bit; half of the unit axis is exact.

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 from mjcourse.spatial._arrays import (
     FloatArray,
     array,
+    arrays,
     components,
     dot2,
     norm,
-    same_leading,
     split_exponent,
     square_sum,
 )
@@ -97,7 +97,7 @@ def quat_sub(a: ArrayLike, b: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, leading shapes that do not broadcast, or a zero quaternion.
     """
-    w, vector = _relative(("a", a), ("b", b))
+    w, vector = _relative(a, b)
     return _log(w, -vector)
 
 
@@ -114,7 +114,7 @@ def angular_distance(a: ArrayLike, b: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, leading shapes that do not broadcast, or a zero quaternion.
     """
-    w, vector = _relative(("a", a), ("b", b))
+    w, vector = _relative(a, b)
     half: FloatArray = np.arctan2(norm(vector), np.abs(w))
     return 2.0 * half
 
@@ -136,10 +136,9 @@ def quat_slerp(a: ArrayLike, b: ArrayLike, t: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, leading shapes that do not broadcast, or a zero quaternion.
     """
-    start, end, t = array("a", a, (4,)), array("b", b, (4,)), array("t", t, ())
-    same_leading(("a", start, 1), ("b", end, 1), ("t", t, 0))
+    start, end, t = arrays(("a", a, (4,)), ("b", b, (4,)), ("t", t, ()))
     with np.errstate(invalid="ignore"):
-        rotvec = _log(*_relative(("a", start), ("b", end)))
+        rotvec = _log(*_relative(start, end))
         return quat_mul(unit("a", start), rotvec_to_quat(t[..., None] * rotvec))
 
 
@@ -160,12 +159,7 @@ def quat_integrate(quat: ArrayLike, angvel: ArrayLike, dt: ArrayLike) -> FloatAr
     Raises:
         ValueError: a bad shape, leading shapes that do not broadcast, or a zero quaternion.
     """
-    start, angvel, dt = (
-        array("quat", quat, (4,)),
-        array("angvel", angvel, (3,)),
-        array("dt", dt, ()),
-    )
-    same_leading(("quat", start, 1), ("angvel", angvel, 1), ("dt", dt, 0))
+    start, angvel, dt = arrays(("quat", quat, (4,)), ("angvel", angvel, (3,)), ("dt", dt, ()))
     return quat_mul(unit("quat", start), rotvec_to_quat(angvel * dt[..., None]))
 
 
@@ -176,13 +170,10 @@ def _length_error(part: FloatArray, length: FloatArray) -> FloatArray:
     return dot2(left, right) / (2.0 * length)
 
 
-def _relative(
-    first: tuple[str, ArrayLike], second: tuple[str, ArrayLike]
-) -> tuple[FloatArray, FloatArray]:
+def _relative(a: ArrayLike, b: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Scalar and vector part of a positive multiple of conj(a) ⊗ b, summed by `dot2`."""
-    (a_name, a), (b_name, b) = ((name, array(name, value, (4,))) for name, value in (first, second))
-    same_leading((a_name, a, 1), (b_name, b, 1))
-    a, b = scale_to_one(a_name, a), scale_to_one(b_name, b)
+    a, b = arrays(("a", a, (4,)), ("b", b, (4,)))
+    a, b = scale_to_one("a", a), scale_to_one("b", b)
     product = dot2(_SIGNS * a[..., _FROM_A], b[..., _FROM_B])
     return product[..., 0], product[..., 1:]
 

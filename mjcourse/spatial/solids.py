@@ -11,7 +11,7 @@ ValueError.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mjcourse.spatial._arrays import FloatArray, array, components, reject, same_leading
+from mjcourse.spatial._arrays import FloatArray, arrays, components, reject
 
 
 def box_inertia(mass: ArrayLike, half_sizes: ArrayLike) -> FloatArray:
@@ -114,8 +114,7 @@ def capsule_inertia(mass: ArrayLike, radius: ArrayLike, half_length: ArrayLike) 
 
 def _three_axes(mass: ArrayLike, name: str, value: ArrayLike, share: float) -> FloatArray:
     """Moments m/share (b² + c²) and so on."""
-    m, sizes = array("mass", mass, ()), array(name, value, (3,))
-    same_leading(("mass", m, 0), (name, sizes, 1))
+    m, sizes = arrays(("mass", mass, ()), (name, value, (3,)))
     reject((sizes < 0).any(axis=-1), name, "has a negative entry")
     x, y, z = components((m / share)[..., None] * sizes * sizes)
     return _diagonal(y + z, x + z, x + y)
@@ -130,12 +129,10 @@ def _read_sizes(
     mass: ArrayLike, *sizes: tuple[str, ArrayLike]
 ) -> tuple[FloatArray, tuple[FloatArray, ...]]:
     """The mass and the sizes, each of shape (...)."""
-    m = array("mass", mass, ())
-    read = tuple((name, array(name, value, ()), 0) for name, value in sizes)
-    same_leading(("mass", m, 0), *read)
-    for name, value, _ in read:
+    m, *values = arrays(("mass", mass, ()), *((name, value, ()) for name, value in sizes))
+    for (name, _), value in zip(sizes, values, strict=True):
         reject(value < 0, name, "is negative")
-    return m, tuple(value for _, value, _ in read)
+    return m, tuple(values)
 
 
 def _diagonal(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ components x in B has R x + p in A.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mjcourse.spatial._arrays import FloatArray, array, cross, same_leading
+from mjcourse.spatial._arrays import FloatArray, arrays, cross
 from mjcourse.spatial.rotations import skew
 
 
@@ -39,11 +39,11 @@ def pose_compose(
     Raises:
         ValueError: a bad shape, or leading shapes that do not broadcast.
     """
-    rot1, pos1 = array("rot1", rot1, (3, 3)), array("pos1", pos1, (3,))
-    rot2, pos2 = array("rot2", rot2, (3, 3)), array("pos2", pos2, (3,))
-    lead = same_leading(("rot1", rot1, 2), ("pos1", pos1, 1), ("rot2", rot2, 2), ("pos2", pos2, 1))
-    pos = (rot1 @ pos2[..., None])[..., 0] + pos1
-    return _spread(rot1 @ rot2, (*lead, 3, 3)), _spread(pos, (*lead, 3))
+    rot1, pos1, rot2, pos2 = arrays(
+        *(("rot1", rot1, (3, 3)), ("pos1", pos1, (3,))),
+        *(("rot2", rot2, (3, 3)), ("pos2", pos2, (3,))),
+    )
+    return _spread(rot1 @ rot2, (rot1 @ pos2[..., None])[..., 0] + pos1)
 
 
 def pose_inverse(rot: ArrayLike, pos: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -61,10 +61,9 @@ def pose_inverse(rot: ArrayLike, pos: ArrayLike) -> tuple[FloatArray, FloatArray
     Raises:
         ValueError: a bad shape, or leading shapes that do not broadcast.
     """
-    rot, pos = array("rot", rot, (3, 3)), array("pos", pos, (3,))
-    lead = same_leading(("rot", rot, 2), ("pos", pos, 1))
+    rot, pos = arrays(("rot", rot, (3, 3)), ("pos", pos, (3,)))
     back = np.swapaxes(rot, -1, -2)
-    return _spread(back, (*lead, 3, 3)), _spread(0.0 - (back @ pos[..., None])[..., 0], (*lead, 3))
+    return _spread(back, 0.0 - (back @ pos[..., None])[..., 0])
 
 
 def motion_transform(rot: ArrayLike, pos: ArrayLike) -> FloatArray:
@@ -121,8 +120,7 @@ def cross_motion(velocity: ArrayLike, motion: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, or leading shapes that do not broadcast.
     """
-    v, m = array("velocity", velocity, (6,)), array("motion", motion, (6,))
-    same_leading(("velocity", v, 1), ("motion", m, 1))
+    v, m = arrays(("velocity", velocity, (6,)), ("motion", motion, (6,)))
     turn, move = v[..., :3], v[..., 3:]
     return np.concatenate(
         (cross(turn, m[..., :3]), cross(turn, m[..., 3:]) + cross(move, m[..., :3])), axis=-1
@@ -144,8 +142,7 @@ def cross_force(velocity: ArrayLike, force: ArrayLike) -> FloatArray:
     Raises:
         ValueError: a bad shape, or leading shapes that do not broadcast.
     """
-    v, f = array("velocity", velocity, (6,)), array("force", force, (6,))
-    same_leading(("velocity", v, 1), ("force", f, 1))
+    v, f = arrays(("velocity", velocity, (6,)), ("force", force, (6,)))
     turn, move = v[..., :3], v[..., 3:]
     return np.concatenate(
         (cross(turn, f[..., :3]) + cross(move, f[..., 3:]), cross(turn, f[..., 3:])), axis=-1
@@ -154,12 +151,12 @@ def cross_force(velocity: ArrayLike, force: ArrayLike) -> FloatArray:
 
 def _blocks(rot: ArrayLike, pos: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
     """R, [p]× R and a zero matrix, in their common shape."""
-    rot, pos = array("rot", rot, (3, 3)), array("pos", pos, (3,))
-    same_leading(("rot", rot, 2), ("pos", pos, 1))
+    rot, pos = arrays(("rot", rot, (3, 3)), ("pos", pos, (3,)))
     coupling = skew(pos) @ rot
     return np.broadcast_to(rot, coupling.shape), coupling, np.zeros_like(coupling)
 
 
-def _spread(value: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-    """A fresh array of the broadcast shape."""
-    return np.array(np.broadcast_to(value, shape))
+def _spread(rot: FloatArray, pos: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A pose as fresh arrays with the same leading axes."""
+    lead = np.broadcast_shapes(rot.shape[:-2], pos.shape[:-1])
+    return np.array(np.broadcast_to(rot, (*lead, 3, 3))), np.array(np.broadcast_to(pos, (*lead, 3)))

@@ -239,6 +239,20 @@ class Course(Struct, frozen=True):
         return tuple(lesson for level in self.levels for lesson in level.lessons)
 
     @property
+    def written_levels(self) -> tuple[Level, ...]:
+        """The levels with their written lessons alone, but for levels without any."""
+        levels = (
+            replace(level, lessons=tuple(x for x in level.lessons if x.document is not None))
+            for level in self.levels
+        )
+        return tuple(level for level in levels if level.lessons)
+
+    @property
+    def written_lessons(self) -> tuple[Lesson, ...]:
+        """All written lessons in the order of the map."""
+        return tuple(lesson for lesson in self.lessons if lesson.document is not None)
+
+    @property
     def owners(self) -> tuple[Owner, ...]:
         """Everything that may have a document: lessons, then pages."""
         return (*self.lessons, *self.pages)

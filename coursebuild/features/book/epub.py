@@ -38,7 +38,6 @@ from coursebuild.core.pages.theme import accents
 from coursebuild.features.book.lessons import (
     PICTURES,
     extension,
-    levels_with_lessons,
     render_lesson,
     site_address,
     style_path,
@@ -95,11 +94,9 @@ class _Epub:
         self._course = context.course
         self._library = context.library
         self._language = context.course.language or "en"
-        self._levels = levels_with_lessons(context)
         self._chapters = {
             urls.lesson_path(lesson): _lesson_name(lesson)
-            for _, lessons in self._levels
-            for lesson in lessons
+            for lesson in context.course.written_lessons
         }
         self._pictures: dict[str, str] = {}
         """Names of pictures in the package, by their site path."""
@@ -126,11 +123,11 @@ class _Epub:
         yield OutputFile("EPUB/cover.svg", self._cover())
         yield OutputFile("EPUB/title.xhtml", self._title())
         yield OutputFile("EPUB/nav.xhtml", self._nav())
-        for level, lessons in self._levels:
+        for level in self._course.written_levels:
             name = _level_name(level)
             items.append(EpubItem(f"x-{xml_id(name)}", name, _XHTML, linear=True))
             yield OutputFile(f"EPUB/{name}", self._level(level))
-            for lesson in lessons:
+            for lesson in level.lessons:
                 chapter = self._chapter(lesson)
                 items.append(_chapter_item(_lesson_name(lesson), chapter))
                 yield OutputFile(f"EPUB/{_lesson_name(lesson)}", chapter)
@@ -201,7 +198,7 @@ class _Epub:
         body = self._library.render(
             "book/epub-nav.html",
             title=self._course.title,
-            levels=self._levels,
+            levels=self._course.written_levels,
             level_name=_level_name,
             lesson_name=_lesson_name,
         )

@@ -1,6 +1,6 @@
 """Takes the lessons of a course from the pages of its site.
 
-Entry points: `levels_with_lessons`; `render_lesson`, one of them for use elsewhere.
+Entry point: `render_lesson`, one of them for use elsewhere.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from markupsafe import Markup
 
-from coursebuild.core.model import Lesson, Level
+from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.html_tree import HtmlContent, parse_html
@@ -28,21 +28,12 @@ _TEXT_START, _TEXT_END = '<div class="prose">\n', '\n</div>\n<div class="lesson-
 """What surrounds the text of a lesson, see `templates/lesson.html`."""
 
 
-def levels_with_lessons(context: ExportContext) -> list[tuple[Level, list[Lesson]]]:
-    """Return the levels that have written lessons, with these lessons."""
-    pairs = (
-        (level, [lesson for lesson in level.lessons if lesson.document])
-        for level in context.course.levels
-    )
-    return [(level, lessons) for level, lessons in pairs if lessons]
-
-
 def summary_line(context: ExportContext) -> str:
     """Return the number of lessons, and the versions that they were verified with."""
     words, results = context.library.words, context.library.results
     verified = words("site.verified", engine=results.engine, python=results.python)
-    count = sum(len(lessons) for _, lessons in levels_with_lessons(context))
-    return f"{words('exports.lessons', n=count)}. {verified}."
+    lessons = words("exports.lessons", n=len(context.course.written_lessons))
+    return f"{lessons}. {verified}."
 
 
 def render_lesson(

@@ -23,7 +23,6 @@ from coursebuild.core.pages.html_tree import to_html
 from coursebuild.features.book.lessons import (
     PICTURES,
     extension,
-    levels_with_lessons,
     render_lesson,
     site_address,
     style_path,
@@ -39,8 +38,8 @@ _TYPES = {**PICTURES, "avif": "image/avif", "woff2": "font/woff2"}
 
 def page_file(context: ExportContext) -> OutputFile:
     """Return the page."""
-    course, levels = context.course, levels_with_lessons(context)
-    ids = {urls.lesson_path(lesson): lesson.id for _, lessons in levels for lesson in lessons}
+    course = context.course
+    ids = {urls.lesson_path(lesson): lesson.id for lesson in course.written_lessons}
     picture = functools.cache(functools.partial(_data_address, context))
 
     def address(path: str, anchor: str) -> str:
@@ -74,7 +73,7 @@ def page_file(context: ExportContext) -> OutputFile:
         summary=course.summary,
         facts=summary_line(context),
         licence=course.licence,
-        levels=levels,
+        levels=course.written_levels,
         level_anchor=level_anchor,
         lesson_anchor=lambda lesson: _anchor(lesson.id),
         quoted=urls.quote_anchor,

@@ -23,7 +23,7 @@ from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.figures import ReadFile, describe_difference
 from coursebuild.core.scripts.findings import classes
 from coursebuild.core.text.source import Excerpt
-from coursebuild.features.truth.claims import Claims, claims_of, documents_with_claims, sum_claims
+from coursebuild.features.truth.claims import Claims, course_claims, sum_claims
 
 _ROWS = 40
 """Rows of a table: GitHub shows a summary of up to a mebibyte."""
@@ -225,8 +225,7 @@ def _describe_lab_change(before: LabState, now: LabState) -> str:
 
 def _truth_section(old: Course, new: Course) -> str:
     before, now = (
-        {owner.id: claims_of(document) for owner, document in documents_with_claims(course)}
-        for course in (old, new)
+        {owner.id: claims for owner, claims in course_claims(course)} for course in (old, new)
     )
     no_claims = Claims(0, 0, 0, ())
     pairs = {id: (before.get(id, no_claims), now.get(id, no_claims)) for id in {**before, **now}}

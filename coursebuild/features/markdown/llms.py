@@ -25,13 +25,10 @@ def write_llms(library: Library) -> bytes:
     if course.summary:
         parts.append(f"> {escape_line(course.summary)}")
     parts.append(words("exports.llms"))
-    for level in course.levels:
+    for level in course.written_levels:
         label = f"{words('level.label', id=level.id)}: {level.title}"
-        rows = [
-            _lesson_row(library, lesson) for lesson in level.lessons if lesson.document is not None
-        ]
-        if rows:
-            parts.append("\n".join((f"## {escape_line(label)}", "", *rows)))
+        rows = (_lesson_row(library, lesson) for lesson in level.lessons)
+        parts.append("\n".join((f"## {escape_line(label)}", "", *rows)))
     parts += _optional_part(library)
     return visible("\n\n".join(parts) + "\n").encode()
 

@@ -36,7 +36,7 @@ def package_files(context: ExportContext) -> Iterator[SiteFile]:
     files.append(OutputFile("sco/scorm.css", context.assets.file("css/scorm.css")))
     files.append(OutputFile("sco/scorm.js", script))
     yield from files
-    for lesson in _written_lessons(context.course.lessons):
+    for lesson in context.course.written_lessons:
         yield OutputFile(_start_path(lesson), _start_page(context, lesson))
     manifest = _manifest(context.course, sorted(file.path for file in files))
     yield OutputFile("imsmanifest.xml", manifest)
@@ -44,10 +44,6 @@ def package_files(context: ExportContext) -> Iterator[SiteFile]:
 
 def _is_packed(path: str) -> bool:
     return path not in _MACHINES and not (path.startswith("assets/") and path.endswith(_COPIES))
-
-
-def _written_lessons(lessons: Iterable[Lesson]) -> list[Lesson]:
-    return [lesson for lesson in lessons if lesson.document is not None]
 
 
 def _start_path(lesson: Lesson) -> str:
@@ -71,18 +67,18 @@ def _start_page(context: ExportContext, lesson: Lesson) -> bytes:
 
 def _manifest(course: Course, paths: Iterable[str]) -> bytes:
     """Write the manifest: the lessons, and the files of each, within the lengths IMS allows."""
-    lessons = _written_lessons(course.lessons)
-    lesson_files = {f"lessons/{x.id}-{x.slug}": (x, [_start_path(x)]) for x in lessons}
+    lesson_files = {
+        f"lessons/{x.id}-{x.slug}": (x, [_start_path(x)]) for x in course.written_lessons
+    }
     shared: list[str] = []
     for path in paths:
         lesson = lesson_files.get(path.rpartition(".")[0])
         (shared if lesson is None else lesson[1]).append(path)
-    levels = ((level, _written_lessons(level.lessons)) for level in course.levels)
     return render_xml(
         Path(__file__).with_name("manifest.jinja"),
         course=course,
         language=course.language or "en",
-        levels=[(level, lessons) for level, lessons in levels if lessons],
+        levels=course.written_levels,
         lesson_files=lesson_files.values(),
         shared=shared,
         identifier=identifier,

@@ -12,12 +12,7 @@ from coursebuild.core.features import Feature
 from coursebuild.core.model import Course, Document, Lesson
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
-from coursebuild.features.truth.claims import (
-    claims_of,
-    document_claims,
-    documents_with_claims,
-    sum_claims,
-)
+from coursebuild.features.truth.claims import course_claims, document_claims, sum_claims
 from coursebuild.features.truth.table import KIND
 
 _TEXTS = """\
@@ -37,7 +32,7 @@ def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]
     """Yield an error if less is proven than the course map asks for."""
     if course.truth is None:
         return
-    claims = sum_claims(claims_of(document) for _, document in documents_with_claims(course))
+    claims = sum_claims(claims for _, claims in course_claims(course))
     if claims.proven < course.truth * claims.all:
         required = f"{100 * course.truth:g} %"
         message = f"{claims.share} of the numbers are proven, and {required} are asked for"
@@ -48,8 +43,8 @@ def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]
 def unproven(course: Course) -> Iterator[Diagnostic | str]:
     """Yield the share of proven numbers by lesson, and each number that nothing proves."""
     rows = [
-        (owner.id if isinstance(owner, Lesson) else owner.title, claims_of(document))
-        for owner, document in documents_with_claims(course)
+        (owner.id if isinstance(owner, Lesson) else owner.title, claims)
+        for owner, claims in course_claims(course)
     ]
     for name, claims in (*rows, ("all", sum_claims(claims for _, claims in rows))):
         if claims.all:

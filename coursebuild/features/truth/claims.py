@@ -1,6 +1,6 @@
 """Finds the numbers that a document claims, and what proves each.
 
-Entry points: `claims_of(document)`, `documents_with_claims(course)`, `sum_claims(claims)`.
+Entry points: `document_claims(document)`, `course_claims(course)`, `sum_claims(claims)`.
 
 1. A number in digits is a claim, except: a whole number up to twelve without a unit, which counts
    or names as a word does; a year; what only looks like a number (versions, dates, `x1`).
@@ -74,17 +74,12 @@ class Claims(Struct, frozen=True):
         return tuple(map(str, counts))
 
 
-def claims_of(document: model.Document) -> Claims:
-    """Return the claims of a document, from its summary if it has one."""
-    summary = (document.summaries or {}).get("truth")
-    return summary if isinstance(summary, Claims) else document_claims(document)
-
-
-def documents_with_claims(course: model.Course) -> Iterator[tuple[model.Owner, model.Document]]:
-    """Yield the documents whose claims count: of lessons, and of pages in the menu."""
+def course_claims(course: model.Course) -> Iterator[tuple[model.Owner, Claims]]:
+    """Yield what counts, with its claims: lessons, and pages in the menu."""
     for owner, document in course.owned_documents:
         if isinstance(owner, model.Lesson) or owner.menu:
-            yield owner, document
+            summary = (document.summaries or {}).get("truth")
+            yield owner, summary if isinstance(summary, Claims) else document_claims(document)
 
 
 def sum_claims(claims: Iterable[Claims]) -> Claims:

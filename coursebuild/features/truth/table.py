@@ -18,7 +18,7 @@ from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt
-from coursebuild.features.truth.claims import KINDS, claims_of, documents_with_claims, sum_claims
+from coursebuild.features.truth.claims import KINDS, course_claims, sum_claims
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext
@@ -55,15 +55,14 @@ def parse_truth(fence: Fence, texts: TextParser) -> Parsed[TruthTable]:
 
 def values(library: Library, place: urls.Place, block: TruthTable) -> TruthRows:
     """Return the rows of the table."""
-    words, claims = library.words, []
     rows: list[tuple[str, ...]] = []
-    for owner, document in documents_with_claims(library.course):
-        claims.append(claims_of(document))
+    claims_by_owner = list(course_claims(library.course))
+    for owner, claims in claims_by_owner:
         name = f"{owner.id} {owner.title}" if isinstance(owner, Lesson) else owner.title
         link = Markup('<a href="{}">{}</a>').format(place.href(urls.owner_path(owner)), name)
-        rows.append((str(link), claims[-1].share, *claims[-1].counts))
-    total = sum_claims(claims)
-    return TruthRows((*rows, (str(escape(words("truth.all"))), total.share, *total.counts)))
+        rows.append((str(link), claims.share, *claims.counts))
+    total, name = sum_claims(claims for _, claims in claims_by_owner), library.words("truth.all")
+    return TruthRows((*rows, (str(escape(name)), total.share, *total.counts)))
 
 
 def _table(page: PageContext, block: TruthTable) -> Table:
