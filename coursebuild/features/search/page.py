@@ -14,12 +14,7 @@ from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.lesson import LessonLink
 from coursebuild.core.pages.page_inputs import DocumentInputs, HighlightedFile, PageInputs
-from coursebuild.features.search.sections import (
-    Section,
-    SectionPiece,
-    document_sections,
-    html_sections,
-)
+from coursebuild.features.search.sections import Section, SectionReader
 from coursebuild.features.search.words import count_terms
 
 _EXCLUDED_KINDS = frozenset({"home", "notfound"})
@@ -67,15 +62,20 @@ def page_sections(inputs: PageInputs, document: Document | None, body: str) -> t
     lead: tuple[str, ...] = (inputs.head.description,)
     if isinstance(head, LessonLink):
         lead += (", ".join(head.aliases), *head.objectives)
+    shown = inputs.document_inputs or DocumentInputs()
+    labels = {kind: callout.label for kind, callout in shown.callouts.items()}
+    reader = SectionReader(labels, shown.blocks)
+    for text in lead:
+        reader.add("text", text)
     if document is not None:
-        document_inputs = inputs.document_inputs or DocumentInputs()
-        labels = {kind: callout.label for kind, callout in document_inputs.callouts.items()}
-        return document_sections(document, lead, labels, document_inputs.blocks)
-    code = [v.text for v in inputs.values.values() if isinstance(v, HighlightedFile)]
-    pieces = [SectionPiece("text", text) for text in lead if text]
-    pieces += [SectionPiece("code", text) for text in code if text]
-    sections = () if inputs.head.kind in _LEAD_ONLY else html_sections(body)
-    return (Section("", "", 0, tuple(pieces)), *sections)
+        reader.document(document)
+        return reader.end()
+    for value in inputs.values.values():
+        if isinstance(value, HighlightedFile):
+            reader.add("code", value.text)
+    if inputs.head.kind not in _LEAD_ONLY:
+        reader.html(body)
+    return reader.end()
 
 
 def script(kind: str, name: str, value: object) -> bytes:

@@ -1,6 +1,6 @@
 """Splits a page into the sections that are searched.
 
-Entry points: `document_sections`, for a page that shows a document; `html_sections`, for others.
+Entry point: `SectionReader`, which reads a document, or HTML where a page shows none.
 
 1. The blocks are walked in order, those in containers too; a heading begins a section.
 2. Formulas become lines of plain text (`tex`); the section is also found by their commands.
@@ -56,41 +56,18 @@ _LINES = frozenset(
 )
 
 
-def document_sections(
-    document: model.Document,
-    lead: Iterable[str],
-    labels: Mapping[str, str],
-    block_values: Mapping[int, Struct],
-) -> tuple[Section, ...]:
-    """Return the sections of a document.
-
-    Args:
-        document: the full document, not its summary.
-        lead: paragraphs above the document on its page.
-        labels: the labels of the kinds of callouts, by name.
-        block_values: the values of features' blocks, by the block's offset.
-    """
-    reader = SectionReader(labels, block_values)
-    for text in lead:
-        reader.add("text", text)
-    reader.blocks(document.blocks)
-    for footnote in document.footnotes:
-        reader.blocks(footnote.blocks)
-    return reader.end()
-
-
-def html_sections(body: str) -> tuple[Section, ...]:
-    """Return the sections of a page's body."""
-    reader = SectionReader({}, {})
-    reader.html(parse_html(body))
-    reader.end_line()
-    return reader.end()
-
-
 class SectionReader:
-    """Collects the sections of a page, from a document (`blocks`) or from HTML (`html`)."""
+    """Collects the sections of a page."""
 
-    def __init__(self, labels: Mapping[str, str], block_values: Mapping[int, Struct]) -> None:
+    def __init__(
+        self, labels: Mapping[str, str] = {}, block_values: Mapping[int, Struct] = {}
+    ) -> None:
+        """Begin a page.
+
+        Args:
+            labels: the labels of the kinds of callouts, by name.
+            block_values: the values of features' blocks, by the block's offset.
+        """
         self._labels = labels
         self._block_values = block_values
         self._sections: list[Section] = []
@@ -123,6 +100,12 @@ class SectionReader:
     def values(self, block: model.FeatureBlock) -> Struct | None:
         """Return the result of `FenceKind.values` for a block."""
         return self._block_values.get(block.span.start)
+
+    def document(self, document: model.Document) -> None:
+        """Read a full document, not its summary."""
+        self.blocks(document.blocks)
+        for footnote in document.footnotes:
+            self.blocks(footnote.blocks)
 
     def blocks(self, blocks: Iterable[model.Block]) -> None:
         """Read blocks in order."""
@@ -195,28 +178,31 @@ class SectionReader:
 
     # --- HTML
 
-    def html(self, content: Iterable[HtmlContent]) -> None:
-        """Read elements: headings begin sections, other blocks begin lines."""
+    def html(self, body: str) -> None:
+        """Read the body of a page: headings begin sections, other blocks begin lines."""
+        self._elements(parse_html(body))
+        self._end_line()
+
+    def _elements(self, content: Iterable[HtmlContent]) -> None:
         for child in content:
             if isinstance(child, str):
                 self._text += child
             elif child.name in _HEADINGS:
-                self.end_line()
-                self.html(child.children)
+                self._end_line()
+                self._elements(child.children)
                 heading, self._text = _line(self._text), ""
                 if child.name != "h1":  # the page's title
                     self.end()
                     id = child.attributes.get("id", "")
                     self._begin(id, heading, _HEADINGS[child.name])
             elif child.name in _LINES:
-                self.end_line()
-                self.html(child.children)
-                self.end_line()
+                self._end_line()
+                self._elements(child.children)
+                self._end_line()
             elif child.name not in _SKIPPED_ELEMENTS:
-                self.html(child.children)
+                self._elements(child.children)
 
-    def end_line(self) -> None:
-        """Add the text since the last line as a piece."""
+    def _end_line(self) -> None:
         self.add("text", self._text)
         self._text = ""
 

@@ -10,7 +10,7 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.features.search.page import note_page, page_sections, text_and_terms, weigh_terms
-from coursebuild.features.search.sections import Section, SectionPiece, html_sections
+from coursebuild.features.search.sections import Section, SectionPiece, SectionReader
 from support.rendered_course import Make
 
 LESSON = """Before any *heading*, at $I_{xx}$.[^n]
@@ -178,4 +178,6 @@ def test_the_file_of_a_page_is_a_script_that_hands_over_plain_values(make: Make)
     ],
 )
 def test_a_drawn_page_by_its_headings(body: str, sections: tuple[Section, ...]) -> None:
-    assert html_sections(body) == sections
+    reader = SectionReader()
+    reader.html(body)
+    assert reader.end() == sections
