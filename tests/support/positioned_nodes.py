@@ -28,7 +28,7 @@ def plain(node: Node) -> object:
     """The value as `json.loads` and `tomllib.loads` give it, but for dates."""
     match node:
         case ObjectNode():
-            return {member.key.value: plain(member.value) for member in node.members}
+            return {name: plain(member.value) for name, member in node.members.items()}
         case ArrayNode():
             return [plain(item) for item in node.items]
         case StringNode():

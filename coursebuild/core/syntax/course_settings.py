@@ -30,14 +30,14 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
         yield from _check_verify(node, fields)
     for node, filter in decoding.find_structs(Filter):
         yield from _check_filter(node, filter)
-    for member in root.object("verify").object("env").members:
-        if not _VARIABLE.fullmatch(member.key.value):
-            message = f"{format_name(member.key.value)} cannot be set for scripts"
+    for name, member in root.object("verify").object("env").members.items():
+        if not _VARIABLE.fullmatch(name):
+            message = f"{format_name(name)} cannot be set for scripts"
             help = "expected: a name of your own, as in `FAST`"
             yield diagnose("field-value", member.key.span, message, help=help)
-    for member in root.object("callouts").members:
-        if not _CALLOUT.fullmatch(member.key.value):
-            message = f"{format_name(member.key.value)} cannot be a kind of callout"
+    for name, member in root.object("callouts").members.items():
+        if not _CALLOUT.fullmatch(name):
+            message = f"{format_name(name)} cannot be a kind of callout"
             help = "expected: lower-case letters and digits in words joined by single hyphens"
             yield diagnose("field-value", member.key.span, message, help=help)
     for node, silence in decoding.find_structs(Silence):
@@ -45,7 +45,7 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
 
 
 def _check_verify(node: ObjectNode, fields: VerifyTable) -> Iterator[Diagnostic]:
-    tolerances = [m for name in ("rtol", "atol") if (m := node.member(name)) is not None]
+    tolerances = [m for name in ("rtol", "atol") if (m := node.members.get(name)) is not None]
     if fields.compare == "rtol" and not tolerances:
         message = '`compare = "rtol"` needs `rtol` or `atol`'
         yield diagnose("field-missing", node.place("compare"), message)

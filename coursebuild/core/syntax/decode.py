@@ -202,11 +202,10 @@ class _Decoder:
         return _INVALID if _INVALID in values else tuple(values)
 
     def decode_map(self, node: ObjectNode, type: inspect.DictType) -> object:
-        values: dict[str, object] = {}
-        for member in node.members:
-            key = member.key.value
-            if key not in values:
-                values[key] = self.decode_value(member.value, type.value_type, key)
+        values = {
+            key: self.decode_value(member.value, type.value_type, key)
+            for key, member in node.members.items()
+        }
         return _INVALID if _INVALID in values.values() else values
 
     # ---------------------------------------------------------------------------------- structs
@@ -220,17 +219,15 @@ class _Decoder:
         """The struct; `variants` are those of its union, by their tags."""
         fields = {field.name: field for field in type.fields}
         values: dict[str, object] = {}
-        unknown: dict[str, StringNode] = {}
-        for member in node.members:
-            key = member.key.value
+        unknown: list[StringNode] = []
+        for key, member in node.members.items():
             if key in fields:
-                if key not in values:
-                    values[key] = self.decode_value(member.value, fields[key].type, key)
+                values[key] = self.decode_value(member.value, fields[key].type, key)
             elif not variants or key != type.tag_field:
-                unknown.setdefault(key, member.key)
+                unknown.append(member.key)
         misspelt: set[str] = set()
         if type.forbid_unknown_fields and unknown:
-            misspelt = self.report_unknown(unknown.values(), fields, values, type, variants or {})
+            misspelt = self.report_unknown(unknown, fields, values, type, variants or {})
         missing = [field for field in type.fields if field.required and field.name not in values]
         for absent in missing:
             if absent.name not in misspelt:  # a misspelt field is one mistake
@@ -286,14 +283,11 @@ class _Decoder:
         self, node: ObjectNode, tag: str, variants: Mapping[str, inspect.StructType]
     ) -> object:
         """The struct of the implied variant, unless the fields are clearly those of another."""
-        owners = {
-            member.key.value: _variants_with_field(member.key.value, variants)
-            for member in node.members
-        }
-        for key in (member.key for member in node.members):
-            if not owners[key.value] and nearest(key.value, [tag], cutoff=0.7):
-                message = f"unknown field {format_name(key.value)}"
-                return self.report("field-unknown", key.span, message, f"did you mean `{tag}`?")
+        owners = {key: _variants_with_field(key, variants) for key in node.members}
+        for key, member in node.members.items():
+            if not owners[key] and nearest(key, [tag], cutoff=0.7):
+                message, place = f"unknown field {format_name(key)}", member.key.span
+                return self.report("field-unknown", place, message, f"did you mean `{tag}`?")
         help = did_you_mean("", variants)
         implied = next((t for t, v in variants.items() if getattr(v.cls, "implied", False)), None)
         if implied is not None:

@@ -25,7 +25,9 @@ def require_one_of(
     node: ObjectNode, type: type[Struct], names: tuple[str, ...], *, only: bool = True
 ) -> Iterator[Diagnostic]:
     """Report if none of the fields is there or, with `only`, more than one of them."""
-    members = [member for name in names if (member := node.member(name)) and has_value(node, name)]
+    members = [
+        member for name in names if (member := node.members.get(name)) and has_value(node, name)
+    ]
     if not members and not _has_misspelling(node, type, names):
         choice = ", ".join(f"`{name}`" for name in names[:-1]) + f" or `{names[-1]}`"
         yield diagnose("field-missing", node.mark, f"{choice} is missing")
@@ -38,8 +40,7 @@ def require_one_of(
 
 def _has_misspelling(node: ObjectNode, type: type[Struct], names: tuple[str, ...]) -> bool:
     """Whether an unknown field is surely a misspelling of one of the names, already reported."""
-    keys = (member.key.value for member in node.members)
-    return any(nearest(key, names) for key in keys if key not in type.__struct_fields__)
+    return any(nearest(key, names) for key in node.members if key not in type.__struct_fields__)
 
 
 def check_unique(

@@ -146,23 +146,21 @@ class _Reader:
         return self.read_scalar(start, scalar[0])
 
     def read_object(self, start: int, depth: int) -> ObjectNode:
-        members: list[Member] = []
-        keys: dict[str, StringNode] = {}
+        members: dict[str, Member] = {}
         is_done = self.peek() == "}"
         while not is_done:
             if self.peek() != '"':
                 self.fail_expecting("a key in double quotes", opening=start)
             key = self.read_string()
-            first = keys.setdefault(key.value, key)
-            if first is not key:
+            if first := members.get(key.value):
                 message = f"`{shorten(key.value)}` is given twice"
-                notes = (Note("the first one is here", first.span),)
+                notes = (Note("the first one is here", first.key.span),)
                 self.diagnostics.append(diagnose("field-repeated", key.span, message, notes=notes))
             self.read_colon(key)
-            members.append(Member(key, self.read_value(depth + 1)))
+            members.setdefault(key.value, Member(key, self.read_value(depth + 1)))
             is_done = self.read_separator(start, "}")
         self.offset += 1
-        return ObjectNode(self.body, start, self.offset, (start, start + 1), tuple(members))
+        return ObjectNode(self.body, start, self.offset, (start, start + 1), members)
 
     def read_array(self, start: int, depth: int) -> ArrayNode:
         items: list[Node] = []
@@ -173,7 +171,7 @@ class _Reader:
             items.append(self.read_value(depth + 1))
             is_done = self.read_separator(start, "]")
         self.offset += 1
-        return ArrayNode(self.body, start, self.offset, (start, start + 1), tuple(items))
+        return ArrayNode(self.body, start, self.offset, (start, start + 1), items)
 
     def read_colon(self, key: StringNode) -> None:
         char = self.peek()

@@ -4,7 +4,8 @@ Entry points: the union `Node`, `Member`; for the parsers `replace_escapes`, `ch
 `tex_word` and `odd_character`. Both languages give the same nodes, so that one decoder serves both.
 
 A node keeps offsets into the excerpt that was parsed; its `span` in the lesson is worked out on
-demand. Nodes compare by identity: two equal numbers at two places are two nodes.
+demand. Nodes compare by identity: two equal numbers at two places are two nodes. Only their parser
+changes them.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 
-class _PositionedNode(Struct, frozen=True, eq=False):
+class _PositionedNode(Struct, eq=False):
     """A node at `[start, end)` of the text that was parsed."""
 
     body: Excerpt
@@ -44,7 +45,7 @@ class _PositionedNode(Struct, frozen=True, eq=False):
         return self.body.text[self.start : self.end]
 
 
-class StringNode(_PositionedNode, frozen=True, eq=False):
+class StringNode(_PositionedNode, eq=False):
     """A string, a key included."""
 
     excerpt: Excerpt
@@ -56,32 +57,32 @@ class StringNode(_PositionedNode, frozen=True, eq=False):
         return self.excerpt.text
 
 
-class NumberNode(_PositionedNode, frozen=True, eq=False):
+class NumberNode(_PositionedNode, eq=False):
     """A number; a float may be infinite or, in TOML, not a number."""
 
     value: int | float
 
 
-class BoolNode(_PositionedNode, frozen=True, eq=False):
+class BoolNode(_PositionedNode, eq=False):
     """`true` or `false`."""
 
     value: bool
 
 
-class NullNode(_PositionedNode, frozen=True, eq=False):
+class NullNode(_PositionedNode, eq=False):
     """JSON's `null`."""
 
 
-class DateNode(_PositionedNode, frozen=True, eq=False):
+class DateNode(_PositionedNode, eq=False):
     """A date or time of TOML. No field takes one."""
 
 
-class ErrorNode(_PositionedNode, frozen=True, eq=False):
+class ErrorNode(_PositionedNode, eq=False):
     """Stands for a value that could not be read and was reported."""
 
 
-class _Container(_PositionedNode, frozen=True, eq=False):
-    """A value that holds others."""
+class _Container(_PositionedNode, eq=False):
+    """A value that holds others; one of TOML grows until the end of its text."""
 
     opening: tuple[int, int]
     """The offsets of its bracket, brace or `[header]`; a header may stand below a part of the
@@ -93,25 +94,21 @@ class _Container(_PositionedNode, frozen=True, eq=False):
         return self.body.span(*self.opening)
 
 
-class ArrayNode(_Container, frozen=True, eq=False):
+class ArrayNode(_Container, eq=False):
     """A list of values."""
 
-    items: tuple[Node, ...]
+    items: list[Node]
 
 
-class ObjectNode(_Container, frozen=True, eq=False):
+class ObjectNode(_Container, eq=False):
     """A JSON object or a TOML table."""
 
-    members: tuple[Member, ...]
-    """All members as written, even those with a repeated key."""
-
-    def member(self, name: str) -> Member | None:
-        """The first member of that name."""
-        return next((member for member in self.members if member.key.value == name), None)
+    members: dict[str, Member]
+    """The members by key, as they are written; of a repeated key the first."""
 
     def get(self, name: str) -> Node | None:
-        """The value of the first member of that name."""
-        member = self.member(name)
+        """The value of a key."""
+        member = self.members.get(name)
         return None if member is None else member.value
 
     def place(self, name: str) -> Span:
@@ -122,7 +119,7 @@ class ObjectNode(_Container, frozen=True, eq=False):
     def items(self, name: str) -> tuple[Node, ...]:
         """The items of the array of that name; none if there is no such array."""
         value = self.get(name)
-        return value.items if isinstance(value, ArrayNode) else ()
+        return tuple(value.items) if isinstance(value, ArrayNode) else ()
 
     def objects(self, name: str) -> tuple[ObjectNode, ...]:
         """The objects in the array of that name."""
@@ -133,7 +130,7 @@ class ObjectNode(_Container, frozen=True, eq=False):
         value = self.get(name)
         if isinstance(value, ObjectNode):
             return value
-        return ObjectNode(self.body, self.start, self.end, self.opening, ())
+        return ObjectNode(self.body, self.start, self.end, self.opening, {})
 
     def strings(self, name: str) -> tuple[StringNode, ...]:
         """The strings in the array of that name."""

@@ -104,9 +104,10 @@ def _build_declarations(source: Source, root: ObjectNode, fields: ModelFile) -> 
 
 
 def _build_sweep(node: ObjectNode, table: SweepTable) -> DeclaredSweep:
-    spans = {member.key.value: member.key.mark for member in node.object("vary").members}
+    members = node.object("vary").members
     variations = (
-        _build_variation(name, values, spans[name]) for name, values in table.vary.items()
+        _build_variation(name, values, members[name].key.mark)
+        for name, values in table.vary.items()
     )
     return DeclaredSweep(**asdict(table), variations=tuple(variations))
 
@@ -119,7 +120,7 @@ def _build_variation(name: str, values: tuple[SweepValue, ...] | str, span: Span
 
 
 def _build_scenario(node: ObjectNode, table: ScenarioTable) -> DeclaredScenario:
-    places = tuple((member.key.value, member.value.mark) for member in node.members)
+    places = tuple((name, member.value.mark) for name, member in node.members.items())
     return DeclaredScenario(**asdict(table), span=node.mark, places=places)
 
 

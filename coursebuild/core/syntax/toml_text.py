@@ -12,11 +12,10 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from typing import Any, TypeAlias
+from typing import Any
 
 import tree_sitter
 import tree_sitter_toml
-from msgspec import Struct, field
 
 from coursebuild.core.syntax.nodes import (
     ArrayNode,
@@ -50,9 +49,7 @@ def parse_toml(text: Source | Excerpt, *, rule: str = "map-syntax") -> Parsed[Ob
     try:
         tomllib.loads(text.text)
         reader = _Reader(body)
-        root = _build_node(body, reader.read_document())
-        assert isinstance(root, ObjectNode)
-        return Parsed(root, tuple(reader.diagnostics))
+        return Parsed(reader.read_document(), tuple(reader.diagnostics))
     except RecursionError:
         diagnostic = diagnose(rule, body.span(0, 0), "tables, arrays or keys nest too deep")
     except ValueError as error:
@@ -88,30 +85,6 @@ def _diagnose_repeated_key(body: Excerpt, message: str) -> Diagnostic | None:
     return diagnose("field-repeated", key.span, message, notes=notes, help=help if is_array else "")
 
 
-class _GrowingTable(Struct):
-    """A table to which more may be added, or the tables that share a `[[header]]`."""
-
-    start: int
-    end: int
-    mark: tuple[int, int]
-    members: dict[str, tuple[StringNode, _Item]] = field(default_factory=dict)
-    tables: list[_GrowingTable] = field(default_factory=list)
-
-
-_Item: TypeAlias = _GrowingTable | Node
-
-
-def _build_node(body: Excerpt, item: _Item) -> Node:
-    """The node of an item to which nothing will be added any more."""
-    if not isinstance(item, _GrowingTable):
-        return item
-    if item.tables:
-        tables = tuple(_build_node(body, table) for table in item.tables)
-        return ArrayNode(body, item.start, item.end, item.mark, tables)
-    members = tuple(Member(key, _build_node(body, inner)) for key, inner in item.members.values())
-    return ObjectNode(body, item.start, item.end, item.mark, members)
-
-
 class _Reader:
     """Makes nodes of the syntax tree of a text that is TOML, except that keys may be repeated."""
 
@@ -126,9 +99,9 @@ class _Reader:
         """The key that the last statement repeats, and its first occurrence."""
         self.diagnostics: list[Diagnostic] = []
 
-    def read_document(self) -> _GrowingTable:
+    def read_document(self) -> ObjectNode:
         """The table of the whole text."""
-        root = _GrowingTable(0, len(self.text), (0, 0))
+        root = ObjectNode(self.body, 0, len(self.text), (0, 0), {})
         for statement in self.root.named_children:
             if statement.type == "pair":
                 self.read_pair(root, statement)
@@ -138,58 +111,55 @@ class _Reader:
 
     # ------------------------------------------------------------------------------- statements
 
-    def read_table(self, root: _GrowingTable, statement: tree_sitter.Node) -> None:
+    def read_table(self, root: ObjectNode, statement: tree_sitter.Node) -> None:
         """Read `[name]` or `[[name]]`, and the pairs below it."""
         _, name, closing, *rest = statement.children
         pairs = [child for child in rest if child.type == "pair"]
         start, end = statement.start_byte, closing.end_byte
-        mark = (start, end)
+        opening = (start, end)
         if pairs:
             end = pairs[-1].named_children[1].end_byte
         self.repetition = None
         *outer, last = self.read_key_path(name)
         parent = self.open_table(root, outer, end)
-        table = _GrowingTable(start, end, mark)
-        first, item = parent.members.setdefault(last.value, (last, table))
-        if first is not last:
-            self.repetition = (last, first)
+        table = ObjectNode(self.body, start, end, opening, {})
         if statement.type == "table_array_element":
-            if first is last:
-                item = _GrowingTable(start, end, mark)
-                parent.members[last.value] = (last, item)
-            if isinstance(item, _GrowingTable):
-                item.tables.append(table)
-                item.end = end
-        elif first is not last:  # the header of a table inside it stands above
+            array = self.add(parent, last, ArrayNode(self.body, start, end, opening, []))
+            if isinstance(array, ArrayNode):
+                array.items.append(table)
+                array.end = end
+        elif self.add(parent, last, table) is not table:  # that of a table inside it stands above
             table = self.open_table(parent, [last], end)
-            table.mark = mark
+            table.opening = opening
         for pair in pairs:
             self.read_pair(table, pair)
 
-    def read_pair(self, table: _GrowingTable, pair: tree_sitter.Node) -> None:
+    def read_pair(self, table: ObjectNode, pair: tree_sitter.Node) -> None:
         """Read `key = value` in a table."""
         name, value_node = pair.named_children[:2]
         self.repetition = None
         value = self.read_value(value_node)
         *outer, last = self.read_key_path(name)
-        table = self.open_table(table, outer, value_node.end_byte)
-        first, _ = table.members.setdefault(last.value, (last, value))
-        if first is not last:
-            self.repetition = (last, first)
+        self.add(self.open_table(table, outer, value.end), last, value)
 
-    def open_table(self, table: _GrowingTable, keys: list[StringNode], end: int) -> _GrowingTable:
+    def open_table(self, table: ObjectNode, keys: list[StringNode], end: int) -> ObjectNode:
         """Return the table to which keys lead, made if need be and extended to `end`."""
         for key in keys:
-            new = _GrowingTable(key.start, key.end, (key.start, key.end))
-            first, item = table.members.setdefault(key.value, (key, new))
-            if first is not key:
-                self.repetition = (key, first)
-            table = item if isinstance(item, _GrowingTable) else new
+            new = ObjectNode(self.body, key.start, key.end, (key.start, key.end), {})
+            item = self.add(table, key, new)
+            if isinstance(item, ArrayNode) and item.items:
+                item.end = max(item.end, end)
+                item = item.items[-1]
+            table = item if isinstance(item, ObjectNode) else new
             table.end = max(table.end, end)
-            if table.tables:
-                table = table.tables[-1]
-                table.end = max(table.end, end)
         return table
+
+    def add(self, table: ObjectNode, key: StringNode, value: Node) -> Node:
+        """Give a key its value; return that which it has, another one if the key is repeated."""
+        member = table.members.setdefault(key.value, Member(key, value))
+        if member.key is not key:
+            self.repetition = (key, member.key)
+        return member.value
 
     # ------------------------------------------------------------------------------------ values
 
@@ -214,13 +184,13 @@ class _Reader:
                 return self.read_string(node)
             case "array":
                 inner = (child for child in node.named_children if child.type != "comment")
-                items = tuple(self.read_value(child) for child in inner)
+                items = [self.read_value(child) for child in inner]
                 return ArrayNode(self.body, start, end, (start, start + 1), items)
             case "inline_table":
-                table = _GrowingTable(start, end, (start, start + 1))
+                table = ObjectNode(self.body, start, end, (start, start + 1), {})
                 for pair in node.named_children:
                     self.read_pair(table, pair)
-                return _build_node(self.body, table)
+                return table
             case "boolean":
                 return BoolNode(self.body, start, end, self.text[start:end] == "true")
             case "integer" | "float":

@@ -39,13 +39,13 @@ def layout_json(node: Node, width: int, column: int = 0, indent: int = 0) -> str
     return text + line[-1]
 
 
-def _child_nodes(node: Node) -> tuple[Member | Node, ...]:
+def _child_nodes(node: Node) -> list[Member] | list[Node]:
     if isinstance(node, ObjectNode):
-        return node.members
-    return node.items if isinstance(node, ArrayNode) else ()
+        return list(node.members.values())
+    return node.items if isinstance(node, ArrayNode) else []
 
 
-def _count_breaks(node: Node, parts: tuple[Member | Node, ...]) -> list[int]:
+def _count_breaks(node: Node, parts: list[Member] | list[Node]) -> list[int]:
     """Count the line ends before each part and the closing bracket; 1 each for a single line."""
     if "\n" not in node.raw:
         return [1] * (len(parts) + 1)

@@ -140,7 +140,7 @@ def _values(node: Node, path: Entry) -> Iterator[tuple[Entry, Node]]:
     """Yield every value inside a node, with the path to it."""
     parts: list[tuple[str | int, Node]] = []
     if isinstance(node, ObjectNode):
-        parts = [(member.key.value, member.value) for member in node.members]
+        parts = [(name, member.value) for name, member in node.members.items()]
     elif isinstance(node, ArrayNode):
         parts = list(enumerate(node.items))
     for name, value in parts:

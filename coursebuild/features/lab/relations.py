@@ -149,11 +149,11 @@ def _check_step(node: Node, name: str, controls: Controls) -> Iterator[Diagnosti
         case ObjectNode():
             if not node.members:
                 yield diagnose("field-value", node.mark, f"`{name}` names no control")
-            for member in node.members:
-                if isinstance(controls.get(member.key.value), Button):
+            for label, member in node.members.items():
+                if isinstance(controls.get(label), Button):
                     alone = "write" if len(node.members) == 1 else "press it in a step of its own:"
-                    help = f'{alone} `"{member.key.value}"`'
-                    message = f"`{member.key.value}` is a button and has no value"
+                    help = f'{alone} `"{label}"`'
+                    message = f"`{label}` is a button and has no value"
                     yield diagnose("lab-name", member.key.span, message, help=help)
                 else:
                     yield from _check_setting(member.key, member.value, controls)

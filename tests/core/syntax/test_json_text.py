@@ -16,7 +16,7 @@ from support.positioned_nodes import plain
 
 def walk(node: Node) -> list[Node]:
     if isinstance(node, ObjectNode):
-        inner = [n for member in node.members for n in (member.key, member.value)]
+        inner = [n for member in node.members.values() for n in (member.key, member.value)]
         return [node, *(m for n in inner for m in walk(n))]
     if isinstance(node, ArrayNode):
         return [node, *(n for item in node.items for n in walk(item))]

@@ -170,7 +170,7 @@ def check_places(node: Node, text: str) -> None:
     """Check that a node contains its mark and, if the text has no headers, its child nodes."""
     inner: list[Node] = []
     if isinstance(node, ObjectNode):
-        inner = [n for member in node.members for n in (member.key, member.value)]
+        inner = [n for member in node.members.values() for n in (member.key, member.value)]
     elif isinstance(node, ArrayNode):
         inner = list(node.items)
     assert node.span.contains(node.mark)
@@ -186,7 +186,7 @@ def test_toml_of_a_fence_has_its_places_in_the_lesson() -> None:
     body = Excerpt.join([*lines], "\n")
     root = parse_toml(body).value
     assert root is not None
-    assert [member.value.span.text for member in root.members] == ["1", "'x'"]
+    assert [member.value.span.text for member in root.members.values()] == ["1", "'x'"]
     (diagnostic,) = parse_toml(body.slice(0, 3), rule="toml-syntax").diagnostics
     assert (diagnostic.rule, diagnostic.span.source) == ("toml-syntax", lesson)
     assert (diagnostic.span.line, diagnostic.span.column) == (2, 6)
