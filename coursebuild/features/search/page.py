@@ -62,9 +62,9 @@ def page_sections(inputs: PageInputs, document: Document | None, body: str) -> t
     lead: tuple[str, ...] = (inputs.head.description,)
     if isinstance(head, LessonLink):
         lead += (", ".join(head.aliases), *head.objectives)
-    shown = inputs.document_inputs or DocumentInputs()
-    labels = {kind: callout.label for kind, callout in shown.callouts.items()}
-    reader = SectionReader(labels, shown.blocks)
+    document_inputs = inputs.document_inputs or DocumentInputs()
+    labels = {kind: callout.label for kind, callout in document_inputs.callouts.items()}
+    reader = SectionReader(labels, document_inputs.blocks)
     for text in lead:
         reader.add("text", text)
     if document is not None:
