@@ -223,9 +223,9 @@ def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
     table = np.full((len(times) + 1, 5), np.nan)
     table[0] = invariants(model, scratch, data.qpos, data.qvel)
     peaks, steps = Peaks(penetration=deepest_contact(scratch)), 0
-    for index in range(len(times)):
-        if scenario.controls:
-            data.ctrl[:] = scenario.command(index)
+    for index, command in enumerate(scenario.commands(scenario.sample)):
+        if command:
+            data.ctrl[:] = command
         peaks, steps_made = advance_watching(model, data, steps_per_sample, peaks, thickness)
         steps += steps_made
         if not peaks.finite:

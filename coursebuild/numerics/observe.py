@@ -92,11 +92,12 @@ def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
     assert quantity is not None
     data = initial_data(scene.scenario, model)
     values = []
-    rows = zip(states.qpos, states.qvel, states.act, strict=True)
-    for index, (qpos, qvel, act) in enumerate(rows):
+    commands = scene.scenario.commands(scene.scenario.sample)
+    rows = zip(states.qpos, states.qvel, states.act, commands, strict=False)
+    for qpos, qvel, act, command in rows:
         data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
-        if scene.scenario.controls:
-            data.ctrl[:] = scene.scenario.command(index)
+        if command:
+            data.ctrl[:] = command
         mujoco.mj_forward(model, data)
         match quantity.kind:
             case "body":

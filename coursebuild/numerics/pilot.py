@@ -81,8 +81,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
     peaks = Peaks()
     times, steps_per_sample = scenario.times, scenario.steps(step)
     gaps = np.full((len(twins), len(times)), np.nan)
-    for index in range(len(times)):
-        command = scenario.command(index)
+    for index, command in enumerate(scenario.commands(scenario.sample)):
         for copy in (data, *twins) if command else ():
             copy.ctrl[:] = command
         for number in range(steps_per_sample):

@@ -80,19 +80,6 @@ class Scenario(Struct, frozen=True):
         """
         return whole_number(self.sample, timestep, "the sampling interval", "the timestep")
 
-    def command(self, index: int) -> tuple[float, ...]:
-        """The command before the sample with this index (from 0); empty without commands.
-
-        Raises:
-            ValueError: the hold is no multiple of `sample`.
-        """
-        if not self.controls:
-            return ()
-        samples = 1
-        if self.hold:
-            samples = whole_number(self.hold, self.sample, "the hold", "the sampling interval")
-        return self.controls[min(index // samples, len(self.controls) - 1)]
-
     def holds(self, end: float | None = None) -> list[tuple[float, float, tuple[float, ...]]]:
         """The intervals in which commands hold: begin and end (s), and the command.
 
@@ -108,7 +95,7 @@ class Scenario(Struct, frozen=True):
         ]
 
     def commands(self, timestep: float) -> Iterator[tuple[float, ...]]:
-        """The command of each step, for a timestep (s)."""
+        """The command of each step, for a timestep (s); for `sample`, that of each sample."""
         for begin, end, command in self.holds():
             yield from itertools.repeat(command, round((end - begin) / timestep))
 
