@@ -21,6 +21,7 @@ from msgspec.structs import astuple
 from numpy.typing import NDArray
 
 from coursebuild.core.model.scenarios import is_multiple
+from coursebuild.numerics.reports.text import INTEGRATORS
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -42,9 +43,7 @@ class Integrator(enum.Enum):
     DISCRETE = "discrete"
 
 
-STANDARD: tuple[Integrator, ...] = tuple(
-    integrator for integrator in Integrator if integrator is not Integrator.EULER_EXPLICIT
-)
+STANDARD: tuple[Integrator, ...] = tuple(map(Integrator, INTEGRATORS))
 """The integrators with a name of their own in MJCF."""
 
 

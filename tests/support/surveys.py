@@ -12,7 +12,7 @@ from coursebuild.core.text.source import Source
 from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelText, open_model
 from coursebuild.numerics.pruning.readers import read_code
-from coursebuild.numerics.pruning.survey import Order, Survey, survey
+from coursebuild.numerics.pruning.survey import Survey, Surveyor
 from coursebuild.numerics.reports.diet import Finding
 from coursebuild.numerics.timing import Clock
 from support.bench_reports import MACHINE
@@ -87,21 +87,20 @@ def run_survey(
     """Survey a model; `lesson` is a script that uses it."""
     model = open_files(text if isinstance(text, Mapping) else {PATH: text})
     place = Source("models/a.toml", "").span(0, 0)
-    order = Order(
-        "a",
-        "",
-        MACHINE,
-        model,
-        pruning_scenes(model.model, declarations, quick=quick),
-        (read_code("examples/a.py", lesson),) if lesson else (),
-        {key: Keep(key, reason, finding_span=place) for key, reason in (keeps or {}).items()},
-        {},
-        has_commands,
-        clock,
-        quick,
-        lambda _: None,
-    )
-    return survey(order)
+    return Surveyor(
+        model="a",
+        digest="",
+        machine=MACHINE,
+        text=model,
+        scenes=pruning_scenes(model.model, declarations, quick=quick),
+        readers=(read_code("examples/a.py", lesson),) if lesson else (),
+        keeps={key: Keep(key, reason, finding_span=place) for key, reason in (keeps or {}).items()},
+        locked={},
+        has_commands=has_commands,
+        clock=clock,
+        quick=quick,
+        tell=lambda _: None,
+    ).survey()
 
 
 def findings_by_kind(survey: Survey) -> dict[str, Finding]:

@@ -1,6 +1,6 @@
 """Model pruning: what a model holds that its scenarios do not need (`coursebuild diet`).
 
-Entry points: `survey.survey(order)`, of a `model_text.ModelText`; `compare.pruning_scenes` are its
+Entry points: `survey.Surveyor`, for a `model_text.ModelText`; `compare.pruning_scenes` are its
 scenarios.
 
 `markup`, `edits`: MJCF as text with places, and changes of it. `candidates`: what could be left

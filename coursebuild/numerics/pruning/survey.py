@@ -1,6 +1,6 @@
 """The scene diet of one model.
 
-Entry point: `survey`.
+Entry point: `Surveyor`, whose `survey` gives a `Survey`.
 
 1. The model runs once in each scenario. From one that is lost nothing is claimed.
 2. *Proved*: what no motion is computed of is taken out at once, as much as the compiler can do
@@ -17,9 +17,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import cached_property
 
 import mujoco
-from msgspec import Struct
+from msgspec import Struct, field
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import Machine
@@ -63,8 +64,24 @@ Rerun = Callable[[Mapping[str, bytes]], str]
 """New bytes of files → which script or lab then prints something else; empty where none does."""
 
 
-class Order(Struct, frozen=True, eq=False):
-    """The task of a survey."""
+class Survey(Struct, frozen=True):
+    """The result of a survey."""
+
+    report: DietReport
+    text: ModelText
+    edits: tuple[ModelEdit, ...] = ()
+    """All that `--fix` changes."""
+
+
+class _PrunedGroup(Struct, frozen=True, eq=False):
+    """Items that are taken out together, with the finding about them."""
+
+    items: tuple[Item, ...]
+    finding: Finding
+
+
+class Surveyor(Struct, kw_only=True, eq=False, dict=True):
+    """Looks for everything that a model can be without."""
 
     model: str
     """Its name."""
@@ -88,72 +105,54 @@ class Order(Struct, frozen=True, eq=False):
     """Gets a line about each stage."""
     rerun: Rerun | None = None
     """`None`: scripts and labs do not run."""
+    good_runs: tuple[WatchedRun, ...] = ()
+    """Of the whole model, those that were not lost."""
+    rejected: list[RejectedTrial] = field(default_factory=list)
 
-
-class Survey(Struct, frozen=True):
-    """The result of a survey."""
-
-    report: DietReport
-    text: ModelText
-    edits: tuple[ModelEdit, ...] = ()
-    """All that `--fix` changes."""
-
-
-def survey(order: Order) -> Survey:
-    """Look for everything that a model can be without."""
-    runs = [watch(order.text.model, scene) for scene in order.scenes]
-    report = DietReport(
-        model=order.model,
-        digest=order.digest,
-        quick=order.quick,
-        machine=order.machine,
-        readers=tuple(dict.fromkeys(reader.path.partition(":")[0] for reader in order.readers)),
-        scenarios=tuple(
-            DietScenario(
-                run.scene.name,
-                round(run.scene.scenario.duration / run.scene.timestep),
-                run.judgement.status.value,
-                run.judgement.reasons,
-            )
-            for run in runs
-        ),
-        findings=(),
-        tried=(),
-        fixed=None,
-        slim=None,
-        slim_difference=None,
-        stale=(),
-    )
-    good_runs = tuple(run for run in runs if run.judgement.ok)
-    return _Surveyor(order, good_runs).run(report) if good_runs else Survey(report, order.text)
-
-
-class _PrunedGroup(Struct, frozen=True, eq=False):
-    """Items that are taken out together, with the finding about them."""
-
-    items: tuple[Item, ...]
-    finding: Finding
-
-
-class _Surveyor:
-    def __init__(self, order: Order, good_runs: tuple[WatchedRun, ...]) -> None:
-        self.order = order
-        self.good_runs = good_runs
-        self.trials = PruningTrials(
-            order.text, [run.scene for run in good_runs], order.clock, quick=order.quick
+    def survey(self) -> Survey:
+        """Run the model in its scenarios, then without what it may not need."""
+        runs = [watch(self.text.model, scene) for scene in self.scenes]
+        self.good_runs = tuple(run for run in runs if run.judgement.ok)
+        report = DietReport(
+            model=self.model,
+            digest=self.digest,
+            quick=self.quick,
+            machine=self.machine,
+            readers=tuple(dict.fromkeys(reader.path.partition(":")[0] for reader in self.readers)),
+            scenarios=tuple(
+                DietScenario(
+                    run.scene.name,
+                    round(run.scene.scenario.duration / run.scene.timestep),
+                    run.judgement.status.value,
+                    run.judgement.reasons,
+                )
+                for run in runs
+            ),
+            findings=(),
+            tried=(),
+            fixed=None,
+            slim=None,
+            slim_difference=None,
+            stale=(),
         )
-        self.rejected: list[RejectedTrial] = []
+        return self._try_all(report) if self.good_runs else Survey(report, self.text)
 
-    def run(self, report: DietReport) -> Survey:
+    @cached_property
+    def trials(self) -> PruningTrials:
+        """Tries the model without some things, in the scenarios in which it was not lost."""
+        scenes = tuple(run.scene for run in self.good_runs)
+        return PruningTrials(self.text, scenes, self.clock, self.quick)
+
+    def _try_all(self, report: DietReport) -> Survey:
         """Try every candidate, then all findings together."""
-        text, runs = self.order.text, self.good_runs
+        text, runs = self.text, self.good_runs
         groups = self._prove()
         candidates = [far_bodies(text, self._code_names(), runs)]
         if not any(group.finding.kind == "contact-off" for group in groups):
             candidates.append(idle_contacts(text, runs))
         groups = self._confirm([*groups, *self._try_by_running(candidates)])
         groups += self._try_by_running([item] for item in other_settings(text, runs))
-        self.order.tell("all together")
+        self.tell("all together")
         fixable = [item for group in groups if group.finding.fixable for item in group.items]
         fixed = self.trials.prune(largest_subset(fixable, self._is_needless)) if fixable else None
         slim, slim_difference = self._save_most(
@@ -161,9 +160,7 @@ class _Surveyor:
         )
         used_keys = {group.finding.kind for group in groups}
         used_keys |= {f"{item.kind} {item.name}" for group in groups for item in group.items}
-        stale = {
-            key: keep.finding_span for key, keep in self.order.keeps.items() if key not in used_keys
-        }
+        stale = {key: keep.finding_span for key, keep in self.keeps.items() if key not in used_keys}
         report = replace(
             report,
             findings=tuple(group.finding for group in groups),
@@ -173,14 +170,14 @@ class _Surveyor:
             slim_difference=slim_difference,
             stale=tuple(StaleKeep(k, at.path, at.line, at.column) for k, at in stale.items()),
         )
-        return Survey(report, self.order.text, () if fixed is None else fixed.edits)
+        return Survey(report, self.text, () if fixed is None else fixed.edits)
 
     def _code_names(self) -> set[str]:
-        return {name for reader in self.order.readers for name in reader.names}
+        return {name for reader in self.readers for name in reader.names}
 
     def _confirm(self, groups: Sequence[_PrunedGroup]) -> list[_PrunedGroup]:
         """The groups without which scripts and labs of the course print the same."""
-        self.order.tell("scripts and labs")
+        self.tell("scripts and labs")
         unkept = [group for group in groups if not group.finding.kept]
         confirmed = largest_subset(unkept, lambda groups: not self._find_changed_output(groups))
         for group in unkept:
@@ -190,11 +187,10 @@ class _Surveyor:
         return [group for group in groups if group.finding.kept or group in confirmed]
 
     def _prove(self) -> list[_PrunedGroup]:
-        order = self.order
-        order.tell("what nobody needs")
-        items = unread_elements(order.text, [run.scene.scenario for run in self.good_runs])
-        if not any(reader.touches(PREMISES) for reader in order.readers):
-            items += unreachable_contacts(order.text)
+        self.tell("what nobody needs")
+        items = unread_elements(self.text, [run.scene.scenario for run in self.good_runs])
+        if not any(reader.touches(PREMISES) for reader in self.readers):
+            items += unreachable_contacts(self.text)
         items = [item for item in items if self._is_unread(item)]
         unkept = [item for item in items if not self._keep_reason(item)]
         removable = largest_subset(unkept, self._is_needless)
@@ -223,7 +219,7 @@ class _Surveyor:
         self, names: Collection[str], kinds: Collection[str], change: Collection[str]
     ) -> Reader | None:
         """The first reader that may notice that things are gone."""
-        readers = (reader for reader in self.order.readers if reader.notices(names, kinds, change))
+        readers = (reader for reader in self.readers if reader.notices(names, kinds, change))
         return next(readers, None)
 
     def _is_needless(self, items: Sequence[Item]) -> bool:
@@ -232,7 +228,7 @@ class _Surveyor:
         if trial is None:
             return False
         kinds = _views(items)
-        change = difference(self.order.text.model, trial.model)
+        change = difference(self.text.model, trial.model)
         own_fields = {field for item in items for field in KINDS[item.kind].fields.split()}
         if unrelated_fields(change, kinds) - own_fields:
             return False
@@ -245,17 +241,15 @@ class _Surveyor:
         return result is not None and result.identical
 
     def _may_sleep(self) -> bool:
-        sleep_flag = int(self.order.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
-        return bool(
-            sleep_flag or any(reader.touches({"enableflags"}) for reader in self.order.readers)
-        )
+        sleep_flag = int(self.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
+        return bool(sleep_flag or any(reader.touches({"enableflags"}) for reader in self.readers))
 
     def _try_by_running(self, candidates: Iterable[Sequence[Item]]) -> list[_PrunedGroup]:
         """Take out of each list of items as many of a kind as change no motion."""
         groups: list[_PrunedGroup] = []
         for items in candidates:
             for reason, similar in self._group_items(items):
-                self.order.tell(similar[0].kind)
+                self.tell(similar[0].kind)
                 group = self._try_items(similar, reason)
                 groups += [] if group is None else [group]
         return groups
@@ -273,7 +267,7 @@ class _Surveyor:
 
         # Bodies fall asleep below a speed, which is then the difference.
         sleeps = items[0].kind == "sleep"
-        tolerance = float(self.order.text.model.opt.sleep_tolerance) if sleeps else TOLERANCE
+        tolerance = float(self.text.model.opt.sleep_tolerance) if sleeps else TOLERANCE
         removable = largest_subset(items, moves_alike)
         if not removable:
             worst = max((result.difference for result in results), default=math.inf)
@@ -284,14 +278,14 @@ class _Surveyor:
         group = self._make_group(removable, reason, MEASURED_LABEL, results[-1].difference)
         saving = group.finding.saving
         is_slow = saving.time is None or not (saving.certain and saving.time >= MIN_SPEEDUP)
-        if self.order.clock is not None and is_slow and not reason:
+        if self.clock is not None and is_slow and not reason:
             self._reject(removable, results[-1].difference, "it saves no time")
             return None
         return group
 
     def _keep_reason(self, item: Item) -> str:
         """Why the author keeps an item; empty where no entry names it."""
-        keeps = self.order.keeps
+        keeps = self.keeps
         keep = keeps.get(f"{item.kind} {item.name}") or keeps.get(item.kind)
         return "" if keep is None else keep.reason
 
@@ -308,7 +302,7 @@ class _Surveyor:
         kind, trial, edits = items[0].kind, self.trials.prune(items), self.trials.edits(items)
         change: frozenset[str] = frozenset()
         if trial is not None:  # not where it goes only with what uses it
-            change = difference(self.order.text.model, trial.model)
+            change = difference(self.text.model, trial.model)
             change |= self.trials.state_difference(trial)
         timed = not kind.startswith("unused-") or kind == "unused-site"
         reader = self._find_noticing_reader((), _views(items), change)
@@ -338,9 +332,9 @@ class _Surveyor:
             return "it is kept"
         if label != PROVED_LABEL:
             return f"only what is {PROVED_LABEL} is changed"
-        if kind == "actuator-idle" and self.order.has_commands:
+        if kind == "actuator-idle" and self.has_commands:
             return "scenarios give commands by number: their rows would have to be shortened"
-        locked = (self.order.locked.get(edit.path, "") for edit in edits)
+        locked = (self.locked.get(edit.path, "") for edit in edits)
         return next(filter(None, locked), "")
 
     def _reject(self, items: Sequence[Item], difference: float | None, reason: str) -> None:
@@ -350,7 +344,7 @@ class _Surveyor:
         self.rejected.append(attempt)
 
     def _text_edits(self, edits: Sequence[ModelEdit]) -> tuple[TextEdit, ...]:
-        by_path = {document.path: document for document in self.order.text.documents}
+        by_path = {document.path: document for document in self.text.documents}
         text_edits = []
         for edit in merge_edits(edits):
             document = by_path[edit.path]
@@ -365,10 +359,10 @@ class _Surveyor:
 
     def _find_changed_output(self, groups: Sequence[_PrunedGroup]) -> str:
         """Which script or lab of the course prints something else without these groups."""
-        trial, rerun = self._prune(groups), self.order.rerun
+        trial, rerun = self._prune(groups), self.rerun
         if trial is None or rerun is None:
             return ""
-        return rerun(self.order.text.files(trial.edits))
+        return rerun(self.text.files(trial.edits))
 
     def _save_most(self, groups: Sequence[_PrunedGroup]) -> tuple[Saving | None, float | None]:
         """The saving and difference of all groups that go together, or of the best one alone."""

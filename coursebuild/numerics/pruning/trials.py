@@ -70,16 +70,13 @@ class PrunedModel(Struct, frozen=True, eq=False):
     index: IndexMap
 
 
-class PruningTrials:
+class PruningTrials(Struct, eq=False, dict=True):
     """Tries a model without some things."""
 
-    def __init__(
-        self, text: ModelText, scenes: Sequence[Scene], clock: Clock | None, *, quick: bool
-    ) -> None:
-        self.text = text
-        self.scenes = scenes
-        self.clock = clock
-        self.quick = quick
+    text: ModelText
+    scenes: tuple[Scene, ...]
+    clock: Clock | None
+    quick: bool
 
     def prune(self, items: Iterable[Item]) -> PrunedModel | None:
         """The model without these items; `None` if it does not compile, or differs otherwise."""

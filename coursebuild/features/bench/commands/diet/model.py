@@ -32,7 +32,7 @@ from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.markup import MarkupError
 from coursebuild.numerics.pruning.model_text import ModelTextError, model_bytes, open_model
 from coursebuild.numerics.pruning.readers import Reader
-from coursebuild.numerics.pruning.survey import Order, Rerun, Survey, survey
+from coursebuild.numerics.pruning.survey import Rerun, Survey, Surveyor
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
 
 _TEXT = ".coursebuild-text.xml"
@@ -91,22 +91,21 @@ class DietModel:
                 place = scene.model.source.span(0, 0)
                 diagnostic = diagnose("model-error", place, message, help=help)
                 raise CannotMeasureError(diagnostic) from None
-            order = Order(
-                scene.name,
-                scene.digest,
-                machine,
-                text,
-                pruning_scenes(text.model, declarations, quick=quick),
-                self.readers,
-                self.keeps,
-                self.locked,
-                any(scenario.controls for scenario in declarations.scenarios),
-                time.thread_time_ns,
-                quick,
-                tell,
-                rerun,
-            )
-            return survey(order)
+            return Surveyor(
+                model=scene.name,
+                digest=scene.digest,
+                machine=machine,
+                text=text,
+                scenes=pruning_scenes(text.model, declarations, quick=quick),
+                readers=self.readers,
+                keeps=self.keeps,
+                locked=self.locked,
+                has_commands=any(scenario.controls for scenario in declarations.scenarios),
+                clock=time.thread_time_ns,
+                quick=quick,
+                tell=tell,
+                rerun=rerun,
+            ).survey()
 
     def write(self, survey: Survey) -> None:
         """Write the changes that were found; all of them, or none.
