@@ -302,7 +302,7 @@ def row(name: str, native: list[float], v8: list[float], *workers: list[float]) 
 
 
 def page_cost(browser: Any, url: str, name: str) -> str:
-    """The cost of a page, and how its lab runs."""
+    """The weight of a page, and how its lab runs."""
     context = browser.new_context(viewport={"width": 1280, "height": 900})
     sizes: list[int] = []
     page = context.new_page()
@@ -319,6 +319,13 @@ def page_cost(browser: Any, url: str, name: str) -> str:
     page.reload(wait_until="networkidle")
     page.locator(".lab").first.scroll_into_view_if_needed()
     page.wait_for_selector(".lab-play", timeout=60_000)
+    run = run_cost(context, page)
+    context.close()
+    return f"  page {name}: {before}; {after}\n    {run}"
+
+
+def run_cost(context: Any, page: Any) -> str:
+    """How the lab of a page runs, from Play on."""
     page.evaluate(WATCH)
     clock = "document.querySelector('.lab-time').textContent"
     start_ms = page.evaluate(
@@ -342,12 +349,10 @@ def page_cost(browser: Any, url: str, name: str) -> str:
     frames = page.evaluate("window.frames_")
     long = page.evaluate("window.long_")
     task_end, stamp_end = read_busy_time()
-    context.close()
     median = statistics.median(frames)
     slow = sorted(frames)[int(0.99 * len(frames))]
     return (
-        f"  page {name}: {before}; {after}\n"
-        f"    Play to first moving frame {start_ms:.0f} ms (warm cache); frame median"
+        f"Play to first moving frame {start_ms:.0f} ms (warm cache); frame median"
         f" {median:.1f} ms, 99th percentile {slow:.1f} ms; {len(long)} tasks over 50 ms in 5 s;"
         f" page thread busy {100 * (task_end - task) / (stamp_end - stamp):.0f} %"
     )

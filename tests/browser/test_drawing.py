@@ -10,8 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from support.built_sites import Site
-from support.lab_course import PAGE
-from support.lab_page import lab, until, watch_page
+from support.lab_page import PAGE, lab, until, watch_page
 
 pytestmark = pytest.mark.browser
 

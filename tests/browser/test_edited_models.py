@@ -9,8 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.axe import violations
-from support.lab_course import PAGE
-from support.lab_page import EDITED_LAB, lab, press, until, watch_page
+from support.lab_page import EDITED_LAB, PAGE, lab, press, until, watch_page
 
 pytestmark = pytest.mark.browser
 

@@ -10,10 +10,10 @@ from playwright.sync_api import Browser, BrowserContext, Route, expect
 
 from support.axe import violations
 from support.built_sites import Site
-from support.lab_course import PAGE
 from support.lab_page import (
     AUTO,
     MOUNT,
+    PAGE,
     SWING,
     fetch_text,
     floats,

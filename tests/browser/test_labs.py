@@ -16,10 +16,10 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.built_sites import Site
-from support.lab_course import PAGE
 from support.lab_page import (
     ALL,
     AUTO,
+    PAGE,
     SWING,
     TWINS,
     floats,

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import pytest
 from playwright.sync_api import BrowserContext, CDPSession, Page, Route
 
-from support.lab_course import PAGE
-from support.lab_page import SWING, fetch_text, watch_page
+from support.lab_page import PAGE, SWING, fetch_text, watch_page
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -17,8 +17,7 @@ from coursebuild.preview.answers import PREFIX, Answers
 from coursebuild.preview.server import PreviewServer
 from coursebuild.preview.session import Session
 from support.built_sites import Site
-from support.lab_course import PAGE
-from support.lab_page import becomes, lab, until, wait_for_condition, watch_page
+from support.lab_page import PAGE, becomes, lab, until, wait_for_condition, watch_page
 from support.scratch_course import Folder
 from support.static_host import Host
 

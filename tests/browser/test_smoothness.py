@@ -11,8 +11,7 @@ from collections import defaultdict
 import pytest
 from playwright.sync_api import BrowserContext, Page
 
-from support.lab_course import PAGE
-from support.lab_page import SWING, lab, reach, time_of, wait_for_condition, watch_page
+from support.lab_page import PAGE, SWING, lab, reach, time_of, wait_for_condition, watch_page
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, CDPSession, Page
 
-from support.lab_course import PAGE
-from support.lab_page import MOUNT, SWING, until, wait_for_condition, watch_page
+from support.lab_page import MOUNT, PAGE, SWING, until, wait_for_condition, watch_page
 
 pytestmark = pytest.mark.browser
 

@@ -14,6 +14,8 @@ from playwright.sync_api import BrowserContext, Locator, Page, Request, Route, e
 
 from support.chromium import SLOW
 
+PAGE = "lessons/1.1-one.html"
+"""The page of the course in `tests/courses/labs`."""
 SWING, AUTO, ALL, TWINS, EDITED_LAB = 0, 1, 2, 3, 4
 """The index of each lab on the page."""
 

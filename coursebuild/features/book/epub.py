@@ -55,6 +55,7 @@ _CONTAINER = """\
 </rootfiles>
 </container>
 """
+_FOLDER = "EPUB/"
 _XHTML = "application/xhtml+xml"
 _FEATURES = ("structuralNavigation", "tableOfContents", "displayTransformability")
 _STYLE_RULE = re.compile(r"\.s[0-9a-f]{7}\{[^{}]*\}")
@@ -75,12 +76,21 @@ _COVER_SIZES, _COVER_LINES, _COVER_WIDTH = (120, 100, 84, 68, 54), 6, 1020
 class EpubItem(Struct, frozen=True):
     """A file of the package."""
 
-    id: str
-    href: str
+    file: SiteFile
     type: str
     properties: str = ""
     linear: bool = False
     """Whether it is a page of the reading order."""
+
+    @property
+    def href(self) -> str:
+        """Its path in the package."""
+        return self.file.path.removeprefix(_FOLDER)
+
+    @property
+    def id(self) -> str:
+        """Its id in the list of the package's files."""
+        return f"i-{xml_id(self.href)}"
 
 
 def epub_files(context: ExportContext) -> Iterator[SiteFile]:
@@ -102,39 +112,35 @@ class _Epub:
         """Names of pictures in the package, by their site path."""
 
     def files(self) -> Iterator[SiteFile]:
+        items = list(self._items())
         yield OutputFile("mimetype", b"application/epub+zip")
         yield OutputFile("META-INF/container.xml", _CONTAINER.encode())
-        items = [
-            EpubItem("title", "title.xhtml", _XHTML, linear=True),
-            EpubItem("nav", "nav.xhtml", _XHTML, "nav", linear=True),
-            EpubItem("style", "style.css", "text/css"),
-            EpubItem("cover", "cover.svg", PICTURES["svg"], "cover-image"),
-        ]
-        style = self._style()
-        yield OutputFile("EPUB/style.css", style.encode())
+        yield from (item.file for item in items)
+        yield OutputFile(f"{_FOLDER}package.opf", self._package(items))
+
+    def _items(self) -> Iterator[EpubItem]:
+        yield _page_item("title.xhtml", self._title())
+        yield _page_item("nav.xhtml", self._nav(), "nav")
+        cover = OutputFile(f"{_FOLDER}cover.svg", self._cover())
+        yield EpubItem(cover, PICTURES["svg"], "cover-image")
+        style, site = self._style(), self._context.site()
+        yield EpubItem(OutputFile(f"{_FOLDER}style.css", style.encode()), "text/css")
         folder = posixpath.dirname(style_path(self._context))
         for name in _FONT.findall(style):
-            items.append(EpubItem(f"f-{xml_id(name)}", name, f"font/{extension(name)}"))
-            yield CachedFile(f"EPUB/{name}", "", self._context.site()[f"{folder}/{name}"].make)
+            font = CachedFile(f"{_FOLDER}{name}", "", site[f"{folder}/{name}"].make)
+            yield EpubItem(font, f"font/{extension(name)}")
         for number, family in enumerate(self._course.theme.fonts, 1):
-            name = f"fonts/licence-{number}.txt"
-            items.append(EpubItem(f"f-{xml_id(name)}", name, "text/plain"))
-            yield OutputFile(f"EPUB/{name}", family.licence.data)
-        yield OutputFile("EPUB/cover.svg", self._cover())
-        yield OutputFile("EPUB/title.xhtml", self._title())
-        yield OutputFile("EPUB/nav.xhtml", self._nav())
+            licence = OutputFile(f"{_FOLDER}fonts/licence-{number}.txt", family.licence.data)
+            yield EpubItem(licence, "text/plain")
         for level in self._course.written_levels:
-            name = _level_name(level)
-            items.append(EpubItem(f"x-{xml_id(name)}", name, _XHTML, linear=True))
-            yield OutputFile(f"EPUB/{name}", self._level(level))
+            yield _page_item(_level_name(level), self._level(level))
             for lesson in level.lessons:
                 chapter = self._chapter(lesson)
-                items.append(_chapter_item(_lesson_name(lesson), chapter))
-                yield OutputFile(f"EPUB/{_lesson_name(lesson)}", chapter)
+                properties = [key for key in ("mathml", "svg") if f"<{key[:4]}".encode() in chapter]
+                yield _page_item(_lesson_name(lesson), chapter, " ".join(properties))
         for path, name in self._pictures.items():
-            items.append(EpubItem(f"i-{xml_id(name)}", name, PICTURES[extension(path)]))
-            yield CachedFile(f"EPUB/{name}", "", self._context.site()[path].make)
-        yield OutputFile("EPUB/package.opf", self._package(items))
+            picture = CachedFile(f"{_FOLDER}{name}", "", site[path].make)
+            yield EpubItem(picture, PICTURES[extension(path)])
 
     def _style(self) -> str:
         """Return the style sheet, with rules of the theme, and of the site for single elements."""
@@ -239,9 +245,8 @@ class _Epub:
         return self._pictures.setdefault(path, f"images/{digest}.{extension(path)}")
 
 
-def _chapter_item(name: str, chapter: bytes) -> EpubItem:
-    properties = [key for key in ("mathml", "svg") if f"<{key[:4]}".encode() in chapter]
-    return EpubItem(f"x-{xml_id(name)}", name, _XHTML, " ".join(properties), linear=True)
+def _page_item(name: str, page: bytes, properties: str = "") -> EpubItem:
+    return EpubItem(OutputFile(f"{_FOLDER}{name}", page), _XHTML, properties, linear=True)
 
 
 def _mean_width(title: str) -> float:

@@ -30,7 +30,6 @@ from coursebuild.core.model import (
     Heading,
     Script,
     Table,
-    child_blocks,
     walk_blocks,
 )
 from coursebuild.core.model.results import Outcome
@@ -109,30 +108,23 @@ def _block_cells(writer: DocumentWriter, blocks: Iterable[Block]) -> Iterator[Ce
         pending.clear()
 
     for block in blocks:
-        if isinstance(block, Script):
-            yield from flush()
-            yield from _script_cells(writer, section, block)
-        elif id(block) in output_ids:
+        if id(block) in output_ids:
             continue
-        else:
-            if isinstance(block, Heading) and block.level <= _MAX_LEVEL:
-                yield from flush()
-                section = block.anchor
+        if isinstance(block, Heading) and block.level <= _MAX_LEVEL:
+            yield from flush()
+            section = block.anchor
+        if not isinstance(block, Script):
             pending.append(block)
-            nested = list(_nested_cells(writer, section, child_blocks(block)))
-            if nested:
-                yield from flush()
-                yield from nested
+        if scripts := _find_scripts((block,)):
+            yield from flush()
+            for script in scripts:
+                yield from _script_cells(writer, section, script)
     yield from flush()
 
 
-def _nested_cells(
-    writer: DocumentWriter, section: str, blocks: tuple[Block, ...]
-) -> Iterator[Cell]:
-    """Yield cells for the scripts inside a block, which follow after it."""
-    for block in walk_blocks(blocks):
-        if isinstance(block, Script):
-            yield from _script_cells(writer, section, block)
+def _find_scripts(blocks: tuple[Block, ...]) -> list[Script]:
+    """Return the scripts among some blocks and inside them."""
+    return [block for block in walk_blocks(blocks) if isinstance(block, Script)]
 
 
 def _footnote_cells(writer: DocumentWriter) -> Iterator[Cell]:
@@ -142,7 +134,8 @@ def _footnote_cells(writer: DocumentWriter) -> Iterator[Cell]:
         title = f"## {writer.words('markup.footnotes')}"
         yield _text_cell("footnotes", "\n\n".join((title, *notes)))
     for note in footnotes:
-        yield from _nested_cells(writer, "footnotes", note.blocks)
+        for script in _find_scripts(note.blocks):
+            yield from _script_cells(writer, "footnotes", script)
 
 
 def _script_cells(writer: DocumentWriter, section: str, block: Script) -> Iterator[Cell]:

@@ -38,14 +38,14 @@ _DIGITS = 12
 """Digits of a hash in the list: enough to distinguish the versions of one file."""
 _MAX_NAME = 12
 """Characters that fit below an icon."""
-_COPIES = (".br", ".gz", ".zip", ".ipynb", ".md", ".imscc")
+_COPIES = (".br", ".gz", ".zip", ".ipynb", ".md")
 _PICTURES = (".svg", ".png", ".jpg", ".jpeg", ".gif", ".webp", ".avif")
 _SHELL = (".css", ".js", ".svg")
 _TEXT = (".html", ".webmanifest", *_PICTURES)
 _SEARCH_INDEX = "search/index.js"
 _LARGE = 1 << 20
 """Bytes: larger pages and pictures are only stored for those who ask for everything."""
-_FOR_MACHINES = (urls.ROBOTS, urls.SITEMAP, urls.WORKER, "llms.txt", "llms-full.txt")
+_FOR_MACHINES = (urls.ROBOTS, urls.SITEMAP, urls.WORKER, "llms.txt")
 
 
 def offline_files(site: SiteContext) -> Iterator[OutputFile | FileList]:

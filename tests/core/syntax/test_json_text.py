@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.core.text.source import Excerpt, Source
-from support.json_texts import parse
+from support.json_fences import parse_text as parse
 from support.positioned_nodes import plain
 
 

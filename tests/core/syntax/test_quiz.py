@@ -17,8 +17,9 @@ from coursebuild.features.quiz.model import (
     OrderQuestion,
     OutputQuestion,
 )
+from support.json_fences import MCQ
+from support.json_fences import parse_quiz as parse
 from support.plain_html import plain_blocks
-from support.quiz_fences import MCQ, parse
 
 
 def html(blocks: tuple[Block, ...]) -> str:

@@ -13,8 +13,8 @@ from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
-from support import lab_fences, quiz_fences
-from support.json_texts import parse
+from support.json_fences import parse_lab, parse_quiz
+from support.json_fences import parse_text as parse
 from support.text_cases import FOLDER, Reader, check_texts
 
 DEEP = "objects and arrays nest more than 64 deep"
@@ -35,7 +35,7 @@ def read_model(text: str) -> tuple[object, tuple[Diagnostic, ...]]:
 
 
 def read_lab(text: str) -> tuple[object, tuple[Diagnostic, ...]]:
-    parsed_lab = lab_fences.parse(text)
+    parsed_lab = parse_lab(text)
     return parsed_lab.value, parsed_lab.diagnostics
 
 
@@ -45,7 +45,7 @@ READERS: dict[str, Reader] = {
     "map": read_map,
     "model": read_model,
     "lab": read_lab,
-    "quiz": lambda text: (None, quiz_fences.parse(text).diagnostics),
+    "quiz": lambda text: (None, parse_quiz(text).diagnostics),
 }
 
 

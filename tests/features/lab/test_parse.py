@@ -18,8 +18,9 @@ from coursebuild.features.lab.schema import (
     Slider,
     Verify,
 )
-from support.lab_fences import messages, parse
+from support.json_fences import parse_lab as parse
 from support.lab_values import lab_of
+from support.positioned_nodes import format_diagnostics
 
 COMPLETE = r"""{
   "title": "The flip", "note": "Press *Play*.", "height": 240, "dock": true,
@@ -94,6 +95,10 @@ def test_the_least_that_a_lab_needs() -> None:
     assert (lab.note, lab.fields) == ((), SimLab(model="m"))
     assert (lab.fields.height, lab.is_docked(), lab.verify) == (300, False, Verify())
     assert parse('{"model": "m", "overlays": ["com"], "camera": {"azimuth": 1}}').diagnostics == ()
+
+
+def messages(body: str, kind: str) -> list[str]:
+    return format_diagnostics(parse(body, kind).diagnostics)
 
 
 def test_of_another_kind_only_what_all_have_is_checked() -> None:
