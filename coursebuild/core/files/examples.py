@@ -17,13 +17,13 @@ from __future__ import annotations
 import contextlib
 import enum
 import hashlib
-import json
 import os
 import re
 import stat
 from collections.abc import Mapping
 from pathlib import Path
 
+import msgspec
 from msgspec import Struct
 
 from coursebuild.core.files.errors import (
@@ -252,31 +252,30 @@ def _hash(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
+class _Manifest(Struct, frozen=True):
+    """The hashes that each extracted file may have, by path."""
+
+    version: int
+    files: dict[str, tuple[str, ...]]
+
+
 def _load_manifest(root: Path) -> dict[str, tuple[str, ...]]:
     """The hashes that each extracted file may have; empty if the manifest is missing or damaged."""
     try:
-        files = json.loads((root / MANIFEST).read_bytes())["files"]
-        manifest = {path: tuple(hashes) for path, hashes in files.items()}
+        files = msgspec.json.decode((root / MANIFEST).read_bytes(), type=_Manifest).files
     except OSError as error:
         if lacking(error):  # an empty manifest would make all files look edited, now and later
             raise
         return {}
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except ValueError:
         return {}
-    is_valid = all(
-        path.startswith(f"{FOLDER}/")
-        and ".." not in path.split("/")
-        and all(isinstance(h, str) for h in hashes)
-        for path, hashes in manifest.items()
-    )
-    return manifest if is_valid else {}
+    is_ours = all(p.startswith(f"{FOLDER}/") and ".." not in p.split("/") for p in files)
+    return files if is_ours else {}
 
 
 def _save_manifest(root: Path, manifest: Mapping[str, tuple[str, ...]]) -> None:
-    files = {path: list(manifest[path]) for path in sorted(manifest)}
-    data = (
-        json.dumps({"version": 1, "files": files}, indent=1, ensure_ascii=False) + "\n"
-    ).encode()
+    text = msgspec.json.encode(_Manifest(1, dict(sorted(manifest.items()))))
+    data = msgspec.json.format(text, indent=1) + b"\n"
     path = root / MANIFEST
     while True:
         try:

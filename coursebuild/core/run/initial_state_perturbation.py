@@ -203,26 +203,18 @@ class _Plan:
     """Which numbers of a model's states are moved, and in which direction."""
 
     def __init__(self, mujoco: Any, numpy: Any, model: Any, run: int) -> None:
-        free_joint, ball_joint = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
         self._numpy = numpy
-        tree_of_dof = numpy.array(model.dof_treeid)
-        kinds, starts = model.jnt_type, model.jnt_qposadr
-        trees = tree_of_dof[model.jnt_dofadr] if model.njnt else numpy.zeros(0, int)
-        self._tree_of_qpos = numpy.full(int(model.nq), -1)
-        self._plain = numpy.ones(int(model.nq), bool)
-        """Numbers that are no part of a quaternion."""
-        self._quaternions: list[tuple[int, int]] = []
-        """For each: its place in qpos and its tree."""
-        for kind, at, tree in zip(kinds, starts, trees, strict=True):
-            kind, at, tree = int(kind), int(at), int(tree)
-            place = at + 3 if kind == free_joint else at
-            if kind in (free_joint, ball_joint):
-                self._plain[place : place + 4] = False
-                self._quaternions.append((place, tree))
-                self._tree_of_qpos[at : place + 4] = tree
-            else:
-                self._tree_of_qpos[at] = tree
-        self._tree_of_dof = tree_of_dof
+        is_free = model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)
+        is_ball = model.jnt_type == int(mujoco.mjtJoint.mjJNT_BALL)
+        self._tree_of_dof = numpy.array(model.dof_treeid)
+        trees = self._tree_of_dof[model.jnt_dofadr]
+        self._tree_of_qpos = numpy.repeat(trees, numpy.where(is_free, 7, 1 + 3 * is_ball))
+        starts = (model.jnt_qposadr + 3 * is_free)[is_free | is_ball]
+        self._quaternions = starts[:, None] + numpy.arange(4)
+        """The places of each in qpos, a row each."""
+        self._is_plain = numpy.ones(int(model.nq), bool)
+        """Which numbers are no part of a quaternion."""
+        self._is_plain[self._quaternions] = False
         self._signs = [
             _signs(numpy, field, int(size), run)
             for field, size in enumerate((model.nq, model.nv, model.na))
@@ -232,18 +224,15 @@ class _Plan:
         """Move the masked numbers in place; return whether any changed."""
         numpy = self._numpy
         before = [array.copy() for array in (qpos, qvel, act)]
-        new_parts = (masks[0] & self._plain, *masks[1:])
+        new_parts = (masks[0] & self._is_plain, *masks[1:])
         for array, signs, mask in zip((qpos, qvel, act), self._signs, new_parts, strict=True):
             array[mask] *= 1.0 + SIZE * signs[mask]
-        signs = self._signs[0]
-        for at, _ in self._quaternions:
-            part = slice(at, at + 4)
-            if masks[0][part].any():
-                old = before[0][part]
-                new = old * (1.0 + SIZE * signs[part])
-                length, norm = numpy.linalg.norm(old), numpy.linalg.norm(new)
-                is_turned = (old != 0).sum() > 1
-                qpos[part] = new * (length / norm) if norm > 0 and is_turned else old
+        old = before[0][self._quaternions]
+        is_turned = masks[0][self._quaternions].any(axis=1) & ((old != 0).sum(axis=1) > 1)
+        places, old = self._quaternions[is_turned], old[is_turned]
+        new = old * (1.0 + SIZE * self._signs[0][places])
+        lengths, norms = (numpy.linalg.norm(q, axis=1, keepdims=True) for q in (old, new))
+        qpos[places] = new * (lengths / norms)
         if begins:
             self._move_resting(before, qpos, masks[0])
         return any(
@@ -255,19 +244,17 @@ class _Plan:
         """Move coordinates of trees that begin with nothing but zeros, and turn their bodies."""
         numpy, signs = self._numpy, self._signs[0]
         q, v = before[0], before[1]
-        resting = set(self._tree_of_qpos.tolist()) - {-1}
-        resting -= set(self._tree_of_qpos[self._plain & (q != 0)].tolist())
-        resting -= set(self._tree_of_dof[v != 0].tolist())
-        for at, tree in self._quaternions:
-            if (q[at : at + 4] != 0).sum() > 1:
-                resting.discard(tree)
-        if not resting:
-            return
-        still = numpy.isin(self._tree_of_qpos, sorted(resting)) & mask
-        qpos[still & self._plain] = SIZE * signs[still & self._plain]
-        for at, tree in self._quaternions:
-            if tree in resting and mask[at : at + 4].all():
-                qpos[at + 1 : at + 4] = 0.5 * SIZE * signs[at + 1 : at + 4]
+        is_turned = (q[self._quaternions] != 0).sum(axis=1) > 1
+        moved_trees = (
+            self._tree_of_qpos[self._is_plain & (q != 0)],
+            self._tree_of_dof[v != 0],
+            self._tree_of_qpos[self._quaternions[is_turned, 0]],
+        )
+        is_resting = mask & ~numpy.isin(self._tree_of_qpos, numpy.concatenate(moved_trees))
+        plain = is_resting & self._is_plain
+        qpos[plain] = SIZE * signs[plain]
+        imaginary = self._quaternions[is_resting[self._quaternions].all(axis=1), 1:]
+        qpos[imaginary] = 0.5 * SIZE * signs[imaginary]
 
 
 def _signs(numpy: Any, field: int, size: int, run: int) -> Any:
@@ -277,14 +264,12 @@ def _signs(numpy: Any, field: int, size: int, run: int) -> Any:
     far, with every second number in the other direction.
     """
     pair, second = divmod(run - 1, 2)
-    signs = []
-    for i in range(size):
-        bits = (i * 0x9E3779B1 + field * 0x85EBCA77 + 0x27D4EB2F) & 0xFFFFFFFF
-        bits = ((bits ^ (bits >> 15)) * 0x2C1B3C6D) & 0xFFFFFFFF
-        bits = ((bits ^ (bits >> 12)) * 0x297A2D39) & 0xFFFFFFFF
-        odd = (bits >> 16) + pair * i
-        signs.append(1.0 if odd & 1 else -1.0)
-    return numpy.array(signs) * ((-1.0 if second else 1.0) * 0.5**pair)
+    places = numpy.arange(size, dtype=numpy.uint64)
+    bits = (places * 0x9E3779B1 + field * 0x85EBCA77 + 0x27D4EB2F) & 0xFFFFFFFF
+    bits = ((bits ^ (bits >> 15)) * 0x2C1B3C6D) & 0xFFFFFFFF
+    bits = ((bits ^ (bits >> 12)) * 0x297A2D39) & 0xFFFFFFFF
+    is_odd = ((bits >> 16) + pair * places) & 1
+    return numpy.where(is_odd, 1.0, -1.0) * ((-1.0 if second else 1.0) * 0.5**pair)
 
 
 def _states(data: Any) -> tuple[bytes, ...]:

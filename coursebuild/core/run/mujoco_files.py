@@ -55,17 +55,13 @@ class ModelFiles:
     def scan_spec(self, spec: Any) -> None:
         """Note the assets of an `MjSpec`, which are read when it is compiled."""
         self._given_names |= frozenset(map(_base_name, spec.assets))
-        strip = bool(spec.strippath)
-        mesh = functools.partial(_asset_candidates, spec.modelfiledir, spec.meshdir, strip=strip)
-        texture = functools.partial(
-            _asset_candidates, spec.modelfiledir, spec.texturedir, strip=strip
-        )
+        find = functools.partial(_asset_candidates, spec.modelfiledir, strip=bool(spec.strippath))
         for kind in ("meshes", "hfields", "skins"):
             for element in getattr(spec, kind):
-                self._find_asset(mesh(element.file))
+                self._find_asset(find(spec.meshdir, element.file))
         for element in spec.textures:
             for file in (element.file, *element.cubefiles):
-                self._find_asset(texture(file))
+                self._find_asset(find(spec.texturedir, file))
 
     def _scan_model(self, path: str, depth: int) -> None:
         if _base_name(path) in self._given_names:
@@ -83,23 +79,20 @@ class ModelFiles:
         for tag, attributes in tags:
             if tag == "compiler":
                 compiler |= attributes
-        assets_folder = compiler.get("assetdir", "")
+        asset_folder = compiler.get("assetdir", "")
+        mesh_folder = compiler.get("meshdir", asset_folder)
+        texture_folder = compiler.get("texturedir", asset_folder)
         strip = compiler.get("strippath") == "true"
-        mesh = functools.partial(
-            _asset_candidates, folder, compiler.get("meshdir", assets_folder), strip=strip
-        )
-        texture = functools.partial(
-            _asset_candidates, folder, compiler.get("texturedir", assets_folder), strip=strip
-        )
+        find = functools.partial(_asset_candidates, folder, strip=strip)
         for tag, attributes in tags:
             file = attributes.get("file", "")
             if tag in _MESH:
-                self._find_asset(mesh(file or attributes.get("filename", "")))
+                self._find_asset(find(mesh_folder, file or attributes.get("filename", "")))
             elif tag == "texture":
                 for name in ("file", *_CUBE):
-                    self._find_asset(texture(attributes.get(name, "")))
+                    self._find_asset(find(texture_folder, attributes.get(name, "")))
             elif tag == "flexcomp":
-                self._find_asset([*_join(folder, file), *mesh(file)])
+                self._find_asset([*_join(folder, file), *find(mesh_folder, file)])
             elif tag == "model" and file and depth < _DEEPEST:
                 path = self._find_asset([*_join("", file), *_join(folder, file)])
                 if path:

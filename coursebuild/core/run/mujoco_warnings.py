@@ -11,7 +11,6 @@ Our handler may be called in any thread, also in MuJoCo's own.
 
 from __future__ import annotations
 
-import ctypes
 import posix
 from collections.abc import Callable
 from typing import Any
@@ -26,12 +25,9 @@ class Warnings:
         self._on_warning = on_warning
         self._script_handler: Callable[[str], object] | None = None
         """The handler that the script has set."""
-        self._print: Callable[[bytes], object] = _to_standard_error
         self._set, self._get = mujoco.set_mju_user_warning, mujoco.get_mju_user_warning
         if self._get() is not None:  # set when MuJoCo was imported
             return
-        if not hasattr(ctypes.PyDLL(mujoco._functions.__file__), "mju_setLogHandler"):
-            self._print = _to_standard_output()  # before MuJoCo 3.10
         self._set(self._handle)
         for real, new in ((self._set, self._set_handler), (self._get, self._get_handler)):
             wrapper = mujoco_tracing.wrap_function(new, like=real)
@@ -41,7 +37,7 @@ class Warnings:
         self._on_warning(message)
         if self._script_handler is not None:
             return self._script_handler(message)
-        return self._print(message.encode("utf-8", "replace"))
+        return posix.write(2, f"WARNING: {message}\n\n".encode("utf-8", "replace"))
 
     def _set_handler(self, *args: Any, **keywords: Any) -> None:
         handler = args[0] if len(args) == 1 and not keywords else None
@@ -59,13 +55,3 @@ class Warnings:
     def _get_handler(self, *args: Any, **keywords: Any) -> Any:
         handler = self._get(*args, **keywords)
         return self._script_handler if handler == self._handle else handler
-
-
-def _to_standard_error(message: bytes) -> object:
-    return posix.write(2, b"WARNING: " + message + b"\n\n")
-
-
-def _to_standard_output() -> Callable[[bytes], object]:
-    """A function that prints as MuJoCo did, through the buffers of the C library."""
-    write = ctypes.PyDLL(None).printf
-    return lambda message: write(b"WARNING: %s\n\n", message)

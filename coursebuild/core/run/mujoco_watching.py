@@ -35,7 +35,7 @@ _KINDS = (
     (" in QACC ", "mjWARN_BADQACC", "accelerations"),
 )
 """A part of MuJoCo's message, the counter, and our name for the sign."""
-_REQUIRED_ATTRIBUTES = ("MjData", "_functions", "mjtGeom", "mjtWarning", "set_mju_user_warning")
+_REQUIRED_ATTRIBUTES = ("MjData", "mjtGeom", "mjtWarning", "set_mju_user_warning")
 _DEFAULT_MODEL_NAME = "MuJoCo Model"
 """MuJoCo's name for a model that its author has not named."""
 _MOST_NOTES = 16
