@@ -14,7 +14,11 @@ script no longer uses.
    move at all: its coordinates become ±SIZE, and its bodies turn by as much.
 4. A state that the script restores bit by bit is no initial state: it was moved already. Nor is a
    correction in the last places, such as of the length of a quaternion.
-5. The final state is noted, with the sizes that it is compared by (`trajectory_extent`).
+5. The final state is noted, with the sizes that it is compared by, since it may well end near zero:
+   the largest positions and velocities since the simulation began (new data, or the clock went
+   back). Coordinates that began at zero and were moved all the same count as of size 1. Velocities
+   are compared by at least the velocity that would lead as far as the positions in the whole time:
+   those of a body at rest are only the trembling that moving it has left.
 
 The model, the time, controls and forces stay as they are.
 """
@@ -28,7 +32,6 @@ from types import ModuleType
 from typing import Any
 
 from coursebuild.core.run import mujoco_tracing
-from coursebuild.core.run.trajectory_extent import TrajectoryExtent
 
 SIZE = 1e-12
 """Relative; for a state of zeros absolute, in the unit of the coordinate (rad, m)."""
@@ -56,6 +59,8 @@ _INTEGRATING = ("mj_step2", "mj_Euler", "mj_implicit", "mj_RungeKutta")
 _MOST_KNOWN = 500_000
 _MOST_NUMBERS = 8192
 """The most numbers of all final states that are noted."""
+_DIVERGENCE_SIZE = 1e10
+"""Larger numbers are those of a simulation that is lost."""
 _FIELDS = ("qpos", "qvel", "act")
 
 
@@ -81,7 +86,7 @@ class _Perturbation:
         self._mujoco = mujoco
         self._numpy = numpy
         self._run = run
-        self._extents: dict[int, TrajectoryExtent] = {}
+        self._extents: dict[int, _Extent] = {}
         self._known_hashes: set[int] = set()
         self._plans: dict[int, tuple[Any, _Plan]] = {}
         self._count = 0
@@ -97,7 +102,7 @@ class _Perturbation:
         model, data = _model_and_data(args, keywords)
         extent = self._extents.get(id(data))
         if extent is None or extent.of() is not data:
-            extent = self._extents[id(data)] = TrajectoryExtent(data, self._count)
+            extent = self._extents[id(data)] = _Extent(data, self._count)
             self._count += 1
         elif _states(data) == extent.states and data.time >= extent.time:
             return
@@ -110,13 +115,13 @@ class _Perturbation:
             extent.cover(data)
             self._remember(extent, data)
 
-    def _remember(self, extent: TrajectoryExtent, data: Any) -> None:
+    def _remember(self, extent: _Extent, data: Any) -> None:
         extent.time = data.time
         extent.states = states = _states(data)
         if len(self._known_hashes) < _MOST_KNOWN:
             self._known_hashes.update(hash((i, state)) for i, state in enumerate(states))
 
-    def _move(self, model: Any, data: Any, extent: TrajectoryExtent) -> None:
+    def _move(self, model: Any, data: Any, extent: _Extent) -> None:
         begins = not extent.states or data.time < extent.time
         plan = self._get_plan(model)
         arrays = [getattr(data, name) for name in _FIELDS]
@@ -197,6 +202,45 @@ class _Perturbation:
             parts = [str(extent.number), str(len(data.qpos))]
             parts += [x.hex() for x in (*extent.sizes(), *numbers)]
             mujoco_tracing.note(f"s{' '.join(parts)}")
+
+
+class _Extent:
+    """The last state of an `MjData` that MuJoCo computed with, and how far it has come."""
+
+    def __init__(self, data: Any, number: int) -> None:
+        self.of: Any = weakref.ref(data)
+        self.number = number
+        """Its number in the order in which data were first computed with."""
+        self.time = float("inf")
+        self.states: tuple[bytes, ...] = ()
+        self.begin(0.0)
+
+    def begin(self, time: float) -> None:
+        """A simulation begins at this time."""
+        self.start_time = self.until = time
+        self.largest = [0.0, 0.0]
+        """The largest |qpos| and |qvel| since then."""
+        self.from_zero = False
+        """Whether coordinates that were zero have been moved."""
+
+    def cover(self, data: Any) -> None:
+        """Include the state that the simulation has come to."""
+        if data.time < self.until:  # MuJoCo has reset what diverged
+            self.begin(data.time)
+        self.until = data.time
+        for i, array in enumerate((data.qpos, data.qvel)):
+            if len(array):
+                largest = float(max(array.max(), -array.min()))
+                if self.largest[i] < largest < _DIVERGENCE_SIZE:
+                    self.largest[i] = largest
+
+    def sizes(self) -> tuple[float, float]:
+        """The sizes that positions and velocities are compared by."""
+        position, velocity = self.largest
+        if self.from_zero:
+            position = max(position, 1.0)
+        time = self.until - self.start_time
+        return position, max(velocity, position / time if time > 0 else 0.0)
 
 
 class _Plan:

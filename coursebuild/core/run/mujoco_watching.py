@@ -3,9 +3,9 @@
 Entry points: `watch`, once MuJoCo has been imported; `finish`, when the script has ended. Nothing
 is noted until `mujoco_tracing.tracer` is set.
 
-1. MuJoCo warns before it resets a lost state, or goes on with one. The warning is noted (see
-   `mujoco_warnings`) from any thread, whatever the script resets afterwards, and without making a
-   step slower. MuJoCo turns the clock back in no other case.
+1. MuJoCo warns before it resets a lost state, or goes on with one. The warning is noted from any
+   thread, whatever the script resets afterwards, and without making a step slower. MuJoCo turns the
+   clock back in no other case.
 2. Every `MjData` is checked when it is reset, when the script no longer uses it, and at the end:
    its warning counters, whether its state is finite, and how deep its bodies lie in each other,
    which MuJoCo does not warn of.
@@ -17,13 +17,13 @@ nothing else refers to it by then, it is checked and released.
 from __future__ import annotations
 
 import contextlib
+import posix
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import FrameType, ModuleType
 from typing import Any
 
 from coursebuild.core.run import initial_state_perturbation, mujoco_tracing
-from coursebuild.core.run.mujoco_warnings import Warnings
 
 DEEP = 1.0
 """A contact is deep where the smaller of two geoms has sunk in by more than this part of its
@@ -90,7 +90,7 @@ class _Watch:
         wrap(spec, "recompile", None, lambda args, keywords, result: self._hold(result[1]))
         resets = ("mj_resetData", "mj_resetDataKeyframe", "mj_resetDataDebug")
         mujoco_tracing.wrap_functions(mujoco, resets, self._before_reset)
-        Warnings(mujoco, self._note_warning)
+        _Warnings(mujoco, self._note_warning)
 
     def finish(self) -> None:
         for key in list(self._data_by_id):
@@ -194,6 +194,50 @@ class _Watch:
         parts = (kind, detail, time, model, path, str(line))
         fields = (part.replace("\t", " ").replace("\0", "") for part in parts)
         tracer.note("d" + "\t".join(fields))
+
+
+class _Warnings:
+    """Calls `on_warning`, which must never fail, with the text of each warning, from any thread.
+
+    MuJoCo's handler of warnings is ours. It calls the handler that the script has set, which is the
+    only one that the script sees; or else writes what MuJoCo would have written, in the same place,
+    except for `MUJOCO_LOG.TXT`.
+    """
+
+    def __init__(self, mujoco: Any, on_warning: Callable[[str], None]) -> None:
+        self._on_warning = on_warning
+        self._script_handler: Callable[[str], object] | None = None
+        """The handler that the script has set."""
+        self._set, self._get = mujoco.set_mju_user_warning, mujoco.get_mju_user_warning
+        if self._get() is not None:  # set when MuJoCo was imported
+            return
+        self._set(self._handle)
+        for real, new in ((self._set, self._set_handler), (self._get, self._get_handler)):
+            wrapper = mujoco_tracing.wrap_function(new, like=real)
+            mujoco_tracing.replace_function(mujoco, real.__name__, wrapper)
+
+    def _handle(self, message: str) -> object:
+        self._on_warning(message)
+        if self._script_handler is not None:
+            return self._script_handler(message)
+        return posix.write(2, f"WARNING: {message}\n\n".encode("utf-8", "replace"))
+
+    def _set_handler(self, *args: Any, **keywords: Any) -> None:
+        handler = args[0] if len(args) == 1 and not keywords else None
+        ours = callable(handler) and not hasattr(handler, "restype")  # not a function in C
+        try:
+            self._set(*((self._handle,) if ours else args), **keywords)
+        except BaseException as error:
+            if error.__traceback__ is not None:
+                error.__traceback__ = error.__traceback__.tb_next
+            raise
+        self._script_handler = handler if ours else None
+        if self._get() is None:
+            self._set(self._handle)
+
+    def _get_handler(self, *args: Any, **keywords: Any) -> Any:
+        handler = self._get(*args, **keywords)
+        return self._script_handler if handler == self._handle else handler
 
 
 def _count_references(data_by_id: Mapping[int, object], key: int) -> int:
