@@ -1,7 +1,7 @@
 """The scales of axes: the places of ticks, and their texts.
 
 Entry points: `Scale`, from values to places; `ticks`, `tick_texts` (linear); `log_ticks`, `log`
-(logarithmic); `number_text`.
+(logarithmic); `number_text`, `typeset_number`.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def tick_texts(values: Sequence[float]) -> list[str]:
     plain = _digits(values, "f", tolerance) if largest < 1e15 else None
     if plain is not None and 1e-4 <= largest < 1e6:
         return plain
-    powers = _digits(values, "e", tolerance) or [_readable(f"{v:.3e}") for v in values]
+    powers = _digits(values, "e", tolerance) or [typeset_number(f"{v:.3e}") for v in values]
     longest = max(map(len, powers))
     return powers if plain is None or max(map(len, plain)) > longest else plain
 
@@ -88,14 +88,15 @@ def _digits(values: Sequence[float], form: str, tolerance: float) -> list[str] |
     for digits in range(18):
         texts = [f"{value:.{digits}{form}}" for value in values]
         if all(abs(float(t) - v) <= tolerance for t, v in zip(texts, values, strict=True)):
-            return [_readable(text) for text in texts]
+            return [typeset_number(text) for text in texts]
     return None
 
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def _readable(text: str) -> str:
+def typeset_number(text: str) -> str:
+    """A formatted number as people write it: `−1.5·10⁻³` for `-1.5e-03`; zero has no sign."""
     mantissa, _, exponent = text.partition("e")
     mantissa = mantissa.replace("-", "\u2212")
     if float(text) == 0:

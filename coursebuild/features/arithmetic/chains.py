@@ -22,7 +22,7 @@ from typing import Any, Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.features.arithmetic.evaluate import WrongDimensions, describe_dimension, evaluate
+from coursebuild.features.arithmetic.evaluate import describe_dimension, evaluate
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 from coursebuild.features.arithmetic.statements import FormulaSide, Statement, read_statements
 
@@ -70,15 +70,9 @@ def _check_chain(statement: Statement) -> Iterator[FormulaComparison]:
             continue
         try:
             mistake = _find_mistake(left.get_expression(), right.get_expression(), relation)
-        except WrongDimensions as error:
-            yield FormulaComparison("wrong", error.start, error.end, error.reason)
         except NotUnderstood as error:
-            yield FormulaComparison("unread", error.start, error.end, error.reason)
-        else:
-            if mistake is None:
-                yield FormulaComparison("holds", left.start, right.end)
-            else:
-                yield FormulaComparison("wrong", *mistake)
+            mistake = FormulaComparison(error.kind, error.start, error.end, error.reason)
+        yield mistake or FormulaComparison("holds", left.start, right.end)
 
 
 def _without_common_unit(sides: tuple[FormulaSide, ...]) -> tuple[FormulaSide, ...]:
@@ -105,22 +99,20 @@ def _strip_unit(expression: Expression) -> Expression:
     return parts[0] if has_unit else expression
 
 
-def _find_mistake(
-    left: Expression, right: Expression, relation: str
-) -> tuple[int, int, str, str] | None:
-    """Return the range, message and help if a relation does not hold; `None` if it does."""
+def _find_mistake(left: Expression, right: Expression, relation: str) -> FormulaComparison | None:
+    """Return a comparison that is wrong if a relation does not hold; `None` if it does."""
     if relation == "?":
         raise right.not_understood("the relation says too little")
     values = evaluate(left), evaluate(right)
     if values[0].dimension != values[1].dimension:
         message = " is held against ".join(describe_dimension(value.dimension) for value in values)
-        return right.start, right.end, message, ""
+        return FormulaComparison("wrong", right.start, right.end, message)
     if relation in _ORDER:
         if _ORDER[relation](values[0].value, values[1].value):
             return None
         numbers = [_format_number(value.value) for value in values]
         message = f"{numbers[0]} {relation} {numbers[1]} does not hold"
-        return right.start, right.end, message, ""
+        return FormulaComparison("wrong", right.start, right.end, message)
     numerals = [(i, n) for i, e in enumerate((left, right)) if (n := _read_numeral(e))]
     if not numerals:
         if relation == "≈":
@@ -129,7 +121,7 @@ def _find_mistake(
             return None
         numbers = [_format_number(value.value) for value in values]
         message = f"{numbers[0]} and {numbers[1]} are not the same"
-        return right.start, right.end, message, ""
+        return FormulaComparison("wrong", right.start, right.end, message)
     index, numeral = max(numerals, key=lambda item: (item[1].step, item[0]))  # the coarser one
     side, value = (left, right)[index], values[1 - index].value
     if _agrees(numeral, value, relation):
@@ -138,7 +130,7 @@ def _find_mistake(
     message = f"{_format_number(value / numeral.unit_size, digits)} comes out, and not this"
     is_rounded = numeral.is_whole and relation == "=" and _agrees(numeral, value, "≈")
     help = "write `\\approx` where a whole number is rounded" if is_rounded else ""
-    return side.start, side.end, message, help
+    return FormulaComparison("wrong", side.start, side.end, message, help)
 
 
 def _format_number(value: Any, digits: int = 10) -> str:

@@ -26,6 +26,8 @@ _MAX_DIGITS = 300
 class WrongDimensions(NotUnderstood):
     """Quantities of different dimensions are combined."""
 
+    kind = "wrong"
+
 
 class PhysicalQuantity(Struct, frozen=True):
     """A value in base units of the SI."""

@@ -6,6 +6,7 @@ Entry points: `Expression`, `NotUnderstood`; `CONSTANTS`.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
 
 from msgspec import Struct
 
@@ -15,6 +16,8 @@ CONSTANTS = frozenset((r"\pi", r"\mathrm{e}"))
 
 class NotUnderstood(Exception):  # noqa: N818  # it is no mistake
     """A part of a formula that cannot be computed, with the reason and its range in the TeX."""
+
+    kind: Literal["wrong", "unread"] = "unread"
 
     def __init__(self, reason: str, start: int, end: int) -> None:
         super().__init__(reason)

@@ -17,7 +17,6 @@ from coursebuild.features.arithmetic.chains import FormulaComparison
 from coursebuild.features.arithmetic.evaluate import (
     Arithmetic,
     PhysicalQuantity,
-    WrongDimensions,
     describe_dimension,
     evaluate,
 )
@@ -43,10 +42,8 @@ def check_identity(tex: str, symbols: Mapping[str, Dimension]) -> Iterator[Formu
                 if relation != "=":
                     raise NotUnderstood("it is no equation", left.start, right.end)
                 yield from _compare(left.get_expression(), right.get_expression(), symbols)
-            except WrongDimensions as error:
-                yield FormulaComparison("wrong", error.start, error.end, error.reason)
             except NotUnderstood as error:
-                yield FormulaComparison("unread", error.start, error.end, error.reason)
+                yield FormulaComparison(error.kind, error.start, error.end, error.reason)
 
 
 def _compare(

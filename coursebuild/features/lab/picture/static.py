@@ -14,6 +14,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from coursebuild.core.drawing.scales import typeset_number
 from coursebuild.features.lab.files import LabRecord
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.picture.draw import FreeCamera, draw
@@ -32,7 +33,6 @@ _BAR = 0.2
 """The largest part of the picture's width that the scale bar takes."""
 _LARGE = 1e9
 """From here on numbers are written with powers of ten, as in the live lab."""
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def draw_picture(lab: Lab, main: MainRun) -> bytes:
@@ -112,10 +112,5 @@ def _format_value(value: Any, digits: int) -> str:
         return value
     if not isinstance(value, int | float):
         return "\u2013"
-    if abs(value) >= _LARGE:
-        mantissa, exponent = f"{value:.{max(2, digits)}e}".split("e")
-        return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}".replace("-", "\u2212")
-    text = f"{value:.{digits}f}"
-    if float(text) == 0:
-        text = text.lstrip("-")
-    return text.replace("-", "\u2212")
+    form = f".{max(2, digits)}e" if abs(value) >= _LARGE else f".{digits}f"
+    return typeset_number(f"{value:{form}}")
