@@ -5,7 +5,6 @@ Entry point: `Course`.
 
 from __future__ import annotations
 
-import hashlib
 import re
 from typing import Annotated, Literal, TypeAlias
 
@@ -16,7 +15,7 @@ from coursebuild.core.model import fields
 from coursebuild.core.model.blocks import Comparison, Document, Filter, Recording
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.core.model.theme import Theme
-from coursebuild.core.text.source import Source, Span
+from coursebuild.core.text.source import Source, Span, key_of
 
 _COMMENT = re.compile("<!--(.*?)-->", re.DOTALL)
 _LICENCE = re.compile("copyright|licen[cs]e", re.IGNORECASE)
@@ -220,7 +219,7 @@ class Course(Struct, frozen=True):
     def key(self) -> str:
         """The key of progress in readers' browsers: the id, or a text made from the title."""
         words = re.findall(r"[a-z0-9]+", self.title.lower())
-        digest = hashlib.sha256(self.title.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+        digest = key_of(self.title)[:8]
         return self.id or "-".join((*words, digest))
 
     def comparison_of(self, recording: Recording) -> Comparison:

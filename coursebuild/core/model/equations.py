@@ -9,12 +9,12 @@ on other pages too.
 
 from __future__ import annotations
 
-import hashlib
 from typing import NamedTuple
 
 from coursebuild.core.model.blocks import Document, FeatureBlock, Heading
 from coursebuild.core.model.inlines import Label
 from coursebuild.core.model.walk import block_formulas, child_blocks, document_blocks, walk_blocks
+from coursebuild.core.text.source import key_of, unique_name
 
 
 class DisplayFormula(NamedTuple):
@@ -62,10 +62,4 @@ def display_formulas(document: Document) -> tuple[DisplayFormula, ...]:
 
 def _make_id(tex: str, used_ids: set[str]) -> str:
     """Make the id of a formula without a label; a repeated formula gets a number."""
-    digest = hashlib.sha256(" ".join(tex.split()).encode("utf-8", "surrogatepass")).hexdigest()
-    base = name = f"eq:{digest[:8]}"
-    count = 1
-    while name in used_ids:
-        count += 1
-        name = f"{base}-{count}"
-    return name
+    return unique_name(f"eq:{key_of(' '.join(tex.split()))[:8]}", used_ids)

@@ -18,9 +18,9 @@ from __future__ import annotations
 import hashlib
 import re
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from functools import cached_property
-from itertools import accumulate
+from itertools import accumulate, chain, count
 
 from msgspec import Struct
 
@@ -35,6 +35,12 @@ def text_digest(text: str) -> bytes:
 def key_of(*texts: str) -> str:
     """The SHA-256 of some texts in hexadecimal digits: a name for what is made from them."""
     return text_digest("\0".join(texts)).hex()
+
+
+def unique_name(name: str, used_names: Container[str], separator: str = "-") -> str:
+    """A name that is not in use: the name itself, or with a number behind it, from 2."""
+    numbered_names = (f"{name}{separator}{number}" for number in count(2))
+    return next(n for n in chain([name], numbered_names) if n not in used_names)
 
 
 class Source(Struct, frozen=True, dict=True):

@@ -5,13 +5,12 @@ Entry point: `Lab`.
 
 from __future__ import annotations
 
-import hashlib
 from typing import TypeAlias
 
 from msgspec.structs import replace
 
 from coursebuild.core.model import Block, FeatureBlock, Inline
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.source import Excerpt, Span, key_of
 from coursebuild.features.lab.schema import SimLab, Verify
 
 SIMLAB = "simlab"
@@ -80,8 +79,7 @@ class Lab(FeatureBlock, frozen=True):
         if goal is None:
             return None
         condition = f"{self.fields.title}\n{goal.expr}\n{goal.hold}"
-        digest = hashlib.sha256(condition.encode("utf-8", "surrogatepass")).hexdigest()
-        key = f"goal-{digest[:8]}"
+        key = f"goal-{key_of(condition)[:8]}"
         return key, (key,)
 
     def tasks(self) -> int:

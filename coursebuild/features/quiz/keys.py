@@ -8,29 +8,22 @@ an item is a hash of its text. So adding, removing or moving one changes the key
 
 from __future__ import annotations
 
-import hashlib
 import unicodedata
 from collections.abc import Iterable, Iterator
 
-DIGITS = 8
-"""Hexadecimal digits of a hash: few, so that an address that holds one stays readable."""
+from coursebuild.core.text.source import key_of, unique_name
 
 
 def text_key(kind: str, text: str) -> str:
     """Return the key of a text of a kind (`mcq`, `option`), whatever its white space."""
     normalized_text = unicodedata.normalize("NFC", " ".join(text.split()))
-    data = f"{kind}\n{normalized_text}".encode("utf-8", "surrogatepass")
-    return hashlib.sha256(data).hexdigest()[:DIGITS]
+    return key_of(f"{kind}\n{normalized_text}")[:8]  # few, as addresses hold it
 
 
 def unique_keys(texts: Iterable[tuple[str, str]], used_keys: Iterable[str] = ()) -> Iterator[str]:
     """Yield the keys of texts, given as (kind, text); a key already in use gets a number."""
     all_keys = set(used_keys)
     for kind, text in texts:
-        base = key = text_key(kind, text)
-        count = 1
-        while key in all_keys:
-            count += 1
-            key = f"{base}-{count}"
+        key = unique_name(text_key(kind, text), all_keys)
         all_keys.add(key)
         yield key

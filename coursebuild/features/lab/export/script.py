@@ -20,6 +20,7 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined, Template
 from msgspec import Struct
 
+from coursebuild.core.text.source import unique_name
 from coursebuild.features.lab.export.expressions import RESERVED
 from coursebuild.features.lab.export.translate import (
     context_fields,
@@ -67,14 +68,13 @@ def file_name(lab: str) -> str:
 
 def fill_in_values(export: Export, values: Mapping[int, float | str]) -> str:
     """Fill the values of the controls into a script, as the page does."""
+    return _PLACE.sub(lambda match: _literal(values[int(match[1])]), export.text)
 
-    def literal(match: re.Match[str]) -> str:
-        value = values[int(match[1])]
-        if isinstance(value, str):
-            return json.dumps(value, ensure_ascii=False)
-        return str(int(value)) if value == int(value) and abs(value) < 1e15 else repr(value)
 
-    return _PLACE.sub(literal, export.text)
+def _literal(value: float | str) -> str:
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    return str(int(value)) if value == int(value) and abs(value) < 1e15 else repr(value)
 
 
 def initial_values(lab: Lab) -> dict[int, float | str]:
@@ -129,7 +129,7 @@ def _export(lab: Lab, metadata: ExportMetadata) -> Export:
     )
     text = _template().render(
         introduction=_introduction(lab, metadata),
-        seconds=_number(metadata.seconds),
+        seconds=_literal(metadata.seconds),
         constants=constants,
         model=json.dumps(code.model),
         xml=None if lab.xml is None else _long_text(lab.xml.text),
@@ -165,10 +165,7 @@ def _names(controls: Sequence[Control]) -> list[str]:
         if not name or name[0].isdigit():
             name = f"{'button' if is_button else 'control'}_{name}".strip("_")
         name = name if is_button else name.upper()
-        number, unique_name = 2, name
-        while unique_name in {*names, *RESERVED} or keyword.iskeyword(unique_name):
-            unique_name, number = f"{name}_{number}", number + 1
-        names.append(unique_name)
+        names.append(unique_name(name, {*names, *RESERVED, *keyword.kwlist}, "_"))
     return names
 
 
@@ -216,7 +213,7 @@ def _comment(control: Slider | Select) -> list[str]:
 
 
 def _option(label: str, value: float | str) -> str:
-    literal = json.dumps(value) if isinstance(value, str) else _number(value)
+    literal = _literal(value)
     return literal if _one_line(label) == literal else f"{literal} ({_one_line(label)})"
 
 
@@ -224,11 +221,6 @@ def _one_line(text: str) -> str:
     """Put a text of the author on one line, for a comment."""
     printable = "".join(c if c.isprintable() else " " for c in text)
     return " ".join(printable.replace("\\", "/").replace('"', "'").split())
-
-
-def _number(value: float) -> str:
-    """Write a number without `.0`."""
-    return str(int(value)) if value == int(value) else repr(value)
 
 
 def _long_text(text: str) -> str:
