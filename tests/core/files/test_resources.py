@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import sys
 from pathlib import Path
 
@@ -52,10 +51,7 @@ def test_bundle_and_templates_are_read_by_their_paths(
 
 
 def test_no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
-    def none(name: str) -> str:
-        raise importlib.metadata.PackageNotFoundError(name)
-
-    monkeypatch.setattr(importlib.metadata, "version", none)
     monkeypatch.setattr(sys, "path", ["/nowhere"])
+    versions.engine_version.cache_clear()
     with pytest.raises(EffectError, match="MuJoCo is not installed"):
         versions.engine_version()

@@ -112,7 +112,7 @@ def test_nothing_survives_the_tool(root: Path, number: int) -> None:
         assert not any(is_alive(pid) for pid in pids)
     assert all(wait_until_ended(pid) for pid in pids)
     folder = Path((root / "examples/tmp").read_text()).parent
-    assert folder.name.startswith("coursebuild-")
+    assert folder.name.startswith("coursebuild.")
     wait_until(lambda: not folder.exists(), "the end of the temporary folder")
 
 
