@@ -9,7 +9,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from coursebuild.core.model.results import TrialLine
-from coursebuild.core.model.sensitivity import Doubt, Flip, Sensitivity
+from coursebuild.core.model.sensitivity import Sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.rules import HELP, RULES
 from coursebuild.core.text.source import Span
@@ -47,15 +47,9 @@ def _line_value(line: ScriptLine | TrialLine) -> dict[str, Any]:
 def _sensitivity_value(s: Sensitivity) -> dict[str, Any]:
     """The sensitivity of a script; an amplification without bounds is `null`."""
     value: dict[str, Any] = plain(s, standing="status")
-    rows: dict[str, tuple[Doubt | Flip, ...]] = {
-        "doubts": s.doubts,
-        "flips": s.flips,
-    }
-    lists = {
-        name: [{"file": row.span.path, **plain(row)} for row in entries]
-        for name, entries in rows.items()
-    }
-    return {**value, "chaotic": s.chaotic, **lists}
+    for name, rows in (("doubts", s.doubts), ("flips", s.flips)):
+        value[name] = [{"file": row.span.path, **plain(row)} for row in rows]
+    return {**value, "chaotic": s.chaotic}
 
 
 # --- JUnit

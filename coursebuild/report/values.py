@@ -153,12 +153,5 @@ def plain(value: object, **names: str) -> Any:
 
 def place_fields(span: Span | None) -> dict[str, Any]:
     """The path, the lines and the columns of a span; all `None` where it is not known."""
-    if span is None:
-        return dict.fromkeys(("path", "line", "column", "end_line", "end_column"))
-    return {
-        "path": span.path,
-        "line": span.line,
-        "column": span.column,
-        "end_line": span.end_line,
-        "end_column": span.end_column,
-    }
+    names = ("path", "line", "column", "end_line", "end_column")
+    return {name: None if span is None else getattr(span, name) for name in names}

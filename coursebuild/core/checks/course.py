@@ -66,25 +66,21 @@ def _check_features(course: Course, documents: Collection[Document]) -> Iterator
 
 def _check_empty_lesson(
     course: Course, document: Document, blocks: Iterable[Block]
-) -> tuple[Diagnostic, ...]:
+) -> Iterator[Diagnostic]:
     """Report a complete lesson that shows nothing; `blocks` are those of the document.
 
     A draft may be empty.
     """
-    if not is_blank(blocks):
-        return ()
     source = document.source
-    return tuple(
-        diagnose(
-            "lesson-empty",
-            source.span(0, 0),
-            f"lesson {lesson.id} is complete, and there is nothing to read in {source.path}",
-            help='write it, say `status = "draft"` in the map, '
-            'or say `status = "planned"` and remove the file',
-        )
-        for lesson in course.lessons
-        if lesson.document is document and lesson.status == "complete"
-    )
+    for lesson in course.lessons:
+        if lesson.document is document and lesson.status == "complete" and is_blank(blocks):
+            yield diagnose(
+                "lesson-empty",
+                source.span(0, 0),
+                f"lesson {lesson.id} is complete, and there is nothing to read in {source.path}",
+                help='write it, say `status = "draft"` in the map, '
+                'or say `status = "planned"` and remove the file',
+            )
 
 
 def _check_title(course: Course, document: Document) -> Iterator[Diagnostic]:
@@ -119,20 +115,15 @@ def _have_one_progress(first: Heading | FeatureBlock, block: FeatureBlock) -> bo
     return keys is not None and other_keys is not None and keys[0] == other_keys[0]
 
 
-def _check_terms(
-    blocks: Iterable[Block], definitions: Mapping[str, Span]
-) -> tuple[Diagnostic, ...]:
+def _check_terms(blocks: Iterable[Block], definitions: Mapping[str, Span]) -> Iterator[Diagnostic]:
     """Report terms that have an earlier definition; `definitions` has the first of each."""
-    diagnostics: list[Diagnostic] = []
-    for inline in walk_inlines(tuple(i for block in blocks for i in block_inlines(block))):
-        if not isinstance(inline, Term):
+    inlines = walk_inlines(tuple(i for block in blocks for i in block_inlines(block)))
+    for term in (inline for inline in inlines if isinstance(inline, Term)):
+        first = definitions.get(term.id)
+        if first is None or (first.path, first.start) == (term.span.path, term.span.start):
             continue
-        first = definitions.get(inline.id)
-        if first is None or (first.path, first.start) == (inline.span.path, inline.span.start):
-            continue
-        message = f"the term `{inline.id}` is defined twice"
+        message = f"the term `{term.id}` is defined twice"
         help = "leave one definition, and link to it from here: "
-        help += f'`[…](term:{inline.id})`; or name this one by `{{term="…"}}`'
+        help += f'`[…](term:{term.id})`; or name this one by `{{term="…"}}`'
         notes = [Note("the first one is here", first)]
-        diagnostics.append(diagnose("term-repeated", inline.span, message, help=help, notes=notes))
-    return tuple(diagnostics)
+        yield diagnose("term-repeated", term.span, message, help=help, notes=notes)

@@ -151,20 +151,13 @@ def _merge_differences(
             recorded[d.start : d.end].strip() or printed[d.printed_start : d.printed_end].strip()
         )
 
-    visible = [d for d in differences if not is_blank(d)] or differences
     merged_differences: list[Difference] = []
-    for d in visible:
-        last = merged_differences[-1] if merged_differences else None
-        if (
-            last is not None
-            and last.numbers is None
-            and d.numbers is None
-            and not recorded[last.end : d.start].strip()
-            and not printed[last.printed_end : d.printed_start].strip()
-        ):
-            merged_differences[-1] = Difference(
-                last.start, d.end, last.printed_start, d.printed_end
-            )
-        else:
-            merged_differences.append(d)
+    for d in [d for d in differences if not is_blank(d)] or differences:
+        if merged_differences and d.numbers is None:
+            last = merged_differences[-1]
+            gap = Difference(last.end, d.start, last.printed_end, d.printed_start)
+            if last.numbers is None and is_blank(gap):
+                merged_differences.pop()
+                d = Difference(last.start, d.end, last.printed_start, d.printed_end)
+        merged_differences.append(d)
     return tuple(merged_differences)
