@@ -229,8 +229,7 @@ def _script_between(
 def _holds(bound_text: BoundText, lines: Sequence[PrintedLine]) -> bool:
     if bound_text.numbers:
         return bound_text.is_in(lines)
-    text = bound_text.before
-    return bool(text) and next(text_places(text, lines), None) is not None
+    return next(text_places(bound_text.before, lines), None) is not None
 
 
 def _orphan_diagnostic(
@@ -255,15 +254,13 @@ def dependent_bindings(
 ) -> tuple[DependentBinding, ...]:
     """The bindings of the course, in order, that depend on a changed value of a recording."""
     changes = [c for c in verdict.changes if c.kind is not DriftKind.EXTRA]
+    key, lines = _recording_key(verdict), outputs.lines(verdict)
     dependents: list[DependentBinding] = []
-    for document in documents:
-        for binding in document_bindings(document):
-            for candidate in outputs.of_binding(binding):
-                if _recording_key(candidate) == _recording_key(verdict):
-                    spans = _dependence_spans(binding, outputs.lines(candidate))
-                    change = next((c for p in spans for c in changes if _overlaps(p, c.span)), None)
-                    if change is not None:
-                        dependents.append(DependentBinding(binding, change))
+    for binding in (b for document in documents for b in document_bindings(document)):
+        if any(_recording_key(candidate) == key for candidate in outputs.of_binding(binding)):
+            spans = _dependence_spans(binding, lines)
+            change = next((c for p in spans for c in changes if _overlaps(p, c.span)), None)
+            dependents += [] if change is None else [DependentBinding(binding, change)]
     return tuple(dependents)
 
 
@@ -274,12 +271,10 @@ def _overlaps(a: Span, b: Span) -> bool:
 def _dependence_spans(binding: NumberBinding, lines: Sequence[PrintedLine]) -> Iterator[Span]:
     """Where the numbers or the text of a binding stand in a recorded output."""
     bound_text = BoundText.of(binding.text)
-    if not bound_text.numbers:
-        for line, start, end in text_places(bound_text.before, lines) if bound_text.before else ():
-            if line.locate is not None:
-                yield line.locate(start, end)
-        return
-    for window in bound_text.windows(lines):
-        if window.line.locate is not None and bound_text.shows(window):
-            for number in window.numbers:
-                yield window.line.locate(number.start, number.end)
+    places = text_places(bound_text.before, lines)
+    if bound_text.numbers:
+        windows = filter(bound_text.shows, bound_text.windows(lines))
+        places = ((w.line, number.start, number.end) for w in windows for number in w.numbers)
+    for line, start, end in places:
+        if line.locate is not None:
+            yield line.locate(start, end)

@@ -179,8 +179,8 @@ def _whole_words(text: str) -> str:
 
 
 def text_places(text: str, lines: Iterable[PrintedLine]) -> Iterator[tuple[PrintedLine, int, int]]:
-    """Where a text stands in printed lines: whole words only, white space of any width."""
+    """Where a text, if any, stands in printed lines: whole words, white space of any width."""
     pattern = re.compile(_whole_words(text))
-    for line in lines:
+    for line in lines if text else ():
         for match in pattern.finditer(line.text.replace("\u2212", "-")):
             yield line, match.start(), match.end()

@@ -42,24 +42,22 @@ def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
     Where two blocks have the same path, only the first is run; what is recorded below the second
     is not compared with its output. Nor is an output whose fence has mistakes in its options.
     """
-    by_path = {run.path: run for run in runs}
-    first_by_path: dict[str, Script] = {}
+    by_path = {run.path: run for run in runs if run.outcome is Outcome.OK and run.stdout.strip()}
+    paths: set[str] = set()
     verdicts: list[Verdict] = []
     for document in course.documents:
-        script_above: Script | None = None
+        script_above, is_repeated = "", False
         for block in document_blocks(document):
             if isinstance(block, Script):
-                script_above = block
-                first_by_path.setdefault(block.path, block)
+                script_above, is_repeated = block.path, block.path in paths
+                paths.add(block.path)
             elif isinstance(block, Recording) and block.script is not None:
                 comparison, run = course.comparison_of(block), by_path.get(block.script)
-                is_nearest = script_above is not None and script_above.path == block.script
-                is_run = not is_nearest or first_by_path[block.script] is script_above
-                is_comparable = block.readable and is_run
-                if is_comparable and run and run.outcome is Outcome.OK and run.stdout.strip():
-                    verdicts.append(compare(block, comparison, run.stdout))
-                else:
+                is_of_other_block = is_repeated and block.script == script_above
+                if run is None or is_of_other_block or not block.readable:
                     verdicts.append(Verdict(block, comparison, "unchecked"))
+                else:
+                    verdicts.append(compare(block, comparison, run.stdout))
     return tuple(verdicts)
 
 
