@@ -27,6 +27,7 @@ from coursebuild.core.model import (
     Mjcf,
     MjcfModel,
     document_blocks,
+    find_blocks,
 )
 from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.model.scenarios import DURATION, MOST_STEPS, DeclaredSweep
@@ -84,9 +85,11 @@ def check_compiled(
 
     `readable` makes one line of a message of MuJoCo.
     """
-    blocks = (block for document in course.documents for block in document_blocks(document))
     lesson_models = {
-        name for block in blocks if isinstance(block, FeatureBlock) for name in block.models()
+        name
+        for document in course.documents
+        for block in find_blocks(document, FeatureBlock)
+        for name in block.models()
     }
     diagnostics: list[Diagnostic] = []
     included = _included_models(course, models) - lesson_models

@@ -5,21 +5,19 @@ Entry points: `check_course`; `check_document`, the same for one document.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from coursebuild.core.checks.links import LinkTargets, check_links, link_targets
 from coursebuild.core.model import (
-    Block,
     Course,
     Document,
     FeatureBlock,
     Heading,
     Term,
-    block_inlines,
     document_blocks,
     find_blocks,
+    find_inlines,
     is_blank,
-    walk_inlines,
 )
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.registry import features
@@ -49,12 +47,11 @@ def check_document(
 def _check_core_rules(
     course: Course, document: Document, targets: LinkTargets
 ) -> Iterator[Diagnostic]:
-    blocks = tuple(document_blocks(document))
-    yield from _check_empty_lesson(course, document, blocks)
+    yield from _check_empty_lesson(course, document)
     yield from _check_title(course, document)
     yield from check_links(course, document, targets)
     yield from _check_anchors(document)
-    yield from _check_terms(blocks, targets.terms)
+    yield from _check_terms(document, targets.terms)
 
 
 def _check_features(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:
@@ -64,16 +61,12 @@ def _check_features(course: Course, documents: Collection[Document]) -> Iterator
             yield from feature.check(course, documents)
 
 
-def _check_empty_lesson(
-    course: Course, document: Document, blocks: Iterable[Block]
-) -> Iterator[Diagnostic]:
-    """Report a complete lesson that shows nothing; `blocks` are those of the document.
-
-    A draft may be empty.
-    """
+def _check_empty_lesson(course: Course, document: Document) -> Iterator[Diagnostic]:
+    """Report a complete lesson that shows nothing; a draft may be empty."""
     source = document.source
     for lesson in course.lessons:
-        if lesson.document is document and lesson.status == "complete" and is_blank(blocks):
+        is_complete = lesson.document is document and lesson.status == "complete"
+        if is_complete and is_blank(document_blocks(document)):
             yield diagnose(
                 "lesson-empty",
                 source.span(0, 0),
@@ -115,10 +108,9 @@ def _have_one_progress(first: Heading | FeatureBlock, block: FeatureBlock) -> bo
     return keys is not None and other_keys is not None and keys[0] == other_keys[0]
 
 
-def _check_terms(blocks: Iterable[Block], definitions: Mapping[str, Span]) -> Iterator[Diagnostic]:
+def _check_terms(document: Document, definitions: Mapping[str, Span]) -> Iterator[Diagnostic]:
     """Report terms that have an earlier definition; `definitions` has the first of each."""
-    inlines = walk_inlines(tuple(i for block in blocks for i in block_inlines(block)))
-    for term in (inline for inline in inlines if isinstance(inline, Term)):
+    for term in find_inlines(document, Term):
         first = definitions.get(term.id)
         if first is None or (first.path, first.start) == (term.span.path, term.span.start):
             continue

@@ -41,8 +41,8 @@ from coursebuild.core.model import (
     block_inlines,
     computed_once,
     document_blocks,
-    document_inlines,
     document_scripts,
+    find_inlines,
     is_comment,
     line_anchor,
     linked_lines,
@@ -87,9 +87,8 @@ def link_targets(course: Course) -> LinkTargets:
     terms: dict[str, Span] = {}
     for document in course.documents:
         scripts.update(script.path for script in document_scripts(document))
-        for inline in document_inlines(document):
-            if isinstance(inline, Term):
-                terms.setdefault(inline.id, inline.span)
+        for term in find_inlines(document, Term):
+            terms.setdefault(term.id, term.span)
     return LinkTargets(
         {lesson.id: lesson.document for lesson in course.lessons},
         frozenset(level.id for level in course.levels),

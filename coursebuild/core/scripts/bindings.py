@@ -30,8 +30,8 @@ from coursebuild.core.model import (
     NumberBinding,
     Script,
     Table,
-    document_inlines,
     document_scripts,
+    find_inlines,
 )
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bound_numbers import (
@@ -144,8 +144,7 @@ def _recording_key(verdict: Verdict) -> tuple[str, int]:
 
 def document_bindings(document: Document) -> tuple[NumberBinding, ...]:
     """The bound numbers of a document, in order: also in footnotes, tables and quizzes."""
-    inlines = document_inlines(document)
-    return tuple(i for i in inlines if isinstance(i, NumberBinding) and i.source is None)
+    return tuple(b for b in find_inlines(document, NumberBinding) if b.source is None)
 
 
 def check_bindings(

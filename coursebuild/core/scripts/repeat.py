@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from coursebuild.core.model import Comparison, Course, Recording, Table, document_blocks
+from coursebuild.core.model import Comparison, Course, Recording, Table, find_blocks
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.scripts.align import Step, StepKind, align
 from coursebuild.core.scripts.compare import compare
@@ -42,10 +42,10 @@ def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
     if before.outcome is not Outcome.OK or now.outcome is not Outcome.OK:
         return False
     recordings = [
-        block
+        recording
         for document in course.documents
-        for block in document_blocks(document)
-        if isinstance(block, Recording) and block.script == now.path and block.readable
+        for recording in find_blocks(document, Recording)
+        if recording.script == now.path and recording.readable
     ]
     return bool(recordings) and all(
         compare(r, course.comparison_of(r), run.stdout).status != "drift"

@@ -11,7 +11,7 @@ import contextlib
 import textwrap
 from collections.abc import Callable, Iterator
 
-from coursebuild.core.model import Course, PlainCode, SourcePart, document_blocks
+from coursebuild.core.model import Course, PlainCode, SourcePart, find_blocks
 from coursebuild.core.scripts.edit import whole_lines
 from coursebuild.core.scripts.failures import without_indentation
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
@@ -61,9 +61,9 @@ def check_source_parts(course: Course, read: ReadText) -> Iterator[Diagnostic]:
 
 def _source_parts(course: Course) -> Iterator[tuple[PlainCode, SourcePart]]:
     for document in course.documents:
-        for block in document_blocks(document):
-            if isinstance(block, PlainCode) and block.source is not None:
-                yield block, block.source
+        for code in find_blocks(document, PlainCode):
+            if code.source is not None:
+                yield code, code.source
 
 
 def _read_parts(text: str) -> dict[str, list[str]]:
