@@ -62,21 +62,12 @@ class Site:
 
     def clear(self) -> None:
         """Move away the products that a cold build must not find."""
-        for pattern in self.tool.products:
-            head, spares, names = pattern.partition("!")
-            path = self.folder / head
-            if spares and path.is_dir():
-                for child in path.iterdir():
-                    if child.name not in names.split(","):
-                        self._move_away(child)
-            else:
-                self._move_away(path)
-
-    def _move_away(self, path: Path) -> None:
-        if path.exists() or path.is_symlink():
-            self.earlier.mkdir(exist_ok=True)
-            self.moved_count += 1
-            path.rename(self.earlier / str(self.moved_count))
+        self.earlier.mkdir(exist_ok=True)
+        paths = [path for pattern in self.tool.products for path in self.folder.glob(pattern)]
+        for path in paths:
+            if path.name not in self.tool.spared:
+                self.moved_count += 1
+                path.rename(self.earlier / str(self.moved_count))
 
     @property
     def earlier(self) -> Path:

@@ -77,7 +77,9 @@ class Tool(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     build: str = ""
     """Its options for a build; empty: not built."""
     products: tuple[str, ...] = ()
-    """What a cold build must not find; a pattern with a last part `!a,b` spares those names."""
+    """Patterns of the paths that a cold build must not find."""
+    spared: tuple[str, ...] = ()
+    """Names that match, and that it may find."""
     page: str = ""
     """The built page of a lesson."""
     source: str

@@ -77,7 +77,8 @@ def with_feature(course: Course, path: str) -> str:
         UsageError: the map cannot have it.
     """
     source = course.map
-    table = getattr(parse_toml(source).value, "get", lambda name: None)("course")
+    root = parse_toml(source).value
+    table = None if root is None else root.get("course")
     if not isinstance(table, ObjectNode):
         raise UsageError(f"{source.path} cannot be read")
     array = table.get("features")

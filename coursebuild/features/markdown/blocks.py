@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from typing import assert_never
+from typing import Literal, TypeAlias, assert_never
 
 from coursebuild.core import model
 from coursebuild.core.pages.marks import (
@@ -36,6 +36,8 @@ _SPACED_BLOCKS = (
 )
 """Blocks with empty lines around them, even in a tight list."""
 
+_Room: TypeAlias = Literal["block", "line", "cell"]
+"""What inlines may fill: lines of their own, a single line, or a cell of a table."""
 _LAST_MARKS = re.compile(r"(^|\s)(#+)$")
 _ALWAYS_ESCAPED = re.compile(r"[$`]")
 """Marks that other readers of Markdown may understand where ours reads text."""
@@ -73,7 +75,7 @@ class BlockWriter(ABC):
 
     def inlines(self, inlines: Iterable[model.Inline]) -> str:
         """Write inlines on one line, such as a title."""
-        return " ".join(self._inlines(inlines, line=True).split("\n")).strip()
+        return " ".join(self._inlines(inlines, "line").split("\n")).strip()
 
     def footnotes(self, footnotes: Iterable[model.Footnote]) -> str:
         """Write the definitions of footnotes, for references such as `[^1]`."""
@@ -130,7 +132,7 @@ class BlockWriter(ABC):
         """Write an inline within HTML, where text is no Markdown."""
         if isinstance(inline, model.Text):
             return escape(inline.text)
-        return self._inline(inline, line=False, cell=False)
+        return self._inline(inline, "block")
 
     def _heading(self, heading: model.Heading) -> str:
         text = _LAST_MARKS.sub(r"\1\\\2", self.inlines(heading.children))
@@ -165,49 +167,47 @@ class BlockWriter(ABC):
         return table(map(self._cell, block.header), rows, (align or "" for align in block.align))
 
     def _cell(self, cell: model.Cell) -> str:
-        return self._inlines(cell.children, line=True, cell=True).replace("\n", " ")
+        return self._inlines(cell.children, "cell").replace("\n", " ")
 
     # --- inlines
 
-    def _inlines(
-        self, inlines: Iterable[model.Inline], *, line: bool = False, cell: bool = False
-    ) -> str:
-        text = self._join_inlines(inlines, line=line, cell=cell)
-        return text if line else guard_lines(text)
+    def _inlines(self, inlines: Iterable[model.Inline], room: _Room = "block") -> str:
+        text = self._join_inlines(inlines, room)
+        return guard_lines(text) if room == "block" else text
 
-    def _join_inlines(self, inlines: Iterable[model.Inline], *, line: bool, cell: bool) -> str:
-        return "".join([self._inline(inline, line=line, cell=cell) for inline in inlines])
+    def _join_inlines(self, inlines: Iterable[model.Inline], room: _Room) -> str:
+        return "".join([self._inline(inline, room) for inline in inlines])
 
-    def _inline(self, inline: model.Inline, *, line: bool, cell: bool) -> str:
+    def _inline(self, inline: model.Inline, room: _Room) -> str:
         match inline:
             case model.Text():
-                return _text(inline, cell=cell)
+                return _text(inline, room)
             case model.SoftBreak():
-                return " " if line else "\n"
+                return "\n" if room == "block" else " "
             case model.HardBreak():
-                if line:
+                if room != "block":
                     return " "
                 return "\\\n" if inline.span.text.startswith("\\") else "  \n"
             case model.CodeSpan():
                 source = inline.span.text
                 ticks = source[: len(source) - len(source.lstrip("`"))]
-                return _escape_pipes(code_span(inline.text, ticks), cell=cell)
+                return _escape_pipes(code_span(inline.text, ticks), room)
             case model.NumberBinding():
                 return escape_marks(_MINUS.sub("\u2212", inline.text))
             case model.Math():
                 tag = self._tag(inline.span.start) if inline.display else ""
-                return _formula(inline, tag, cell=cell)
+                return _formula(inline, tag, room)
             case model.Emphasis() | model.Strong() | model.Term() | model.Strikethrough():
                 mark = _delimiter(inline)
-                return f"{mark}{self._join_inlines(inline.children, line=line, cell=cell)}{mark}"
+                return f"{mark}{self._join_inlines(inline.children, room)}{mark}"
             case model.Link():
-                text = self._join_inlines(inline.children, line=line, cell=cell)
-                return self._link(inline, text, cell=cell)
+                text = self._join_inlines(inline.children, room)
+                return self._link(inline, text, room)
             case model.Image():
                 url = self.url(inline.url)
-                return _escape_pipes(picture(inline.alt, url, inline.title), cell=cell)
+                return _escape_pipes(picture(inline.alt, url, inline.title), room)
             case model.RawInline():
-                return _escape_pipes(raw_html(inline, self.url), cell=cell)
+                return _escape_pipes(raw_html(inline, self.url), room)
             case model.FootnoteRef():
                 return self.reference(inline.number)
             case _:
@@ -217,16 +217,16 @@ class BlockWriter(ABC):
         number = self.formula_number(start)
         return f"\\tag{{{number}}}" if number else ""
 
-    def _link(self, node: model.Link, text: str, *, cell: bool) -> str:
+    def _link(self, node: model.Link, text: str, room: _Room) -> str:
         source = node.span.text
-        if source == f"<{model.plain_text(node.children)}>" and not cell:
+        if source == f"<{model.plain_text(node.children)}>" and room != "cell":
             return source
         href = self.href(node.target)
         text = text or escape_marks(self.link_text(node.target))
-        return link(text, href.replace("|", "%7C") if cell else href, node.title)
+        return link(text, href.replace("|", "%7C") if room == "cell" else href, node.title)
 
 
-def _text(node: model.Text, *, cell: bool) -> str:
+def _text(node: model.Text, room: _Room) -> str:
     """Write a text, copied from its source if that is the same."""
     source = node.span.text
     if source != node.text:
@@ -237,12 +237,12 @@ def _text(node: model.Text, *, cell: bool) -> str:
             text = f"{text[:-1]}&#{ord(text[-1])};"
         return text.replace("\n", "&#10;")
     source = _ALWAYS_ESCAPED.sub(lambda match: f"\\{match[0]}", source)
-    return _escape_pipes(source, cell=cell)
+    return _escape_pipes(source, room)
 
 
-def _escape_pipes(text: str, *, cell: bool) -> str:
+def _escape_pipes(text: str, room: _Room) -> str:
     """Escape the pipes of a text in a cell of a table."""
-    return _PIPE.sub(r"\\|", text) if cell else text
+    return _PIPE.sub(r"\\|", text) if room == "cell" else text
 
 
 def _delimiter(node: model.Emphasis | model.Strong | model.Term | model.Strikethrough) -> str:
@@ -253,10 +253,10 @@ def _delimiter(node: model.Emphasis | model.Strong | model.Term | model.Striketh
     return mark * 2 if isinstance(node, model.Strong) else mark
 
 
-def _formula(node: model.Math, tag: str, *, cell: bool) -> str:
+def _formula(node: model.Math, tag: str, room: _Room) -> str:
     """Write a formula between dollar signs, with its number if it has one."""
     tex = f"{node.tex.text}\n{tag}" if tag else node.tex.text  # it can end with a comment
-    if cell:  # a pipe would end the cell, and an escaped one is another sign
+    if room == "cell":  # a pipe would end the cell, and an escaped one is another sign
         tex = tex.replace(r"\|", r"\Vert{}").replace("|", r"\vert{}")
     if _COMMENT.search(tex):  # the line end ends the comment
         tex = _remove_empty_lines(tex)
