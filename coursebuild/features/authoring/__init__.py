@@ -3,7 +3,7 @@
 - `init`: writes a small complete course, from the files in `course/`
 - `new`: adds a lesson or a feature, with its entry in the map (`course_map`), a model, a template
 - `rename`: gives a lesson another id, wherever the course names it (`references`)
-- `fmt`: formats lessons (`format`, with `json_layout` and `text_layout`)
+- `fmt`: formats lessons (`format`, with `layout`)
 - `doctor`: checks which of the things that courses need work here
 """
 

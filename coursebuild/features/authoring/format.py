@@ -28,8 +28,13 @@ from coursebuild.core.syntax.spans import PositionedToken, read_markdown
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Parsed
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.values import fingerprint
-from coursebuild.features.authoring.json_layout import layout_json
-from coursebuild.features.authoring.text_layout import GAP, align_table, fill_lines, split_words
+from coursebuild.features.authoring.layout import (
+    GAP,
+    align_table,
+    fill_lines,
+    layout_json,
+    split_words,
+)
 
 WIDTH = 120
 """The width of tables, and of JSON on one line, in a course that sets none."""
