@@ -1,10 +1,10 @@
 """The documents of a course and their pages, from the store or made by several processes.
 
 Entry point: `Documents`, a context manager and the `Parser` of a course, which returns summaries
-(`read_document`) and draws pages (`draw`).
+(`read_documents`) and draws pages (`draw`).
 
-1. `prefetch` gets the summaries of texts. Those of texts that were read before come from the store;
-   the other texts are read, by worker processes where there are many.
+1. `read_documents` gets the summaries of texts. Those of texts that were read before come from the
+   store; the other texts are read, by worker processes where there are many.
 2. `draw` draws pages. The worker that has read a document also draws its page, since it still has
    the whole document.
 """
@@ -128,8 +128,10 @@ class Documents(Parser):
             self._store.put(_CLEAN_COURSES, key, state)
         return diagnostics
 
-    def prefetch(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
-        """Get the summaries of sources, each given with whether it is a lesson."""
+    def read_documents(
+        self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]
+    ) -> list[Parsed[Document]]:
+        """Return documents without their prose, and what is wrong in them."""
         texts = [SourceText.of(source, callouts, lesson=lesson) for source, lesson in sources]
         missing = [text for text in texts if not self._has_summary(text)]
         if len(missing) >= _MIN_PARALLEL:
@@ -139,6 +141,8 @@ class Documents(Parser):
             self._add_summary(text, decode(data, DocumentSummary, text.source))
             if reader is not None:
                 self._readers[text.source.path] = reader
+        summaries = [self._summaries[text.source.path] for text in texts]
+        return [Parsed(summary.document, summary.diagnostics) for summary in summaries]
 
     def _has_summary(self, text: SourceText) -> bool:
         """Whether there is a summary of a text, in memory or in the store."""
@@ -156,20 +160,6 @@ class Documents(Parser):
         assert summary is not None, "what was just encoded can be decoded"
         self._texts[text.source.path] = text
         self._summaries[text.source.path] = summary.with_notes()
-
-    def read_document(
-        self, source: Source, callouts: frozenset[str], *, lesson: bool
-    ) -> Parsed[Document]:
-        """Return a document without its prose, and what is wrong in it."""
-        text = self._texts.get(source.path)
-        if (
-            text is None
-            or text.source is not source
-            or (text.callouts, text.lesson) != (callouts, lesson)
-        ):
-            self.prefetch([(source, lesson)], callouts)
-        summary = self._summaries[source.path]
-        return Parsed(summary.document, summary.diagnostics)
 
     def read_map(self, source: Source) -> Parsed[Course | None]:
         """Return the course that a map describes, and what is wrong in it."""

@@ -26,11 +26,8 @@ from coursebuild.core.model import (
     Declarations,
     Document,
     Lesson,
-    Level,
     Limits,
     Link,
-    Owner,
-    Page,
     UrlTarget,
     document_inlines,
     local_file,
@@ -42,7 +39,7 @@ from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.scripts.source_parts import check_source_parts, shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
-from coursebuild.core.text.source import Source
+from coursebuild.core.text.source import Source, Span
 
 MAP = "content/course.toml"
 MAP_TEXT = 1_000_000
@@ -52,16 +49,16 @@ MAP_TEXT = 1_000_000
 class Parser:
     """Parses texts and checks courses; keeps nothing."""
 
-    def prefetch(self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]) -> None:
-        """Prepare for texts that will be parsed soon, each given with whether it is a lesson."""
+    def read_documents(
+        self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]
+    ) -> list[Parsed[Document]]:
+        """Return the documents that texts hold, and what is wrong in them.
 
-    def read_document(
-        self, source: Source, callouts: frozenset[str], *, lesson: bool
-    ) -> Parsed[Document]:
-        """Return the document that a text holds, and what is wrong in it."""
+        Each text is given with whether it is a lesson.
+        """
         from coursebuild.core.syntax.document import parse_document
 
-        return parse_document(source, callouts, lesson=lesson)
+        return [parse_document(source, callouts, lesson=lesson) for source, lesson in sources]
 
     def read_map(self, source: Source) -> Parsed[Course | None]:
         """Return the course that a map describes, and what is wrong in it."""
@@ -125,56 +122,28 @@ class _Loader:
         self.trusted = trusted
         self.parser = parser
         self.files = read.value
+        self.unreadable = list(read.value.unreadable)
+        """Files that cannot be read, or that are too long."""
         self.diagnostics = list(read.diagnostics)
-        self.sources: Mapping[str, Source] = {}
-        self.callouts = frozenset(CALLOUTS)
-        self.unlisted_lessons: dict[str, Source] = {}
-        """Lesson files that the map does not name, by path; without one that is probably meant by
-        an entry without a file."""
 
     def load(self) -> Course | None:
         """Return the whole course, or `None` where there is no usable map."""
         course = self._parse_map()
-        limit = (Limits() if course is None else course.limits).text
-        lessons = self._drop_long(limit, self.files.lessons)
-        texts = self._drop_long(limit, self.files.pages)
-        short = self._drop_long(limit, (model.source for model in self.files.models))
-        self.files = replace(
-            self.files,
-            lessons=lessons,
-            pages=texts,
-            models=tuple(model for model in self.files.models if model.source in short),
-            declarations=self._drop_long(limit, self.files.declarations),
-        )
+        self._drop_long_texts((Limits() if course is None else course.limits).text)
         declarations = self._parse_declarations()
-        self.sources = {source.path: source for source in (*lessons, *texts)}
         if course is None:
             if self.files.map is not None:
-                self._prefetch(self.files.lessons, ())
-                for source in self.files.lessons:
-                    self._parse_document(source, lesson=True)
+                lessons = [(source, True) for source in self.files.lessons]
+                self._parse_documents(lessons, frozenset(CALLOUTS))
             return None
-        self.callouts = course.callout_names
-        self.unlisted_lessons = self._lessons_not_in(course)
-        planned = {x.path for x in course.lessons if x.status == "planned"}
-        page_paths = {page.path for page in course.pages}
-        self._prefetch(
-            [source for source in self.files.lessons if source.path not in planned],
-            [source for source in self.files.pages if source.path in page_paths],
-        )
-        levels = tuple(self._attach_level(level) for level in course.levels)
-        self._report_unlisted_lessons()
-        pages = self._attach_pages(course.pages, course.limits.text)
-        theme = self._load_theme(course.theme)
-        self._report_unlisted_pages(course)
+        self._compare_lessons(course)
+        course = self._attach_documents(course, self._find_pages(course))
         course = replace(
             course,
-            levels=levels,
-            pages=pages,
             models=self.files.models,
             files=self._files_to_show(course),
             declarations=declarations,
-            theme=theme,
+            theme=self._load_theme(course.theme),
         )
         self.diagnostics += self.parser.check(course)
         environment = course_environment(self.root, course)
@@ -188,6 +157,19 @@ class _Loader:
                 message = f"there is no folder `{package.path}`"
                 self.diagnostics.append(diagnose("field-value", package.span, message))
         return course
+
+    # --- texts
+
+    def _drop_long_texts(self, limit: int) -> None:
+        """Leave out the files that are too long."""
+        models = {model.source: model for model in self.files.models}
+        self.files = replace(
+            self.files,
+            lessons=self._drop_long(limit, self.files.lessons),
+            pages=self._drop_long(limit, self.files.pages),
+            models=tuple(models[source] for source in self._drop_long(limit, models)),
+            declarations=self._drop_long(limit, self.files.declarations),
+        )
 
     def _drop_long(self, limit: int, sources: Iterable[Source]) -> tuple[Source, ...]:
         """Return the sources that are not too long; the others count as unreadable."""
@@ -204,8 +186,7 @@ class _Loader:
             self.diagnostics.append(
                 diagnose("text-long", source.span(limit, limit + 1), message, help=help)
             )
-            unreadable = (*self.files.unreadable, source.path)
-            self.files = replace(self.files, unreadable=unreadable)
+            self.unreadable.append(source.path)
         return tuple(short)
 
     def _load_theme(self, theme: Theme) -> Theme:
@@ -248,100 +229,101 @@ class _Loader:
             self.diagnostics += parsed_file.diagnostics
             model_path = source.path.removesuffix(".toml") + ".xml"
             if model_path.removeprefix("models/").removesuffix(".xml") not in names:
-                if model_path not in self.files.unreadable:
+                if model_path not in self.unreadable:
                     paths = [model.source.path for model in self.files.models]
                     self.diagnostics.append(diagnose_orphan_scenarios(source, paths))
             elif parsed_file.value is not None:
                 declarations.append(parsed_file.value)
         return tuple(declarations)
 
-    def _prefetch(self, lessons: Sequence[Source], pages: Sequence[Source]) -> None:
-        sources = [*((s, True) for s in lessons), *((s, False) for s in pages)]
-        self.parser.prefetch(sources, self.callouts)
+    # --- lessons and pages
 
-    def _parse_document(self, source: Source, *, lesson: bool) -> Document:
-        parsed_document = self.parser.read_document(source, self.callouts, lesson=lesson)
-        self.diagnostics += parsed_document.diagnostics
-        return parsed_document.value
-
-    def _attach_level(self, level: Level) -> Level:
-        return replace(
-            level, lessons=tuple(self._attach_lesson(lesson) for lesson in level.lessons)
-        )
-
-    def _attach_lesson(self, lesson: Lesson) -> Lesson:
-        source = self.sources.get(lesson.path)
-        if lesson.status == "planned":
-            if source is not None:
-                message = f"lesson {lesson.id} is planned, and there is a file {lesson.path}"
-                help = 'say `status = "draft"` or `"complete"`, or move the file away'
-                self._report("lesson-planned-file", lesson, message, help)
-            return lesson
-        if source is not None:
-            return replace(lesson, document=self._parse_document(source, lesson=True))
-        if lesson.path not in self.files.unreadable:
-            closest = nearest(lesson.path, self.unlisted_lessons)
-            help = 'write it, or say `status = "planned"`'
-            if closest is not None:
-                help = f"is it `{closest}`, which the map does not name?"
-                self._parse_document(self.unlisted_lessons.pop(closest), lesson=True)
-            self._report("lesson-missing", lesson, f"there is no file {lesson.path}", help)
-        return lesson
-
-    def _report(self, rule: str, entry: Owner, message: str, help: str) -> None:
-        self.diagnostics.append(diagnose(rule, entry.span.first_line(), message, help=help))
-
-    def _lessons_not_in(self, course: Course) -> dict[str, Source]:
-        paths = {lesson.path for lesson in course.lessons}
-        return {s.path: s for s in self.files.lessons if s.path not in paths}
-
-    def _report_unlisted_lessons(self) -> None:
-        for source in self.unlisted_lessons.values():
+    def _compare_lessons(self, course: Course) -> None:
+        """Compare the lessons of the map with the files that there are."""
+        paths = {source.path for source in self.files.lessons}
+        listed_paths = {lesson.path for lesson in course.lessons}
+        unlisted = {s.path: s for s in self.files.lessons if s.path not in listed_paths}
+        for lesson in course.lessons:
+            if lesson.status == "planned":
+                if lesson.path in paths:
+                    message = f"lesson {lesson.id} is planned, and there is a file {lesson.path}"
+                    help = 'say `status = "draft"` or `"complete"`, or move the file away'
+                    self._report("lesson-planned-file", lesson.span, message, help)
+            elif lesson.path not in paths and lesson.path not in self.unreadable:
+                closest = nearest(lesson.path, unlisted)
+                help = 'write it, or say `status = "planned"`'
+                if closest is not None:
+                    help = f"is it `{closest}`, which the map does not name?"
+                    del unlisted[closest]
+                message = f"there is no file {lesson.path}"
+                self._report("lesson-missing", lesson.span, message, help)
+        for source in unlisted.values():
             help = f"add a [[level.lesson]] to {MAP}, or move the file away"
             if source.path.count("/") > 2:
                 help = "lessons lie in content/lessons itself: move it there, or out of content/"
             message = f"the course map does not name {source.path}"
-            self.diagnostics.append(
-                diagnose("lesson-unlisted", source.span(0, 0), message, help=help)
-            )
-            self._parse_document(source, lesson=True)
+            self._report("lesson-unlisted", source.span(0, 0), message, help)
 
-    def _report_unlisted_pages(self, course: Course) -> None:
-        paths = {page.path for page in course.pages}
+    def _find_pages(self, course: Course) -> list[Source]:
+        """Find the texts of the pages of the map, which may lie anywhere in the course's folder."""
+        sources = {source.path: source for source in (*self.files.lessons, *self.files.pages)}
+        paths = [page.path for page in course.pages]
+        unread = [path for path in paths if path not in {*sources, *self.unreadable}]
+        further_paths = [path for path in unread if (self.root / path).exists()]
+        read = read_sources(self.root, further_paths, self.open_texts)
+        self.diagnostics += read.diagnostics
+        sources |= {s.path: s for s in self._drop_long(course.limits.text, read.value)}
+        for page in course.pages:
+            if page.path not in {*further_paths, *sources, *self.unreadable}:
+                message = f"there is no file {page.path}"
+                help = "write it, or take the page out of the map"
+                self._report("page-missing", page.span, message, help)
         for source in self.files.pages:
             if source.path not in paths:
                 message = f"the course map does not name {source.path}"
                 help = f"add a [[page]] to {MAP}, or move the file away"
-                diagnostic = diagnose("page-unlisted", source.span(0, 0), message, help=help)
-                self.diagnostics.append(diagnostic)
+                self._report("page-unlisted", source.span(0, 0), message, help)
+        return [sources[path] for path in dict.fromkeys(paths) if path in sources]
 
-    def _attach_pages(self, pages: tuple[Page, ...], limit: int) -> tuple[Page, ...]:
-        # Pages may lie outside the folders that are read with the course.
-        paths = (page.path for page in pages)
-        unread = [path for path in paths if path not in self.files.unreadable]
-        unread = [p for p in unread if p not in self.sources and (self.root / p).exists()]
-        read = read_sources(self.root, unread, self.open_texts)
-        self.diagnostics += read.diagnostics
-        sources = self._drop_long(limit, read.value)
-        if sources:
-            self._prefetch((), sources)
-        elsewhere = {source.path: source for source in sources}
-        return tuple(self._attach_page(page, elsewhere) for page in pages)
+    def _attach_documents(self, course: Course, pages: Iterable[Source]) -> Course:
+        """Parse the lessons, also those that the map does not name, and the pages."""
+        planned = {lesson.path for lesson in course.lessons if lesson.status == "planned"}
+        sources = [(s, True) for s in self.files.lessons if s.path not in planned]
+        sources += [(source, False) for source in pages]
+        documents = self._parse_documents(sources, course.callout_names)
 
-    def _attach_page(self, page: Page, elsewhere: Mapping[str, Source]) -> Page:
-        source = self.sources.get(page.path) or elsewhere.get(page.path)
-        if source is not None:
-            return replace(page, document=self._parse_document(source, lesson=False))
-        if page.path not in self.files.unreadable and not (self.root / page.path).exists():
-            message = f"there is no file {page.path}"
-            help = "write it, or take the page out of the map"
-            self._report("page-missing", page, message, help)
-        return page
+        def attach(lesson: Lesson) -> Lesson:
+            return replace(lesson, document=documents.get((lesson.path, True)))
+
+        return replace(
+            course,
+            levels=tuple(
+                replace(level, lessons=tuple(map(attach, level.lessons))) for level in course.levels
+            ),
+            pages=tuple(
+                replace(page, document=documents.get((page.path, False))) for page in course.pages
+            ),
+        )
+
+    def _parse_documents(
+        self, sources: list[tuple[Source, bool]], callouts: frozenset[str]
+    ) -> dict[tuple[str, bool], Document]:
+        """Parse texts; return the documents by path, and by whether they are lessons."""
+        documents = {}
+        parsed_documents = self.parser.read_documents(sources, callouts)
+        for (source, lesson), parsed_document in zip(sources, parsed_documents, strict=True):
+            self.diagnostics += parsed_document.diagnostics
+            documents[source.path, lesson] = parsed_document.value
+        return documents
+
+    def _report(self, rule: str, span: Span, message: str, help: str) -> None:
+        self.diagnostics.append(diagnose(rule, span.first_line(), message, help=help))
 
     def _files_to_show(self, course: Course) -> tuple[str, ...]:
         """The files that a page may show or link to: all but the map, the lessons and the pages."""
         models = (f"models/{model.name}.xml" for model in self.files.models)
-        excluded = {MAP, *self.sources, *(page.path for page in course.pages), *models}
+        texts = (source.path for source in (*self.files.lessons, *self.files.pages))
+        excluded = {MAP, *texts, *(page.path for page in course.pages), *models}
         return tuple(path for path in self.files.files if path not in excluded)
 
 

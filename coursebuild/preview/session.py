@@ -226,7 +226,7 @@ class Session:
             (source,) = sources
             if source != owner.document.source or self._diagnostics_by_file.get(path):
                 callouts, lesson = self.library.course.callout_names, isinstance(owner, Lesson)
-                parsed_document = self._documents.read_document(source, callouts, lesson=lesson)
+                (parsed_document,) = self._documents.read_documents([(source, lesson)], callouts)
                 diagnostics = (*read.diagnostics, *parsed_document.diagnostics)
                 changed_owners.append((replace(owner, document=parsed_document.value), diagnostics))
         return changed_owners
