@@ -28,7 +28,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptJob, ScriptRun
-from coursebuild.core.run.runner import OnFinish, OnStart, RunAll, RunStoppedError, ScriptServer
+from coursebuild.core.run.runner import OnFinish, RunAll, RunStoppedError, ScriptServer
 from coursebuild.core.scripts.bindings import BindingEvidence
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -204,24 +204,13 @@ class BackgroundRebuild:
         run_scripts = self._run_unless_edited(course)
 
         def run_all(
-            root: Path,
-            jobs: Sequence[ScriptJob],
-            *,
-            on_start: OnStart,
-            on_finish: OnFinish,
-            **keywords: Any,
+            root: Path, jobs: Sequence[ScriptJob], *, on_finish: OnFinish, **keywords: Any
         ) -> tuple[ScriptRun, ...]:
             def take_run(run: ScriptRun) -> None:
                 on_finish(run)
                 session.take_run(keys[run.path], run)
 
-            run_here = functools.partial(run_scripts, root, **keywords)
-            runs = run_here(jobs, on_start=on_start, on_finish=take_run)
-            # Run again at once: an author who sees a new output can accept it before labs have run.
-            drifted_paths = session.drifted_scripts(runs)
-            drifted_jobs = [job for job in jobs if job.path in drifted_paths]
-            session.take_second_runs(run_here(drifted_jobs))
-            return runs
+            return run_scripts(root, jobs, on_finish=take_run, **keywords)
 
         return run_all
 
@@ -241,7 +230,7 @@ class BackgroundRebuild:
         return functools.partial(self._server.run, is_unwanted=is_any_edited)
 
     def _run_again(self, course: Course, drifted_paths: Collection[str]) -> None:
-        """Run drifted scripts once more whose results were remembered."""
+        """Run drifted scripts once more, unless they have done so already."""
         session, options = self._session, self._options.for_course(course)
         paths = {path for path in drifted_paths if session.second_output(path) is None}
         scripts = [script for script in extract(course).value if script.path in paths]

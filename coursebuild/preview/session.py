@@ -97,10 +97,10 @@ class Session:
         self._targets: LinkTargets | None = None
         self._results = Results((), (), (), (), python_version(), engine_version())
         self._reports = Reports()
-        self._run_keys: dict[str, ScriptKey] = {}
-        """The keys of the scripts that were run, by path."""
-        self._second_outputs: dict[str, tuple[tuple[ScriptKey, str], str]] = {}
-        """Of scripts that ran twice, by path: their key with the first output, and the second."""
+        self._runs: dict[str, tuple[ScriptKey, ScriptRun]] = {}
+        """The last run of each script, by path, with the key of the script that ran."""
+        self._second_outputs: dict[str, tuple[ScriptKey, str, str]] = {}
+        """Of scripts that ran twice, by path: their key, the first output and the second."""
         self._trials = PublishedTrials()
         self.files = Files(options, self._assets, self._documents, self._is_sound)
         self._site = site
@@ -254,9 +254,7 @@ class Session:
             with self._reading_lock:
                 parsed_course = load(self.root, documents, self.open_texts)
                 course = parsed_course.value
-                reports = Parsed(Reports(), ())
-                if course is not None:
-                    reports = shown_reports(self.root, course)
+                reports = Parsed(Reports()) if course is None else shown_reports(self.root, course)
                 with self.condition:
                     if edits != self.edits:
                         continue
@@ -295,8 +293,8 @@ class Session:
 
     def _show(self, course: Course) -> None:
         """Draw pages of this course from now on, with what is known of it."""
-        unchanged_keys = dict(self._run_keys.items() & script_keys(course).items())
-        runs = tuple(run for run in self._results.runs if run.path in unchanged_keys)
+        keys = script_keys(course)
+        runs = tuple(run for path, (key, run) in self._runs.items() if keys.get(path) == key)
         results = replace(self._results, runs=runs, verdicts=compare(course, runs))
         self._template_diagnostics = ()
         self.library = Library(course, results, self._assets, self._reports, self._trials)
@@ -314,7 +312,8 @@ class Session:
         with self.condition:
             self.verified_course, self.running_diagnostics = course, verification.diagnostics
             self._results, self._trials = results, trials
-            self._run_keys = script_keys(course)
+            keys = script_keys(course)
+            self._runs = {run.path: (keys[run.path], run) for run in results.runs}
             if self.course is not None:
                 self._show(self.course)
             self.notify()
@@ -322,9 +321,7 @@ class Session:
     def take_run(self, script: ScriptKey, run: ScriptRun) -> None:
         """Take the result of one script, while others run."""
         with self.condition:
-            rest = (r for r in self._results.runs if r.path != run.path)
-            self._results = replace(self._results, runs=(*rest, run))
-            self._run_keys[run.path] = script
+            self._runs[run.path] = script, run
             if self.course is not None:
                 self._show(self.course)
             self.notify()
@@ -338,27 +335,25 @@ class Session:
     def known_runs(self, course: Course) -> dict[str, ScriptRun]:
         """The runs of a course's scripts, by path; empty where a script has changed since."""
         with self.condition:
-            are_same = script_keys(course) == self._run_keys
-            return {run.path: run for run in self._results.runs} if are_same else {}
+            are_same = script_keys(course) == {p: key for p, (key, _) in self._runs.items()}
+            return {path: run for path, (_, run) in self._runs.items()} if are_same else {}
 
     def take_second_runs(self, runs: Iterable[ScriptRun]) -> None:
         """Take the outputs of scripts that ran once more."""
-        first = {run.path: run for run in self._results.runs}
         with self.condition:
             for run in runs:
+                key, first = self._runs[run.path]
                 printed = run.stdout if run.outcome is Outcome.OK else ""
-                self._second_outputs[run.path] = (
-                    (self._run_keys[run.path], first[run.path].stdout),
-                    printed,
-                )
+                self._second_outputs[run.path] = key, first.stdout, printed
             self.notify()
 
     def second_output(self, path: str) -> str | None:
         """What a script printed when it ran once more, if its text has not changed since."""
-        first, printed = self._second_outputs.get(path, (None, ""))
-        run = next((run for run in self._results.runs if run.path == path), None)
-        is_same = run is not None and first == (self._run_keys.get(path), run.stdout)
-        return printed if is_same else None
+        if path not in self._runs or path not in self._second_outputs:
+            return None
+        key, run = self._runs[path]
+        key_then, first_output, second_output = self._second_outputs[path]
+        return second_output if (key_then, first_output) == (key, run.stdout) else None
 
     def make_site(self, pause: Callable[[], None]) -> None:
         """Make all files of the site, and serve them; `pause` is called between pages."""
