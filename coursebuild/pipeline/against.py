@@ -86,7 +86,7 @@ def compare_with_version(
         work = _Comparison(course, options, scripts, version)
         blocked = tuple(
             ScriptComparison(b.path, "", "uncompared", "the file there is not what its lesson says")
-            for b in extracted_scripts.blocked
+            for b in extracted_scripts.files.blocked
         )
         return work.report(blocked if documents is None else ())
 

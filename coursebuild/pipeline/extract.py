@@ -40,7 +40,7 @@ def _extract(options: Options, *, adopt: bool) -> Report:
     extracted_scripts = extract_scripts(course, options)
     remarks = _list_changes(extracted_scripts)
     refusals: list[Diagnostic] = []
-    if adopt and extracted_scripts.blocked:
+    if adopt and extracted_scripts.files.blocked:
         adoptions, refusals, files_read = _adopt(options, extracted_scripts)
         if files_read:
             parsed_course = load(options.root)
@@ -56,9 +56,9 @@ def _extract(options: Options, *, adopt: bool) -> Report:
 
 def _list_changes(extracted_scripts: ExtractedScripts) -> list[str]:
     removals = (
-        f"removed {path}, which no lesson has any more" for path in extracted_scripts.removed_paths
+        f"removed {path}, which no lesson has any more" for path in extracted_scripts.files.removed
     )
-    return [*(f"wrote {path}" for path in extracted_scripts.written_paths), *removals]
+    return [*(f"wrote {path}" for path in extracted_scripts.files.written), *removals]
 
 
 def _adopt(
@@ -69,7 +69,7 @@ def _adopt(
     edits: dict[Source, list[Edit]] = {}
     refusals: list[Diagnostic] = []
     files_read: dict[str, bytes] = {}
-    for example in extracted_scripts.blocked:
+    for example in extracted_scripts.files.blocked:
         extraction = by_path.get(example.path)
         if extraction is None or example.obstacle not in (Obstacle.EDITED, Obstacle.FOREIGN):
             continue

@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from msgspec import Struct
 
 from coursebuild.core.files.errors import OutsideProjectError
-from coursebuild.core.files.examples import BlockedFile, Obstacle, write_examples
+from coursebuild.core.files.examples import BlockedFile, ExamplesReport, Obstacle, write_examples
 from coursebuild.core.files.write import remove_leftovers
 from coursebuild.core.model import Course, Recording, document_blocks
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
@@ -34,46 +34,30 @@ class ExtractedScripts(Struct, frozen=True):
     runnable: tuple[Extraction, ...]
     """Those whose files are as their lessons say; none where their interpreter is missing."""
     diagnostics: tuple[Diagnostic, ...]
-    written_paths: tuple[str, ...]
-    removed_paths: tuple[str, ...]
-    blocked: tuple[BlockedFile, ...]
+    files: ExamplesReport
+    """What became of the files."""
 
 
 def extract_scripts(course: Course, options: Options) -> ExtractedScripts:
     """Bring `examples/` up to date, without overwriting anybody's edits."""
     extraction_result = extract(course)
+    extractions, diagnostics = extraction_result.value, list(extraction_result.diagnostics)
     folders = {document.source.path.rpartition("/")[0] for document in course.documents}
     remove_leftovers(options.root / folder for folder in folders)
     try:
-        report = write_examples(options.root, {e.path: e.data for e in extraction_result.value})
+        files = write_examples(options.root, {e.path: e.data for e in extractions})
     except OutsideProjectError as error:
-        place = (
-            extraction_result.value[0].script.path_span
-            if extraction_result.value
-            else course.map.span(0, 0)
-        )
-        diagnostic = diagnose(
-            "script-path", place, error.message, help="make it a folder of the course"
-        )
-        return ExtractedScripts(
-            extraction_result.value, (), (*extraction_result.diagnostics, diagnostic), (), (), ()
-        )
-    by_path = {e.path: e for e in extraction_result.value}
-    blocked_paths = {example.path for example in report.blocked}
-    diagnostics = [
-        *extraction_result.diagnostics,
-        *(_diagnose_blocked(b, by_path.get(b.path), course) for b in report.blocked),
-    ]
+        place = extractions[0].script.path_span if extractions else course.map.span(0, 0)
+        help = "make it a folder of the course"
+        diagnostics.append(diagnose("script-path", place, error.message, help=help))
+        files = ExamplesReport((), (), (), ())
+        return ExtractedScripts(extractions, (), tuple(diagnostics), files)
+    by_path = {e.path: e for e in extractions}
+    diagnostics += (_diagnose_blocked(b, by_path.get(b.path), course) for b in files.blocked)
+    blocked_paths = {example.path for example in files.blocked}
     can_run = course.python is None or options.interpreter is not None
-    runnable = tuple(e for e in extraction_result.value if can_run and e.path not in blocked_paths)
-    return ExtractedScripts(
-        extraction_result.value,
-        runnable,
-        tuple(diagnostics),
-        report.written,
-        report.removed,
-        report.blocked,
-    )
+    runnable = tuple(e for e in extractions if can_run and e.path not in blocked_paths)
+    return ExtractedScripts(extractions, runnable, tuple(diagnostics), files)
 
 
 _OBSTACLES = {
