@@ -13,6 +13,7 @@ import argparse
 import tempfile
 from pathlib import Path
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.features.bench.commands.diet.run import diet
 from coursebuild.numerics.reports.diet import DietReport
 from coursebuild.pipeline.options import Options
@@ -64,7 +65,7 @@ def main() -> None:
         (root / "models" / "arm.xml").write_text(arm().replace("RUBBLE", ""))
         field = arm().replace("RUBBLE", rubble(arguments.pieces))
         (root / "models" / "rubble.xml").write_text(field)
-        measurement = diet(Options(root, 1))
+        measurement = diet(Options(root, 1, Memo(root)))
     for report in measurement.reports:
         show(report)
 

@@ -24,6 +24,7 @@ from markupsafe import Markup
 from msgspec.structs import replace
 
 from coursebuild.core.checks.formulas import course_formulas
+from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Formula, MathError, Results
@@ -105,7 +106,7 @@ def measure_typing(root: Path, repeat: int) -> None:
     """The cost of one more word in the longest lesson for the language server: time of one core."""
     from markdown_it import MarkdownIt
 
-    session = Session(Options(root, 1), site=False)
+    session = Session(Options(root, 1, Memo(root)), site=False)
     rebuild = BackgroundRebuild(session, Style())
     session.start()
     rebuild.run_once()
@@ -134,7 +135,7 @@ def measure_typing(root: Path, repeat: int) -> None:
 
 def measure_scripts(root: Path, repeat: int) -> None:
     """Our runner compared with bare Python."""
-    options = Options(root, len(os.sched_getaffinity(0)))
+    options = Options(root, len(os.sched_getaffinity(0)), Memo(root))
     course = load(root).value
     assert course is not None
     runnable = extract_scripts(course, options).runnable
@@ -155,10 +156,10 @@ def measure_scripts(root: Path, repeat: int) -> None:
 
 def measure_stages(course: Course, results: Results, root: Path, repeat: int) -> None:
     """The other stages of a build."""
-    options = Options(root, 1)
+    options = Options(root, 1, Memo(root))
 
     def make_files() -> None:
-        with Documents(options.store, 1) as documents:
+        with Documents(options) as documents:
             loaded_course = load(root, documents).value
             assert loaded_course is not None
             for file in site_files(loaded_course, results, documents, options, Reports()).files:
@@ -234,7 +235,7 @@ def main() -> None:
     measure_scripts(root, arguments.repeat)
     course = load(root).value
     assert course is not None
-    results = verify(course, Options(root, 1)).results
+    results = verify(course, Options(root, 1, Memo(root))).results
     results = replace(results, formulas=typeset(course))
     measure_stages(course, results, root, arguments.repeat)
     measure_lessons(course, results, arguments.repeat)

@@ -43,7 +43,7 @@ from coursebuild.pipeline.scripts import extract_scripts, run
 root = pathlib.Path.cwd()
 with ScriptServer() as server:
     store = Memo(root, fresh=True)
-    options = Options(root, int(sys.argv[1]), cache=store, run_all=server.run)
+    options = Options(root, int(sys.argv[1]), store, run_all=server.run)
     chosen = extract_scripts(load(root).value, options).runnable
     for _ in range(2):
         began = time.perf_counter()

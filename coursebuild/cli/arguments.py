@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import os
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.core.run.sandbox import find_sandbox
 from coursebuild.pipeline.options import Options, find_course, open_store
 from coursebuild.pipeline.progress import Progress
@@ -18,13 +19,14 @@ def options_of(arguments: argparse.Namespace) -> Options:
     """Make the options of a command from its arguments."""
     jobs = getattr(arguments, "jobs", None) or available_cores()
     root = find_course(arguments.root)
-    store = None
     if hasattr(arguments, "cache"):
         fresh = arguments.no_cache
         store = open_store(root, arguments.cache, arguments.cache_size, fresh=fresh)
+    else:
+        store = Memo(root)
     sandbox = find_sandbox(root) if getattr(arguments, "sandbox", False) else None
     quiet, long, verbose = (getattr(arguments, n, False) for n in ("quiet", "long", "verbose"))
-    return Options(root, jobs, Progress(quiet=quiet), store, long, verbose, sandbox=sandbox)
+    return Options(root, jobs, store, Progress(quiet=quiet), long, verbose, sandbox=sandbox)
 
 
 def available_cores() -> int:

@@ -52,7 +52,7 @@ def prepare(options: Options, make: MakeSite | None = None) -> Iterator[tuple[Re
     The caller holds the course's lock, and makes the files before the context ends. `make` makes
     other files than those of the site.
     """
-    with Documents(options.store, options.jobs, options.progress.stage) as documents:
+    with Documents(options) as documents:
         checked_course = read_and_verify(options, documents, static=True)
         if not checked_course.is_sound:
             yield checked_course.report(), None

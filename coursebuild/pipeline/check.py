@@ -49,7 +49,7 @@ def check(
     are moved a little. `truth`: list what nothing in the course proves.
     """
     with project_lock(options.root, options.progress.say):
-        with Documents(options.store, options.jobs, options.progress.stage) as documents:
+        with Documents(options) as documents:
             checked_course = read_and_verify(options, documents, names, shard=shard)
         course, verification = checked_course.course, checked_course.verification
         if course is None or verification is None:

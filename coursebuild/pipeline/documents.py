@@ -12,11 +12,9 @@ Entry point: `Documents`, a context manager and the `Parser` of a course, which 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
-from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Course, Declarations, Document
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
@@ -24,6 +22,7 @@ from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.fingerprints import course_fingerprint
 from coursebuild.pipeline.load import Parser
+from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.reading import (
     PAGES,
     SUMMARIES,
@@ -41,13 +40,7 @@ if TYPE_CHECKING:
     from coursebuild.core.pages.page_inputs import PageInputs
 
 Value = TypeVar("Value")
-Stage: TypeAlias = Callable[[str], AbstractContextManager[None]]
 Request: TypeAlias = SourceText | PageRequest
-
-
-def _no_stage(name: str) -> AbstractContextManager[None]:
-    return nullcontext()
-
 
 _MAPS, _DECLARATIONS, _CLEAN_COURSES = "maps", "declarations", "checked"
 """Kinds of entries in the store; the last is for courses in which nothing was wrong."""
@@ -58,17 +51,16 @@ _MIN_PARALLEL = 8
 class Documents(Parser):
     """Summaries of the documents of a course, and their pages."""
 
-    def __init__(self, store: Memo, jobs: int, stage: Stage = _no_stage) -> None:
-        """Use `jobs` worker processes at most; `stage` is called when long work begins."""
-        self._store = store
-        self._stage = stage
-        self._jobs = jobs
+    def __init__(self, options: Options) -> None:
+        self._store = options.store
+        self._stage = options.progress.stage
+        self._jobs = options.jobs
         self._texts: dict[str, SourceText] = {}
         self._summaries: dict[str, DocumentSummary] = {}
         self._fingerprints: tuple[Course, tuple[str | None, str | None]] | None = None
         self._readers: dict[str, int] = {}
         """The number of the worker that has read a text, by the text's path."""
-        self._reader = PageReader(store)
+        self._reader = PageReader(self._store)
         self._workers: Workers[Request, bytes] | None = None
 
     def __enter__(self) -> Self:

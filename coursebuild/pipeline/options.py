@@ -37,10 +37,10 @@ class Options(Struct, frozen=True):
     """Absolute, links resolved."""
     jobs: int
     """How many scripts run at a time."""
+    store: Memo
+    """Results made before."""
     progress: Progress = field(default_factory=lambda: Progress(quiet=True))
     """Says what is done; by default nothing."""
-    cache: Memo | None = None
-    """Results made before; by default those in the course's folder."""
     long: bool = False
     """Whether scripts run that have a recorded run in the course."""
     verbose: bool = False
@@ -51,11 +51,6 @@ class Options(Struct, frozen=True):
     """The interpreter of scripts, if it is another than ours; see `for_course`."""
     sandbox: Sandbox | None = None
     """The sandbox of each script; with one, no other code of the course runs."""
-
-    @property
-    def store(self) -> Memo:
-        """The store of results."""
-        return Memo(self.root) if self.cache is None else self.cache
 
     def for_course(self, course: Course) -> Options:
         """The same options, with the environment that the map names for scripts, if it works."""

@@ -42,6 +42,7 @@ from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import MAP, load
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.theme import template_diagnostic
 from coursebuild.pipeline.verify import Verification
@@ -86,7 +87,8 @@ class Session:
         self.running_diagnostics: tuple[Diagnostic, ...] = ()
         self.all_due = True
         """Whether any script may print something new, since other files have changed."""
-        self._documents = Documents(options.store, 1)
+        quiet_options = replace(options, jobs=1, progress=Progress(quiet=True))
+        self._documents = Documents(quiet_options)
         self._reading_lock = threading.Lock()
         """Held while documents are read: `Documents` has one text of each."""
         self._assets = Assets(template_texts(), Bundle(), prepared_folder())
@@ -107,8 +109,7 @@ class Session:
 
     def start(self) -> None:
         """Read the course on all cores, while this process has no threads and can be copied."""
-        options = self.options
-        with Documents(options.store, options.jobs, options.progress.stage) as documents:
+        with Documents(self.options) as documents:
             self.read(documents)
         sys.setswitchinterval(_SWITCH)
         gc.freeze()  # what was read lives as long as the process: do not look through it again

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.pipeline.options import Options
 from coursebuild.preview.rebuild import BackgroundRebuild
 from coursebuild.preview.session import Session
 from coursebuild.report import Style
@@ -26,7 +25,7 @@ class Live:
 
     def __init__(self, folder: Folder) -> None:
         self.folder = folder
-        self.session = Session(Options(folder.root.resolve(), 2))
+        self.session = Session(folder.options(jobs=2))
         self.rebuild = BackgroundRebuild(self.session, Style())
         self.session.start()
 

@@ -79,7 +79,7 @@ def write(path: Path, text: str) -> None:
 
 
 def options(root: Path, **fields: Any) -> Options:
-    return Options(root, 1, cache=Memo(root, **fields))
+    return Options(root, 1, Memo(root, **fields))
 
 
 def take_calls(fake: Fake) -> list[str]:

@@ -151,8 +151,8 @@ class RenderedCourse(Struct, frozen=True):
                 (root / path).write_bytes(data)
             course = replace(self.course, files=tuple(files))
             library = Library(course, self.results, self.assets, reports or Reports())
-            options = Options(root, 1, cache=Memo(Path(CACHE.name)))
-            with Documents(options.store, 1) as documents:
+            options = Options(root, 1, Memo(Path(CACHE.name)))
+            with Documents(options) as documents:
                 site = SiteMaker(library, self.assets, documents, options).make_site()
                 files_by_path = {file.path: file.make() for file in site.files}
         assert [file.path for file in site.files] == sorted(files_by_path)

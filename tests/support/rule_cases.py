@@ -189,7 +189,7 @@ class Workshop:
     def options(self, root: Path, *, fresh: bool = False) -> Options:
         """For a command on a course; `fresh`: all is to be made again."""
         store = Memo(root, shared=self._results, fresh=fresh)
-        return Options(root, jobs=1, cache=store, run_all=self._scripts.run)
+        return Options(root, 1, store, run_all=self._scripts.run)
 
     def try_labs(
         self, root: Path, wrap: Callable[[LabEngine], Any] = lambda engine: engine
@@ -202,7 +202,7 @@ class Workshop:
         engines = copy.copy(self._engines)
         engines.browser = wrap(engines.browser)
         # What labs did is not shared: it would not be tried by another engine.
-        unshared = replace(options, cache=Memo(root))
+        unshared = replace(options, store=Memo(root))
         _, lab_diagnostics = try_labs(
             course_load.value, unshared, engines, dict(models), model_diagnostics
         )

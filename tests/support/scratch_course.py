@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coursebuild.cli import main
-from coursebuild.core.engine.memo import HASH
+from coursebuild.core.engine.memo import HASH, Memo
 from coursebuild.pipeline.options import Options
 
 ROOT = Path(__file__).parents[2]
@@ -144,7 +144,8 @@ class Folder:
 
     def options(self, jobs: int = 1) -> Options:
         """To call a command as a function."""
-        return Options(self.root.resolve(), jobs)
+        root = self.root.resolve()
+        return Options(root, jobs, Memo(root))
 
     def main(self, *arguments: str, cwd: Path | None = None) -> CommandResult:
         """Run a command in this process."""

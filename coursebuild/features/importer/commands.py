@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
     out = Path(arguments.out or source.resolve().name).absolute()
     store = open_store(out, arguments.cache, arguments.cache_size, fresh=arguments.no_cache)
     progress = Progress(quiet=arguments.quiet)
-    options = Options(out, arguments.jobs or available_cores(), progress, store)
+    options = Options(out, arguments.jobs or available_cores(), store, progress)
     converted = convert(source)
     write_course(converted, out, source)
     remarks = [f"wrote {plural(len(converted.files), 'file')} to {out}"]

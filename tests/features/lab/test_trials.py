@@ -148,7 +148,7 @@ def test_failure_of_a_lab_is_kept_and_one_that_took_too_long_is_not(tmp_path: Pa
     fences = fence(lab.format(0.1, "null.x")) + fence(lab.format(500, ""))
     course = make_course(fences, models={"ball": BALL})
     models = {"ball": compile_all(tmp_path, [("models/ball.xml", BALL)])[0]}
-    options = Options(root=tmp_path, jobs=1)
+    options = Options(tmp_path, 1, Memo(tmp_path))
     outcomes = []
     with closing(OpenEngines(tmp_path)) as engines:
         for seconds in (0.2, 60.0):

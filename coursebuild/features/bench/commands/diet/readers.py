@@ -122,7 +122,7 @@ class Reruns:
             course = load(root).value
             if course is None:
                 return "the course"
-            options = replace(self.options, root=root, cache=Memo(root))
+            options = replace(self.options, root=root, store=Memo(root))
             outputs = self._run(course, options, self._documents)
         changes = (name for name in original_outputs if outputs.get(name) != original_outputs[name])
         return next(changes, "")
