@@ -76,7 +76,7 @@ def compare_with_version(
                 f"the course cannot be read: {error.span.path}:{error.span.line}: {error.message}",
                 help="`coursebuild check` tells all that is wrong",
             )
-        documents = select(course, names, options.root).documents
+        documents = select(course, names, options.root)
         extracted_scripts = extract_scripts(course, options)
         scripts = tuple(
             e

@@ -54,25 +54,28 @@ def prepare(options: Options, make: MakeSite | None = None) -> Iterator[tuple[Re
     """
     with Documents(options) as documents:
         checked_course = read_and_verify(options, documents, static=True)
+        if isinstance(checked_course, Report):
+            yield checked_course, None
+            return
         if not checked_course.is_sound:
             yield checked_course.report(), None
             return
         from coursebuild.core.pages.templates import TemplateFailure
         from coursebuild.pipeline.site import site_files
 
-        assert checked_course.course is not None and checked_course.verification is not None
-        results, reports = checked_course.verification.results, checked_course.reports
+        course, results = checked_course.course, checked_course.verification.results
         diagnostics: tuple[Diagnostic, ...] = ()
         try:
-            site = (make or site_files)(checked_course.course, results, documents, options, reports)
+            reports = checked_course.reports
+            site = (make or site_files)(course, results, documents, options, reports)
             diagnostics = site.diagnostics
-            if checked_course.course.theme.templates:  # these may fail on any page
+            if course.theme.templates:  # these may fail on any page
                 for file in site.files:
                     if file.path.endswith(".html"):
                         file.make()
         except TemplateFailure as failure:
             from coursebuild.pipeline.theme import template_diagnostic
 
-            diagnostics = (template_diagnostic(checked_course.course, failure),)
+            diagnostics = (template_diagnostic(course, failure),)
         report = checked_course.report(diagnostics)
         yield report, site if report.ok else None

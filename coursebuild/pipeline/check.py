@@ -15,14 +15,13 @@ from msgspec.structs import replace
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.registry import feature_trials, unproven
-from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.judge import depends_on, judge
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.options import Options, Selection, select
+from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verification, verify
 from coursebuild.report import Report
@@ -51,9 +50,9 @@ def check(
     with project_lock(options.root, options.progress.say):
         with Documents(options) as documents:
             checked_course = read_and_verify(options, documents, names, shard=shard)
+        if isinstance(checked_course, Report):
+            return checked_course
         course, verification = checked_course.course, checked_course.verification
-        if course is None or verification is None:
-            return checked_course.report()
         if timings is not None:
             from coursebuild.pipeline.shards import write_timings
 
@@ -66,8 +65,8 @@ def check(
             from coursebuild.core.scripts.sensitivity import noise_warnings
             from coursebuild.pipeline.sensitivity import measure
 
-            runs, selected = verification.results.runs, checked_course.selection.documents
-            sensitivities = measure(course, options.for_course(course), runs, selected, halve=True)
+            runs, selected = verification.results.runs, checked_course.documents
+            sensitivities = measure(course, checked_course.options, runs, selected, halve=True)
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
         if shard is not None:
             remarks.append(_describe_part(shard, verification))
@@ -80,38 +79,34 @@ class CheckedCourse(Struct, frozen=True):
 
     began: float
     """When the command began, by `time.monotonic`."""
-    diagnostics: tuple[Diagnostic, ...]
-    selection: Selection
-    """The lessons and pages that the command is about."""
-    course: Course | None = None
-    """`None` where the map cannot be read; then so is `verification`."""
-    verification: Verification | None = None
-    reports: Reports = Reports()
+    course: Course
+    options: Options
+    """With the course's interpreter."""
+    documents: frozenset[str] | None
+    """The paths of the lessons and pages that the command is about; `None`: all."""
+    verification: Verification
+    reports: Reports
     """Those that pages may show."""
-    interpreter: Interpreter | None = None
-    """The interpreter of the scripts, if it is not ours."""
+    diagnostics: tuple[Diagnostic, ...]
 
     @property
     def is_sound(self) -> bool:
         """Whether nothing is wrong but what warnings say."""
-        return self.course is not None and not any(d.is_error for d in self.diagnostics)
+        return not any(d.is_error for d in self.diagnostics)
 
     def report(self, further: Iterable[Diagnostic] = ()) -> Report:
         """The report; `further` are diagnostics found since."""
-        diagnostics = (*self.diagnostics, *further)
-        course, verification, selection = self.course, self.verification, self.selection
-        if course is None or verification is None:
-            return judge(None, diagnostics, self.began)
+        verification = self.verification
         report = judge(
-            course,
-            diagnostics,
+            self.course,
+            (*self.diagnostics, *further),
             self.began,
             scripts=verification.scripts,
-            lessons=len(selection.lessons),
-            documents=selection.documents,
+            documents=self.documents,
             labs=verification.labs,
         )
-        return replace(report, depends=depends_on(course, verification.results, self.interpreter))
+        depends = depends_on(self.course, verification.results, self.options.interpreter)
+        return replace(report, depends=depends)
 
 
 def read_and_verify(
@@ -121,24 +116,23 @@ def read_and_verify(
     *,
     static: bool = False,
     shard: Shard | None = None,
-) -> CheckedCourse:
+) -> CheckedCourse | Report:
     """What `check`, `build` and `export` do: read a course, check it, run it.
 
-    The caller holds the course's lock. `static`: with the static forms of labs, for pages.
+    Where the map cannot be read, there is only a report. The caller holds the course's lock.
+    `static`: with the static forms of labs, for pages.
     """
     began = time.monotonic()
     parsed_course = load(options.root, documents, trusted=options.sandbox is None)
     course = parsed_course.value
     if course is None:
-        return CheckedCourse(began, parsed_course.diagnostics, Selection((), (), None))
-    selection = select(course, names, options.root)
+        return judge(None, parsed_course.diagnostics, began)
+    selected = select(course, names, options.root)
     options = options.for_course(course)
-    verification = verify(course, options, selection.documents, static=static, shard=shard)
+    verification = verify(course, options, selected, static=static, shard=shard)
     reports = shown_reports(options.root, course)
     diagnostics = (*parsed_course.diagnostics, *verification.diagnostics, *reports.diagnostics)
-    return CheckedCourse(
-        began, diagnostics, selection, course, verification, reports.value, options.interpreter
-    )
+    return CheckedCourse(began, course, options, selected, verification, reports.value, diagnostics)
 
 
 def _describe_part(shard: Shard, verification: Verification) -> str:

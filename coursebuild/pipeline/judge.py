@@ -40,18 +40,19 @@ def judge(
     *,
     scripts: Sequence[ScriptLine] = (),
     labs: tuple[TrialLine, ...] = (),
-    lessons: int | None = None,
     documents: Collection[str] | None = None,
     remarks: tuple[str, ...] = (),
 ) -> Report:
     """Make the report of a command that began at this moment of `time.monotonic`.
 
-    `lessons`: how many it is about, by default all that are written. `documents` limits it to
-    mistakes in these files, in the map, and of the scripts that ran.
+    `documents` limits it to these lessons and pages, by path: to mistakes in them and in the map,
+    and those of the scripts that ran.
     """
-    if lessons is None:
-        entries = () if course is None else course.lessons
-        lessons = sum(lesson.document is not None for lesson in entries)
+    lessons = () if course is None else course.lessons
+    if documents is None:
+        lessons = tuple(lesson for lesson in lessons if lesson.document is not None)
+    else:
+        lessons = tuple(lesson for lesson in lessons if lesson.path in documents)
     relevant = sort_diagnostics(diagnostics)
     if documents is not None and course is not None:
         paths = {*documents, course.map.path}
@@ -60,7 +61,7 @@ def judge(
     reported = tuple(d for d in relevant if not _is_silenced(d, silences))
     errors = sum(d.is_error for d in reported)
     summary = Summary(
-        lessons=lessons,
+        lessons=len(lessons),
         scripts=len(scripts),
         ran=sum(line.status not in _NOT_RUN for line in scripts),
         skipped=sum(line.status == "skipped" for line in scripts),

@@ -18,7 +18,7 @@ from coursebuild.core.files.changes import undo_changes
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.errors import UsageError as UsageError
 from coursebuild.core.files.read import find_root
-from coursebuild.core.model import Course, Lesson, Owner, Page
+from coursebuild.core.model import Course, Lesson, Owner
 from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.memory import Memory
 from coursebuild.core.text.diagnostics import did_you_mean, nearest
@@ -129,31 +129,16 @@ def _parse_size(option: str, text: str) -> int:
     return int(match[1]) << (10 * " KMGT".index(match[2].upper() or " "))
 
 
-class Selection(Struct, frozen=True):
-    """The lessons and pages that a command is about."""
-
-    lessons: tuple[Lesson, ...]
-    pages: tuple[Page, ...]
-    documents: frozenset[str] | None
-    """Paths of their files; `None`: everything."""
-
-
-def select(course: Course, names: tuple[str, ...], root: Path) -> Selection:
+def select(course: Course, names: tuple[str, ...], root: Path) -> frozenset[str] | None:
     """Find the lessons named by id, slug, `id-slug` or file, and the pages named by id or file.
 
-    Without names, all of them. A file may be given from the course's folder or from the working
-    directory.
+    Return the paths of their files; `None`, for everything, where there are no names. A file may be
+    given from the course's folder or from the working directory.
 
     Raises:
         UsageError: a name means nothing, or a lesson that is not written yet.
     """
-    if not names:
-        return Selection(course.written_lessons, course.pages, None)
-    owners = [_find_owner(course, name, root) for name in names]
-    lessons = tuple(lesson for lesson in course.lessons if lesson in owners)
-    pages = tuple(page for page in course.pages if page in owners)
-    paths = {lesson.path for lesson in lessons} | {page.path for page in pages}
-    return Selection(lessons, pages, frozenset(paths))
+    return frozenset(_find_owner(course, name, root).path for name in names) if names else None
 
 
 def documents_by_name(course: Course) -> dict[str, Owner]:

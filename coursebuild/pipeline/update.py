@@ -75,8 +75,7 @@ class _Updater:
         """Those of reading the course."""
         self.options = options.for_course(course)
         self.dry_run = dry_run
-        self.selection = select(course, names, options.root)
-        self.documents = self.selection.documents
+        self.documents = select(course, names, options.root)
         self.recordings = recorded_outputs(course, self.documents)
         self.extracted_scripts = extract_scripts(course, self.options)
         paths = {recording.script for recording in self.recordings}
@@ -115,7 +114,6 @@ class _Updater:
             diagnostics,
             began,
             scripts=script_lines(self.scripts, [_as_it_ran(*pair) for pair in runs], ()),
-            lessons=len(self.selection.lessons),
             documents=self.documents,
             remarks=tuple(remarks),
         )

@@ -9,13 +9,13 @@ from coursebuild.cli.arguments import add_lessons, options_of
 from coursebuild.cli.output import CLEAN, FAILURE, fail, write
 from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.read import read_bytes
-from coursebuild.core.model import Course, Lesson, Owner
+from coursebuild.core.model import Course, Lesson
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.format import format_document
 from coursebuild.pipeline.load import load_course
-from coursebuild.pipeline.options import Selection, select
+from coursebuild.pipeline.options import select
 from coursebuild.pipeline.update import changed_text
 from coursebuild.report.text import location
 
@@ -58,10 +58,11 @@ def run(arguments: argparse.Namespace) -> int:
     return write("".join(f"{line}\n" for line in lines), FAILURE if lines else status)
 
 
-def _format_documents(course: Course, selection: Selection) -> Iterator[tuple[Source, Parsed[str]]]:
+def _format_documents(
+    course: Course, documents: frozenset[str] | None
+) -> Iterator[tuple[Source, Parsed[str]]]:
     callouts = course.callout_names
-    owners: tuple[Owner, ...] = (*selection.lessons, *selection.pages)
-    for owner in owners:
-        if owner.document is not None:
-            source, lesson = owner.document.source, isinstance(owner, Lesson)
+    for owner, document in course.owned_documents:
+        if documents is None or owner.path in documents:
+            source, lesson = document.source, isinstance(owner, Lesson)
             yield source, format_document(source, callouts, lesson=lesson, width=course.width)
