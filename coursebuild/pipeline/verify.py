@@ -64,7 +64,11 @@ class Verification(Struct, frozen=True):
     results: Results
     diagnostics: tuple[Diagnostic, ...]
     scripts: tuple[ScriptLine, ...]
-    labs: tuple[TrialLine, ...]
+
+    @property
+    def labs(self) -> tuple[TrialLine, ...]:
+        """The lines of a report about trials."""
+        return tuple(trial.line for trial in self.results.trials)
 
 
 def verify(
@@ -124,8 +128,7 @@ def verify(
     python = python_version() if interpreter is None else interpreter.version
     engine = engine_version() if interpreter is None else interpreter.engine
     results = Results(runs, verdicts, (), models, python, engine, trial_results)
-    lines = script_lines(extractions, runs, verdicts)
-    return Verification(results, diagnostics, lines, tuple(trial.line for trial in trial_results))
+    return Verification(results, diagnostics, script_lines(extractions, runs, verdicts))
 
 
 def _run_with_trials(
