@@ -15,8 +15,10 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Annotated
 
-from msgspec import Struct
+import msgspec
+from msgspec import Meta, Struct
 
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.write import write_atomic
@@ -40,6 +42,12 @@ class Shard(Struct, frozen=True):
         """Return those of the names that belong to this part."""
         parts = split(names, self.count, dict(self.seconds))
         return frozenset(name for name, part in parts.items() if part == self.index)
+
+
+class _Timings(Struct):
+    """What a file of timings holds."""
+
+    seconds: dict[str, Annotated[float, Meta(ge=0, lt=1e9)]]
 
 
 def split(names: Iterable[str], count: int, seconds: Mapping[str, float]) -> dict[str, int]:
@@ -96,19 +104,12 @@ def read_timings(file: str) -> dict[str, float]:
         UsageError: it has none.
     """
     try:
-        value = json.loads(Path(file).read_bytes())
+        return msgspec.json.decode(Path(file).read_bytes(), type=_Timings).seconds
     except OSError as error:
         raise UsageError(f"--timings: {file} cannot be read: {reason(error)}") from None
-    except (ValueError, RecursionError):
-        value = None
-    times = value.get("seconds") if isinstance(value, dict) else None
-    if not isinstance(times, dict) or not all(_is_time(time) for time in times.values()):
-        raise UsageError(f"--timings: {file} holds no times; `--write-timings` writes such a file")
-    return {name: float(time) for name, time in times.items()}
-
-
-def _is_time(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < 1e9
+    except (msgspec.DecodeError, RecursionError):
+        message = f"--timings: {file} holds no times; `--write-timings` writes such a file"
+        raise UsageError(message) from None
 
 
 def write_timings(file: str, seconds: Mapping[str, float], names: Iterable[str]) -> None:

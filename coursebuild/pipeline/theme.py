@@ -48,7 +48,7 @@ def load_theme(root: Path, theme: Theme) -> Parsed[Theme]:
             return None
 
     def read_all(files: tuple[ThemeFile, ...]) -> tuple[ThemeFile, ...]:
-        return tuple(mistakes for file in files if (mistakes := read(file)) is not None)
+        return tuple(whole for file in files if (whole := read(file)) is not None)
 
     templates = read_folder(root, TEMPLATES.rstrip("/"))
     whole = replace(

@@ -224,7 +224,9 @@ class _Lookup:
         self, formula: model.Math | model.MathBlock, offset: int
     ) -> Referent | None:
         """List the symbols of a formula whose meaning the text declares."""
-        mathml_by_formula = kept_formulas(self.texts.store, self.document.source.path)
+        mathml_by_formula = kept_formulas(
+            self.texts.session.options.store, self.document.source.path
+        )
 
         def mathml(math: model.Math | model.MathBlock) -> str:
             return mathml_by_formula.get(Formula(math.tex.text, math.display), "")

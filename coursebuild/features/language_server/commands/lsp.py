@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     options = replace(options_of(arguments), progress=Progress(quiet=True))
     stdin, stdout = _take_streams()
     live_course = LiveCourse(options, Style(), site=False)
-    server = Server(live_course.session, options.store)
+    server = Server(live_course.session)
     try:
         live_course.start()
         _start_thread(server.read_edits)

@@ -16,7 +16,6 @@ from lsprotocol import types
 from pygls.lsp.server import LanguageServer
 
 from coursebuild import __version__
-from coursebuild.core.engine.memo import Memo
 from coursebuild.core.text.source import Source
 from coursebuild.features.language_server.commands.actions import actions
 from coursebuild.features.language_server.commands.completion import completions
@@ -53,8 +52,8 @@ _OPTIONS: dict[str, object] = {
 class Server:
     """Answers a client, and sends it the diagnostics of its course."""
 
-    def __init__(self, session: Session, store: Memo) -> None:
-        self.session, self.store, self.places = session, store, Places(session.root)
+    def __init__(self, session: Session) -> None:
+        self.session, self.places = session, Places(session.root)
         self.client = LanguageServer(
             "coursebuild", __version__, types.TextDocumentSyncKind.Full, max_workers=1
         )
@@ -75,7 +74,7 @@ class Server:
         library = self.session.library
         if library is None:
             return None
-        texts = OpenTexts(self.session, library, self.places, self.store)
+        texts = OpenTexts(self.session, library, self.places)
         return answer(texts, texts.source(self.places.path(params.text_document.uri)), params)
 
     def _begin(self) -> None:

@@ -9,7 +9,6 @@ from functools import lru_cache
 
 from msgspec import Struct
 
-from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.model import Document, Lesson, Owner
 from coursebuild.core.pages.library import Library
@@ -26,7 +25,6 @@ class OpenTexts(Struct, frozen=True):
     library: Library
     """The course as it was last read."""
     places: Places
-    store: Memo
 
     def source(self, path: str) -> Source:
         """Return the text of a file of the course; an empty one where there is no such file."""
