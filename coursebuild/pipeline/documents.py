@@ -125,33 +125,33 @@ class Documents(Parser):
     ) -> list[Parsed[Document]]:
         """Return documents without their prose, and what is wrong in them."""
         texts = [SourceText.of(source, callouts, lesson=lesson) for source, lesson in sources]
-        missing = [text for text in texts if not self._has_summary(text)]
+        summaries = {text.key: self._find_summary(text) for text in texts}
+        missing = [text for text in texts if summaries[text.key] is None]
         if len(missing) >= _MIN_PARALLEL:
             prepare_to_read(missing[0])
         answers = self._answer_requests("reading lessons and pages", iter(missing))
         for text, (data, reader) in zip(missing, answers, strict=True):
-            self._add_summary(text, decode(data, DocumentSummary, text.source))
+            summaries[text.key] = self._keep(text, decode(data, DocumentSummary, text.source))
             if reader is not None:
                 self._readers[text.source.path] = reader
-        summaries = [self._summaries[text.source.path] for text in texts]
-        return [Parsed(summary.document, summary.diagnostics) for summary in summaries]
+        found = (summaries[text.key] for text in texts)
+        return [Parsed(s.document, s.diagnostics) for s in found if s is not None]
 
-    def _has_summary(self, text: SourceText) -> bool:
-        """Whether there is a summary of a text, in memory or in the store."""
-        text_before = self._texts.get(text.source.path)
-        if text_before is not None and text_before.key == text.key:
-            return True
+    def _find_summary(self, text: SourceText) -> DocumentSummary | None:
+        """Find the summary of a text, in memory or in the store."""
+        path = text.source.path
+        if path in self._texts and self._texts[path].key == text.key:
+            return self._summaries[path]
         summary = self._store.get(
             SUMMARIES, text.key, lambda data: decode(data, DocumentSummary, text.source)
         )
-        if summary is not None:
-            self._add_summary(text, summary)
-        return summary is not None
+        return None if summary is None else self._keep(text, summary)
 
-    def _add_summary(self, text: SourceText, summary: DocumentSummary | None) -> None:
+    def _keep(self, text: SourceText, summary: DocumentSummary | None) -> DocumentSummary:
         assert summary is not None, "what was just encoded can be decoded"
-        self._texts[text.source.path] = text
-        self._summaries[text.source.path] = summary.with_notes()
+        path = text.source.path
+        self._texts[path], self._summaries[path] = text, summary.with_notes()
+        return self._summaries[path]
 
     def read_map(self, source: Source) -> Parsed[Course | None]:
         """Return the course that a map describes, and what is wrong in it."""
