@@ -48,11 +48,12 @@ def judge(
     `documents` limits it to these lessons and pages, by path: to mistakes in them and in the map,
     and those of the scripts that ran.
     """
-    lessons = () if course is None else course.lessons
-    if documents is None:
-        lessons = tuple(lesson for lesson in lessons if lesson.document is not None)
+    if course is None:
+        lesson_count = 0
+    elif documents is None:
+        lesson_count = len(course.written_lessons)
     else:
-        lessons = tuple(lesson for lesson in lessons if lesson.path in documents)
+        lesson_count = sum(lesson.path in documents for lesson in course.lessons)
     relevant = sort_diagnostics(diagnostics)
     if documents is not None and course is not None:
         paths = {*documents, course.map.path}
@@ -61,7 +62,7 @@ def judge(
     reported = tuple(d for d in relevant if not _is_silenced(d, silences))
     errors = sum(d.is_error for d in reported)
     summary = Summary(
-        lessons=len(lessons),
+        lessons=lesson_count,
         scripts=len(scripts),
         ran=sum(line.status not in _NOT_RUN for line in scripts),
         skipped=sum(line.status == "skipped" for line in scripts),
