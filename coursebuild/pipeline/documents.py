@@ -134,8 +134,8 @@ class Documents(Parser):
             summaries[text.key] = self._keep(text, decode(data, DocumentSummary, text.source))
             if reader is not None:
                 self._readers[text.source.path] = reader
-        found = (summaries[text.key] for text in texts)
-        return [Parsed(s.document, s.diagnostics) for s in found if s is not None]
+        all_summaries = (summaries[text.key] for text in texts)
+        return [Parsed(s.document, s.diagnostics) for s in all_summaries if s is not None]
 
     def _find_summary(self, text: SourceText) -> DocumentSummary | None:
         """Find the summary of a text, in memory or in the store."""
