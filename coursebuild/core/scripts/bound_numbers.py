@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from decimal import Decimal
 from functools import cached_property
 
 from msgspec import Struct
@@ -101,6 +102,7 @@ class Window(Struct, frozen=True):
 class BoundText(Struct, frozen=True):
     """The text of a binding: its numbers and the text around; without numbers, `before` is all."""
 
+    text: str
     before: str
     numbers: tuple[Number, ...]
     after: str
@@ -110,27 +112,26 @@ class BoundText(Struct, frozen=True):
         """The numbers and the plain text of a binding."""
         numbers = scan_prose(text)
         if not numbers:
-            return cls(plain_text(text), (), "")
-        return cls(
-            plain_text(text[: numbers[0].start]), numbers, plain_text(text[numbers[-1].end :])
-        )
+            return cls(text, plain_text(text), (), "")
+        before, after = text[: numbers[0].start], text[numbers[-1].end :]
+        return cls(text, plain_text(before), numbers, plain_text(after))
 
     def shows(self, window: Window) -> bool:
         """Whether the printed numbers, rounded, are those of the binding."""
         return all(map(shows, self.numbers, window.numbers))
 
-    def rewrite(self, text: str, window: Window) -> str | None:
+    def rewrite(self, window: Window) -> str:
         """The binding's text with printed numbers in it, rounded to the digits that it shows.
 
-        `None` where its notation is not that of a printed number.
+        Empty where its notation is not that of a printed number, or one would be rounded to zero.
         """
         places: list[tuple[int, int, str]] = []
         for number, printed in zip(self.numbers, window.numbers, strict=True):
             rounded = round_like(number, printed.value) if printed.is_finite else None
-            if rounded is None:
-                return None
+            if rounded is None or (printed.value and not Decimal(plain_text(rounded))):
+                return ""
             places.append((number.start, number.end, rounded))
-        return replace_ranges(text, places)
+        return replace_ranges(self.text, places)
 
     def is_in(self, lines: Sequence[PrintedLine]) -> bool:
         """Whether printed numbers that may be meant, rounded, are those of the binding."""

@@ -39,7 +39,7 @@ def mismatch(
             f"`{binding.text}` does not stand in the output of `{path}`",
             help="write it as it is printed, or take `{out}` away",
         )
-    label, better = _propose(bound_text, binding.text, lines, list(map(PrintedLine, before)))
+    label, better = _propose(bound_text, lines, list(map(PrintedLine, before)))
     return diagnose(
         "binding-mismatch",
         binding.text_span,
@@ -51,7 +51,7 @@ def mismatch(
 
 
 def _propose(
-    bound_text: BoundText, text: str, lines: Sequence[PrintedLine], before: Sequence[PrintedLine]
+    bound_text: BoundText, lines: Sequence[PrintedLine], before: Sequence[PrintedLine]
 ) -> tuple[str, str]:
     """What is printed instead, in words, and the text to write; empty where that is not certain."""
     windows = bound_text.windows(lines)
@@ -64,19 +64,15 @@ def _propose(
     nearest_text = f"the nearest printed value{'s are' if several else ' is'} {nearest.text}"
     windows_before = [window for window in bound_text.windows(before) if bound_text.shows(window)]
     if not windows_before:
-        rewritings = {_rewrite(bound_text, text, window) for window in windows}
+        rewritings = {bound_text.rewrite(window) for window in windows}
         certain = bound_text.has_context(nearest) and len(rewritings) == 1
         return nearest_text, rewritings.pop() if certain else ""
-    text_before, now = (
-        windows_before[0].text,
-        [_successor(window_before, before, lines) for window_before in windows_before],
-    )
-    rewritings = {_rewrite(bound_text, text, window) if window else "" for window in now}
+    text_before = windows_before[0].text
+    now = [_successor(window, before, lines) for window in windows_before]
+    rewritings = {bound_text.rewrite(window) if window else "" for window in now}
     if now[0] is None or len(rewritings) > 1 or ("" in rewritings and len(now) > 1):
-        return (
-            f"it is not certain what is printed in place of {text_before} now; {nearest_text}",
-            "",
-        )
+        doubt = f"it is not certain what is printed in place of {text_before} now"
+        return f"{doubt}; {nearest_text}", ""
     better = rewritings.pop()
     if better and not BoundText.of(better).is_in(lines):  # other numbers have its words or unit
         better = ""
@@ -133,11 +129,3 @@ def _distance(
         )
         absolute += difference(s.value, p.value)
     return relative, absolute
-
-
-def _rewrite(bound_text: BoundText, text: str, window: Window) -> str:
-    """The binding's text with printed numbers; empty where one of them would be rounded to zero."""
-    better = bound_text.rewrite(text, window) or ""
-    new = BoundText.of(better).numbers if better else ()
-    lost = any(p.value and not n.value for n, p in zip(new, window.numbers, strict=False))
-    return "" if lost else better
