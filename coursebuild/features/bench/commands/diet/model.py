@@ -22,7 +22,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import CourseFiles, read_bytes
 from coursebuild.core.model import Course, MjcfModel
 from coursebuild.core.model.results import Machine
-from coursebuild.core.run.mjcf import model_files
+from coursebuild.core.run.mjcf import TEXT_PATH, model_files
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.bench.measuring import report_errors
@@ -35,7 +35,7 @@ from coursebuild.numerics.pruning.readers import Reader
 from coursebuild.numerics.pruning.survey import Rerun, Survey, Surveyor
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
 
-_TEXT = ".coursebuild-text.xml"
+_TEXT = Path(TEXT_PATH).name
 """No file has this name: MuJoCo reads the text in its place."""
 
 
