@@ -7,13 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from coursebuild.core.features import TrialContext, TrialOutcome
-from coursebuild.core.model import Course
+from coursebuild.core.model import Course, find_blocks
 from coursebuild.core.model.results import CompileResult
 from coursebuild.core.run.memory import Memory
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
-from coursebuild.features.lab.checks import labs_in
 from coursebuild.features.lab.compile import compile_lab
 from coursebuild.features.lab.inputs import SECONDS, lab_trials
 from coursebuild.features.lab.model import Lab
@@ -37,7 +36,7 @@ def lab_of(text: str) -> Lab:
     source = Source("content/lessons/4.2-x.md", text)
     result = parse_document(source, frozenset(), lesson=True)
     assert result.diagnostics == (), [d.message for d in result.diagnostics]
-    (lab,) = labs_in((result.value,))
+    (lab,) = find_blocks(result.value, Lab)
     return lab
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from coursebuild.core.model import Course, Document, FeatureBlock, document_blocks
+from coursebuild.core.model import Course, Document, FeatureBlock, find_blocks
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.features.lab.model import BUILT_IN_KINDS, Lab
@@ -26,7 +26,7 @@ def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagno
     """Report unknown kinds and models of the labs in some documents."""
     kinds = lab_kinds(course)
     models = {model.name for model in course.models}
-    for lab in labs_in(documents):
+    for lab in (lab for document in documents for lab in find_blocks(document, Lab)):
         if lab.kind not in kinds:
             message, help = f"no kind of lab is called `{lab.kind}`", did_you_mean(lab.kind, kinds)
             yield diagnose("lab-kind", lab.kind_span, message, help=help)
@@ -36,17 +36,11 @@ def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagno
                 yield diagnose("lab-model", lab.place(("model",)), message, help=help)
 
 
-def labs_in(documents: Iterable[Document]) -> Iterator[Lab]:
-    """The labs of some documents, those of quizzes included."""
-    for document in documents:
-        yield from (block for block in document_blocks(document) if isinstance(block, Lab))
-
-
 def check_model_names(
     course: Course, facts_of: Callable[[FeatureBlock], ModelFacts | None]
 ) -> Iterator[Diagnostic]:
     """Report keyframes and sites that the models of labs do not have."""
-    for lab in labs_in(course.documents):
+    for lab in (lab for document in course.documents for lab in find_blocks(document, Lab)):
         facts = facts_of(lab)
         if facts is not None:
             yield from _check_names(lab, facts)

@@ -10,11 +10,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from coursebuild.core.features import Trial
-from coursebuild.core.model import Course
+from coursebuild.core.model import Course, find_blocks
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.source import key_of
-from coursebuild.features.lab.checks import labs_in
 from coursebuild.features.lab.compile import LabModule, compile_lab
 from coursebuild.features.lab.engines.files import engine_digest, lab_digest
 from coursebuild.features.lab.gallery import gallery_labs
@@ -29,7 +28,7 @@ _DISPLAY_FIELDS = ("id", "title", "model", "height", "toggles")
 def lab_trials(course: Course) -> Iterator[Trial]:
     """Yield every lab of a course, in order; then those made for models that no text shows."""
     for owner, document in course.owned_documents:
-        for number, lab in enumerate(labs_in((document,)), 1):
+        for number, lab in enumerate(find_blocks(document, Lab), 1):
             yield Trial(f"{owner.id}-lab-{number}", owner.id, lab)
     for model, lab in gallery_labs(course):
         yield Trial(f"model-{model.name.replace('/', '-')}", model.name, lab)

@@ -10,7 +10,7 @@ import functools
 from collections.abc import Iterator
 from pathlib import Path
 
-from coursebuild.core.model import document_blocks
+from coursebuild.core.model import find_blocks
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import ExportContext
@@ -62,8 +62,7 @@ def _quizzes(context: ExportContext) -> Iterator[QuizItems]:
     """Write all quizzes, in the order of the course."""
     for owner in context.course.owners:
         summary = owner.document
-        if summary and any(isinstance(block, Quiz) for block in document_blocks(summary)):
+        if summary and any(find_blocks(summary, Quiz)):
             page = context.page(summary)
-            for block in document_blocks(page.document):
-                if isinstance(block, Quiz):
-                    yield quiz_items(page, block, context.course)
+            for quiz in find_blocks(page.document, Quiz):
+                yield quiz_items(page, quiz, context.course)

@@ -37,11 +37,11 @@ def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Dia
     """
     first: dict[str, Quiz] = {}
     for document in course.documents:
-        for quiz in quizzes(document):
+        for quiz in find_blocks(document, Quiz):
             first.setdefault(quiz.id, quiz)  # the id is empty where it cannot be read
     norun = {s.path: s.norun for document in course.documents for s in document_scripts(document)}
     for document in documents:
-        for quiz in quizzes(document):
+        for quiz in find_blocks(document, Quiz):
             if quiz.id and first[quiz.id] is not quiz:
                 yield diagnose(
                     "quiz-id-repeated",
@@ -53,15 +53,11 @@ def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Dia
             yield from _check_scripts(quiz, norun)
 
 
-def quizzes(document: Document) -> Iterator[Quiz]:
-    """The quizzes of a document."""
-    return find_blocks(document, Quiz)
-
-
 def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | None]:
     """Report predictions with nothing to hide below them, or no lab there to run."""
     diagnostics = (
-        _check_predictions(quiz, _following_blocks(quiz, document)) for quiz in quizzes(document)
+        _check_predictions(quiz, _following_blocks(quiz, document))
+        for quiz in find_blocks(document, Quiz)
     )
     return Parsed(None, tuple(chain.from_iterable(diagnostics)))
 
@@ -121,7 +117,7 @@ def _check_scripts(quiz: Quiz, scripts: Mapping[str, bool]) -> Iterator[Diagnost
 def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:
     """Report `output` questions about a line that the script, run to its end, did not print."""
     printed = {run.path: run.stdout for run in runs if run.outcome is Outcome.OK}
-    course_quizzes = (quiz for document in course.documents for quiz in quizzes(document))
+    course_quizzes = (quiz for document in course.documents for quiz in find_blocks(document, Quiz))
     for question in (q for quiz in course_quizzes for q in quiz.output_questions()):
         if question.script in printed:
             count = len(printed[question.script].rstrip().split("\n"))

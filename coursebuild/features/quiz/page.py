@@ -25,7 +25,7 @@ from coursebuild.core.model import (
     Heading,
     Mode,
     Recording,
-    document_blocks,
+    find_blocks,
     plain_text,
 )
 from coursebuild.core.model.results import Outcome
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 def quiz(page: PageContext, block: Quiz) -> Markup:
     """Draw a quiz with its questions."""
-    headings = (b for b in document_blocks(page.document) if isinstance(b, Heading))
+    headings = find_blocks(page.document, Heading)
     return page.template(
         "quiz/quiz.html",
         quiz=block,
@@ -78,7 +78,7 @@ def index_quiz(reader: IndexReader, block: Quiz) -> None:
 
 def is_heading(document: Document, title: str) -> bool:
     """Whether a heading of the document reads like the title."""
-    headings = (b for b in document_blocks(document) if isinstance(b, Heading))
+    headings = find_blocks(document, Heading)
     return any(plain_text(h.children).strip() == title.strip() for h in headings)
 
 
@@ -126,9 +126,9 @@ def _grading_attributes(page: PageContext, question: AnyQuestion) -> Iterator[tu
 
 def _comparison_rule(page: PageContext, script: str) -> str:
     """Say for the page's script how the numbers in the output of a lesson's script compare."""
-    for block in document_blocks(page.document):
-        if isinstance(block, Recording) and block.script == script:
-            verdict = page.inputs.verdicts.get(block.span.start)
+    for recording in find_blocks(page.document, Recording):
+        if recording.script == script:
+            verdict = page.inputs.verdicts.get(recording.span.start)
             if verdict is not None:
                 return _format_rule(verdict.comparison)
     return _format_rule(Comparison(Mode.DIGITS))
