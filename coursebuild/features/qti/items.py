@@ -21,7 +21,7 @@ from coursebuild.core.model import Block, Course, Inline
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.xml import element, identifier, markup, render_xml
-from coursebuild.core.text.source import Span
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.qti.flow import Flow
 from coursebuild.features.quiz.model import (
     AnyQuestion,
@@ -55,7 +55,7 @@ class QuizItems(Struct, frozen=True):
     identifier: str
     title: str
     items: tuple[QuestionItem, ...]
-    losses: tuple[tuple[Span, str], ...]
+    losses: tuple[Diagnostic, ...]
     """What an item cannot hold of its question, or why a question has no item."""
 
 
@@ -65,7 +65,9 @@ def quiz_items(page: PageContext, quiz: Quiz, course: Course) -> QuizItems:
     for number, question in enumerate(quiz.questions, 1):
         writer = _Writer(page, quiz, number, course)
         item = writer.item(question)
-        losses += [(question.span, loss) for loss in writer.flow.losses]
+        for loss in writer.flow.losses:
+            message = f"this question is not whole in the QTI package: {loss}"
+            losses.append(diagnose("package-reduced", question.span, message))
         items += [item] if item is not None else []
     name = identifier("quiz.", quiz.id, most=_NAME)
     return QuizItems(name, quiz.title or quiz.id, tuple(items), tuple(losses))

@@ -15,7 +15,7 @@ from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.xml import identifier, render_xml
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.qti.flow import STRIKE_CLASS
 from coursebuild.features.qti.items import STYLE, QuizItems, quiz_items
 from coursebuild.features.quiz.model import Quiz
@@ -32,9 +32,7 @@ def package_files(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
     """Yield the files, none if no question has an answer, and report what items cannot hold."""
     quizzes: list[QuizItems] = []
     for quiz in _quizzes(context):
-        for span, loss in quiz.losses:
-            message = f"this question is not whole in the QTI package: {loss}"
-            yield diagnose("package-reduced", span, message)
+        yield from quiz.losses
         if quiz.items:
             quizzes.append(quiz)
             test = render_xml(_FOLDER / "test.jinja", quiz=quiz)

@@ -55,10 +55,7 @@ def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Dia
 
 def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | None]:
     """Report predictions with nothing to hide below them, or no lab there to run."""
-    diagnostics = (
-        _check_predictions(quiz, _following_blocks(quiz, document))
-        for quiz in find_blocks(document, Quiz)
-    )
+    diagnostics = (_check_predictions(quiz, document) for quiz in find_blocks(document, Quiz))
     return Parsed(None, tuple(chain.from_iterable(diagnostics)))
 
 
@@ -70,7 +67,8 @@ def _following_blocks(quiz: Quiz, document: Document) -> tuple[Block, ...]:
     return rest[: next(ends, None)]
 
 
-def _check_predictions(quiz: Quiz, blocks: tuple[Block, ...]) -> Iterator[Diagnostic]:
+def _check_predictions(quiz: Quiz, document: Document) -> Iterator[Diagnostic]:
+    blocks = _following_blocks(quiz, document)
     labs = [block for block in blocks if isinstance(block, Lab)]
     for question in quiz.questions:
         if not isinstance(question, ChoiceQuestion):
