@@ -52,8 +52,10 @@ def project_lock(
         on_wait: is called once, with a message, if another run has the lock.
         name: the name of the lock's file.
     """
-    fd = _lock_file(root.resolve() / ".coursebuild" / name, on_wait)
+    fd = None
     try:
+        with contextlib.suppress(OSError):
+            fd = _lock_file(root.resolve() / ".coursebuild" / name, on_wait)
         yield
     finally:
         if fd is not None:
@@ -76,32 +78,21 @@ def folder_lock(folder: Path) -> Iterator[None]:
         os.close(fd)
 
 
-def _lock_file(path: Path, on_wait: Callable[[str], None] | None) -> int | None:
-    """Open and lock a file, waiting if need be; `None` where that is not possible."""
-    has_reported = False
+def _lock_file(path: Path, on_wait: Callable[[str], None] | None) -> int:
+    """Open and lock a file, waiting if need be; where there are no locks, only open it."""
     while True:
+        make_private_folder(path.parent)
+        fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
-            make_private_folder(path.parent)
-            fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        except OSError:
-            return None
-        try:
-            locked = try_lock(fd)
-            if locked is False:
-                if on_wait is not None and not has_reported:
+            if try_lock(fd) is False:
+                if on_wait is not None:
                     on_wait(_waiting_message(fd))
-                    has_reported = True
+                    on_wait = None
                 fcntl.flock(fd, fcntl.LOCK_EX)
-            elif locked is None:
-                os.close(fd)
-                return None
             if _is_at(fd, path):
                 os.ftruncate(fd, 0)
                 os.pwrite(fd, f"{os.getpid()}\n".encode(), 0)
                 return fd
-        except OSError:
-            os.close(fd)
-            return None
         except BaseException:
             os.close(fd)
             raise
