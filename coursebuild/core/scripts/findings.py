@@ -97,16 +97,13 @@ def output_findings(
                 yield silence_diagnostic(recording, run.path)
             elif verdict.status == "drift":
                 dependents = dependent_bindings(verdict, course.documents, outputs)
-                unstable_output = _find_instability(course, verdict, run, repeated_runs or {})
+                unstable_output = _find_instability(verdict, run, repeated_runs or {})
                 yield unstable_output or drift_diagnostic(verdict, owner.id, dependents)
         yield from check_bindings(document, outputs, evidence)
 
 
 def _find_instability(
-    course: Course,
-    verdict: Verdict,
-    first: ScriptRun | None,
-    repeated_runs: Mapping[str, ScriptRun],
+    verdict: Verdict, first: ScriptRun | None, repeated_runs: Mapping[str, ScriptRun]
 ) -> Diagnostic | None:
     """A diagnostic if two runs are known to print different outputs."""
     recording, comparison = verdict.recording, verdict.comparison

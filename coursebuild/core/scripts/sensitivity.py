@@ -67,7 +67,7 @@ def sensitivity(
     `base` is its ordinary run; there are no `moved_runs` where they would have no point.
     """
     compared = _compared_recordings(course, recordings)
-    standing = _standing(course, compared, base, moved_runs)
+    standing = _standing(compared, base, moved_runs)
     if standing is not Standing.MEASURED:
         return Sensitivity(path, owner, standing)
     reason_unhalved = _reason_unhalved(halved)
@@ -75,7 +75,7 @@ def sensitivity(
     findings = [
         finding
         for recording, comparison in compared
-        for finding in _find_doubts(course, recording, comparison, base, moved_runs, usable_halved)
+        for finding in _find_doubts(recording, comparison, base, moved_runs, usable_halved)
     ]
     numbers = sum(
         len(line.numbers) for r, c in compared for line in printed_lines(r, c.own_filters)
@@ -97,7 +97,7 @@ def _reason_unhalved(run: ScriptRun | None) -> str:
 
 def is_worth_moving(course: Course, recordings: Iterable[Recording], base: ScriptRun) -> bool:
     """Whether runs of a script with moved states can show anything."""
-    return _standing(course, _compared_recordings(course, recordings), base) is Standing.MEASURED
+    return _standing(_compared_recordings(course, recordings), base) is Standing.MEASURED
 
 
 def _compared_recordings(
@@ -109,7 +109,6 @@ def _compared_recordings(
 
 
 def _standing(
-    course: Course,
     recordings: Sequence[tuple[Recording, Comparison]],
     base: ScriptRun,
     moved_runs: Sequence[ScriptRun] | None = None,
@@ -135,7 +134,6 @@ def _standing(
 
 
 def _find_doubts(
-    course: Course,
     recording: Recording,
     comparison: Comparison,
     base: ScriptRun,
