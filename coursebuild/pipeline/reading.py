@@ -26,7 +26,7 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.prepared import prepared_folder
 from coursebuild.core.engine.tool import step_key, typesetter_digest
 from coursebuild.core.files.resources import template_texts
-from coursebuild.core.model import Document, Script, document_blocks
+from coursebuild.core.model import Document, document_scripts
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.summary import without_prose
 from coursebuild.core.pages.assets import strings_for
@@ -226,7 +226,7 @@ class PageReader:
             summary_document = without_prose(whole.document)
             summary_document = replace(summary_document, equations=equations, summaries={})
             diagnostics = (*whole.diagnostics, *formula_diagnostics, *notes.diagnostics)
-            scripts = (b for b in document_blocks(whole.document) if isinstance(b, Script))
+            scripts = document_scripts(whole.document)
             imports = tuple((s.path, tuple(sorted(find_imports(s.code.text)))) for s in scripts)
             summary = DocumentSummary(
                 summary_document,

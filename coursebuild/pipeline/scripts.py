@@ -15,7 +15,7 @@ from msgspec import Struct
 from coursebuild.core.files.errors import OutsideProjectError
 from coursebuild.core.files.examples import BlockedFile, ExamplesReport, Obstacle, write_examples
 from coursebuild.core.files.write import remove_leftovers
-from coursebuild.core.model import Course, Recording, document_blocks
+from coursebuild.core.model import Course, Recording, find_blocks
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.memory import Memory, longest_first
@@ -175,8 +175,8 @@ def recorded_outputs(course: Course, documents: Collection[str] | None = None) -
         block
         for document in course.documents
         if documents is None or document.source.path in documents
-        for block in document_blocks(document)
-        if isinstance(block, Recording) and block.script is not None and block.readable
+        for block in find_blocks(document, Recording)
+        if block.script is not None and block.readable
     ]
 
 

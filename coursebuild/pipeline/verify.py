@@ -24,7 +24,7 @@ from msgspec import Struct
 
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.features import Trial, TrialContext, TrialOutcome, Trials
-from coursebuild.core.model import Course, FeatureBlock, document_blocks
+from coursebuild.core.model import Course, FeatureBlock, find_blocks
 from coursebuild.core.model.results import (
     CompileResult,
     Outcome,
@@ -219,9 +219,8 @@ def _quoted_scripts(course: Course, documents: Collection[str]) -> set[str]:
     for document in course.documents:
         if document.source.path in documents:
             paths |= {b.script for b in document_bindings(document) if b.script is not None}
-            for block in document_blocks(document):
-                if isinstance(block, FeatureBlock):
-                    paths |= {script for script, _ in block.quoted_lines()}
+            for block in find_blocks(document, FeatureBlock):
+                paths |= {script for script, _ in block.quoted_lines()}
     return paths
 
 

@@ -24,7 +24,13 @@ from msgspec import Struct
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.write import write_atomic
-from coursebuild.core.model import Document, Recording, document_blocks, document_scripts
+from coursebuild.core.model import (
+    Document,
+    Recording,
+    document_scripts,
+    find_blocks,
+    output_numbers,
+)
 from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.model.results import ScriptRun, Verdict
 from coursebuild.core.pages.library import Library
@@ -172,13 +178,13 @@ def _state(run: ScriptRun | None) -> str:
 
 def _outputs(session: Session, library: Library, document: Document) -> Iterator[dict[str, Any]]:
     """Describe recorded outputs, each with its number among those of its script on the page."""
-    numbers: Counter[str] = Counter()
-    for recording in document_blocks(document):
-        if not isinstance(recording, Recording) or recording.script is None:
+    numbers = output_numbers(document)
+    for recording in find_blocks(document, Recording):
+        if recording.script is None:
             continue
         script, verdict = recording.script, library.verdict(recording)
-        output = {"script": script, "nth": numbers[script], "state": "unchecked"}
-        numbers[script] += 1
+        nth = numbers[recording.span.start] - 1
+        output = {"script": script, "nth": nth, "state": "unchecked"}
         if (state := _state(library.runs.get(script))) != "ok":
             output["state"] = state
         elif verdict is not None:

@@ -13,7 +13,7 @@ from coursebuild.core.model import (
     Filter,
     Mode,
     Recording,
-    document_blocks,
+    find_blocks,
 )
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.compare import compare
@@ -50,7 +50,7 @@ def document(text: str, path: str = "content/lessons/4.2-mass.md") -> Document:
 
 
 def recordings(document: Document) -> tuple[Recording, ...]:
-    return tuple(block for block in document_blocks(document) if isinstance(block, Recording))
+    return tuple(find_blocks(document, Recording))
 
 
 def recording(body: str, *, prefix: str = "", eol: str = "\n", fence: str = "```") -> Recording:

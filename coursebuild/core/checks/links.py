@@ -50,6 +50,7 @@ from coursebuild.core.model import (
     local_file,
     model_anchors,
     output_anchor,
+    output_numbers,
     resolve,
     walk_inlines,
 )
@@ -113,7 +114,7 @@ def anchors(document: Document) -> Mapping[str, Span]:
 def _anchors(document: Document) -> Iterator[tuple[str, Span]]:
     if document.title_anchor:
         yield document.title_anchor, document.source.span(0, 0)
-    outputs: dict[str, int] = {}
+    numbers = output_numbers(document)
     # A summary does not say where formulas stand.
     yield from ((formula.id, document.source.span(0, 0)) for formula in document.equations)
     if document.summaries is None:
@@ -127,8 +128,7 @@ def _anchors(document: Document) -> Iterator[tuple[str, Span]]:
         elif isinstance(block, Script):
             yield listing_anchor(block.path), block.span
         elif isinstance(block, Recording) and block.script is not None:
-            outputs[block.script] = outputs.get(block.script, 0) + 1
-            yield output_anchor(block.script, outputs[block.script]), block.span
+            yield output_anchor(block.script, numbers[block.span.start]), block.span
         elif isinstance(block, HtmlBlock):
             yield from ((id, block.span) for id in _HTML_ID.findall(block.html))
         for inline in walk_inlines(block_inlines(block)):

@@ -13,7 +13,13 @@ from typing import NamedTuple
 
 from coursebuild.core.model.blocks import Document, FeatureBlock, Heading
 from coursebuild.core.model.inlines import Label
-from coursebuild.core.model.walk import block_formulas, child_blocks, document_blocks, walk_blocks
+from coursebuild.core.model.walk import (
+    block_formulas,
+    child_blocks,
+    document_blocks,
+    find_blocks,
+    walk_blocks,
+)
 from coursebuild.core.text.source import key_of, unique_name
 
 
@@ -32,8 +38,7 @@ def feature_block_ids(document: Document) -> frozenset[int]:
     """The Python ids of the blocks of features and of all blocks inside them."""
     return frozenset(
         id(block)
-        for holder in document_blocks(document)
-        if isinstance(holder, FeatureBlock)
+        for holder in find_blocks(document, FeatureBlock)
         for block in (holder, *walk_blocks(child_blocks(holder)))
     )
 

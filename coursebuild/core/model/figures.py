@@ -12,7 +12,12 @@ from msgspec import Struct
 from coursebuild.core.model.addresses import local_file
 from coursebuild.core.model.blocks import Document, FigureName, Paragraph, Script
 from coursebuild.core.model.inlines import Image
-from coursebuild.core.model.walk import block_inlines, document_blocks, walk_inlines
+from coursebuild.core.model.walk import (
+    block_inlines,
+    document_blocks,
+    document_scripts,
+    walk_inlines,
+)
 from coursebuild.core.text.source import Span
 
 
@@ -56,8 +61,7 @@ def unshown_figures(document: Document) -> tuple[FigureName, ...]:
     shown_names = {(figure.script, figure.name) for figure in recorded_figures(document)}
     return tuple(
         figure
-        for block in document_blocks(document)
-        if isinstance(block, Script)
-        for figure in block.figures
-        if (block.path, figure.name) not in shown_names
+        for script in document_scripts(document)
+        for figure in script.figures
+        if (script.path, figure.name) not in shown_names
     )

@@ -1,14 +1,14 @@
 """Walking a document: every block and every inline in order.
 
 Entry points: `document_blocks`, `document_inlines`, and `find_blocks`, `find_inlines` for those of
-one type; `document_scripts`, `sibling_groups`; `walk_blocks`, `walk_inlines` and `block_formulas`;
-`is_blank`, `is_comment`.
+one type; `document_scripts`, `output_numbers`, `sibling_groups`; `walk_blocks`, `walk_inlines` and
+`block_formulas`; `is_blank`, `is_comment`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TypeVar
 
 from coursebuild.core.model.blocks import (
@@ -129,6 +129,20 @@ def document_blocks(document: Document) -> Iterator[Block]:
 def find_blocks(document: Document, kind: type[AnyBlock]) -> Iterator[AnyBlock]:
     """The blocks of a type in a document."""
     return (block for block in document_blocks(document) if isinstance(block, kind))
+
+
+def output_numbers(document: Document) -> Mapping[int, int]:
+    """The number of each recording among the outputs of its script, from 1, by offset."""
+
+    def count() -> dict[int, int]:
+        counts: dict[str, int] = {}
+        numbers: dict[int, int] = {}
+        for block in find_blocks(document, Recording):
+            if block.script is not None:
+                counts[block.script] = numbers[block.span.start] = counts.get(block.script, 0) + 1
+        return numbers
+
+    return computed_once(document, "output_numbers", count)
 
 
 def sibling_groups(document: Document) -> Iterator[tuple[Block, ...]]:

@@ -29,6 +29,7 @@ from coursebuild.core.model import (
     line_anchor,
     listing_anchor,
     output_anchor,
+    output_numbers,
 )
 from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.model.results import Outcome
@@ -154,10 +155,11 @@ class OutputView(Struct, frozen=True):
 
 
 def _output(page: PageContext, block: Recording) -> OutputView:
+    numbers = output_numbers(page.document)
     return OutputView(
         caption=page.inlines(block.caption),
         path=block.script or "",
-        anchor=output_anchor(block.script, page.outputs[block.span.start]) if block.script else "",
+        anchor=output_anchor(block.script, numbers[block.span.start]) if block.script else "",
         text=None if isinstance(block.body, Table) else visible(block.body.text).rstrip("\n"),
         table=page.blocks((block.body,)) if isinstance(block.body, Table) else None,
         receipt=output_receipt(page, block),

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from html import unescape
 
 from msgspec import Struct
@@ -39,28 +39,20 @@ class PageFacts(Struct, frozen=True):
 
 
 _FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
-_SIGN = re.compile(
-    r"(?:[\x00-%'-;=-\x7f]++|<[^>]*+>)*+"
-    r"([^\x00-\x7f]|&(?:#[0-9]+;?|#[xX][0-9a-fA-F]+;?|[^\t\n\f <&#;]{1,32};?)|[<&])?"
-)
-"""A character outside ASCII, or what may be a character reference, as in `html.unescape`. The match
-includes everything before it, tags skipped, so that no place is scanned twice.
-"""
+_TAG = re.compile(r"<[^>]*+>")
 
 
 def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:
-    """The characters of a page's text, without most of ASCII, and those of its formulas."""
+    """The characters outside ASCII of a page's text and of its formulas; see `PageFacts`."""
     parts = _FORMULA.split(html)
-    text = _characters("".join(parts[::2]))
-    mathematics = {c for c in _characters("\n".join(parts[1::2])) if not c.isascii()}
-    if len(parts) > 1:
-        mathematics.add(" ")
-    return frozenset(text), frozenset(mathematics)
+    text, mathematics = _characters(parts[::2]), _characters(parts[1::2])
+    return text, mathematics | {" "} if len(parts) > 1 else mathematics
 
 
-def _characters(html: str) -> set[str]:
-    """The characters of the text of a piece of HTML, without most of ASCII."""
-    return set[str]().union(*map(unescape, set(_SIGN.findall(html))))
+def _characters(parts: Iterable[str]) -> frozenset[str]:
+    """The characters outside ASCII of the text of pieces of HTML."""
+    text = unescape(_TAG.sub("\n", "\n".join(parts)))
+    return frozenset(character for character in set(text) if not character.isascii())
 
 
 def common_characters(library: Library) -> frozenset[str]:

@@ -30,7 +30,6 @@ from coursebuild.core.model import (
     Script,
     Target,
     UrlTarget,
-    document_blocks,
     sibling_groups,
 )
 from coursebuild.core.pages import blocks, formulas, urls
@@ -56,16 +55,6 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     def script_outputs(self) -> Mapping[int, tuple[Recording, ...]]:
         """The recordings drawn together with a script, by the script's offset."""
         return dict(_outputs_of_scripts(self.document))
-
-    @cached_property
-    def outputs(self) -> Mapping[int, int]:
-        """The number of each recording among the outputs of its script, from 1, by offset."""
-        counts: dict[str, int] = {}
-        numbers: dict[int, int] = {}
-        for block in document_blocks(self.document):
-            if isinstance(block, Recording) and block.script is not None:
-                counts[block.script] = numbers[block.span.start] = counts.get(block.script, 0) + 1
-        return numbers
 
     @cached_property
     def equations(self) -> Mapping[int, Equation]:

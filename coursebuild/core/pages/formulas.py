@@ -33,10 +33,11 @@ _WHOLE = re.compile(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", r
 _ANNOTATION = re.compile(r"<annotation\b.*?</annotation>", re.DOTALL)
 _TAG = re.compile(r"<[^>]*>")
 _PIECE = re.compile(r"<math>.*?</math>", re.DOTALL)
-_OPENING = frozenset("([“‘\"'")
 _GLUE_START, _GLUE_END = '<span class="held">', "</span>"
 _FORMULAS_WITH_PUNCTUATION = re.compile(
-    r"""((?:<math>.*?</math>)+)((?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*)""", re.DOTALL
+    r"""([(\[“‘"']*+)((?:<math>.*?</math>)+)"""
+    r"""((?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*)""",
+    re.DOTALL,
 )
 
 _RELATIONS = frozenset("=<>≤≥≠≈≡∼≃≅∝→←↔⇒⇐⇔↦⟶⟹∈∉⊂⊆⊃⊇≪≫≔:")
@@ -47,7 +48,6 @@ _LAST = re.compile(
     rf"""<mo(?: lspace="0em")?(?=>(?:{_SIGN})</mo>(?:</mrow>)*+"""
     r"""(?:<annotation\b[^<]*</annotation></semantics>)?</math>\s)"""
 )
-_END = re.compile(r"</math>(?=\s)")
 _OPEN, _CLOSE, _BAR = frozenset("([{⟨⌊⌈"), frozenset(")]}⟩⌋⌉"), frozenset("|‖∥∣")
 
 
@@ -134,38 +134,11 @@ def wrap_wide_pieces(html: str, label: str) -> str:
 
 def glue_formulas(html: str) -> str:
     """Glue each inline formula of a page to its punctuation and unit (steps 3 and 4)."""
-    html = _remove_outer_space(html)
-    parts: list[str] = []
-    position = 0
-    start = html.find("<math>")
-    while start >= 0:
-        match = _FORMULAS_WITH_PUNCTUATION.match(html, start)
-        if match is None:
-            break
-        before = start
-        while before > position and html[before - 1] in _OPENING:
-            before -= 1
-        if before < start or match[2]:
-            parts += (html[position:before], _glue_formula(html[before:start], match[1], match[2]))
-            position = match.end()
-        start = html.find("<math>", match.end())
-    return "".join((*parts, html[position:]))
-
-
-def _remove_outer_space(html: str) -> str:
-    """Remove the space of operators at the ends of formulas, next to a space (step 4)."""
     html = _FIRST.sub(r'\g<0> lspace="0em"', html)
-    parts: list[str] = []
-    position = previous_end = 0
-    for end in _END.finditer(html):
-        # The last operator before this end, unless it belongs to an earlier formula.
-        start = html.rfind("<mo", previous_end, end.start())
-        match = _LAST.match(html, start) if start >= 0 else None
-        previous_end = end.end()
-        if match is not None:
-            parts += (html[position : match.end()], ' rspace="0em"')
-            position = match.end()
-    return "".join((*parts, html[position:]))
+    html = _LAST.sub(r'\g<0> rspace="0em"', html)
+    return _FORMULAS_WITH_PUNCTUATION.sub(
+        lambda match: _glue_formula(*match.groups()) if match[1] or match[3] else match[0], html
+    )
 
 
 def _glue_formula(before: str, formula: str, after: str) -> str:

@@ -21,7 +21,8 @@ from coursebuild.core.model import (
     block_formulas,
     block_inlines,
     document_blocks,
-    document_inlines,
+    find_blocks,
+    find_inlines,
     walk_inlines,
 )
 from coursebuild.core.model.blocks import title_line
@@ -105,13 +106,9 @@ def _check_placement(document: Document) -> tuple[Diagnostic, ...]:
 
 def _check_ids_of_terms(document: Document) -> Iterator[Diagnostic]:
     """Report headings whose explicit ids are those of terms."""
-    terms = {
-        inline.anchor: inline.span
-        for inline in document_inlines(document)
-        if isinstance(inline, Term)
-    }
-    for block in document_blocks(document):
-        if isinstance(block, Heading) and block.anchor in terms:
-            notes = [Note("it is that of this term", terms[block.anchor])]
-            message = f"the id `{block.anchor}` is already used"
-            yield diagnose("anchor-repeated", block.span, message, notes=notes)
+    terms = {term.anchor: term.span for term in find_inlines(document, Term)}
+    for heading in find_blocks(document, Heading):
+        if heading.anchor in terms:
+            notes = [Note("it is that of this term", terms[heading.anchor])]
+            message = f"the id `{heading.anchor}` is already used"
+            yield diagnose("anchor-repeated", heading.span, message, notes=notes)

@@ -17,7 +17,7 @@ from coursebuild.core.model import (
     Lesson,
     LessonTarget,
     Link,
-    document_inlines,
+    find_inlines,
     resolve,
 )
 from coursebuild.core.syntax.nodes import ObjectNode, StringNode
@@ -35,9 +35,7 @@ def rename_references(course: Course, lesson: Lesson, new: str) -> list[Edit]:
     edits = {(e.span.path, e.span.start): e for e in _map_edits(course, lesson, new)}
     name = re.compile(rf"(?<![\w.]){re.escape(lesson.id)}(?!\w|\.\w)")
     for document in course.documents:
-        for inline in document_inlines(document):
-            if not isinstance(inline, Link):
-                continue
+        for inline in find_inlines(document, Link):
             target = resolve(inline.target, course, document.source.path)
             if isinstance(target, LessonTarget) and target.id == lesson.id:
                 span = inline.target_span

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 
-from coursebuild.core.model import Course, Document, FeatureBlock, document_blocks
+from coursebuild.core.model import Course, Document, FeatureBlock, find_blocks
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.model.scenarios import keyframe_scenarios
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
@@ -18,9 +18,8 @@ from coursebuild.features.bench.model import Bench, declared_scenarios
 def check_benches(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
     """Report mistakes of `bench` fences that the course alone shows."""
     for document in documents:
-        for block in document_blocks(document):
-            if isinstance(block, Bench):
-                yield from _check(block, course)
+        for block in find_blocks(document, Bench):
+            yield from _check(block, course)
 
 
 def check_keyframes(
@@ -28,8 +27,8 @@ def check_keyframes(
 ) -> Iterator[Diagnostic]:
     """Report unknown scenarios of models that declare none: there, keyframes are scenarios."""
     for document in course.documents:
-        for block in document_blocks(document):
-            if isinstance(block, Bench) and not declared_scenarios(course, block.model):
+        for block in find_blocks(document, Bench):
+            if not declared_scenarios(course, block.model):
                 facts = facts_of(block)
                 if facts is not None:
                     yield from _check_scenario(block, keyframe_scenarios(facts.keyframes))

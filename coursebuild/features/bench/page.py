@@ -15,7 +15,7 @@ from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model import document_blocks, scenario_anchor
+from coursebuild.core.model import find_blocks, scenario_anchor
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.marks import escape_marks, guard_lines
 from coursebuild.features.bench.figures import Grid, machine_text
@@ -87,7 +87,7 @@ def draw_bench(page: PageContext, block: Bench) -> Markup:
     drawings: tuple[Markup, ...] = ()
     if view.scenario is not None and "plot" in block.shows:
         # The blocks of a page are numbered.
-        places = [b.span.start for b in document_blocks(page.document) if isinstance(b, Bench)]
+        places = [b.span.start for b in find_blocks(page.document, Bench)]
         drawings = plots(f"_bench-{places.index(block.span.start) + 1}", view.scenario.report)
     return page.template("bench/bench.html", bench=view, plots=drawings)
 

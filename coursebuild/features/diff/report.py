@@ -13,7 +13,7 @@ from typing import TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model import Comparison, Course, Recording, document_blocks
+from coursebuild.core.model import Comparison, Course, Recording, find_blocks
 from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.pages.marks import fence, table
 from coursebuild.core.registry import feature_trials
@@ -119,13 +119,12 @@ def _changes(
 def _scripts(course: Course) -> dict[str, ScriptState]:
     outputs: dict[str | None, list[Recording]] = {}
     for document in course.documents:
-        for block in document_blocks(document):
-            if isinstance(block, Recording):
-                body = block.body if isinstance(block.body, Excerpt) else None
-                text = body or Excerpt.of_span(block.body_span)
-                comparison = block.comparison or course.comparison
-                output = replace(block, body=text, comparison=comparison)
-                outputs.setdefault(block.script, []).append(output)
+        for block in find_blocks(document, Recording):
+            body = block.body if isinstance(block.body, Excerpt) else None
+            text = body or Excerpt.of_span(block.body_span)
+            comparison = block.comparison or course.comparison
+            output = replace(block, body=text, comparison=comparison)
+            outputs.setdefault(block.script, []).append(output)
     return {
         script.path: ScriptState(script.owner, script.text, tuple(outputs.get(script.path, ())))
         for script in extract(course).value

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from msgspec.structs import replace
 
 from coursebuild.core.features import Picture
-from coursebuild.core.model import Course, Document, FeatureBlock, MjcfModel, document_blocks
+from coursebuild.core.model import Course, Document, FeatureBlock, MjcfModel, find_blocks
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import BY_LAB, Library
 from coursebuild.core.pages.renderer import Renderer
@@ -35,7 +35,7 @@ def gallery_labs(course: Course) -> Iterator[tuple[MjcfModel, Lab]]:
 def _labs_by_model(document: Document) -> dict[str, Lab]:
     """Map models to their first labs; those in questions are left out, as in summaries."""
     labs: dict[str, Lab] = {}
-    blocks = [block for block in document_blocks(document) if isinstance(block, FeatureBlock)]
+    blocks = [*find_blocks(document, FeatureBlock)]
     outer_spans = [block.span for block in blocks if not isinstance(block, Lab)]
     for lab in blocks:
         if isinstance(lab, Lab) and not any(span.contains(lab.span) for span in outer_spans):

@@ -234,10 +234,8 @@ class _Lookup:
         formula_symbols = symbols(mathml(formula))
         declarations = [
             math
-            for math in model.document_inlines(self.document)
-            if isinstance(math, model.Math)
-            and math.meaning
-            and only_symbol(mathml(math)) in formula_symbols
+            for math in model.find_inlines(self.document, model.Math)
+            if math.meaning and only_symbol(mathml(math)) in formula_symbols
         ]
         if not declarations:
             return None

@@ -185,9 +185,8 @@ def _links(texts: OpenTexts) -> Iterator[tuple[model.Link, model.Target]]:
         path = document.source.path
         is_open = path in texts.session.open_texts
         open_document = texts.document(texts.source(path)) if is_open else None
-        for inline in model.document_inlines(open_document or document):
-            if isinstance(inline, model.Link):
-                yield inline, model.resolve(inline.target, course, path)
+        for link in model.find_inlines(open_document or document, model.Link):
+            yield link, model.resolve(link.target, course, path)
 
 
 def _resolve_anchor(library: Library, target: model.Target, path: str) -> tuple[str, str]:

@@ -22,7 +22,7 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import CourseFiles, read_bytes
 from coursebuild.core.files.temporary import temporary_folder
-from coursebuild.core.model import Course, FeatureBlock, document_blocks
+from coursebuild.core.model import Course, FeatureBlock, find_blocks
 from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.scripts.extract import extract
 from coursebuild.features.lab.model import Lab
@@ -70,8 +70,8 @@ def _may_use(text: str, model: str) -> bool:
 def _block_readers(course: Course, model: str) -> Iterator[Reader]:
     """Yield the labs and other blocks that show a model."""
     for document in course.documents:
-        for block in document_blocks(document):
-            if not isinstance(block, FeatureBlock) or model not in block.models():
+        for block in find_blocks(document, FeatureBlock):
+            if model not in block.models():
                 continue
             place = f"{block.span.path}:{block.span.line}"
             kinds = frozenset(VIEWS.values()) - _NOT_DRAWN
@@ -140,8 +140,8 @@ class Reruns:
         showing_documents = {
             document.source.path
             for document in self.course.documents
-            for block in document_blocks(document)
-            if isinstance(block, FeatureBlock) and self.scene.name in block.models()
+            for block in find_blocks(document, FeatureBlock)
+            if self.scene.name in block.models()
         }
         labs = [trial for trial in results.trials if trial.span.path in showing_documents]
         self._documents = frozenset(
