@@ -183,10 +183,12 @@ def typeset(course: Course) -> tuple[tuple[Formula, str | MathError], ...]:
 def measure_lessons(course: Course, results: Results, repeat: int) -> None:
     """The cost of each step for a lesson: time of one core, without caches between lessons."""
     library = Library(course, results, Assets(template_texts(), Bundle()))
-    texts = {document.source.path: document for document in course.documents}
-    page_inputs = (page.inputs(library) for page in page_list(library))
-    pages = [(inputs, texts[inputs.document]) for inputs in page_inputs if inputs.document]
-    kinds = frozenset(kind.name for kind in course.callouts)
+    pages = [
+        (page.inputs(library), document)
+        for page in page_list(library)
+        if (document := page.document(library)) is not None
+    ]
+    kinds = course.callout_names
     scripts = [script.code.text for script, _ in library.scripts.values()]
     renderer = library.renderer
 

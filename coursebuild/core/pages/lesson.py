@@ -99,7 +99,6 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
         PageHead(place.path, "lesson", lesson.title, lesson.summary, data),
         "lesson.html",
         values,
-        document=document.source.path,
         document_inputs=document_inputs(library, place, document),
     )
 
@@ -128,7 +127,7 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
             lesson_link(library, place, follower) for follower in library.leads[lesson.id]
         ),
         "graph": neighbourhood(library, place, lesson),
-        "referrers": owner_links(library, place, library.referrers.get(lesson.id, ())),
+        "referrers": owner_links(place, library.referrers.get(lesson.id, ())),
         "previous": lesson_link(library, place, order[position - 1]) if position else None,
         "following": lesson_link(library, place, order[position + 1])
         if position + 1 < len(order)

@@ -55,7 +55,8 @@ _ORIGIN = "https://site.invalid"
 
 
 Reference: TypeAlias = tuple[str, str]
-"""A site path and an anchor there, perhaps empty; the path is empty if the address is wrong."""
+"""A site path and an anchor there, perhaps empty. If the address is wrong, the path is empty, and
+words for what is wrong stand for the anchor."""
 
 
 class BrokenLink(Struct, frozen=True):
@@ -105,12 +106,8 @@ def ids_and_addresses(html: str) -> tuple[frozenset[str], frozenset[str]]:
 
 def references(path: str, addresses: Iterable[str], base_url: str) -> frozenset[Reference]:
     """The targets of the addresses in a page."""
-    targets: set[Reference] = set()
-    for url in addresses:
-        target = _target(path, url, base_url)
-        if target is not None:
-            targets.add(target if isinstance(target, tuple) else ("", target))
-    return frozenset(targets)
+    targets = (_target(path, url, base_url) for url in addresses)
+    return frozenset(target for target in targets if target is not None)
 
 
 def has_anchor(ids: Collection[str], anchor: str) -> bool:
@@ -147,18 +144,18 @@ def _base(base_url: str) -> tuple[str, str]:
     return f"{parts.path.rstrip('/')}/", host
 
 
-def _target(path: str, url: str, base_url: str) -> Reference | str | None:
-    """The file and anchor of an address, or what is wrong; `None` for another site."""
+def _target(path: str, url: str, base_url: str) -> Reference | None:
+    """The target of an address; `None` for another site."""
     folder, site_host = _base(base_url)
     try:
         parts = urlsplit(urljoin(_ORIGIN + folder + urls.encode(path), url.strip()))
     except ValueError:
-        return "the address cannot be read"
+        return "", "the address cannot be read"
     host = f"{parts.scheme}://{parts.netloc}"
     if host not in (_ORIGIN, site_host):
         return None
     if not f"{parts.path}/".startswith(folder):
-        return "the address leads out of the site" if host == _ORIGIN else None
+        return ("", "the address leads out of the site") if host == _ORIGIN else None
     target = unquote(parts.path[len(folder) :])
     if not target or target.endswith("/"):
         target += urls.HOME
@@ -178,9 +175,9 @@ def _find_problem(
     resolved = _target(path, url, base_url)
     if resolved is None:
         return None
-    if isinstance(resolved, str):
-        return broken(resolved)
     target, anchor = resolved
+    if not target:
+        return broken(anchor)
     if target not in files:
         return broken(f"no file `{target}` in the site", nearest(target, files, cutoff=0.7))
     if anchor in ("", "top") or target not in ids or has_anchor(ids[target], anchor):

@@ -39,13 +39,9 @@ def owner_link(place: urls.Place, owner: Owner, anchor: str = "") -> OwnerLink:
     return OwnerLink(place.href(urls.owner_path(owner), anchor or None), id, owner.title)
 
 
-def owner_links(library: Library, place: urls.Place, owners: Sequence[Owner]) -> OwnerLinks:
-    """The links to lessons and pages, with the titles in the current map."""
-    current = (
-        library.lessons[owner.id] if isinstance(owner, Lesson) else library.pages[owner.id]
-        for owner in owners[:MAX_LINKS]
-    )
-    visible = tuple(owner_link(place, owner) for owner in current)
+def owner_links(place: urls.Place, owners: Sequence[Owner]) -> OwnerLinks:
+    """The links to lessons and pages."""
+    visible = tuple(owner_link(place, owner) for owner in owners[:MAX_LINKS])
     return OwnerLinks(visible, max(0, len(owners) - MAX_LINKS))
 
 

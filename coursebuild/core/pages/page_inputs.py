@@ -124,6 +124,5 @@ class PageInputs(Struct, frozen=True):
     template: str
     values: Mapping[str, object]
     """Values for the template; each `HighlightedFile`, `AddedParts` or `LessonGraph` is drawn."""
-    document: str | None = None
-    """The path of its document, whose text and contents the template also gets."""
     document_inputs: DocumentInputs | None = None
+    """Those of its document, if it has one, whose text and contents the template also gets."""

@@ -98,14 +98,13 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
         "models": len(course.models),
         "gallery": place.href(library.gallery) if library.gallery else "",
         "numerics": place.href(urls.NUMERICS) if library.reports.cases else "",
+        "article": "",  # without a document
         "scripts": len(library.scripts),
         "scripts_zip": place.href(urls.EXAMPLES_ZIP) if library.scripts else None,
     }
     head = PageHead(urls.HOME, "home", course.title, course.summary, meta.course_data(library))
-    if document is None:
-        return PageInputs(head, "home.html", {**values, "article": ""})
-    inputs = document_inputs(library, place, document)
-    return PageInputs(head, "home.html", values, document.source.path, inputs)
+    inputs = None if document is None else document_inputs(library, place, document)
+    return PageInputs(head, "home.html", values, inputs)
 
 
 def _pictures_of(library: Library, place: urls.Place, owner: Owner) -> tuple[PictureLink, ...]:
@@ -265,7 +264,6 @@ def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
         PageHead(place.path, "page", page.title, ""),
         "page.html",
         {"title": page.title, "edit": edit_address(library, page.path)},
-        document=document.source.path,
         document_inputs=document_inputs(library, place, document),
     )
 

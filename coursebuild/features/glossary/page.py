@@ -59,7 +59,7 @@ def _term_entries(library: Library, place: urls.Place) -> Iterator[TermEntry]:
                 ids.add(term.id)
                 term_users = [user for user in users.get(term.id, ()) if user is not owner]
                 link = owner_link(place, owner, f"term:{term.id}")
-                yield TermEntry(term, link, owner_links(library, place, term_users))
+                yield TermEntry(term, link, owner_links(place, term_users))
 
 
 def sort_key(name: str) -> tuple[object, ...]:

@@ -91,10 +91,10 @@ def _symbol_view(library: Library, place: urls.Place, row: CourseSymbol) -> Symb
     return SymbolView(
         Markup(f"<math>{row.first.symbol}</math>"),
         tuple(
-            MeaningView(text, unit, owner_links(library, place, owners) if is_ambiguous else None)
+            MeaningView(text, unit, owner_links(place, owners) if is_ambiguous else None)
             for (text, unit), owners in row.meanings.items()
         ),
         owner_link(place, row.owners[0], anchor),
         section,
-        owner_links(library, place, row.owners[1:]),
+        owner_links(place, row.owners[1:]),
     )
