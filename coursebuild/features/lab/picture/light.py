@@ -20,8 +20,8 @@ from coursebuild.features.lab.picture.shapes import Array, unit
 _AMBIENT, _FRONT, _TOP = 0.35, 0.25, 0.6
 """Light of a model without lights: from all sides, from the camera, and most from above, so that no
 two sides of a box look alike."""
-_LAMP = (0.25, -0.35, 0.9)
-"""Direction of the light from above."""
+LAMP = (0.25, -0.35, 0.9)
+"""Direction of the light from above, which throws the shadows."""
 _STUDIO_GLOSS = 0.5
 """Strength of highlights in a model without lights."""
 _SPECULAR, _SHININESS = 0.5, 0.5
@@ -91,7 +91,7 @@ def material_of(scene: dict[str, Any], index: int) -> Material:
 
 def studio(forward: Array) -> Light:
     """Return the light of a model without lights, for a camera that looks along `forward`."""
-    down = -np.array(_LAMP) / np.linalg.norm(_LAMP)
+    down = -np.array(LAMP) / np.linalg.norm(LAMP)
     point_lights = (PointLight(np.full(3, _FRONT), forward), PointLight(np.full(3, _TOP), down))
     return Light(np.full(3, _AMBIENT), point_lights, _STUDIO_GLOSS)
 

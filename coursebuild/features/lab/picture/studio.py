@@ -11,6 +11,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from coursebuild.features.lab.picture.light import LAMP
 from coursebuild.features.lab.picture.raster import Eye, GBuffer, rotate
 from coursebuild.features.lab.picture.shapes import Array, Surface, join_surfaces
 
@@ -19,8 +20,6 @@ _GREY, _EDGE_GREY = 0.5, 0.42
 _SHADOW, _POINTS, _WIDTH = 0.32, 10, 0.08
 _GOLDEN = np.pi * (3 - np.sqrt(5))
 """Points at multiples of this angle lie evenly on a disc."""
-_LAMP = (0.25, -0.35, 0.9)
-"""Direction of the light that throws the shadows."""
 _EDGE_SAMPLES = 2
 _DEPTH_TOLERANCE = 1e-3
 
@@ -70,9 +69,9 @@ class Floor(Struct, frozen=True):
         shade = np.zeros_like(depth)
         for i in range(_POINTS):
             angle, radius = _GOLDEN * i, _WIDTH * np.sqrt((i + 0.5) / _POINTS)
-            slope = radius * np.array((np.cos(angle), np.sin(angle))) + _LAMP[:2]
+            slope = radius * np.array((np.cos(angle), np.sin(angle))) + LAMP[:2]
             elevation = joined_surface.vertices[:, 2:] - height
-            flat = joined_surface.vertices[:, :2] - elevation * slope / _LAMP[2]
+            flat = joined_surface.vertices[:, :2] - elevation * slope / LAMP[2]
             vertices = np.column_stack((flat, np.full(len(flat), height)))
             film = GBuffer(eye)
             shadow = Surface(vertices, joined_surface.normals, joined_surface.faces)
