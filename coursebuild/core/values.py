@@ -3,10 +3,10 @@
 Entry points: `encode` and `decode`; `fingerprint`, a hash that is the same for equal values.
 
 1. A value consists of texts, numbers, tuples, lists, sets, mappings, structs and members of enums.
-   In MessagePack each becomes a list: a number for its type, then its parts. Classes have numbers
-   from 16 on; their names stand before the value.
-2. Of the classes named there, only structs, named tuples and enums of this package and of features
-   are instantiated, and only if each field is of its type.
+   In MessagePack each that is no scalar becomes a list: a number for its type, then its parts. The
+   names of structs, named tuples and enums stand before the value.
+2. Of the classes named there, only those of this package and of features are instantiated, and only
+   if each field is of its type.
 3. All places in a value are in one source. `encode` leaves it out, `decode` puts it in again.
 """
 
@@ -18,8 +18,9 @@ import hashlib
 import importlib
 import sys
 import zlib
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from decimal import Decimal
+from itertools import chain
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -31,13 +32,23 @@ from coursebuild.core.text.source import Excerpt, Source, Span
 
 Value = TypeVar("Value")
 
-_TUPLE, _LIST, _SET, _MAPPING, _MARKUP, _TEXT, _NUMBER, _SOURCE, _SPAN, _EXCERPT, _DECIMAL = range(
-    11
-)
-_FIRST_CLASS = 16
 _PLAIN = frozenset((type(None), bool, float, bytes))
 _MIN_INT, _INT_END = -(1 << 63), 1 << 64
 """MessagePack holds integers from the first up to the second; others are packed as texts."""
+_PARTS: dict[type, Callable[[Any], Iterable[Any]]] = {
+    tuple: iter,
+    list: iter,
+    frozenset: iter,
+    dict: lambda value: chain.from_iterable(value.items()),
+    Markup: lambda value: (str(value),),
+    str: lambda value: (value.encode("utf-8", "surrogatepass"),),
+    int: lambda value: (str(value),),
+    Source: lambda value: (),
+    Span: lambda value: (value.start, value.end),
+    Excerpt: lambda value: (value.text, *chain.from_iterable(value.pieces)),
+    Decimal: lambda value: (str(value),),
+}
+"""What a value of each type consists of. The number of a type is its index; others come after."""
 _VALUE_PACKAGES = tuple(
     f"coursebuild.{part}." for part in ("core.model", "core.pages", "features", "numerics")
 )
@@ -90,11 +101,12 @@ def fingerprint(
 class _Encoder:
     def __init__(self, substitutes: Mapping[type, Callable[[Any], object]] | None = None) -> None:
         self._substitutes = substitutes or {}
-        self._class_numbers: dict[type, int] = {}
+        self._class_numbers = {kind: number for number, kind in enumerate(_PARTS)}
 
     def bytes(self, value: object) -> bytes:
         packed = self.pack(value)
-        names = [f"{kind.__module__}:{kind.__qualname__}" for kind in self._class_numbers]
+        kinds = [*self._class_numbers][len(_PARTS) :]
+        names = [f"{kind.__module__}:{kind.__qualname__}" for kind in kinds]
         return msgspec.msgpack.encode((names, packed))
 
     def pack(self, value: Any) -> Any:
@@ -103,94 +115,71 @@ class _Encoder:
         if kind in self._substitutes:
             value = self._substitutes[kind](value)
             kind = type(value)
-        if kind is str:
-            return value if value.isascii() else _pack_text(value)
-        if kind is int:
-            return value if _MIN_INT <= value < _INT_END else [_NUMBER, str(value)]
-        if kind in _PLAIN:
+        if (
+            (kind is int and _MIN_INT <= value < _INT_END)
+            or (kind is str and (value.isascii() or _is_utf8(value)))
+            or kind in _PLAIN
+        ):
             return value
+        kind = frozenset if kind is set else kind
+        parts: Iterable[Any]
+        if kind in _PARTS:
+            parts = _PARTS[kind](value)
+        elif isinstance(value, Struct):
+            parts = [getattr(value, name) for name in value.__struct_fields__]
+        elif isinstance(value, enum.Enum):
+            parts = (value.name,)
+        elif isinstance(value, tuple):
+            parts = value
+        else:
+            raise TypeError(f"a {kind.__qualname__} cannot be kept")
         pack = self.pack
-        if kind is tuple:
-            return [_TUPLE, *[pack(part) for part in value]] if value else []
-        if kind is Span:
-            return [_SPAN, value.start, value.end]
-        if kind is Excerpt:
-            offsets = [offset for piece in value.pieces for offset in piece]
-            return [_EXCERPT, pack(value.text), *offsets]
-        if kind is Source:
-            return [_SOURCE]
-        if isinstance(value, Struct):
-            fields = [pack(getattr(value, name)) for name in value.__struct_fields__]
-            return [self._class_number(kind), *fields]
-        return self._pack_rare(kind, value)
-
-    def _pack_rare(self, kind: type, value: Any) -> Any:
-        pack = self.pack
-        if isinstance(value, enum.Enum):
-            return [self._class_number(kind), value.name]
-        if kind is dict:
-            return [_MAPPING, *[pack(part) for item in value.items() for part in item]]
-        if kind is list:
-            return [_LIST, *[pack(part) for part in value]]
-        if kind in (set, frozenset):
-            return [_SET, *sorted((pack(part) for part in value), key=msgspec.msgpack.encode)]
-        if kind is Decimal:
-            return [_DECIMAL, str(value)]
-        if kind is Markup:
-            return [_MARKUP, pack(str(value))]
-        if isinstance(value, tuple):
-            return [self._class_number(kind), *[pack(part) for part in value]]
-        raise TypeError(f"a {kind.__qualname__} cannot be kept")
-
-    def _class_number(self, kind: type) -> int:
-        return self._class_numbers.setdefault(kind, len(self._class_numbers) + _FIRST_CLASS)
+        items = [pack(part) for part in parts]
+        if kind is frozenset:
+            items.sort(key=msgspec.msgpack.encode)
+        return [self._class_numbers.setdefault(kind, len(self._class_numbers)), *items]
 
 
-def _pack_text(text: str) -> Any:
+def _is_utf8(text: str) -> bool:
+    """Whether a text has no lone surrogate, as JSON may have one."""
     try:
-        text.encode()
-    except UnicodeEncodeError:  # a lone surrogate, as JSON may have one
-        return [_TEXT, text.encode("utf-8", "surrogatepass")]
-    return text
+        return bool(text.encode())
+    except UnicodeEncodeError:
+        return False
 
 
 def _make_builder(names: list[str], source: Source | None) -> Callable[[list[Any]], Any]:
     """Return the function that builds a value of a packed list."""
+
+    def span(start: Any, end: Any) -> Span:
+        if type(start) is not int or type(end) is not int or source is None:
+            raise TypeError("no span")
+        return Span(source, start, end)
 
     def excerpt(text: Any, *offsets: Any) -> Excerpt:
         if source is None or not isinstance(text, str) or set(map(type, offsets)) != {int}:
             raise TypeError("no excerpt")
         return Excerpt(source, text, tuple(zip(offsets[::2], offsets[1::2], strict=True)))
 
-    constructors: dict[int, Callable[..., Any]] = {
-        _LIST: lambda *items: list(items),
-        _SET: lambda *items: frozenset(items),
-        _MAPPING: lambda *items: dict(zip(items[::2], items[1::2], strict=True)),
-        _MARKUP: Markup,
-        _TEXT: lambda data: data.decode("utf-8", "surrogatepass"),
-        _NUMBER: int,
-        _DECIMAL: Decimal,
-        _SOURCE: lambda: source,
-        _EXCERPT: excerpt,
+    constructors: dict[type, Callable[..., Any]] = {
+        tuple: lambda *items: items,
+        list: lambda *items: list(items),
+        frozenset: lambda *items: frozenset(items),
+        dict: lambda *items: dict(zip(items[::2], items[1::2], strict=True)),
+        int: int,
+        str: lambda data: data.decode("utf-8", "surrogatepass"),
+        Decimal: Decimal,
+        Markup: Markup,
+        Span: span,
+        Excerpt: excerpt,
+        Source: lambda: source,
     }
-    constructors.update(
-        (number, _make_constructor(_find_class(name)))
-        for number, name in enumerate(names, _FIRST_CLASS)
-    )
+    by_number = [constructors[kind] for kind in _PARTS]
+    by_number += [_make_constructor(_find_class(name)) for name in names]
 
     def build(packed: list[Any]) -> Any:
-        if not packed:
-            return ()
-        head = packed[0]
-        if head == _SPAN:  # the commonest by far, so it goes first
-            _, start, end = packed
-            if type(start) is not int or type(end) is not int or source is None:
-                raise TypeError("no span")
-            return Span(source, start, end)
-        items = [build(part) if type(part) is list else part for part in packed]
-        if head == _TUPLE:
-            return tuple(items[1:])
-        return constructors[head](*items[1:])
+        number, *parts = packed
+        return by_number[number](*[build(part) if type(part) is list else part for part in parts])
 
     return build
 
@@ -198,7 +187,9 @@ def _make_builder(names: list[str], source: Source | None) -> Callable[[list[Any
 def _find_class(name: str) -> type:
     """The class of a name, `MODULE:CLASS`."""
     module, _, inner = name.partition(":")
-    kind: Any = _find_module(module)
+    if module not in sys.modules and module.startswith(_VALUE_PACKAGES) and "__" not in module:
+        importlib.import_module(module)
+    kind: Any = sys.modules[module]
     for part in inner.split("."):
         kind = vars(kind)[part]
     if isinstance(kind, type) and issubclass(kind, enum.Enum | Struct | tuple):
@@ -259,10 +250,3 @@ def _make_type_test(hint: Any) -> Callable[[Any], bool]:
         test_item = _make_type_test(inner[0])
         return lambda value: isinstance(value, kind) and all(map(test_item, value))
     return lambda value: isinstance(value, kind)
-
-
-def _find_module(name: str) -> Any:
-    """A module with classes of values; only those in `_VALUE_PACKAGES` are imported."""
-    if name not in sys.modules and name.startswith(_VALUE_PACKAGES) and "__" not in name:
-        importlib.import_module(name)
-    return sys.modules[name]
