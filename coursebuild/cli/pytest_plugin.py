@@ -10,8 +10,6 @@ configuration, it does nothing.
 
 from __future__ import annotations
 
-import atexit
-import gc
 import re
 import subprocess
 import sys
@@ -76,7 +74,6 @@ class CourseTests:
     def __init__(self, root: Path) -> None:
         from coursebuild.pipeline.load import load
 
-        atexit.register(gc.freeze)  # what was read can crash Python's collector at its end
         course = load(root).value
         self.root = root
         self.tests: Mapping[str, Mapping[str, _Lines]] = _tests_by_file(course)

@@ -5,7 +5,6 @@ Entry point: `run`.
 
 from __future__ import annotations
 
-import atexit
 import gc
 import resource
 
@@ -37,8 +36,6 @@ def run(directory: str | None, words: Sequence[str], *, alone: bool) -> int:
     # The objects of a command live until its end, and hardly any are in cycles: collecting garbage
     # takes time for nothing, most of all when the process ends.
     gc.set_threshold(1_000_000 if alone else 200_000, 50, 50)
-    if alone:
-        atexit.register(gc.freeze)
     try:
         with signals_as_exceptions(alone=alone):
             return _run_command(directory, words)

@@ -34,11 +34,9 @@ _ANNOTATION = re.compile(r"<annotation\b.*?</annotation>", re.DOTALL)
 _TAG = re.compile(r"<[^>]*>")
 _PIECE = re.compile(r"<math>.*?</math>", re.DOTALL)
 _GLUE_START, _GLUE_END = '<span class="held">', "</span>"
-_FORMULAS_WITH_PUNCTUATION = re.compile(
-    r"""([(\[“‘"']*+)((?:<math>.*?</math>)+)"""
-    r"""((?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*)""",
-    re.DOTALL,
-)
+_FORMULAS = re.compile(r"(<math>.*?</math>(?:<math>.*?</math>)*)", re.DOTALL)
+_OPENING = "([“‘\"'"
+_CLOSING = re.compile(r"""(?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*""")
 
 _RELATIONS = frozenset("=<>≤≥≠≈≡∼≃≅∝→←↔⇒⇐⇔↦⟶⟹∈∉⊂⊆⊃⊇≪≫≔:")
 _BINARY = frozenset("+-−±∓×·⋅∗∘⊗⊕∧∨∪∩")
@@ -136,9 +134,15 @@ def glue_formulas(html: str) -> str:
     """Glue each inline formula of a page to its punctuation and unit (steps 3 and 4)."""
     html = _FIRST.sub(r'\g<0> lspace="0em"', html)
     html = _LAST.sub(r'\g<0> rspace="0em"', html)
-    return _FORMULAS_WITH_PUNCTUATION.sub(
-        lambda match: _glue_formula(*match.groups()) if match[1] or match[3] else match[0], html
-    )
+    parts = _FORMULAS.split(html)
+    for at in range(1, len(parts), 2):
+        text = parts[at - 1].rstrip(_OPENING)
+        before, closing = parts[at - 1][len(text) :], _CLOSING.match(parts[at + 1])
+        after = closing[0] if closing else ""
+        if before or after:
+            glued = _glue_formula(before, parts[at], after)
+            parts[at - 1 : at + 2] = text, glued, parts[at + 1][len(after) :]
+    return "".join(parts)
 
 
 def _glue_formula(before: str, formula: str, after: str) -> str:

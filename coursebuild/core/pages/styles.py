@@ -15,13 +15,15 @@ import re
 from collections.abc import Iterable
 from html import escape, unescape
 
+_INSIDE = r"""(?:[^"'>]++|"[^"]*+(?:"|\Z)|'[^']*+(?:'|\Z))*+"""
 _PIECE = re.compile(
-    r"""<!--.*?-->"""
-    r"""|<(?P<raw>script|style|textarea|title)\b(?:[^"'>]++|"[^"]*"|'[^']*')*+>.*?</(?P=raw)\s*>"""
-    r"""|<(?P<tag>[a-zA-Z](?:[^"'>]++|"[^"]*"|'[^']*')*+)>""",
+    r"<!--.*?(?:-->|\Z)"
+    rf"|<(?P<raw>script|style|textarea|title)\b{_INSIDE}(?:\Z|(?<!/)>.*?(?:</(?P=raw)\s*>|\Z))"
+    rf"|<(?P<tag>[a-zA-Z]{_INSIDE})(?:>|\Z)",
     re.DOTALL | re.IGNORECASE,
 )
-"""A comment, an element of raw text, or a tag, so that only real attributes are found."""
+"""A comment, an element of raw text, or a tag, so that only real attributes are found. What never
+ends takes the rest of the page, as in browsers."""
 
 _ATTRIBUTE = re.compile(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
 
