@@ -11,11 +11,8 @@ from coursebuild.core.checks.links import LinkTargets, check_links, link_targets
 from coursebuild.core.model import (
     Course,
     Document,
-    FeatureBlock,
-    Heading,
     Term,
     document_blocks,
-    find_blocks,
     find_inlines,
     is_blank,
 )
@@ -50,7 +47,6 @@ def _check_core_rules(
     yield from _check_empty_lesson(course, document)
     yield from _check_title(course, document)
     yield from check_links(course, document, targets)
-    yield from _check_anchors(document)
     yield from _check_terms(document, targets.terms)
 
 
@@ -83,29 +79,6 @@ def _check_title(course: Course, document: Document) -> Iterator[Diagnostic]:
         if page.document is document and span is not None and span.text != page.title:
             message = f"the course map calls this page `{page.title}`"
             yield diagnose("heading-top", span, message, help="give it one title in both")
-
-
-def _check_anchors(document: Document) -> Iterator[Diagnostic]:
-    """Report the first id of each block of a feature that a heading or another such block has."""
-    owners: dict[str, Heading | FeatureBlock] = {
-        h.anchor: h for h in find_blocks(document, Heading)
-    }
-    for block in find_blocks(document, FeatureBlock):
-        for id in block.anchors():
-            first = owners.setdefault(id, block)
-            if first is block or _have_one_progress(first, block):
-                continue
-            notes = [Note("first used here", first.span)]
-            message = f"the id `{id}` is already used"
-            yield diagnose("anchor-repeated", block.span, message, notes=notes)
-            break
-
-
-def _have_one_progress(first: Heading | FeatureBlock, block: FeatureBlock) -> bool:
-    """Whether a reader's progress in two blocks has the same id, which their feature reports."""
-    keys = block.progress_keys()
-    other_keys = first.progress_keys() if isinstance(first, FeatureBlock) else None
-    return keys is not None and other_keys is not None and keys[0] == other_keys[0]
 
 
 def _check_terms(document: Document, definitions: Mapping[str, Span]) -> Iterator[Diagnostic]:

@@ -310,7 +310,7 @@ class FeatureBlock(Struct, frozen=True):
         return None
 
     def anchors(self) -> tuple[str, ...]:
-        """The ids that a link may name, each once in a document."""
+        """The ids that a link may name; `check` of its feature reports those already in use."""
         return ()
 
     def quoted_lines(self) -> tuple[tuple[str, int], ...]:

@@ -128,7 +128,7 @@ class Quiz(FeatureBlock, frozen=True):
 
     def anchors(self) -> tuple[str, ...]:
         """The anchors of the quiz and of its questions."""
-        return (self.id, *map(self.anchor, self.keys)) if self.id else ()
+        return (self.id, *map(self.anchor, self.keys))
 
     def quoted_lines(self) -> tuple[tuple[str, int], ...]:
         """The lines of output that questions ask for, as (script, line)."""
