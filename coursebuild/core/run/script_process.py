@@ -13,6 +13,7 @@ import atexit
 import builtins
 import contextlib
 import ctypes
+import gc
 import importlib
 import io
 import mmap
@@ -210,6 +211,7 @@ class ScriptProcess:
         sys.modules["__main__"] = self.main
         standard = preloaded.names() & sys.stdlib_module_names
         preloaded.offer(tracer)
+        atexit.unregister(gc.freeze)  # a script ends like any other process of Python
         atexit.register(mujoco_watching.finish)
         with open(self.path, "rb") as file:  # noqa: PTH123 (time counts)
             text = file.read()
