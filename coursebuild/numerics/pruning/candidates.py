@@ -33,7 +33,7 @@ MOST_PAIRS = 100_000
 """With so many pairs of geoms no contact is examined."""
 
 
-class Kind(Struct, frozen=True):
+class FindingKind(Struct, frozen=True):
     """A kind of findings."""
 
     message: str
@@ -50,67 +50,67 @@ class Kind(Struct, frozen=True):
 _UNUSED = "no motion is computed of it, nothing refers to it, and no code can notice"
 _BESIDE = "it is computed beside the motion, and no code can notice"
 KINDS = {
-    "energy-flag": Kind(
+    "energy-flag": FindingKind(
         "energy is computed in every step, and nobody reads it",
         proof=_BESIDE,
         fields="enableflags",
     ),
-    "fwdinv-flag": Kind(
+    "fwdinv-flag": FindingKind(
         "forward and inverse dynamics are compared in every step, for nobody",
         proof=_BESIDE,
         fields="enableflags",
     ),
-    "sensor-unread": Kind(
+    "sensor-unread": FindingKind(
         "nobody reads the {}",
         "sensor",
         "Sensor",
         "what a sensor says moves nothing, and no code can notice",
     ),
-    "actuator-idle": Kind(
+    "actuator-idle": FindingKind(
         "nobody commands the {}",
         "actuator",
         "Actuator",
         "its force is a multiple of a command that is always 0",
         "key_ctrl nu nout nJmom tree_sleep_policy",
     ),
-    "tendon-idle": Kind(
+    "tendon-idle": FindingKind(
         "nothing acts along the {}",
         "tendon",
         "Tendon",
         "it has no force, inertia or limit of its own, and nothing refers to it",
         "wrap_type wrap_prm nwrap nJten ten_J_rownnz ten_J_rowadr ten_J_colind",
     ),
-    "unused-keyframe": Kind("nothing begins at the {}", "keyframe", "Keyframe", _UNUSED),
-    "unused-site": Kind("nothing uses the {}", "site", "Site", _UNUSED),
-    "unused-material": Kind("nothing uses the {}", "material", "Material", _UNUSED),
-    "unused-texture": Kind("nothing uses the {}", "texture", "Texture", _UNUSED),
-    "unused-mesh": Kind("nothing uses the {}", "mesh", "Mesh", _UNUSED, "npolygonmax"),
-    "unused-hfield": Kind("nothing uses the {}", "hfield", "Hfield", _UNUSED),
-    "unused-model": Kind("nothing uses the {}", "model", proof=_UNUSED),
-    "unused-default": Kind("no element is of the {}", "class", proof=_UNUSED),
-    "contact-off": Kind(
+    "unused-keyframe": FindingKind("nothing begins at the {}", "keyframe", "Keyframe", _UNUSED),
+    "unused-site": FindingKind("nothing uses the {}", "site", "Site", _UNUSED),
+    "unused-material": FindingKind("nothing uses the {}", "material", "Material", _UNUSED),
+    "unused-texture": FindingKind("nothing uses the {}", "texture", "Texture", _UNUSED),
+    "unused-mesh": FindingKind("nothing uses the {}", "mesh", "Mesh", _UNUSED, "npolygonmax"),
+    "unused-hfield": FindingKind("nothing uses the {}", "hfield", "Hfield", _UNUSED),
+    "unused-model": FindingKind("nothing uses the {}", "model", proof=_UNUSED),
+    "unused-default": FindingKind("no element is of the {}", "class", proof=_UNUSED),
+    "contact-off": FindingKind(
         "contacts are searched for, and nothing can touch",
         proof="no two geoms can meet, whatever the joints do",
         fields="disableflags",
     ),
-    "collision-unreachable": Kind(
+    "collision-unreachable": FindingKind(
         "contacts are searched for on the {}, and nothing can touch there",
         "geom",
         proof="every geom that it could collide with is out of reach",
         fields="geom_contype geom_conaffinity body_contype body_conaffinity"
         " body_bvhnum body_bvhadr",
     ),
-    "far-body": Kind(
+    "far-body": FindingKind(
         "what the scene is about moves in the same way without the {}", "body", "Body"
     ),
-    "contact-idle": Kind("contacts are searched for, and nothing touched"),
-    "collision-idle": Kind(
+    "contact-idle": FindingKind("contacts are searched for, and nothing touched"),
+    "collision-idle": FindingKind(
         "contacts are searched for on the {}, and nothing touched there", "geom"
     ),
-    "sleep": Kind("bodies at rest can sleep"),
-    "island": Kind("all constraints can be solved at once, without islands"),
-    "solver": Kind("the solver {} does"),
-    "cone": Kind("{} friction cones do"),
+    "sleep": FindingKind("bodies at rest can sleep"),
+    "island": FindingKind("all constraints can be solved at once, without islands"),
+    "solver": FindingKind("the solver {} does"),
+    "cone": FindingKind("{} friction cones do"),
 }
 """What uses other things comes before them, so that they can go with it."""
 
