@@ -28,6 +28,13 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGQUIT, signal.SIG_DFL)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
+# The key of a session's stores, which no test may find in the home of who runs it. Worker processes
+# have it from the first one.
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    _state = tempfile.TemporaryDirectory(prefix="coursebuild-tests-")
+    os.environ["XDG_STATE_HOME"] = _state.name
+    os.environ.pop("COURSEBUILD_STORE_KEY", None)
+
 # Checkers in Java run for seconds only, in which compiling more costs more than it saves.
 os.environ["JDK_JAVA_OPTIONS"] = "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC -Xss4m"
 
@@ -95,8 +102,9 @@ def browsers() -> Iterator[Mapping[str, Browser]]:
 
 
 @pytest.fixture
-def held_back() -> Iterator[Path]:
+def held_back(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder of a user whom permissions hold back, as whom the test runs: root is not held."""
+    monkeypatch.setenv("COURSEBUILD_STORE_KEY", "of another user")
     with tempfile.TemporaryDirectory() as name:
         root = os.geteuid() == 0
         if root:

@@ -73,7 +73,7 @@ def find_course(directory: str | None) -> Path:
         raise UsageError("the working directory is not there any more") from None
     root = find_root(None if directory is None else Path(directory), start)
     check_path(root)
-    undo_changes(root)
+    undo_changes(root, Progress().say)
     return root
 
 

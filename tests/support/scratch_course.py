@@ -17,6 +17,7 @@ from pathlib import Path
 
 from coursebuild.cli import main
 from coursebuild.core.engine.memo import HASH, Memo
+from coursebuild.core.files.trust import make_store
 from coursebuild.pipeline.options import Options
 
 ROOT = Path(__file__).parents[2]
@@ -67,7 +68,7 @@ class Folder:
 
     def borrow(self, stores: Path) -> None:
         """Keep fonts and the like with other courses."""
-        (self.root / ".coursebuild").mkdir()
+        make_store(f"{self.root}/.coursebuild", str(self.root))
         for store in stores.iterdir():
             (self.root / ".coursebuild" / store.name).symlink_to(store)
         self.tmp.mkdir(exist_ok=True)

@@ -4,8 +4,8 @@ Entry point: `Memo`, with `get` and `put`, or both in one, `get_or_create`; `get
 `put_value` for JSON.
 
 1. An entry lies at `.coursebuild/KIND/KEY`, or `KIND/GROUP/KEY` where several results belong
-   together. It begins with a hash of its name and its data, and the reader says which type the
-   data must have. A damaged entry is reported, removed and made again.
+   together. It is sealed under its name with the user's key (see `core.files.trust`), and the
+   reader says which type the data must have. What somebody else wrote, or damaged, is not there.
 2. It is written under a temporary name and then renamed, so that other processes see whole entries
    only.
 3. Results of scripts and trials can be shared: they are also looked for in the shared cache, if
@@ -20,8 +20,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
-import hmac
 import os
 import re
 import threading
@@ -33,7 +31,17 @@ from typing import TYPE_CHECKING, TypeVar
 import msgspec
 
 from coursebuild.core.files.errors import reason
-from coursebuild.core.files.locks import make_private_folder
+from coursebuild.core.files.trust import (
+    FOLDER,
+    FOREIGN,
+    TEMPORARY,
+    find_store,
+    make_store,
+    replace_file,
+    seal,
+    store_key,
+    unseal,
+)
 from coursebuild.core.values import DAMAGE
 
 if TYPE_CHECKING:
@@ -41,14 +49,10 @@ if TYPE_CHECKING:
 
 Value = TypeVar("Value")
 
-FOLDER = ".coursebuild"
 SIZE = 1 << 30
 """Bytes that all entries may take together."""
 HASH = re.compile(r"[0-9a-f]{64}")
 """The name of an entry or of a group of entries."""
-TEMPORARY = ".new-"
-"""What the names of files begin with while they are written."""
-_DIGEST = hashlib.sha256().digest_size
 _USE_INTERVAL = 3600.0
 """Seconds after which the use of an entry is noted again, and a killed writer's file is removed."""
 _PRUNE_INTERVAL = 3600.0
@@ -59,33 +63,6 @@ _GROUP_SIZE = 8
 """Entries that a group keeps, the newest."""
 _PRUNED_SHARE = 0.9
 """Part of the limit that pruning leaves in use, so that not every command has to prune."""
-
-
-def replace_file(path: Path, data: bytes) -> None:
-    """Make or replace a file in an existing folder, whole or not at all."""
-    new = path.with_name(f"{TEMPORARY}{os.urandom(8).hex()}")
-    try:
-        new.write_bytes(data)
-        new.replace(path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            new.unlink()
-        raise
-
-
-def sealed(name: str, data: bytes, key: bytes = b"") -> bytes:
-    """Make an entry: data, preceded by a hash of it and of the entry's name, such as `KIND/KEY`.
-
-    With a key, only those who have the key can make one.
-    """
-    text = b"%s\0%s" % (name.encode(), data)
-    return (hmac.digest(key, text, "sha256") if key else hashlib.sha256(text).digest()) + data
-
-
-def unsealed(name: str, entry: bytes, key: bytes = b"") -> bytes | None:
-    """The data of an entry; `None` where it is not what was stored under this name."""
-    data = entry[_DIGEST:]
-    return data if hmac.compare_digest(entry, sealed(name, data, key)) else None
 
 
 class Memo:
@@ -102,7 +79,11 @@ class Memo:
         size: int = SIZE,
         fresh: bool = False,
     ) -> None:
-        self.folder = root / FOLDER
+        folder, self.set_aside = find_store(str(root))
+        """Why the folder `.coursebuild` of the course is not used; mostly empty."""
+        self.folder = Path(folder)
+        self.root = root
+        self._key = store_key(str(root))
         self.shared = shared
         self.size = size
         self.fresh = fresh
@@ -114,9 +95,11 @@ class Memo:
         self._bytes_written = 0
         if shared is not None:
             shared.tell = self._say
+        if self.set_aside and self.set_aside != FOREIGN:
+            self._say(f"{FOLDER} {self.set_aside}; it is set aside")
 
     def listen(self, tell: Callable[[str], None]) -> None:
-        """Send messages about damaged entries to `tell`, a line each, earlier ones included."""
+        """Send messages about the store to `tell`, a line each, earlier ones included."""
         with self._lock:
             self._tell = tell
             pending, self._pending = self._pending, []
@@ -161,12 +144,9 @@ class Memo:
                 entry = file.read()
         except OSError:
             return None
-        value = _value(unsealed(name, entry), read)
-        with contextlib.suppress(OSError):
-            if value is None:
-                os.unlink(path)  # noqa: PTH108
-                self._say(f"{_short(name)} in {FOLDER} is damaged: it is made again")
-            elif time.time() - modified > _USE_INTERVAL:
+        value = _value(unseal(name, entry, self._key), read)
+        if value is not None and time.time() - modified > _USE_INTERVAL:
+            with contextlib.suppress(OSError):
                 os.utime(path)  # entries used lately are pruned last
         return value
 
@@ -175,7 +155,7 @@ class Memo:
         name = f"{kind}/{key}"
         self._write(name, data)
         if self.shared is not None and shared:
-            self.shared.write(name, sealed(name, data, self.shared.key))
+            self.shared.write(name, seal(name, data, self.shared.key))
 
     def get_value(self, kind: str, key: str, type: type[Value]) -> Value | None:
         """A result that was kept as JSON, if it is of this type."""
@@ -237,7 +217,7 @@ class Memo:
         entry = shared.read(name)
         if entry is None:
             return None
-        data = unsealed(name, entry, shared.key)
+        data = unseal(name, entry, shared.key)
         value = _value(data, read)
         if data is None or value is None:
             self._say(f"{_short(name)} in the shared cache is damaged: it is made again")
@@ -246,16 +226,17 @@ class Memo:
         return value
 
     def _write(self, name: str, data: bytes) -> None:
-        path, entry = self.folder / name, sealed(name, data)
+        path, entry = self.folder / name, seal(name, data, self._key)
         try:
             try:
-                replace_file(path, entry)
+                replace_file(str(path), entry)
             except FileNotFoundError:
-                make_private_folder(self.folder)
+                make_store(str(self.folder), str(self.root))
                 path.parent.mkdir(parents=True, exist_ok=True)
-                replace_file(path, entry)
+                replace_file(str(path), entry)
         except OSError as error:
-            self._say(f"results cannot be kept in {FOLDER}: {reason(error)}")
+            if self._key:  # else it was said at the beginning
+                self._say(f"results cannot be kept in {FOLDER}: {reason(error)}")
             return
         with self._lock:
             self._bytes_written += len(entry)

@@ -18,13 +18,14 @@ from pathlib import Path, PurePosixPath
 from typing import Any, TypeVar
 from urllib.parse import unquote, urlsplit
 
-from coursebuild.core.engine.memo import replace_file
 from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.files.trust import replace_file
 
 _VERSION = "coursebuild-1"
 """The folder of entries in the shared place; change it when the format of entries changes."""
 _SIGNED_VERSION = "coursebuild-1-signed"
 """The folder of signed entries, which only those who have the key can make."""
+_UNSIGNED = b"unsigned"
 _TIMEOUT = 15.0
 """Seconds that a request may take."""
 _FLUSH_TIMEOUT = 60.0
@@ -59,7 +60,7 @@ class FolderPlace:
         target = self.folder / path
         self.folder.mkdir(exist_ok=True)
         target.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(target, data)
+        replace_file(str(target), data)
 
     def names(self, folder: str) -> list[str]:
         """The names in a folder; none if there is none."""
@@ -143,8 +144,8 @@ class SharedCache:
     ) -> None:
         self.address = address
         self.place = place
-        self.key = key
-        """The key that entries are signed with; empty where they are not signed."""
+        self.key = key or _UNSIGNED
+        """The key of their seals; where entries are not signed, one that everybody has."""
         self._folder = _SIGNED_VERSION if key else _VERSION
         self.timeout = timeout
         self.tell: Callable[[str], None] = lambda line: None

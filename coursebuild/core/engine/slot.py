@@ -20,8 +20,8 @@ from pathlib import Path
 from msgspec import Struct
 
 from coursebuild.core.engine.manifest import KIND, MARKER, Manifest, ManifestEntry, holds, marker
-from coursebuild.core.engine.memo import FOLDER
 from coursebuild.core.engine.workers import Workers, can_fork
+from coursebuild.core.files.trust import find_store
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile, SiteFile
 
 _NO_PATH = re.compile(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
@@ -168,7 +168,7 @@ def open_slot(root: Path, slot: Path) -> None:
     """Make the slot ready: the one that the last build put away, or an empty folder."""
     if not os.path.lexists(slot):
         with contextlib.suppress(OSError):  # none was put away, or it is on another file system
-            (root / FOLDER / KIND / "spare").rename(slot)
+            _spare(root).rename(slot)
     if not slot.is_dir() or slot.is_symlink():
         with contextlib.suppress(FileNotFoundError):
             slot.unlink()
@@ -177,13 +177,17 @@ def open_slot(root: Path, slot: Path) -> None:
 
 
 def put_away(root: Path, slot: Path) -> None:
-    """Keep the slot for the next build, in `.coursebuild/`."""
+    """Keep the slot for the next build, in the store."""
     with contextlib.suppress(OSError):
         slot.chmod(0o700)  # a folder that may not be written cannot be moved
         with contextlib.suppress(OSError):
-            slot.rename(root / FOLDER / KIND / "spare")
+            slot.rename(_spare(root))
             return
         remove(slot)
+
+
+def _spare(root: Path) -> Path:
+    return Path(find_store(str(root))[0], KIND, "spare")
 
 
 def _remove_stale(

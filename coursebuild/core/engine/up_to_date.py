@@ -21,6 +21,15 @@ import sys
 import time
 
 from coursebuild.core.files.course_root import FOLDERS, is_dropping
+from coursebuild.core.files.trust import (
+    FOREIGN,
+    find_store,
+    make_store,
+    replace_file,
+    seal,
+    store_key,
+    unseal,
+)
 
 TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
 if TYPE_CHECKING:
@@ -86,7 +95,19 @@ class Watcher:
         except (OSError, _UnclearError):
             return False
         body = "\n".join((_HEADER, state, *input_paths, *output_paths, "", message))
-        return _write(_path(self.root, self.command), body.encode("utf-8", "surrogateescape"))
+        data = body.encode("utf-8", "surrogateescape")
+        name = _name(self.command)
+        store, reason = find_store(self.root)
+        if reason and reason != FOREIGN:  # it is worth a warning, in the next run too
+            return False
+        path = os.path.join(store, name)
+        try:
+            make_store(store, self.root)
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            replace_file(path, seal(name, data, store_key(self.root)))
+        except OSError:
+            return False
+        return True
 
     def _look(self, input_paths: Sequence[str]) -> str | None:
         """The state of the inputs; `None` where it is not reliable."""
@@ -99,11 +120,15 @@ class Watcher:
 def unchanged(root: str, command: Sequence[str]) -> str | None:
     """The message of the command's last run; `None` where anything has changed since."""
     try:
-        with open(_path(root, command), "rb") as file:
-            digest, _, body = file.read().partition(b"\n")
+        name = _name(command)
+        store, reason = find_store(root)
+        if reason and reason != FOREIGN:
+            return None
+        with open(os.path.join(store, name), "rb") as file:
+            body = unseal(name, file.read(), store_key(root)) or b""
         head, _, message = body.decode("utf-8", "surrogateescape").partition("\n\n")
         header, *lines = head.split("\n")
-        if digest != _digest(body) or header != _HEADER:
+        if header != _HEADER:
             return None
         return message if _state(root, lines[1:]) == lines[0] else None
     except (OSError, ValueError, _UnclearError):
@@ -181,22 +206,7 @@ def _numbers(status: os.stat_result, began: int | None) -> tuple[int, ...]:
     return status.st_mode, status.st_size, modified, status.st_ctime_ns, status.st_ino
 
 
-def _digest(data: bytes) -> bytes:
-    return hashlib.blake2b(data, digest_size=32).hexdigest().encode()
-
-
-def _path(root: str, command: Sequence[str]) -> str:
-    name = _digest("\0".join(command).encode("utf-8", "surrogateescape")).decode()
-    return os.path.join(root, ".coursebuild", "unchanged", name)
-
-
-def _write(path: str, body: bytes) -> bool:
-    new = f"{path}.{os.getpid()}"
-    try:
-        os.makedirs(os.path.dirname(path), exist_ok=True)
-        with open(new, "wb") as file:
-            file.write(_digest(body) + b"\n" + body)
-        os.replace(new, path)
-    except OSError:
-        return False
-    return True
+def _name(command: Sequence[str]) -> str:
+    """The name of the record of a command in the store."""
+    text = "\0".join(command).encode("utf-8", "surrogateescape")
+    return f"unchanged/{hashlib.blake2b(text, digest_size=32).hexdigest()}"

@@ -19,6 +19,8 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from coursebuild.core.files.trust import find_store, make_store
+
 _BUSY = frozenset({errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES})
 _LONG_AGO = 3600.0
 """Seconds after which a temporary file is abandoned where there are no locks."""
@@ -48,14 +50,15 @@ def project_lock(
     """Hold a lock of a course folder.
 
     Args:
-        root: the course folder; the lock is `.coursebuild/lock` in it.
+        root: the course folder; the lock is a file of its store.
         on_wait: is called once, with a message, if another run has the lock.
         name: the name of the lock's file.
     """
     fd = None
     try:
         with contextlib.suppress(OSError):
-            fd = _lock_file(root.resolve() / ".coursebuild" / name, on_wait)
+            folder = find_store(str(root.resolve()))[0]
+            fd = _lock_file(root.resolve(), Path(folder, name), on_wait)
         yield
     finally:
         if fd is not None:
@@ -78,11 +81,11 @@ def folder_lock(folder: Path) -> Iterator[None]:
         os.close(fd)
 
 
-def _lock_file(path: Path, on_wait: Callable[[str], None] | None) -> int:
+def _lock_file(root: Path, path: Path, on_wait: Callable[[str], None] | None) -> int:
     """Open and lock a file, waiting if need be; where there are no locks, only open it."""
     while True:
-        make_private_folder(path.parent)
-        fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        make_store(str(path.parent), str(root))
+        fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
         try:
             if try_lock(fd) is False:
                 if on_wait is not None:
@@ -97,14 +100,6 @@ def _lock_file(path: Path, on_wait: Callable[[str], None] | None) -> int:
             os.close(fd)
             raise
         os.close(fd)  # .coursebuild was deleted while we waited
-
-
-def make_private_folder(folder: Path) -> None:
-    """Make the tool's own folder in a course, with a `.gitignore` that covers all of it."""
-    folder.mkdir(exist_ok=True)
-    ignore = folder / ".gitignore"
-    if not ignore.exists():
-        ignore.write_bytes(b"*\n")
 
 
 def _waiting_message(fd: int) -> str:

@@ -3,7 +3,8 @@
 Entry points: `check_other_version`, for what the user names; `latest_version`, the one that pip
 finds; `prepare_environment`, which makes one.
 
-1. Environments lie in `.coursebuild/environments` and are used again. The ones used last are kept.
+1. Environments lie in the user's own state folder, since what a course's folder holds is never run.
+   They are used again, for all courses. The ones used last are kept.
 2. A new one is made under a temporary name, and renamed when MuJoCo can be imported in it, so that
    none is ever incomplete. What a killed process left is removed the next time.
 3. pip, as the user has configured it, installs MuJoCo with the packages that it consists of, and
@@ -29,9 +30,9 @@ import venv
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from coursebuild.core.engine.memo import TEMPORARY
 from coursebuild.core.files.errors import EffectError, UsageError, reason
-from coursebuild.core.files.locks import make_private_folder
+from coursebuild.core.files.locks import folder_lock
+from coursebuild.core.files.trust import TEMPORARY, state_folder
 from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.versions import engine_version, python_version
@@ -89,25 +90,29 @@ def _without_zeros(version: str) -> str:
 def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> Interpreter:
     """The environment with this version of MuJoCo; made if it is not there.
 
-    Only one process at a time may do this for a course: see `project_lock`.
-
     Raises:
         EffectError: it cannot be made.
     """
     parts = [sys.version, sys.base_prefix, site_folders()]
     name = f"mujoco-{engine}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
-    folder = root / ".coursebuild" / _FOLDER
+    state = state_folder(str(root))
+    if state is None:
+        raise EffectError(
+            f"there is no place for an environment with MuJoCo {engine}",
+            help="HOME or XDG_STATE_HOME gives one, outside of the course",
+        )
+    folder = Path(state, _FOLDER)
     prefix = folder / name
     try:
-        make_private_folder(folder.parent)
-        folder.mkdir(exist_ok=True)
-        for remains in folder.glob(f"{TEMPORARY}*"):
-            shutil.rmtree(remains, ignore_errors=True)
-        if not (prefix / "pyvenv.cfg").is_file():
-            say(f"installing MuJoCo {engine} into .coursebuild/{_FOLDER}/{name}")
-            _create_environment(prefix, engine)
-        os.utime(prefix)
-        _remove_unused(folder, prefix)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with folder_lock(folder):
+            for remains in folder.glob(f"{TEMPORARY}*"):
+                shutil.rmtree(remains, ignore_errors=True)
+            if not (prefix / "pyvenv.cfg").is_file():
+                say(f"installing MuJoCo {engine} into {prefix}")
+                _create_environment(prefix, engine)
+            os.utime(prefix)
+            _remove_unused(folder, prefix)
     except OSError as error:
         raise EffectError(f"{prefix.name} cannot be made: {reason(error)}") from None
     return Interpreter(

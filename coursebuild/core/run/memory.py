@@ -31,6 +31,7 @@ from coursebuild.core.engine.digests import (
     modules_in,
 )
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.files.trust import FOLDER
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run.dependencies import (
     Dependency,
@@ -178,7 +179,11 @@ class Memory:
             return ["everything is to run again"]
         last = self.last_record(inputs.path)
         if last is None:
-            return ["there is no result of it on this machine"]
+            aside = self.store.set_aside
+            return [
+                "there is no result of it on this machine",
+                *([f"{FOLDER} is not used: it {aside}"] if aside else []),
+            ]
         clauses = input_changes(last.inputs, inputs)
         clauses += state_changes(last.dependencies, self.states)
         if last.reason_forgotten:

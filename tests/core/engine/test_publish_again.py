@@ -86,8 +86,10 @@ def test_a_file_changed_while_it_is_linked_is_made_again(
     assert texts(root / "public") == {"a.html": "a.html 1", "b.html": "b.html 2"}
 
 
-def test_a_record_that_cannot_be_written_costs_only_time(root: Path, pages: Pages) -> None:
-    (root / ".coursebuild").write_text("in the way")
+def test_a_record_that_cannot_be_written_costs_only_time(
+    root: Path, pages: Pages, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", "/dev/null")
     for _ in range(2):
         assert publish(root, root / "public", pages(a="1")) == ("a.html",)
     assert texts(root / "public") == {"a.html": "a.html 1"}

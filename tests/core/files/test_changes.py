@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 
+import msgspec
 import pytest
 
-from coursebuild.core.files.changes import JOURNAL, FileChange, change_files, undo_changes
+from coursebuild.core.files.changes import FileChange, change_files, journal_path, undo_changes
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
+from coursebuild.core.files.trust import seal, store_key
 
 
 def files(root: Path) -> dict[str, bytes]:
@@ -19,9 +22,10 @@ def files(root: Path) -> dict[str, bytes]:
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
-    (tmp_path / "a.md").write_bytes(b"a\r\n")
-    (tmp_path / "b.md").write_bytes(b"b")
-    return tmp_path
+    (tmp_path / "course").mkdir()
+    (tmp_path / "course/a.md").write_bytes(b"a\r\n")
+    (tmp_path / "course/b.md").write_bytes(b"b")
+    return tmp_path / "course"
 
 
 GOOD = (
@@ -31,10 +35,30 @@ GOOD = (
 )
 
 
+def journal_of(root: Path) -> Path:
+    journal = journal_path(root)
+    assert journal is not None
+    return journal
+
+
+def leave_journal(root: Path, changes: Sequence[FileChange]) -> Path:
+    """What a command leaves that was killed."""
+    journal = journal_of(root)
+    journal.parent.mkdir(parents=True, exist_ok=True)
+    journal.write_bytes(seal("changes", msgspec.msgpack.encode(changes), store_key(str(root))))
+    return journal
+
+
+def undo(root: Path) -> list[str]:
+    lines: list[str] = []
+    undo_changes(root, lines.append)
+    return lines
+
+
 def test_all_are_changed(root: Path) -> None:
     change_files(root, GOOD)
     assert files(root) == {"a.md": b"A\r\n", "new/folder/c.md": b"c"}
-    undo_changes(root)
+    assert undo(root) == []
     assert files(root) == {"a.md": b"A\r\n", "new/folder/c.md": b"c"}
 
 
@@ -48,6 +72,12 @@ def test_all_are_changed(root: Path) -> None:
         (FileChange("gone.md", b"x", None), "gone.md was removed in the meantime"),
         (FileChange("a.md/d.md", None, b"x"), "a.md/d.md cannot be written: file exists"),
         (FileChange("../d.md", None, b"x"), "../d.md leads out of the project"),
+        (FileChange("../d.md", b"x", None), "../d.md leads out of the project"),
+        (FileChange("/etc/d.md", b"x", None), "/etc/d.md leads out of the project"),
+        (FileChange(".git/x", None, b"x"), ".git/x is no file that a command may change"),
+        (FileChange("x/.git/x", None, b"x"), "x/.git/x is no file that a command may change"),
+        (FileChange(".venv/x", None, b"x"), ".venv/x is no file that a command may change"),
+        (FileChange(".hidden", b"x", b"y"), ".hidden is no file that a command may change"),
     ],
 )
 def test_where_one_cannot_be_changed_none_is(root: Path, bad: FileChange, message: str) -> None:
@@ -57,7 +87,7 @@ def test_where_one_cannot_be_changed_none_is(root: Path, bad: FileChange, messag
     assert caught.value.message == message
     assert files(root) == before
     assert not (root / "new").exists()
-    assert not (root / JOURNAL).exists()
+    assert not journal_of(root).exists()
 
 
 def test_read_only_file_is_not_replaced(root: Path) -> None:
@@ -67,21 +97,71 @@ def test_read_only_file_is_not_replaced(root: Path) -> None:
     assert files(root) == {"a.md": b"a\r\n", "b.md": b"b"}
 
 
-def test_undoing_waits_for_a_command_at_work_and_spares_later_edits(root: Path) -> None:
+def test_undoing_waits_for_a_command_at_work_spares_later_edits_and_says_so(root: Path) -> None:
     change_files(root, GOOD[:1])
-    journal = root / JOURNAL
     (root / "b.md").write_bytes(b"edited since")
+    lines: list[str] = []
     with project_lock(root):
-        journal.write_bytes(encode((*GOOD[:1], FileChange("b.md", b"b", b"B"))))
-        thread = threading.Thread(target=undo_changes, args=(root,))
+        journal = leave_journal(root, (*GOOD[:1], FileChange("b.md", b"b", b"B")))
+        thread = threading.Thread(target=undo_changes, args=(root, lines.append))
         thread.start()
         assert journal.exists()
     thread.join()
     assert files(root) == {"a.md": b"a\r\n", "b.md": b"edited since"}
     assert not journal.exists()
+    assert lines == ["undid a change that was interrupted: a.md; left as edited since: b.md"]
 
 
-def encode(changes: tuple[FileChange, ...]) -> bytes:
-    import msgspec
+def test_journal_of_a_change_that_had_not_begun_is_removed_in_silence(root: Path) -> None:
+    journal = leave_journal(root, GOOD)
+    assert undo(root) == []
+    assert files(root) == {"a.md": b"a\r\n", "b.md": b"b"}
+    assert not journal.exists()
 
-    return msgspec.msgpack.encode(changes)
+
+def test_no_journal_lies_in_the_course(root: Path) -> None:
+    """Whatever a folder brings along, no file of it is taken for orders."""
+    (root.parent / "victim").write_bytes(b"dear")
+    orders = msgspec.msgpack.encode((FileChange("../victim", None, b"dear"), *GOOD))
+    for data in (orders, seal("changes", orders, store_key(str(root)))):
+        for name in ("changes", "journal", "journals/changes", journal_of(root).name):
+            file = root / ".coursebuild" / name
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(data)
+    before = files(root)
+    assert undo(root) == []
+    assert files(root) == before
+    assert (root.parent / "victim").read_bytes() == b"dear"
+
+
+@pytest.mark.parametrize("kind", ["empty", "cut", "garbage", "another key", "no changes"])
+def test_damaged_journal_is_told_of_once_and_set_aside(root: Path, kind: str) -> None:
+    journal = leave_journal(root, GOOD)
+    whole = journal.read_bytes()
+    damaged = {
+        "empty": b"",
+        "cut": whole[:-1],
+        "garbage": whole[:40] + b"garbage",
+        "another key": seal("changes", whole[32:], b"of somebody else"),
+        "no changes": seal("changes", msgspec.msgpack.encode(["?"]), store_key(str(root))),
+    }
+    journal.write_bytes(damaged[kind])
+    assert undo(root) == [
+        "a command that was interrupted has left a damaged journal, so nothing was undone: "
+        "look at what it was changing"
+    ]
+    assert undo(root) == []
+    assert files(root) == {"a.md": b"a\r\n", "b.md": b"b"}
+    change_files(root, GOOD)
+    assert files(root) == {"a.md": b"A\r\n", "new/folder/c.md": b"c"}
+
+
+def test_without_a_state_folder_all_are_changed_or_none(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(root / "in the course"))
+    with pytest.raises(EffectError):
+        change_files(root, (*GOOD[:2], FileChange("a.md/d.md", None, b"x")))
+    assert files(root) == {"a.md": b"a\r\n", "b.md": b"b"}
+    change_files(root, GOOD)
+    assert files(root) == {"a.md": b"A\r\n", "new/folder/c.md": b"c"}

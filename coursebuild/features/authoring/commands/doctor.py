@@ -22,6 +22,7 @@ from coursebuild.core.files.course_root import find_course_root
 from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import try_lock
 from coursebuild.core.files.resources import Bundle, template_texts
+from coursebuild.core.files.trust import FOLDER, find_store, store_key
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.report.terminal import GREEN, RED, YELLOW, Style, visible
@@ -65,7 +66,8 @@ def run(arguments: argparse.Namespace) -> int:
     if not folder.is_dir():
         raise UsageError(f"there is no folder {arguments.root}")
     style, status = style_of(sys.stdout), CLEAN
-    for make_probes in (_python, _mujoco, _lab_engine, _fonts, _folder, _locks, _disk, _rendering):
+    probes = (_python, _mujoco, _lab_engine, _fonts, _folder, _store, _locks, _disk, _rendering)
+    for make_probes in probes:
         for probe in make_probes(folder):
             write(_format_line(probe, style), CLEAN)
             if probe.is_required and not probe.ok:
@@ -120,6 +122,18 @@ def _folder(folder: Path) -> Iterator[Probe]:
     ok = os.access(folder, os.W_OK)
     cure = "give yourself the right to write there, or go to another folder"
     yield Probe(f"{folder} can be written" if ok else f"{folder} cannot be written", ok, cure)
+
+
+def _store(folder: Path) -> Iterator[Probe]:
+    place, reason = find_store(str(folder))
+    if not reason:
+        yield Probe(f"what is made once is kept in {place}", True)
+    elif not store_key(str(folder)):
+        cure = "set HOME, XDG_STATE_HOME or COURSEBUILD_STORE_KEY"
+        yield Probe("nothing is kept: there is no place for your key", False, cure, False)
+    else:
+        text = f"{FOLDER} {reason}; what is made once is kept in {place}"
+        yield Probe(text, False, f"remove {folder / FOLDER}", is_required=False)
 
 
 def _locks(folder: Path) -> Iterator[Probe]:

@@ -13,6 +13,7 @@ from coursebuild.core.files.changes import FileChange, change_files, undo_change
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.syntax.schemas import json_schema
 from coursebuild.pipeline.options import check_path
+from coursebuild.pipeline.progress import Progress
 from coursebuild.report.values import plural
 
 EXAMPLES = """\
@@ -42,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     folder = os.path.join(arguments.root or "", arguments.folder)  # noqa: PTH118  # as the user wrote it
     root = Path(folder).resolve()
     check_path(root)
-    undo_changes(root)
+    undo_changes(root, Progress().say)
     files = _read_files()
     existing = [path for path in files if (root / path).exists() or (root / path).is_symlink()]
     if existing:

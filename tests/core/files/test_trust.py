@@ -1,0 +1,262 @@
+"""Which stores are believed: the key, the mark of the owner, what came with a course."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.files import trust
+from support.workflows import git
+
+KEY = "a" * 64
+
+
+@pytest.fixture
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The state folder of a user who has none yet."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path / "state/coursebuild"
+
+
+@pytest.fixture
+def root(tmp_path: Path, state: Path) -> Path:
+    (tmp_path / "course").mkdir()
+    return tmp_path / "course"
+
+
+def fill(root: Path) -> Path:
+    """Keep a result; returns the file in which it lies."""
+    Memo(root).put("kind", KEY, b"kept")
+    return Path(trust.find_store(str(root))[0], "kind", KEY)
+
+
+def found(root: Path) -> tuple[bytes | None, list[str]]:
+    """What is found under the key, and what is said."""
+    store, lines = Memo(root), list[str]()
+    store.listen(lines.append)
+    return store.get("kind", KEY, bytes), lines
+
+
+def become_another_user(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "another state"))
+
+
+# --- the key
+
+
+def test_key_is_made_once_and_for_its_user_alone(root: Path, state: Path) -> None:
+    key = trust.store_key(str(root))
+    assert len(key) == 32 and trust.store_key(str(root)) == key
+    assert (state / "key").stat().st_mode & 0o777 == 0o600
+    assert state.stat().st_mode & 0o777 == 0o700
+    assert [path.name for path in state.iterdir()] == ["key"]
+
+
+@pytest.mark.parametrize("damage", ["empty", "cut", "link", "folder"])
+def test_damaged_key_is_replaced_or_done_without(root: Path, state: Path, damage: str) -> None:
+    fill(root)
+    (state / "key").unlink()
+    match damage:
+        case "empty":
+            (state / "key").write_bytes(b"")
+        case "cut":
+            (state / "key").write_bytes(b"x" * 31)
+        case "link":
+            (root / "key").write_bytes(b"x" * 32)
+            (state / "key").symlink_to(root / "key")
+        case _:
+            (state / "key").mkdir()
+    assert found(root)[0] is None
+    assert Memo(root).get_or_create("kind", KEY, lambda: b"made") == b"made"
+    assert trust.store_key(str(root)) != b"x" * 32
+
+
+def test_processes_that_begin_at_once_have_one_key(root: Path, state: Path) -> None:
+    code = "import sys; from coursebuild.core.files.trust import store_key\n"
+    code += "sys.stdin.read(); print(store_key(sys.argv[1]).hex())"
+    command = [sys.executable, "-c", code, str(root)]
+    pipe = subprocess.PIPE
+    processes = [subprocess.Popen(command, stdin=pipe, stdout=pipe) for _ in range(6)]
+    for process in processes:
+        assert process.stdin is not None
+        process.stdin.close()
+    keys = set()
+    for process in processes:
+        assert process.stdout is not None
+        with process.stdout:
+            keys.add(process.stdout.read())
+        assert process.wait() == 0
+    assert len(keys) == 1
+
+
+@pytest.mark.parametrize("place", ["course", "course/deep", "/dev/null"])
+def test_without_a_place_outside_of_the_course_nothing_is_kept(
+    root: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(root.parent / place))
+    Memo(root).put("kind", KEY, b"kept")
+    assert found(root) == (
+        None,
+        [
+            ".coursebuild needs a key of this user's, for which there is no place: "
+            "set HOME, XDG_STATE_HOME or COURSEBUILD_STORE_KEY; it is set aside"
+        ],
+    )
+    assert list(root.iterdir()) == []
+
+
+def test_store_travels_with_a_secret_and_is_nothing_without(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as here:
+        here.setenv("COURSEBUILD_STORE_KEY", "secret")
+        fill(root)
+    shutil.move(root, tmp_path / "there")
+    become_another_user(monkeypatch, tmp_path)
+    assert found(tmp_path / "there") == (None, [])
+    monkeypatch.setenv("COURSEBUILD_STORE_KEY", "another secret")
+    assert found(tmp_path / "there") == (None, [])
+    monkeypatch.setenv("COURSEBUILD_STORE_KEY", "secret")
+    assert found(tmp_path / "there") == (b"kept", [])
+
+
+def test_store_moves_and_is_copied_with_its_course(root: Path, tmp_path: Path) -> None:
+    fill(root)
+    shutil.copytree(root, tmp_path / "copy")
+    root.rename(tmp_path / "moved")
+    assert found(tmp_path / "copy") == found(tmp_path / "moved") == (b"kept", [])
+
+
+# --- stores of others
+
+
+def times(*folders: Path) -> dict[str, int]:
+    """When each file in the folders was changed last."""
+    paths = (path for folder in folders for path in folder.rglob("*"))
+    return {str(path): os.lstat(path).st_mtime_ns for path in paths}
+
+
+def test_store_of_another_machine_is_a_miss_without_a_word(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry = fill(root)
+    foreign = entry.read_bytes()
+    become_another_user(monkeypatch, tmp_path)
+    assert found(root) == (None, [])
+    assert fill(root) != entry
+    assert found(root) == (b"kept", []), "it has a place of its own"
+    assert entry.read_bytes() == foreign
+
+
+def test_true_entry_of_another_user_in_ones_own_store_is_a_miss(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    foreign = fill(root).read_bytes()
+    become_another_user(monkeypatch, tmp_path)
+    shutil.rmtree(root / ".coursebuild")
+    fill(root).write_bytes(foreign)
+    assert found(root) == (None, [])
+
+
+@pytest.mark.parametrize("kind", ["file", "link", "link to a store", "pipe", "folder", "mark"])
+def test_nothing_in_a_strange_store_is_read_or_written(
+    root: Path, tmp_path: Path, kind: str
+) -> None:
+    """Not through its links either, which lead anywhere."""
+    store, victim = root / ".coursebuild", tmp_path / "victim"
+    victim.mkdir()
+    (victim / "lock").write_text("dear")
+    match kind:
+        case "file":
+            store.write_text("dear")
+        case "link":
+            store.symlink_to(victim)
+        case "link to a store":
+            (tmp_path / "other").mkdir()
+            fill(tmp_path / "other")
+            store.symlink_to(tmp_path / "other/.coursebuild")
+        case "pipe":
+            os.mkfifo(store)
+        case _:
+            store.mkdir()
+            for name in ("kind", "published", "unchanged"):
+                (store / name).symlink_to(victim)
+            for name in ("lock", "clock", "pruned"):
+                (store / name).symlink_to(victim / "lock")
+            if kind == "mark":
+                (store / "owner").write_bytes(b"x" * 32)
+    before = times(root, victim)
+    fill(root)
+    assert found(root) == (b"kept", [])
+    assert times(root, victim) == before
+    assert (victim / "lock").read_text() == "dear"
+
+
+def test_store_of_another_user_is_set_aside_with_a_warning(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COURSEBUILD_STORE_KEY", "of both")
+    fill(root)
+    user = os.geteuid() + 1
+    monkeypatch.setattr(os, "geteuid", lambda: user)
+    assert found(root) == (None, [".coursebuild belongs to another user; it is set aside"])
+
+
+# --- Git
+
+
+@pytest.mark.parametrize("version", [2, 3, 4])
+@pytest.mark.parametrize("place", ["", "courses/one/"])
+def test_store_that_git_tracks_is_set_aside_with_a_warning(
+    tmp_path: Path, state: Path, version: int, place: str
+) -> None:
+    top = tmp_path / "repository"
+    for number in range(60):  # names that begin alike are compressed
+        path = top / place / f".course{number}/file"
+        path.parent.mkdir(parents=True)
+        path.write_text("")
+    root = top / place
+    entry = fill(root)
+    git(top, "init", "--quiet")
+    git(top, "add", "--all")
+    assert found(root) == (b"kept", [])
+    git(top, "add", "--force", str(entry))
+    git(top, "update-index", "--index-version", str(version))
+    assert found(root) == (None, [".coursebuild is tracked by Git; it is set aside"])
+    assert found(root / ".course1") == (None, []), "another folder of the repository"
+    git(top, "rm", "--quiet", "--cached", str(entry))
+    assert found(root) == (b"kept", [])
+
+
+def test_linked_work_tree_and_letters_of_another_case(tmp_path: Path, state: Path) -> None:
+    top = tmp_path / "repository"
+    (top / ".Coursebuild").mkdir(parents=True)
+    (top / ".Coursebuild/changes").write_text("")
+    git(top, "init", "--quiet")
+    git(top, "add", "--force", ".Coursebuild")
+    git(top, "commit", "--quiet", "-m", "a branch")
+    git(top, "worktree", "add", "--quiet", str(tmp_path / "tree"))
+    shutil.rmtree(tmp_path / "tree/.Coursebuild")
+    fill(tmp_path / "tree")
+    assert found(tmp_path / "tree")[1] == [".coursebuild is tracked by Git; it is set aside"]
+
+
+def test_git_folder_that_no_git_has_made_ends_nothing(root: Path) -> None:
+    fill(root)
+    for data in (b"", b"DIRC", b"DIRC\0\0\0\4\xff\xff\xff\xff" + b"x" * 500, b"\0" * 99):
+        (root / ".git").mkdir()
+        (root / ".git/index").write_bytes(data)
+        assert found(root) == (b"kept", [])
+        shutil.rmtree(root / ".git")
+    (root / ".git").mkdir()
+    os.mkfifo(root / ".git/index")
+    assert found(root) == (b"kept", [])
+    shutil.rmtree(root / ".git")
+    (root / ".git").write_text("gitdir: /dev/zero\n")
+    assert found(root) == (b"kept", [])
