@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import shutil
 import signal
 import subprocess
 import zipfile
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.core.files.trust import store_key
 from coursebuild.core.run.versions import engine_version
 from support.scratch_course import CommandResult, Folder, Make, block, kill_at_end, wait_until_alone
 from support.waiting import wait_for_file
@@ -84,9 +86,25 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("environments")
 
 
+@pytest.fixture(autouse=True)
+def state(tmp_path: Path, stores: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A state folder for each test, with the key by which what is shared was sealed."""
+    place = tmp_path / "state/coursebuild"
+    place.mkdir(parents=True)
+    (place / "key").write_bytes(store_key(str(tmp_path)))
+    monkeypatch.setenv("XDG_STATE_HOME", str(place.parent))
+
+
+def environments_folder() -> Path:
+    return Path(os.environ["XDG_STATE_HOME"], "coursebuild/environments")
+
+
 def borrow(course: Folder, environments: Path, version: str = "") -> Folder:
-    """Copy environments into a course: all, or those of a version."""
-    place = course.root / ".coursebuild/environments"
+    """Take environments that were made before: all, or those of a version."""
+    place = environments_folder()
+    if place.is_symlink():
+        place.unlink()
+    shutil.rmtree(place, ignore_errors=True)
     if not version:
         place.symlink_to(environments)
         return course
@@ -97,8 +115,8 @@ def borrow(course: Folder, environments: Path, version: str = "") -> Folder:
 
 
 def environments(course: Folder) -> list[str]:
-    """The MuJoCo versions of the environments in a course, and other files beside these."""
-    names = (path.name for path in course.root.glob(".coursebuild/environments/*"))
+    """The MuJoCo versions of the user's environments, and other files beside these."""
+    names = (path.name for path in environments_folder().glob("*"))
     return sorted(name.removeprefix("mujoco-").rpartition("-")[0] for name in names)
 
 
@@ -309,7 +327,7 @@ def test_interrupted_installations_leave_nothing_and_two_commands_at_once_instal
 def test_only_the_environments_used_last_stay(make: Make, wheels: Path, installed: Path) -> None:
     course = borrow(make(f"## A\n\n{PLAIN}"), installed, NEW_VERSION)
     for number in range(5):
-        old = course.root / f".coursebuild/environments/mujoco-8.{number}-x"
+        old = environments_folder() / f"mujoco-8.{number}-x"
         old.mkdir(parents=True)
         os.utime(old, (number, number))
     assert check_against(course, "-q").status == 0

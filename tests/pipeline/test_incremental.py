@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.core.engine.memo import sealed, unsealed
+from coursebuild.core.files.trust import seal, store_key, unseal
 from support.edited_course import EDITS, LESSON, NORUN, QUIZ, WORDS, Course, Edit, drawn_pages
 from support.live_course import differences
 from support.scratch_course import Folder
@@ -137,22 +137,23 @@ def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Cou
     assert course.folder.spoil() > 30
     assert build(course) == before
     folder = course.folder.root / ".coursebuild"
+    key = store_key(str(course.folder.root))
     for junk in JUNK:
         kinds = set()
         for path in sorted(folder.rglob("*")):
             name = path.relative_to(folder).as_posix()
             kind = name.partition("/")[0]
             if path.is_file() and len(path.name) == 64 and kind not in UNSHARED_KINDS:
-                path.write_bytes(sealed(name, junk))
+                path.write_bytes(seal(name, junk, key))
                 kinds.add(kind)
         assert {"summaries", "pages", "maps", "index"} <= kinds
         assert build(course) == before, junk
     for kind in ("maps", "mathml", "pages", "summaries"):
         for path in sorted((folder / kind).iterdir()):
             name = f"{kind}/{path.name}"
-            names, packed = msgspec.msgpack.decode(unsealed(name, path.read_bytes()))
+            names, packed = msgspec.msgpack.decode(unseal(name, path.read_bytes(), key) or b"")
             packed[-1] = 7
-            path.write_bytes(sealed(name, msgspec.msgpack.encode((names, packed))))
+            path.write_bytes(seal(name, msgspec.msgpack.encode((names, packed)), key))
     assert build(course) == before, "a field of another type"
 
 

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coursebuild.core.engine.memo import sealed, unsealed
+from coursebuild.core.files.trust import seal, unseal
 from coursebuild.core.model.results import Divergence, Outcome, Sign, Trace
 from coursebuild.core.run.dependencies import describe
 from coursebuild.core.run.memory import longest_first
@@ -26,6 +26,8 @@ Act = Callable[[Desk], object]
 SOUGHT_MODULE = Trace((), (), (), (), "", sought=("examples/{json}",))
 DIVERGENCE = Divergence(Sign.STATE, "0.5", "", PATH, 1)
 STATE = "1 1 0x1.0p+0 0x1.0p+0 0x1.8p-1 0x0.0p+0"
+UNSIGNED = b"unsigned"
+"""The key of the seals at a shared place that is not signed."""
 DAMAGED_MESSAGE = "the entry {}… in the shared cache is damaged: it is made again"
 ODD_PATH = os.fsdecode(b"models/\xff.bin")
 
@@ -127,13 +129,13 @@ def test_poisoned_results_of_a_shared_cache_are_one_or_told(tmp_path: Path) -> N
     Desk(tmp_path / "maker", shared=str(place)).run(trace, figures=(("a.svg", b"<svg/>"),))
     (entry,) = [path for path in place.rglob("*") if path.is_file()]
     name = entry.relative_to(place / "coursebuild-1").as_posix()
-    whole = unsealed(name, entry.read_bytes())
+    whole = unseal(name, entry.read_bytes(), UNSIGNED)
     assert whole is not None
     victim = Desk(tmp_path / "victim", shared=str(place))
     believed = 0
     for data in mutations(whole, 200):
         shutil.rmtree(victim.root / ".coursebuild/scripts", ignore_errors=True)
-        entry.write_bytes(sealed(name, data))
+        entry.write_bytes(seal(name, data, UNSIGNED))
         victim.messages.clear()
         run = victim.recall()
         memory = victim.memory()
@@ -402,5 +404,5 @@ def test_another_machine_has_the_result(desk: Desk, tmp_path: Path) -> None:
     (path,) = (p for p in (tmp_path / "shared").rglob("*") if p.is_file())
     name = path.relative_to(tmp_path / "shared" / "coursebuild-1").as_posix()
     for number, data in enumerate((b"", b"{}", b"[1]", b"\x80\x04N.")):
-        path.write_bytes(sealed(name, data))  # an intact entry that is no record
+        path.write_bytes(seal(name, data, UNSIGNED))  # an intact entry that is no record
         assert Desk(tmp_path / f"new {number}", shared=desk.shared).recall() is None

@@ -128,6 +128,12 @@ def _replace(
 
 
 def _check_place(root: Path, out: Path, place: Path) -> None:
+    path = Path(os.path.normpath(root / out))
+    if path.is_relative_to(root) and not place.is_relative_to(root):
+        raise PublishRefusedError(
+            f"{out} is a link that leads out of the project",
+            help="a course may bring such a link: name the folder itself by `--out`",
+        )
     if root.is_relative_to(place):
         relation = "is the project itself" if place == root else "holds the project"
         raise PublishRefusedError(

@@ -26,7 +26,12 @@ from msgspec import Struct
 from coursebuild.core.files.errors import EffectError, FileChangedError, OutsideProjectError, reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.trust import FOLDER, replace_file, seal, state_folder, store_key, unseal
-from coursebuild.core.files.write import check_unchanged, check_writable, write_atomic
+from coursebuild.core.files.write import (
+    check_unchanged,
+    check_writable,
+    remove_leftovers,
+    write_atomic,
+)
 
 _CLOSED = frozenset({".git", ".venv", FOLDER})
 """Folders of the project in which nothing is made."""
@@ -117,6 +122,7 @@ def _undo(root: Path, tell: Callable[[str], None] | None) -> None:
             "look at what it was changing"
         )
     else:
+        remove_leftovers({(root / change.path).parent for change in changes})
         journal.unlink()
     if tell is not None and message:
         tell(message)
@@ -124,7 +130,7 @@ def _undo(root: Path, tell: Callable[[str], None] | None) -> None:
 
 def _restore(root: Path, changes: Sequence[FileChange]) -> str:
     """Give files with their new content the old one back; return what was done, in words."""
-    restored, edited = [], []
+    restored_paths, edited_paths = [], []
     for change in reversed(changes):
         file = _check_path(root, change)
         try:
@@ -132,14 +138,14 @@ def _restore(root: Path, changes: Sequence[FileChange]) -> str:
         except FileChangedError:
             try:
                 _replace(root, change.path, change.new, change.old)
-                restored.append(change.path)
+                restored_paths.append(change.path)
             except FileChangedError:
-                edited.append(change.path)
+                edited_paths.append(change.path)
     message = ""
-    if restored:
-        message = f"undid a change that was interrupted: {', '.join(sorted(restored))}"
-    if edited:
-        names = ", ".join(sorted(edited))
+    if restored_paths:
+        message = f"undid a change that was interrupted: {', '.join(sorted(restored_paths))}"
+    if edited_paths:
+        names = ", ".join(sorted(edited_paths))
         message += f"{'; ' if message else ''}left as edited since: {names}"
     return message
 

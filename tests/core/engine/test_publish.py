@@ -61,16 +61,25 @@ def test_same_bytes_and_permissions_whatever_the_umask(root: Path) -> None:
     assert (root / "a/b/again" / MARKER).read_bytes() == (root / "public" / MARKER).read_bytes()
 
 
-def test_folder_keeps_its_permissions_and_a_link_its_place(root: Path, tmp_path: Path) -> None:
-    (tmp_path / "www").mkdir()
-    (tmp_path / "www").chmod(0o2775)
+def test_link_that_leads_out_of_the_project_is_not_followed(root: Path, tmp_path: Path) -> None:
+    """A course may bring it along, to a folder where another site of ours is."""
+    publish(root, tmp_path / "www", site("one"))
     (root / "public").symlink_to(tmp_path / "www")
+    with pytest.raises(PublishRefusedError, match=r"is a link that leads out of the project$"):
+        publish(root, root / "public", site("two"))
+    assert texts(tmp_path / "www") == site_texts("one")
+
+
+def test_folder_keeps_its_permissions_and_a_link_its_place(root: Path, tmp_path: Path) -> None:
+    (root / "www").mkdir()
+    (root / "www").chmod(0o2775)
+    (root / "public").symlink_to(root / "www")
     for text in ("one", "two"):
         publish(root, root / "public", site(text))
         assert (root / "public").is_symlink()
-        assert stat.S_IMODE((tmp_path / "www").stat().st_mode) == 0o2775
-        assert texts(tmp_path / "www") == site_texts(text)
-    assert entries(tmp_path) == ["course", "www"]
+        assert stat.S_IMODE((root / "www").stat().st_mode) == 0o2775
+        assert texts(root / "www") == site_texts(text)
+    assert entries(tmp_path) == ["course"]
 
 
 def test_file_managers_may_look(root: Path) -> None:

@@ -36,7 +36,7 @@ def fill(root: Path) -> Path:
     return Path(trust.find_store(str(root))[0], "kind", KEY)
 
 
-def found(root: Path) -> tuple[bytes | None, list[str]]:
+def look_up(root: Path) -> tuple[bytes | None, list[str]]:
     """What is found under the key, and what is said."""
     store, lines = Memo(root), list[str]()
     store.listen(lines.append)
@@ -72,7 +72,7 @@ def test_damaged_key_is_replaced_or_done_without(root: Path, state: Path, damage
             (state / "key").symlink_to(root / "key")
         case _:
             (state / "key").mkdir()
-    assert found(root)[0] is None
+    assert look_up(root)[0] is None
     assert Memo(root).get_or_create("kind", KEY, lambda: b"made") == b"made"
     assert trust.store_key(str(root)) != b"x" * 32
 
@@ -101,7 +101,7 @@ def test_without_a_place_outside_of_the_course_nothing_is_kept(
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(root.parent / place))
     Memo(root).put("kind", KEY, b"kept")
-    assert found(root) == (
+    assert look_up(root) == (
         None,
         [
             ".coursebuild needs a key of this user's, for which there is no place: "
@@ -114,23 +114,23 @@ def test_without_a_place_outside_of_the_course_nothing_is_kept(
 def test_store_travels_with_a_secret_and_is_nothing_without(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with monkeypatch.context() as here:
-        here.setenv("COURSEBUILD_STORE_KEY", "secret")
+    with monkeypatch.context() as patch:
+        patch.setenv("COURSEBUILD_STORE_KEY", "secret")
         fill(root)
     shutil.move(root, tmp_path / "there")
     become_another_user(monkeypatch, tmp_path)
-    assert found(tmp_path / "there") == (None, [])
+    assert look_up(tmp_path / "there") == (None, [])
     monkeypatch.setenv("COURSEBUILD_STORE_KEY", "another secret")
-    assert found(tmp_path / "there") == (None, [])
+    assert look_up(tmp_path / "there") == (None, [])
     monkeypatch.setenv("COURSEBUILD_STORE_KEY", "secret")
-    assert found(tmp_path / "there") == (b"kept", [])
+    assert look_up(tmp_path / "there") == (b"kept", [])
 
 
 def test_store_moves_and_is_copied_with_its_course(root: Path, tmp_path: Path) -> None:
     fill(root)
     shutil.copytree(root, tmp_path / "copy")
     root.rename(tmp_path / "moved")
-    assert found(tmp_path / "copy") == found(tmp_path / "moved") == (b"kept", [])
+    assert look_up(tmp_path / "copy") == look_up(tmp_path / "moved") == (b"kept", [])
 
 
 # --- stores of others
@@ -148,9 +148,9 @@ def test_store_of_another_machine_is_a_miss_without_a_word(
     entry = fill(root)
     foreign = entry.read_bytes()
     become_another_user(monkeypatch, tmp_path)
-    assert found(root) == (None, [])
+    assert look_up(root) == (None, [])
     assert fill(root) != entry
-    assert found(root) == (b"kept", []), "it has a place of its own"
+    assert look_up(root) == (b"kept", []), "it has a place of its own"
     assert entry.read_bytes() == foreign
 
 
@@ -161,7 +161,7 @@ def test_true_entry_of_another_user_in_ones_own_store_is_a_miss(
     become_another_user(monkeypatch, tmp_path)
     shutil.rmtree(root / ".coursebuild")
     fill(root).write_bytes(foreign)
-    assert found(root) == (None, [])
+    assert look_up(root) == (None, [])
 
 
 @pytest.mark.parametrize("kind", ["file", "link", "link to a store", "pipe", "folder", "mark"])
@@ -193,7 +193,7 @@ def test_nothing_in_a_strange_store_is_read_or_written(
                 (store / "owner").write_bytes(b"x" * 32)
     before = times(root, victim)
     fill(root)
-    assert found(root) == (b"kept", [])
+    assert look_up(root) == (b"kept", [])
     assert times(root, victim) == before
     assert (victim / "lock").read_text() == "dear"
 
@@ -205,7 +205,7 @@ def test_store_of_another_user_is_set_aside_with_a_warning(
     fill(root)
     user = os.geteuid() + 1
     monkeypatch.setattr(os, "geteuid", lambda: user)
-    assert found(root) == (None, [".coursebuild belongs to another user; it is set aside"])
+    assert look_up(root) == (None, [".coursebuild belongs to another user; it is set aside"])
 
 
 # --- Git
@@ -225,13 +225,13 @@ def test_store_that_git_tracks_is_set_aside_with_a_warning(
     entry = fill(root)
     git(top, "init", "--quiet")
     git(top, "add", "--all")
-    assert found(root) == (b"kept", [])
+    assert look_up(root) == (b"kept", [])
     git(top, "add", "--force", str(entry))
     git(top, "update-index", "--index-version", str(version))
-    assert found(root) == (None, [".coursebuild is tracked by Git; it is set aside"])
-    assert found(root / ".course1") == (None, []), "another folder of the repository"
+    assert look_up(root) == (None, [".coursebuild is tracked by Git; it is set aside"])
+    assert look_up(root / ".course1") == (None, []), "another folder of the repository"
     git(top, "rm", "--quiet", "--cached", str(entry))
-    assert found(root) == (b"kept", [])
+    assert look_up(root) == (b"kept", [])
 
 
 def test_linked_work_tree_and_letters_of_another_case(tmp_path: Path, state: Path) -> None:
@@ -244,7 +244,7 @@ def test_linked_work_tree_and_letters_of_another_case(tmp_path: Path, state: Pat
     git(top, "worktree", "add", "--quiet", str(tmp_path / "tree"))
     shutil.rmtree(tmp_path / "tree/.Coursebuild")
     fill(tmp_path / "tree")
-    assert found(tmp_path / "tree")[1] == [".coursebuild is tracked by Git; it is set aside"]
+    assert look_up(tmp_path / "tree")[1] == [".coursebuild is tracked by Git; it is set aside"]
 
 
 def test_git_folder_that_no_git_has_made_ends_nothing(root: Path) -> None:
@@ -252,11 +252,11 @@ def test_git_folder_that_no_git_has_made_ends_nothing(root: Path) -> None:
     for data in (b"", b"DIRC", b"DIRC\0\0\0\4\xff\xff\xff\xff" + b"x" * 500, b"\0" * 99):
         (root / ".git").mkdir()
         (root / ".git/index").write_bytes(data)
-        assert found(root) == (b"kept", [])
+        assert look_up(root) == (b"kept", [])
         shutil.rmtree(root / ".git")
     (root / ".git").mkdir()
     os.mkfifo(root / ".git/index")
-    assert found(root) == (b"kept", [])
+    assert look_up(root) == (b"kept", [])
     shutil.rmtree(root / ".git")
     (root / ".git").write_text("gitdir: /dev/zero\n")
-    assert found(root) == (b"kept", [])
+    assert look_up(root) == (b"kept", [])

@@ -17,9 +17,10 @@ from typing import Any
 
 import pytest
 
-from coursebuild.core.engine.memo import Memo, sealed, unsealed
+from coursebuild.core.engine.memo import Memo
 from coursebuild.core.features import TrialContext
 from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.trust import seal, store_key, unseal
 from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.mjcf import compile_all
 from coursebuild.features.lab.compile import LabCode
@@ -107,7 +108,8 @@ def test_poisoned_trials_are_one_that_can_be_shown_or_told(
     (entry,) = (tried_course.root / ".coursebuild/labs").iterdir()
     name = f"labs/{entry.name}"
     sound = entry.read_bytes()
-    reply = unsealed(name, sound)
+    key = store_key(str(tried_course.root))
+    reply = unseal(name, sound, key)
     assert reply is not None
     course, ball = load_course(tried_course.root), tried_course.text("models/ball.xml")
     models = {"ball": compile_all(tried_course.root, [("models/ball.xml", ball)])[0]}
@@ -120,7 +122,7 @@ def test_poisoned_trials_are_one_that_can_be_shown_or_told(
     without_main = json.dumps({**json.loads(text), "main": None}).encode()
     texts = map(zlib.compress, (text[:-1], without_main, *mutations(text, count)))
     for data in (reply, *bombs, *texts):
-        entry.write_bytes(sealed(name, data))
+        entry.write_bytes(seal(name, data, key))
         shutil.rmtree(tried_course.root / ".coursebuild/pictures", ignore_errors=True)
         memory = Memory(tried_course.root, Memo(tried_course.root))
         messages.clear()
@@ -129,8 +131,7 @@ def test_poisoned_trials_are_one_that_can_be_shown_or_told(
         try:
             ((result,), diagnostics) = LabTrials(context, engines).run(lab_trials(course))
         except MissedError:
-            assert [line[:26] for line in messages] == [f"the entry {name[:16]}"]
-            assert not entry.exists()
+            assert not messages
             outcomes["missed"] += 1
         else:
             assert isinstance(result.output, LabOutput)

@@ -1,0 +1,155 @@
+"""A stranger's branch brings along what it likes; it does nothing to who looks at it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from coursebuild.core.engine.manifest import MARKER
+from coursebuild.core.files.changes import FileChange
+from coursebuild.core.files.trust import seal
+from support.scratch_course import GOOD, Folder, Make
+from support.workflows import git
+
+LOOKING = (
+    ("check",),
+    ("fmt", "--check"),
+    ("explain", "1.1"),
+    ("doctor",),
+    ("extract",),
+    ("update",),
+    ("build",),
+    ("rename", "1.1", "1.2"),
+)
+"""Commands, the last of which writes what the user asks for."""
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder that holds the course, its user's state folder and what is dear to the user."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    for path in ("victim/HEAD", "victim/site/index.html", "victim/folder/file"):
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text("dear")
+    (tmp_path / "victim/site" / MARKER).write_text(
+        "site built by coursebuild; every file listed here may be replaced\nindex.html\n"
+    )
+    return tmp_path
+
+
+def bring_orders(root: Path, home: Path) -> None:
+    """Journals, in the true format, under each name that a journal ever had."""
+    config = (root / ".git/config").read_bytes()
+    changes = (
+        FileChange("../victim/HEAD", None, b"dear"),
+        FileChange(str(home / "victim/folder/file"), None, b"dear"),
+        FileChange(".git/config", b"[core]\n\tfsmonitor = touch ../owned\n", config),
+        FileChange(".venv/lib/python3.11/site-packages/zz.pth", b"import os", None),
+        FileChange(".git/hooks/post-checkout", b"#!/bin/sh\ntouch ../owned\n", None),
+        FileChange("content/lessons/1.1-one.md", b"## Owned\n", GOOD.encode()),
+    )
+    data = msgspec.msgpack.encode(changes)
+    for name in ("changes", "journal", "journals/changes"):
+        for number, text in enumerate(
+            (data, seal("changes", data, b""), seal("changes", data, b"k"))
+        ):
+            path = root / ".coursebuild" / f"{name}{number or ''}"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(text)
+
+
+def bring_links(root: Path, home: Path) -> None:
+    """Links in the place of whatever a command writes."""
+    store = root / ".coursebuild"
+    store.mkdir()
+    for name in ("lock", "clock", "pruned", "owner", "changes", ".gitignore"):
+        (store / name).symlink_to(home / "victim/HEAD")
+    for name in ("published", "unchanged", "scripts", "fonts", "environments"):
+        (store / name).symlink_to(home / "victim/folder")
+    (root / "public").symlink_to(home / "victim/site")
+    (root / "examples").symlink_to(home / "victim/folder")
+
+
+def bring_store_link(root: Path, home: Path) -> None:
+    (root / ".coursebuild").symlink_to(home / "victim/folder")
+    (root / ".public.coursebuild-new").symlink_to(home / "victim/folder")
+    (root / ".public.coursebuild-old").symlink_to(home / "victim/site")
+
+
+def bring_environment(root: Path, home: Path) -> None:
+    """Programs where the tool might look for some."""
+    program = f"#!/bin/sh\ntouch '{home}/owned'\nexec '{sys.executable}' \"$@\"\n"
+    for folder in (".venv/bin", ".coursebuild/environments/mujoco-3.13.0-x/bin", "bin"):
+        for name in ("python", "python3", "bwrap", "git", "node", "coursebuild"):
+            path = root / folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(program)
+            path.chmod(0o755)
+    for name in ("sitecustomize.py", "usercustomize.py", "msgspec.py", "conftest.py", "jinja2.py"):
+        (root / name).write_text(f"open({str(home / 'owned')!r}, 'w')\n")
+
+
+def read_files(folder: Path) -> dict[str, bytes]:
+    return {str(path): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(
+    "bring",
+    [bring_orders, bring_links, bring_store_link, bring_environment],
+    ids=lambda f: f.__name__,
+)
+def test_looking_at_what_a_branch_brings_does_nothing_else(
+    make: Make, home: Path, bring: Callable[[Path, Path], None]
+) -> None:
+    course = make(GOOD)
+    shutil.rmtree(course.root / ".coursebuild")
+    root = course.root.rename(home / "course")
+    course = Folder(root)
+    course.tmp.mkdir()
+    git(root, "init", "--quiet")
+    bring(root, home)
+    victim, repository = read_files(home / "victim"), read_files(root / ".git")
+    for arguments in LOOKING:
+        run = course.run if arguments == ("check",) else course.main
+        result = run(*arguments)
+        assert "Traceback" not in result.err + result.out, arguments
+        assert read_files(home / "victim") == victim, arguments
+        assert read_files(root / ".git") == repository, arguments
+        assert not (home / "owned").exists(), arguments
+        if bring is not bring_environment:
+            assert not (root / ".venv").exists(), arguments
+        if arguments != LOOKING[-1]:
+            assert course.text(course.lesson()) == GOOD, arguments
+    subprocess.run(["git", "status"], cwd=root, check=True, capture_output=True)
+    assert not (home / "owned").exists()
+
+
+def test_published_site_is_the_one_of_a_course_without_a_store(make: Make, home: Path) -> None:
+    """Not one byte of what another machine has made is published."""
+    foreign, root = make(GOOD), home / "course"
+    assert foreign.main("build", "-q").status == 0
+    shutil.copytree(foreign.root, root, ignore=shutil.ignore_patterns(".coursebuild", "public"))
+    course = Folder(root)
+    course.tmp.mkdir()
+    assert course.main("build", "-q").status == 0
+    site = course.tree("public")
+    shutil.rmtree(root / "public")
+    store = root / ".coursebuild"
+    for entry in [path for path in store.glob("*/**/*") if path.is_file()]:
+        key = b"of a stranger"
+        name = entry.relative_to(store).as_posix()
+        entry.write_bytes(seal(name, b"foreign" + entry.read_bytes()[40:], key))
+    for mark in (True, False):
+        if not mark:
+            (store / "owner").write_bytes(os.urandom(32))
+        result = course.main("build", "-q")
+        assert (result.status, result.err) == (0, "")
+        assert course.tree("public") == site
+        shutil.rmtree(root / "public")
