@@ -230,3 +230,43 @@ def test_adopting_killed_at_any_call_leaves_old_or_new_lesson(
         assert left[lesson] == new[lesson] or left["examples/kept.py"] == edit, place
         assert trials.run() == 0, place
         assert (trials.folder.tree(), trials.leftovers()) == (new, []), place
+
+
+def test_import_killed_at_any_call_is_completed_by_the_same_command(
+    mortals: Mortals, tmp_path: Path
+) -> None:
+    """What it wrote so far is no obstacle, and neither the course nor the report differs."""
+    template = Folder(tmp_path / "template")
+    clock = "import time\nprint(time.time_ns())"
+    template.write("old/1-one.md", "# One\n\n![x](x.png)\n\n" + python_cell(clock))
+    template.write("old/2-two.md", "# Two\n\n" + python_cell("import nowhere_to_be_found"))
+    template.write("old/part/x.png", b"\x89PNG")
+    template.write("new/mine.txt", "Mine.")
+    trials = Trials(mortals, template, tmp_path, "import", "old", "--out", "new")
+    new, report = trials.new, remarks(mortals)
+    assert "requires=nowhere_to_be_found" in report
+    assert {"replace", "link", "write", "mkdir", "unlink"} <= {*trials.calls}
+    lesson, states = "new/content/lessons/1.1-one.md", set()
+    for place, left in trials.deaths():
+        assert left["new/mine.txt"] == b"Mine.", place
+        had_printed = b"Output:" in left.get(lesson, b"")
+        states.add((lesson in left, had_printed))
+        assert trials.run() == 0, (place, mortals.output)
+        assert remarks(mortals) == report, place
+        tree = trials.folder.tree()
+        if had_printed:  # a result that was written is not made again
+            assert tree[lesson] == left[lesson], place
+        assert {**tree, lesson: new[lesson]} == new, place
+        store = "new/.coursebuild/"
+        assert all(name.startswith(store) for name in trials.leftovers()), place
+    assert states == {(False, False), (True, False), (True, True)}
+
+
+def python_cell(code: str) -> str:
+    return f"```{{code-cell}} python\n{code}\n```\n"
+
+
+def remarks(mortals: Mortals) -> str:
+    """What an import says of its files."""
+    first_words = ("wrote", "left:", "examples/")
+    return "\n".join(line for line in mortals.output.split("\n") if line.startswith(first_words))

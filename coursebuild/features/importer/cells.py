@@ -1,6 +1,6 @@
 """Cells of Python, which share their names, as one script of a lesson.
 
-Entry points: `runnable_code` of a cell, `join_cells`, `code_for_readers`.
+Entry points: `runnable_code` of a cell, `join_cells`, `join_outputs`, `code_for_readers`.
 
 Scripts of coursebuild are complete. So all cells of a lesson become one script, which stands where
 the last of them stood; the ones before are shown where they stood, as parts of it.
@@ -20,6 +20,8 @@ _OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULT
 _DEFINITION = re.compile(r"(?:@|(?:async )?def |class )")
 _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
 _FIGURE = re.compile(r"\b(?:plt|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
+_ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+"""What colours text in a terminal."""
 _MAGIC = re.compile(r"^[ \t]*(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 
 
@@ -34,6 +36,16 @@ def join_cells(codes: Iterable[str], title: str) -> str:
         script += ("\n\n" if before and is_apart else "\n") + code + "\n"
         before = code
     return script
+
+
+def join_outputs(codes: Iterable[tuple[Segment, str]]) -> str:
+    """Return what is recorded of the cells whose code the script has: what it should print."""
+    output = ""
+    for cell, code in codes:
+        prints_value = code.count("print(") > cell.text.count("print(")
+        for text in (cell.printed, cell.value if prints_value else ""):
+            output += text and text.removesuffix("\n") + "\n"
+    return _ESCAPE.sub("", output).strip("\n")
 
 
 def code_for_readers(cell: Segment) -> str:

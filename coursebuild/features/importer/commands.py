@@ -7,27 +7,36 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from textwrap import shorten
 
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import add_running, available_cores
+from coursebuild.cli.arguments import add_running, add_sandbox, available_cores
 from coursebuild.cli.output import print_report
-from coursebuild.core.files.changes import FileChange, change_files
+from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.errors import UsageError
-from coursebuild.core.model import Course, Recording, Script
-from coursebuild.core.model.results import Outcome, ScriptRun, Sign
+from coursebuild.core.model import Recording, Script
+from coursebuild.core.model.results import Change, Outcome, ScriptRun, Sign
 from coursebuild.core.pages.marks import fence
+from coursebuild.core.run.sandbox import find_sandbox
+from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Excerpt, Source, Span
-from coursebuild.features.importer.convert import convert, write_course
+from coursebuild.features.importer.convert import (
+    change_tried_lessons,
+    convert,
+    write_course,
+)
+from coursebuild.features.importer.source_files import SourceFiles
 from coursebuild.pipeline.check import check
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.options import Options, open_store
+from coursebuild.pipeline.options import Options, check_path, open_store
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import extract_scripts, recorded_outputs
 from coursebuild.pipeline.scripts import run as run_scripts
@@ -43,6 +52,8 @@ _MISSING_MODULE = re.compile(r"^ModuleNotFoundError: No module named '([\w.]+)'"
 EXAMPLES = """\
 examples:
   coursebuild import ../old-course --out my-course
+  coursebuild import pendulum.ipynb
+  coursebuild import ../from-elsewhere --sandbox     what a stranger wrote
 """
 
 
@@ -50,10 +61,14 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = (
         "Write a course of another tool as one of coursebuild: a course.json with Markdown,\n"
-        "Jupyter notebooks, MyST, Quarto or MkDocs. Its folder is only read."
+        "Jupyter notebooks, MyST, Quarto or MkDocs. Its folder is only read, its code is run:\n"
+        "what the cells and scripts of strangers may do is limited by --sandbox."
     )
     add_running(parser)
-    parser.add_argument("folder", metavar="FOLDER", help="what to import")
+    add_sandbox(parser)
+    parser.add_argument(
+        "source", metavar="FOLDER", help="what to import: a folder, a notebook or a Markdown file"
+    )
     parser.add_argument(
         "--out",
         metavar="FOLDER",
@@ -65,15 +80,22 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the course as one of coursebuild in a new folder, try its scripts, and check it."""
     if arguments.root is not None:
         raise UsageError("import takes no -C: the new course's folder is named by --out")
-    source = Path(arguments.folder)
-    out = Path(arguments.out or source.resolve().name).absolute()
+    files = SourceFiles(Path(arguments.source))
+    out = Path(os.path.realpath(arguments.out or files.name))
+    check_path(out)
     store = open_store(out, arguments.cache, arguments.cache_size, fresh=arguments.no_cache)
-    progress = Progress(quiet=arguments.quiet)
-    options = Options(out, arguments.jobs or available_cores(), store, progress)
-    converted = convert(source)
-    write_course(converted, out, source)
+    options = Options(
+        out,
+        arguments.jobs or available_cores(),
+        store,
+        Progress(quiet=arguments.quiet),
+        verbose=arguments.verbose,
+        sandbox=find_sandbox(out) if arguments.sandbox else None,
+    )
+    converted = convert(files)
+    write_course(converted, out, files, store)
     remarks = [f"wrote {plural(len(converted.files), 'file')} to {out}"]
-    remarks += _try_scripts(options)
+    remarks += _try_scripts(options, converted.notebook_outputs)
     for leftover in converted.leftovers:
         place = f", {leftover.place}" if leftover.place else ""
         remarks.append(f"left: {leftover.path}{place}: {leftover.message}")
@@ -85,9 +107,12 @@ def run(arguments: argparse.Namespace) -> int:
 # --- scripts
 
 
-def _try_scripts(options: Options) -> tuple[str, ...]:
-    """Run each script and add keys and outputs to its lesson; return remarks on the new keys."""
-    course = load(options.root).value
+def _try_scripts(options: Options, notebook_outputs: Mapping[str, str]) -> tuple[str, ...]:
+    """Run each script and add keys and outputs to its lesson; return remarks on what is new.
+
+    Of `notebook_outputs`, those that do not hold here are replaced.
+    """
+    course = load(options.root, trusted=options.sandbox is None).value
     if course is None:
         return ()
     recordings = recorded_outputs(course)
@@ -104,12 +129,27 @@ def _try_scripts(options: Options) -> tuple[str, ...]:
             remarks.append(f"{script.path} got `{keys}`")
         if script_run.outcome is Outcome.OK:
             script_recordings = [r for r in recordings if r.script == script.path]
-            changes += _output_edits(script, script_recordings, course, script_run.stdout)
+            notebook = notebook_outputs.get(script.path)
+            for recording in script_recordings:
+                comparison = course.comparison_of(recording)
+                verdict = compare(recording, comparison, script_run.stdout)
+                if not _is_blank(recording) and (notebook is None or not verdict.changes):
+                    continue
+                edit = update_body(recording, comparison, script_run.stdout, script_run.stdout)
+                if isinstance(edit, Edit):
+                    changes.append(edit)
+                    if not _is_blank(recording):
+                        remarks.append(f"{notebook}: {_describe_changes(verdict.changes)}")
+            if not script_recordings and script_run.stdout.strip() and not script.prefix:
+                end = script.span.end
+                text = "Output:\n\n" + fence("text", script_run.stdout.rstrip("\n"))
+                changes.append(Edit(Span(script.span.source, end, end), f"\n\n{text}"))
     file_changes = (
         FileChange(source.path, source.text.encode(), apply_edits(source.text, changes).encode())
         for source, changes in edits.items()
     )
-    change_files(options.root, [change for change in file_changes if change.new != change.old])
+    lessons = [change for change in file_changes if change.new != change.old]
+    change_tried_lessons(options.root, lessons, options.store)
     return tuple(remarks)
 
 
@@ -142,17 +182,20 @@ def _missing_keys(script: Script, script_run: ScriptRun) -> Iterator[str]:
         yield "deep"
 
 
-def _output_edits(
-    script: Script, recordings: Sequence[Recording], course: Course, printed: str
-) -> Iterator[Edit]:
-    """Yield edits that fill empty outputs with what was printed, or add one where there is none."""
-    for recording in recordings:
-        if isinstance(recording.body, Excerpt) and not recording.body.text.strip():
-            comparison = course.comparison_of(recording)
-            edit = update_body(recording, comparison, printed, printed)
-            if isinstance(edit, Edit):
-                yield edit
-    if not recordings and printed.strip() and not script.prefix:
-        end = script.span.end
-        text = "Output:\n\n" + fence("text", printed.rstrip("\n"))
-        yield Edit(Span(script.span.source, end, end), f"\n\n{text}")
+def _is_blank(recording: Recording) -> bool:
+    return isinstance(recording.body, Excerpt) and not recording.body.text.strip()
+
+
+def _describe_changes(changes: Sequence[Change]) -> str:
+    """Say what became of a recorded output that did not hold, by the first difference."""
+    recorded, printed = (
+        f"`{text}`" if text else "nothing"
+        for text in (
+            shorten(t, 60, placeholder="…") for t in (changes[0].recorded, changes[0].printed)
+        )
+    )
+    rest = f", and {plural(len(changes) - 1, 'more difference')}" if changes[1:] else ""
+    return (
+        "the recorded output does not hold here and is replaced: "
+        f"{recorded} was recorded, {printed} is printed{rest}"
+    )

@@ -14,13 +14,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from coursebuild.core.files.errors import UsageError
+from coursebuild.features.importer.source_files import TEXTS, SourceFiles
 from coursebuild.features.importer.values import (
-    TEXTS,
-    Files,
     ImportedCourse,
     ImportedLevel,
     ImportedText,
-    read_text,
     read_yaml,
     title_of_file,
 )
@@ -36,8 +34,8 @@ _COURSE_KEYS = {"toc", "root", "site-url", "author", "authors", "version"}
 """Keys that only the whole course has: a title next to them is not the title of a level."""
 
 
-def read_contents(files: Files, folder: str) -> ImportedCourse:
-    """Read the course in a folder of notebooks or Markdown; its name is a title of last resort.
+def read_contents(files: SourceFiles) -> ImportedCourse:
+    """Read the course in a folder of notebooks or Markdown, or that of a single text.
 
     Raises:
         UsageError: there is nothing to import.
@@ -55,23 +53,24 @@ def read_contents(files: Files, folder: str) -> ImportedCourse:
         *_read_nav(_get(mkdocs, "nav"), str(_get(mkdocs, "docs_dir") or "docs"), files),
     ] or [*_group_by_folder(files)]
     if not parts:
-        raise UsageError(
-            "there is nothing to import: no course.json, no notebook and no Markdown file"
-        )
-    pages = [p for p in parts if isinstance(p, ImportedText) and _base_name(p.file) in _PAGES]
+        left = [f"{leftover.path}: {leftover.message}" for leftover in sorted(files.leftovers)[:3]]
+        message = "there is nothing to import: no course.json, no notebook and no Markdown file"
+        raise UsageError(message, help="; ".join(left))
+    texts = [] if files.is_single else [part for part in parts if isinstance(part, ImportedText)]
+    pages = [text for text in texts if _base_name(text.file) in _PAGES]
     levels = _group_levels([part for part in parts if part not in pages], title)
     return ImportedCourse(
-        title=title or title_of_file(folder), levels=tuple(levels), pages=tuple(pages)
+        title=title or title_of_file(files.name), levels=tuple(levels), pages=tuple(pages)
     )
 
 
-def _read_settings(name: str, files: Files) -> Mapping[str, Any]:
+def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
     path = next((path for path in (name, name.replace(".yml", ".yaml")) if path in files), None)
     if path is None:
         return {}
-    value = read_yaml(read_text(files[path], path))
+    value = read_yaml(files.read_text(path))
     if value is None:
-        raise UsageError(f"{path} is no YAML")
+        raise UsageError(f"{path} is no YAML, or too large")
     return value if isinstance(value, dict) else {"chapters": value}
 
 
@@ -82,7 +81,7 @@ def _get(settings: object, *path: str) -> object:
     return settings
 
 
-def _read_parts(value: object, files: Files) -> Iterator[ImportedText | ImportedLevel]:
+def _read_parts(value: object, files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
     """Yield the lessons and groups of lessons in the table of contents of any of the tools."""
     if isinstance(value, str):
         if path := _find_text(value, files):
@@ -109,7 +108,9 @@ def _flatten(parts: Iterable[ImportedText | ImportedLevel]) -> Iterator[Imported
         yield from (part,) if isinstance(part, ImportedText) else part.lessons
 
 
-def _read_nav(entries: object, folder: str, files: Files) -> Iterator[ImportedText | ImportedLevel]:
+def _read_nav(
+    entries: object, folder: str, files: SourceFiles
+) -> Iterator[ImportedText | ImportedLevel]:
     """Yield the entries of MkDocs' `nav`: a file, or a title with a file or further entries."""
     for entry in entries if isinstance(entries, list) else ():
         for title, value in entry.items() if isinstance(entry, Mapping) else [("", entry)]:
@@ -120,14 +121,14 @@ def _read_nav(entries: object, folder: str, files: Files) -> Iterator[ImportedTe
                 yield ImportedText(file=path, title=str(title))
 
 
-def _find_text(name: object, files: Files) -> str:
+def _find_text(name: object, files: SourceFiles) -> str:
     """Return a text's path, given with or without its extension; empty where there is none."""
     if not isinstance(name, str) or not name:
         return ""
     name = posixpath.normpath(name)
-    if name in files:
-        return name if name.endswith(TEXTS) else ""
-    return next((name + end for end in TEXTS if name + end in files), "")
+    if path := files.find(name):
+        return path if path.endswith(TEXTS) else ""
+    return next((path for end in TEXTS if (path := files.find(name + end))), "")
 
 
 def _natural_order(path: str) -> list[tuple[int, int | str]]:
@@ -136,11 +137,13 @@ def _natural_order(path: str) -> list[tuple[int, int | str]]:
     return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
 
 
-def _group_by_folder(files: Files) -> Iterator[ImportedText | ImportedLevel]:
+def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
     texts = sorted((path for path in files if path.endswith(TEXTS)), key=_natural_order)
     for folder, paths in itertools.groupby(texts, posixpath.dirname):
         lessons = [
-            ImportedText(file=path) for path in paths if _base_name(path) not in _NOT_LESSONS
+            ImportedText(file=path)
+            for path in paths
+            if files.is_single or _base_name(path) not in _NOT_LESSONS
         ]
         if folder and lessons:
             yield ImportedLevel(title=title_of_file(folder), lessons=tuple(lessons))

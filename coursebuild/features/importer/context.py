@@ -13,7 +13,8 @@ from urllib.parse import unquote, urlsplit
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from coursebuild.features.importer.values import Files, Leftover, stem_of
+from coursebuild.features.importer.source_files import SourceFiles
+from coursebuild.features.importer.values import Leftover, stem_of
 
 
 class LessonContext(Struct, frozen=True, kw_only=True):
@@ -28,7 +29,7 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """New ids of lessons, by the old ones."""
     labels: Mapping[str, str]
     """The address of the lesson or page that sets an anchor, by the anchor."""
-    files: Files
+    files: SourceFiles
     camera_is_position: bool
     path: str = ""
     """The lesson's file, relative to the folder that is imported."""
@@ -41,6 +42,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     leftovers: list[Leftover] = field(default_factory=list)
     copies: dict[str, bytes] = field(default_factory=dict)
     """The files and pictures that the lesson uses, by their new paths."""
+    notebook_outputs: dict[str, str] = field(default_factory=dict)
+    """The notebooks whose recorded outputs are kept, by the paths of their scripts."""
     callouts: dict[str, str] = field(default_factory=dict)
     """Labels of kinds of callouts that coursebuild does not have, by kind."""
 
@@ -92,19 +95,20 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         resolved = posixpath.normpath(posixpath.join(posixpath.dirname(self.path), path))
         if path.startswith("/"):
             resolved = posixpath.normpath(path.lstrip("/"))
-        if resolved in self.files or stem_of(resolved) in self.targets:
+        if file := self.files.find(resolved):
+            return file
+        if stem_of(resolved) in self.targets:
             return resolved
-        return next(
-            (f for f in sorted(self.files) if f.endswith("/" + path.lstrip("./"))), resolved
-        )
+        return next((f for f in self.files if f.endswith("/" + path.lstrip("./"))), resolved)
 
     def add_picture(self, name: str) -> str:
         """Copy a picture that the lesson's file contains, and return its new address."""
-        return self._add_copy(f"{stem_of(self.path)}/{name}", self.pictures[name])
+        file = re.sub(r"[^\w.+-]", "-", name)  # it is a name, whatever path it looks like
+        return self._add_copy(f"{stem_of(self.path)}/{file}", self.pictures[name])
 
     def add_file(self, path: str) -> str:
         """Copy a file of the folder, and return its new address."""
-        return self._add_copy(path, self.files[path].read_bytes())
+        return self._add_copy(path, self.files.read(path))
 
     def _add_copy(self, name: str, data: bytes) -> str:
         path = f"content/files/{name}"

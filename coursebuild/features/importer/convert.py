@@ -1,10 +1,12 @@
 """The course of another tool → the files of one of coursebuild.
 
-Entry points: `convert`, `write_course`.
+Entry points: `convert`, `write_course`, `change_tried_lessons`.
 """
 
 from __future__ import annotations
 
+import contextlib
+import os
 import posixpath
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,27 +15,35 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.changes import FileChange, change_files, undo_changes
 from coursebuild.core.files.errors import EffectError, UsageError, reason
+from coursebuild.core.files.read import read_bytes
 from coursebuild.core.pages.marks import fence
+from coursebuild.core.values import fingerprint
 from coursebuild.features.importer.blocks import convert_segment
-from coursebuild.features.importer.cells import code_for_readers, join_cells, runnable_code
+from coursebuild.features.importer.cells import (
+    code_for_readers,
+    join_cells,
+    join_outputs,
+    runnable_code,
+)
 from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.course_json import read_course_json
 from coursebuild.features.importer.course_map import map_lines, read_texts
 from coursebuild.features.importer.prose import find_anchors
+from coursebuild.features.importer.source_files import TEXTS, SourceFiles
 from coursebuild.features.importer.values import (
-    TEXTS,
-    Files,
     ImportedCourse,
     ImportedText,
     Leftover,
     Segment,
-    list_files,
     stem_of,
 )
 
+TRIED = "tried-lessons"
+"""The kind of entries that say: a lesson as it was converted became this when it was tried."""
 _GITIGNORE = b"public/\nexamples/\n.coursebuild/\n"
 
 
@@ -42,25 +52,27 @@ class ConvertedCourse(Struct, frozen=True):
 
     files: Mapping[str, bytes]
     leftovers: tuple[Leftover, ...]
+    notebook_outputs: Mapping[str, str]
+    """The texts, by the path of the script, whose recorded outputs stand below it."""
 
 
-def convert(folder: Path) -> ConvertedCourse:
+def convert(files: SourceFiles) -> ConvertedCourse:
     """Read a course of another tool; nothing is written.
 
     Raises:
         UsageError: there is nothing to import, or a file cannot be read.
     """
-    files = list_files(folder)
     maps = [path for path in files if posixpath.basename(path) == "course.json"]
     map_path = min(maps, key=lambda path: (path.count("/"), path), default=None)
     if map_path is None:
-        course = read_contents(files, folder.resolve().name)
+        course = read_contents(files)
     else:
         course = read_course_json(map_path, files)
     course = read_texts(course, files)
     lessons = [lesson for level in course.levels for lesson in level.lessons]
     texts, ids = (*lessons, *course.pages), _new_ids(lessons)
-    out, leftovers, callouts = _convert_texts(course, texts, ids, files)
+    out, context = _convert_texts(course, texts, ids, files)
+    leftovers = context.leftovers
     if map_path is not None:
         paths = {text.file for text in texts}
         unused = (path for path in files if path.endswith(TEXTS) and path not in paths)
@@ -73,31 +85,54 @@ def convert(folder: Path) -> ConvertedCourse:
         ]
     packages = dict(_own_packages(files, texts))
     out |= {**packages, **dict(_model_files(files))}
-    lines = map_lines(course, ids, callouts, ("src",) if packages else ())
-    out["content/course.toml"] = "".join(f"{line}\n" for line in lines).encode()
+    lines = map_lines(course, ids, context.callouts, ("src",) if packages else ())
+    out["content/course.toml"] = _encode("".join(f"{line}\n" for line in lines))
     out[".gitignore"] = _GITIGNORE
-    return ConvertedCourse(dict(sorted(out.items())), (*course.leftovers, *leftovers))
+    leftovers = [*sorted(files.leftovers), *course.leftovers, *leftovers]
+    return ConvertedCourse(dict(sorted(out.items())), tuple(leftovers), context.notebook_outputs)
 
 
-def write_course(course: ConvertedCourse, folder: Path, source: Path) -> None:
+def write_course(course: ConvertedCourse, target: Path, files: SourceFiles, store: Memo) -> None:
     """Write all files of a new course, or none.
+
+    Those that an import of the same course wrote before, and nobody has edited since, are made what
+    they were at first: an import that was killed is said again, and begins anew.
 
     Raises:
         UsageError: the folder is the one that is imported, or in it, or has one of the files.
         EffectError: a file cannot be written.
     """
-    target = folder.resolve()
+    if target.is_relative_to(files.folder) and not files.is_single:
+        raise UsageError(f"{target} is in the folder that is imported, which is only read")
     undo_changes(target)
-    if target.is_relative_to(source.resolve()):
-        raise UsageError(f"{folder} is in the folder that is imported, which is only read")
-    for path in course.files:
-        if (target / path).exists():
-            raise UsageError(f"{folder} has {path} already; name an empty folder with --out")
+    changes = []
+    for path, data in course.files.items():
+        old = None
+        if os.path.lexists(target / path):
+            with contextlib.suppress(EffectError):  # which leaves `None`: it is no file of ours
+                old = read_bytes(target, path)
+            trial = fingerprint((path, data, old))
+            if old != data and (old is None or store.peek(TRIED, trial, bytes) is None):
+                raise UsageError(f"{target} has {path} already; name an empty folder with --out")
+        if old != data:
+            changes.append(FileChange(path, old, data))
     try:
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise EffectError(f"{folder} cannot be made: {reason(error)}") from None
-    change_files(target, [FileChange(path, None, data) for path, data in course.files.items()])
+        raise EffectError(f"{target} cannot be made: {reason(error)}") from None
+    change_files(target, changes)
+
+
+def change_tried_lessons(target: Path, changes: Sequence[FileChange], store: Memo) -> None:
+    """Change lessons to what trying their scripts has shown, so that `write_course` knows them."""
+    for change in changes:
+        store.put(TRIED, fingerprint((change.path, change.old, change.new)), b"")
+    change_files(target, changes)
+
+
+def _encode(text: str) -> bytes:
+    """Return UTF-8; JSON may name characters that there are none of, half of a pair."""
+    return text.encode("utf-8", "replace")
 
 
 def _new_ids(lessons: Sequence[ImportedText]) -> dict[str, str]:
@@ -108,9 +143,12 @@ def _new_ids(lessons: Sequence[ImportedText]) -> dict[str, str]:
 
 
 def _convert_texts(
-    course: ImportedCourse, texts: Sequence[ImportedText], ids: Mapping[str, str], files: Files
-) -> tuple[dict[str, bytes], list[Leftover], dict[str, str]]:
-    """Return the files of lessons and pages, the leftovers, and the course's own callouts."""
+    course: ImportedCourse,
+    texts: Sequence[ImportedText],
+    ids: Mapping[str, str],
+    files: SourceFiles,
+) -> tuple[dict[str, bytes], LessonContext]:
+    """Return the files of lessons and pages, and the context that has collected the rest."""
     texts = [text for text in texts if text.path]
     context = LessonContext(
         targets={stem_of(text.file): text.link for text in texts},
@@ -124,8 +162,8 @@ def _convert_texts(
         files=files,
         camera_is_position=course.camera_is_position,
     )
-    out = {text.path: _convert_text(text, context).encode() for text in texts}
-    return {**out, **context.copies}, context.leftovers, context.callouts
+    out = {text.path: _encode(_convert_text(text, context)) for text in texts}
+    return {**out, **context.copies}, context
 
 
 def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
@@ -146,8 +184,13 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
     shown_end = 0
     for number, segment in enumerate(text.segments):
         if number == last:
+            script_path = _script_path(text)
             script = join_cells(codes.values(), text.title)
-            parts[shown_end:] = [fence(f"python file={_script_path(text)}", script)]
+            parts[shown_end:] = [fence(f"python file={script_path}", script)]
+            output = join_outputs((text.segments[cell], code) for cell, code in codes.items())
+            if output.strip():
+                parts.append("Output:\n\n" + fence("text", output))
+                context.notebook_outputs[script_path] = text.file
             continue
         is_cell = segment.kind == "cell"
         parts.append(_write_cell(segment) if is_cell else convert_segment(segment, context))
@@ -169,7 +212,7 @@ def _script_path(text: ImportedText) -> str:
     return f"examples/{'' if words[0].isalpha() else 'l'}{'_'.join(words)}.py"
 
 
-def _own_packages(files: Files, texts: Sequence[ImportedText]) -> Iterator[tuple[str, bytes]]:
+def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator[tuple[str, bytes]]:
     """Yield the files of the course's own packages that its lessons import, below `src`."""
     code = "\n".join(segment.text for text in texts for segment in text.segments)
     imported = set(re.findall(r"^[ \t]*(?:from|import)[ \t]+(\w+)", code, re.MULTILINE))
@@ -177,18 +220,18 @@ def _own_packages(files: Files, texts: Sequence[ImportedText]) -> Iterator[tuple
     for root in roots:
         name = posixpath.basename(root)
         if name in imported and posixpath.dirname(root) not in roots:
-            for path, file in files.items():
+            for path in files:
                 if path.startswith(f"{root}/"):
-                    yield f"src/{name}/{path.removeprefix(f'{root}/')}", file.read_bytes()
+                    yield f"src/{name}/{path.removeprefix(f'{root}/')}", files.read(path)
 
 
-def _model_files(files: Files) -> Iterator[tuple[str, bytes]]:
+def _model_files(files: SourceFiles) -> Iterator[tuple[str, bytes]]:
     """Yield the models, and the meshes and textures in their folders."""
-    for path, file in files.items():
+    for path in files:
         folders = posixpath.dirname(path).split("/")
         if "models" in folders:
             depth = folders.index("models")
             name = "/".join(("models", *folders[depth + 1 :], posixpath.basename(path)))
-            yield name, file.read_bytes()
-        elif path.endswith(".xml") and b"<mujoco" in (data := file.read_bytes()):
+            yield name, files.read(path)
+        elif path.endswith(".xml") and b"<mujoco" in (data := files.read(path)):
             yield f"models/{posixpath.basename(path)}", data

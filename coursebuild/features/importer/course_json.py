@@ -13,13 +13,12 @@ from collections import Counter
 from typing import Any
 
 from coursebuild.core.files.errors import UsageError
+from coursebuild.features.importer.source_files import SourceFiles
 from coursebuild.features.importer.values import (
-    Files,
     ImportedCourse,
     ImportedLevel,
     ImportedText,
     Leftover,
-    read_text,
     stem_of,
 )
 
@@ -45,13 +44,13 @@ _LESSON_FIELDS = (
 )
 
 
-def read_course_json(path: str, files: Files) -> ImportedCourse:
+def read_course_json(path: str, files: SourceFiles) -> ImportedCourse:
     """Read the course that a file describes.
 
     Raises:
         UsageError: it is no JSON, or holds no levels.
     """
-    text = read_text(files[path], path)
+    text = files.read_text(path)
     try:
         # A number such as 4.10 is the name of a lesson.
         data = json.loads(text, parse_float=str, parse_int=str)
@@ -81,7 +80,7 @@ def read_course_json(path: str, files: Files) -> ImportedCourse:
 class _Reader:
     """Reads the objects of the file, and counts the fields that it does not know."""
 
-    def __init__(self, files: Files) -> None:
+    def __init__(self, files: SourceFiles) -> None:
         self.files = files
         self.unknown: Counter[str] = Counter()
         """How often each unknown field occurs."""
@@ -124,7 +123,10 @@ class _Reader:
         file, id, slug = (_read_text(lesson, key) for key in ("file", "id", "slug"))
         paths = [path for path in self.files if path.endswith((".md", ".qmd", ".ipynb"))]
         suffix = "/" + file.lstrip("./")
-        matches = [path for path in paths if file and f"/{path}".endswith(suffix)]
+        exact = self.files.find(posixpath.normpath(file))
+        matches = [
+            path for path in paths if file and (path == exact or f"/{path}".endswith(suffix))
+        ]
         pattern = re.compile(rf"(?:lesson[-_ ]?)?{re.escape(id)}(?![\w.])|{re.escape(slug)}$")
         for path in paths:
             if id and pattern.match(posixpath.basename(stem_of(path))):

@@ -13,13 +13,14 @@ from msgspec.structs import replace
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.toml_text import toml_string
 from coursebuild.features.importer.segments import read_segments
-from coursebuild.features.importer.values import Files, ImportedCourse, ImportedText, title_of_file
+from coursebuild.features.importer.source_files import SourceFiles
+from coursebuild.features.importer.values import ImportedCourse, ImportedText, title_of_file
 
 _COMPLETE = ("", "complete", "completed", "done", "published", "final", "ready")
 """Statuses of a lesson that is finished; with any other it is a draft."""
 
 
-def read_texts(course: ImportedCourse, files: Files) -> ImportedCourse:
+def read_texts(course: ImportedCourse, files: SourceFiles) -> ImportedCourse:
     """Return the course with its texts read, and with their new ids and paths.
 
     Raises:
@@ -38,13 +39,13 @@ def read_texts(course: ImportedCourse, files: Files) -> ImportedCourse:
     return replace(course, levels=tuple(levels), pages=tuple(pages))
 
 
-def _read_text(text: ImportedText, id: str, files: Files) -> ImportedText:
+def _read_text(text: ImportedText, id: str, files: SourceFiles) -> ImportedText:
     """Read the file of a lesson with this id, or of a page, whose id is made from its title."""
     title, slug = text.title, text.slug
     if not text.file:
         title = title or id
         return replace(text, id=id, slug=slug_of(slug or title), title=title)
-    heading, segments, pictures = read_segments(files[text.file], text.file)
+    heading, segments, pictures = read_segments(files.read_text(text.file), text.file)
     title = " ".join((title or heading or title_of_file(text.file)).split())
     slug = slug_of(slug or title_of_file(text.file))
     if not re.search("[a-z]", slug):

@@ -11,7 +11,6 @@ import json
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from markdown_it import MarkdownIt
@@ -20,7 +19,7 @@ from mdit_py_plugins.admon import admon_plugin
 from msgspec.structs import replace
 
 from coursebuild.core.files.errors import UsageError
-from coursebuild.features.importer.values import Segment, read_text, read_yaml
+from coursebuild.features.importer.values import Segment, read_yaml
 
 _COLONS = re.compile(r" {0,3}(:{3,})[ \t]*(.*?)[ \t]*\n?")
 _CELL = re.compile(r"\{code-cell\b.*|\{(?:python|ipython3?)[^}]*\}")
@@ -29,13 +28,12 @@ _TITLE = re.compile(r"^#[ \t]+(.*?)(?:[ \t]+#+)?(?:[ \t]*\{[^{}]*\})?[ \t]*$", r
 """A heading of level 1."""
 
 
-def read_segments(path: Path, name: str) -> tuple[str, list[Segment], dict[str, bytes]]:
+def read_segments(text: str, name: str) -> tuple[str, list[Segment], dict[str, bytes]]:
     """Return the title that a file states, its segments, and the pictures in it.
 
     Raises:
-        UsageError: it cannot be read.
+        UsageError: it is no notebook, but is called so.
     """
-    text = read_text(path, name)
     pictures: dict[str, bytes] = {}
     metadata: Mapping[str, object] = {}
     if name.endswith(".ipynb"):
@@ -158,9 +156,17 @@ def _read_cells(cells: list[dict[str, Any]]) -> tuple[list[Segment], dict[str, b
         elif cell.get("cell_type") == "code" and source.strip():
             outputs = cell.get("outputs") or ()
             tags = " ".join((cell.get("metadata") or {}).get("tags") or ())
-            shows_value = any(output.get("output_type") == "execute_result" for output in outputs)
+            values = [o for o in outputs if o.get("output_type") == "execute_result"]
+            value_texts = ((o.get("data") or {}).get("text/plain") or "" for o in values)
+            streams = (o for o in outputs if o.get("name") == "stdout")
             cell_segment = Segment(
-                kind="cell", place=place, text=source, head=tags, shows_value=shows_value
+                kind="cell",
+                place=place,
+                text=source,
+                head=tags,
+                shows_value=bool(values),
+                printed="".join(_join_lines(stream.get("text") or "") for stream in streams),
+                value="\n".join(map(_join_lines, value_texts)),
             )
             segments.append(cell_segment)
         elif source.strip():

@@ -1,30 +1,14 @@
-"""A course of another tool as values, and how its files are read."""
+"""A course of another tool as values, its YAML among them."""
 
 from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from collections.abc import Mapping, ValuesView
+from typing import Any, Literal
 
 import yaml
 from msgspec import Struct
-
-from coursebuild.core.files.errors import UsageError
-
-TEXTS = (".md", ".qmd", ".ipynb", ".myst")
-"""Extensions of the files that can be lessons."""
-SKIPPED_FOLDERS = (
-    "_build",
-    "_site",
-    "_book",
-    "node_modules",
-    "site-packages",
-    "__pycache__",
-    "public",
-)
-"""Folders that are not read: tools write them."""
 
 
 class Leftover(Struct, frozen=True, order=True):
@@ -52,6 +36,10 @@ class Segment(Struct, frozen=True, kw_only=True):
     shows_value: bool | None = None
     """Of a cell: whether the value of its last expression was shown; `None` where no output is
     recorded."""
+    printed: str = ""
+    """Of a cell: what it printed, as recorded."""
+    value: str = ""
+    """Of a cell: the value that was shown, as recorded."""
 
 
 class ImportedText(Struct, frozen=True, kw_only=True):
@@ -107,41 +95,8 @@ class ImportedCourse(Struct, frozen=True, kw_only=True):
     leftovers: tuple[Leftover, ...] = ()
 
 
-Files: TypeAlias = dict[str, Path]
-"""The files of a folder by their path in it."""
-
-
-def list_files(folder: Path) -> Files:
-    """All files below a folder, but for hidden ones and what tools have made.
-
-    Raises:
-        UsageError: there is no such folder.
-    """
-    if not folder.is_dir():
-        raise UsageError(f"there is no folder {folder}")
-    files = {}
-    for path in sorted(folder.rglob("*")):
-        parts = path.relative_to(folder).parts
-        if path.is_file() and not any(
-            part.startswith(".") or part in SKIPPED_FOLDERS for part in parts
-        ):
-            files["/".join(parts)] = path
-    return files
-
-
-def read_text(path: Path, name: str) -> str:
-    """A text file with LF line ends.
-
-    Raises:
-        UsageError: it cannot be read, or is not UTF-8.
-    """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise UsageError(f"{name} cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise UsageError(f"{name} is not UTF-8") from None
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+_YAML_SIZE, _YAML_DEPTH = 100_000, 100
+"""Values in a YAML text, and how deep they may be nested."""
 
 
 class _Yaml(yaml.SafeLoader):  # type: ignore[misc]  # which has no types
@@ -152,11 +107,24 @@ _Yaml.add_multi_constructor("", lambda loader, tag, node: None)
 
 
 def read_yaml(text: str) -> Any:
-    """Return the value of a YAML text; `None` where it is invalid."""
+    """Return the value of a YAML text; `None` where it is invalid, or too large.
+
+    Its aliases can make a short text a large value, or one without end.
+    """
     try:
-        return _Yaml(text).get_single_data()
+        value = _Yaml(text).get_single_data()
     except (yaml.YAMLError, ValueError, RecursionError):  # such as an invalid date
         return None
+    parts, count = [(value, 0)], 0
+    while parts:
+        part, depth = parts.pop()
+        inside = part.values() if isinstance(part, dict) else part
+        if isinstance(inside, list | ValuesView):
+            parts += ((item, depth + 1) for item in inside)
+            count += len(inside)
+        if count > _YAML_SIZE or depth > _YAML_DEPTH:
+            return None
+    return value
 
 
 def stem_of(path: str) -> str:

@@ -7,12 +7,16 @@ several dialects write alike. `pytest --rewrite-fixtures` writes `expected/`.
 
 from __future__ import annotations
 
+import json
+import os
 import shutil
+import socket
 from pathlib import Path
 
 import pytest
 
 from coursebuild.cli import main
+from support.sandboxes import require_sandbox
 
 HERE = Path(__file__).parent
 CASES = sorted(path.parent.name for path in HERE.glob("*/source"))
@@ -69,7 +73,7 @@ def test_folder_that_cannot_be_imported_is_refused(
     monkeypatch.chdir(tmp_path)
     course = tmp_path / "old"
     stderr = import_refused(capsys, "old")
-    assert stderr == "coursebuild: there is no folder old\n"
+    assert stderr == "coursebuild: there is no folder or file old\n"
     course.mkdir()
     stderr = import_refused(capsys, "old")
     empty_message = "there is nothing to import: no course.json, no notebook and no Markdown file"
@@ -86,7 +90,8 @@ def test_folder_that_cannot_be_imported_is_refused(
         ("course.json", '{"levels": [7]}', "course.json: a level or a lesson is no object"),
         ("one.ipynb", '{"cells": 7}', "one.ipynb is no notebook of format 4"),
         ("one.ipynb", '{"cells": [7]}', "one.ipynb is no notebook of format 4"),
-        ("_toc.yml", "a: [", "_toc.yml is no YAML"),
+        ("_toc.yml", "a: [", "_toc.yml is no YAML, or too large"),
+        ("_toc.yml", "chapters: &a [*a]", "_toc.yml is no YAML, or too large"),
         ("_quarto.yml", "book: 7\nwebsite: [x]", empty_message),
     ]:
         (course / name).write_text(text)
@@ -125,3 +130,136 @@ def test_import_that_fails_leaves_no_file(
     assert main(["import", "old", "--out", "there"]) == 1
     assert "content" in capsys.readouterr().err
     assert texts(tmp_path / "there") == {"content": b"mine"}
+
+
+OUT = "a link leads out of the folder, and nothing behind it is read"
+
+
+def test_no_link_is_followed_out_of_the_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each is named with its reason; those to what is imported itself are followed."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "secrets" / "models").mkdir(parents=True)
+    for name in ("a.md", "a.png", "a.xml", "models/b.xml"):
+        (tmp_path / "secrets" / name).write_text("# SECRET <mujoco/>")
+    old = tmp_path / "old"
+    for folder in ("part/inner", "models", "figures"):
+        (old / folder).mkdir(parents=True)
+    (old / "figures" / "in.png").write_bytes(b"\x89PNG")
+    (old / ".hidden").write_text("SECRET")
+    (old / "part" / "one.md").write_text(
+        "# One\n\n![a](out.png) ![b](far/a.png) ![c](fig/in.png) [d](hidden.txt) [e](../up/a.md)\n"
+    )
+    links = {
+        "_toc.yml": "../secrets/a.md",
+        "course.json": tmp_path / "secrets" / "a.md",
+        "far": "../secrets",
+        "gone.md": "not-there.md",
+        "loop.md": "pool.md",
+        "models/a.xml": "../../secrets/a.xml",
+        "models/more": "../../secrets/models",
+        "part/chain.md": "inner/out.md",
+        "part/far": "../far",
+        "part/fig": "../figures",
+        "part/hidden.txt": "../.hidden",
+        "part/inner/out.md": "../../../secrets/a.md",
+        "part/out.png": "../../secrets/a.png",
+        "part/self": "..",
+        "part/two.md": "one.md",
+        "pool.md": "loop.md",
+        "up": "..",
+    }
+    for name, target in links.items():
+        (old / name).symlink_to(target)
+    os.mkfifo(old / "pipe.md")
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(old / "socket.md"))
+    (old / "part" / "pipe.md").symlink_to("../pipe.md")
+    assert main(["import", "old", "--out", "new"]) == 0
+    files = texts(tmp_path / "new")
+    assert not [path for path, data in files.items() if b"SECRET" in data]
+    assert [path for path in files if path.startswith(("content/files/", "models/"))] == [
+        "content/files/figures/in.png"
+    ]
+    lesson = files["content/lessons/1.1-one.md"]
+    assert (
+        lesson == files["content/lessons/1.2-two.md"] == b"a b ![c](../files/figures/in.png) d e\n"
+    )
+    report = capsys.readouterr().out
+    left = dict(
+        line.removeprefix("left: ").split(": ", 1)
+        for line in report.split("\n")
+        if line.startswith("left: ") and ", line" not in line
+    )
+    followed = {"part/fig", "part/self", "part/two.md"}
+    reasons = {name: OUT for name in links if name not in followed}
+    reasons |= dict.fromkeys(("gone.md", "loop.md", "pool.md"), "a link that leads nowhere")
+    reasons |= dict.fromkeys(("part/hidden.txt", "part/pipe.md"), "a link to what is not imported")
+    reasons |= dict.fromkeys(
+        ("pipe.md", "socket.md"), "a pipe, socket or device, which is not read"
+    )
+    assert left == reasons
+
+
+def test_folder_of_links_alone_says_why_nothing_is_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "one.md").symlink_to("/etc/passwd")
+    assert import_refused(capsys, "old").endswith(f"Markdown file; one.md: {OUT}\n")
+
+
+def notebook(*cells: dict[str, object]) -> str:
+    return json.dumps({"cells": cells, "metadata": {}, "nbformat": 4, "nbformat_minor": 5})
+
+
+def test_single_file_is_imported_with_what_it_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing else in its folder is read, and no picture in it is written where its name says."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("other.md", "model.xml", "img/x.png", ".env", "README.md"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("# Read me\n\nA `<mujoco/>`\n")
+    (tmp_path / "img" / "out.png").symlink_to("/etc/passwd")
+    (tmp_path / "linked.ipynb").symlink_to("beats.ipynb")
+    text = (
+        "# Beats\n\n![x](img/x.png) ![o](img/out.png) [e](.env) ![a](attachment:../../../../a.png)"
+    )
+    attachments = {"../../../../a.png": {"image/png": "iVBORw0KGgo="}}
+    cell = {"cell_type": "markdown", "source": text, "attachments": attachments}
+    (tmp_path / "beats.ipynb").write_text(notebook(cell))
+    assert main(["import", "linked.ipynb"]) == 0
+    assert f"left: img/out.png: {OUT}\n" in capsys.readouterr().out
+    files = texts(tmp_path / "beats")
+    assert sorted(files) == [
+        ".gitignore",
+        "content/course.toml",
+        "content/files/beats/1-..-..-..-..-a.png",
+        "content/files/img/x.png",
+        "content/lessons/1.1-beats.md",
+    ]
+    assert main(["import", "README.md"]) == 0
+    assert "content/lessons/1.1-readme.md" in texts(tmp_path / "README")
+    message = "is neither a folder nor a file with the extension .md, .qmd, .ipynb or .myst"
+    assert f"model.xml {message}; " in import_refused(capsys, "model.xml")
+
+
+def test_cells_of_strangers_run_in_the_sandbox_or_not_at_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    escape = tmp_path / "escape"
+    cell = {"cell_type": "code", "source": f"open({str(escape)!r}, 'w')", "outputs": []}
+    (tmp_path / "one.ipynb").write_text(notebook(cell))
+    with monkeypatch.context() as context:
+        context.setenv("PATH", str(tmp_path))
+        assert main(["import", "one.ipynb", "--sandbox"]) == 1
+    assert "`--sandbox` needs Bubblewrap" in capsys.readouterr().err
+    assert not (tmp_path / "one").exists() and not escape.exists()
+    require_sandbox(tmp_path)
+    assert main(["import", "one.ipynb", "--sandbox"]) == 0
+    assert (tmp_path / "one" / "examples" / "l1_1_one.py").exists() and not escape.exists()
+    assert main(["import", "one.ipynb", "--out", "trusted"]) == 0 and escape.exists()
