@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_running, add_sandbox, available_cores
 from coursebuild.cli.output import print_report
-from coursebuild.core.files.changes import FileChange
+from coursebuild.core.files.changes import FileChange, undo_changes
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.model import Recording, Script
 from coursebuild.core.model.results import Change, Outcome, ScriptRun, Sign
@@ -93,6 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
         sandbox=find_sandbox(out) if arguments.sandbox else None,
     )
     converted = convert(files)
+    undo_changes(out, Progress().say)
     write_course(converted, out, files, store)
     remarks = [f"wrote {plural(len(converted.files), 'file')} to {out}"]
     remarks += _try_scripts(options, converted.notebook_outputs)

@@ -16,7 +16,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.files.changes import FileChange, change_files, undo_changes
+from coursebuild.core.files.changes import FileChange, change_files
 from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.pages.marks import fence
@@ -104,7 +104,6 @@ def write_course(course: ConvertedCourse, target: Path, files: SourceFiles, stor
     """
     if target.is_relative_to(files.folder) and not files.is_single:
         raise UsageError(f"{target} is in the folder that is imported, which is only read")
-    undo_changes(target)
     changes = []
     for path, data in course.files.items():
         old = None
