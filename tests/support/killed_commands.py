@@ -4,8 +4,8 @@
 
 A request is a line of JSON, `{"folder": …, "arguments": […], "fatal": N, "fault": …, "exchanges":
 …}`. The child runs the command in this folder. Without a fault it ends itself, without any cleaning
-up, just before its call number N that changes something in the folder; a write that is hit writes
-half. With `"fault": "files"` or `"memory"` call number N that opens something or starts a process
+up, just before its call number N that changes something in the folder or in the user's journals; a
+write that is hit writes half. With `"fault": "files"` or `"memory"` call number N that opens something or starts a process
 or a thread fails instead, and so does each that follows, as where no more files may be open, or no
 memory is left. With `"fatal": 0` it gets through. `exchanges`: whether the system can swap two
 folders in one step.
@@ -28,6 +28,7 @@ from typing import Any
 import coursebuild
 from coursebuild.cli import main
 from coursebuild.core.engine import publish as publishing
+from coursebuild.core.files.trust import state_folder
 from coursebuild.core.registry import features
 
 BY_PATH = ("open", "rename", "replace", "link", "unlink", "rmdir", "mkdir")
@@ -55,7 +56,8 @@ class Doom:
     """Counts the calls and knows the fatal one."""
 
     def __init__(self, folder: Path, fatal: int) -> None:
-        self.folder = str(folder)
+        journals = Path(state_folder(str(folder)) or folder, "journals")
+        self.folders = (str(folder), str(journals))
         self.fatal = fatal
         self.calls: list[str] = []
 
@@ -66,12 +68,12 @@ class Doom:
 
     def concerns(self, name: str, arguments: tuple[Any, ...]) -> bool:
         if name in BY_FD:
-            return self.place(arguments[0]).startswith(self.folder)
+            return self.place(arguments[0]).startswith(self.folders)
         path = arguments[0]
         if name == "open" and not arguments[1] & os.O_CREAT:
             return False
         # Relative ones are those of a tree that is being removed, or of a course as a whole.
-        return not Path(path).is_absolute() or os.fspath(path).startswith(self.folder)
+        return not Path(path).is_absolute() or os.fspath(path).startswith(self.folders)
 
     def place(self, fd: int) -> str:
         try:
