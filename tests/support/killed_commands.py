@@ -5,10 +5,10 @@
 A request is a line of JSON, `{"folder": …, "arguments": […], "fatal": N, "fault": …, "exchanges":
 …}`. The child runs the command in this folder. Without a fault it ends itself, without any cleaning
 up, just before its call number N that changes something in the folder or in the user's journals; a
-write that is hit writes half. With `"fault": "files"` or `"memory"` call number N that opens something or starts a process
-or a thread fails instead, and so does each that follows, as where no more files may be open, or no
-memory is left. With `"fatal": 0` it gets through. `exchanges`: whether the system can swap two
-folders in one step.
+write that is hit writes half. With `"fault": "files"` or `"memory"` call number N that opens
+something or starts a process or a thread fails instead, and so does each that follows, as where no
+more files may be open, or no memory is left. With `"fatal": 0` it gets through. `exchanges`:
+whether the system can swap two folders in one step.
 A reply is `{"status": …, "calls": [names], "said": …}`, with all that was written for the user;
 there are no names where it died. The name of a call that may fail tells where it is made.
 """
