@@ -123,7 +123,9 @@ def read_and_verify(
     `static`: with the static forms of labs, for pages.
     """
     began = time.monotonic()
-    parsed_course = load(options.root, documents, trusted=options.sandbox is None)
+    parsed_course = load(
+        options.root, documents, code="run" if options.sandbox is None else "refuse"
+    )
     course = parsed_course.value
     if course is None:
         return judge(None, parsed_course.diagnostics, began)

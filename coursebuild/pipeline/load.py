@@ -14,11 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import diagnose_orphan_scenarios
-from coursebuild.core.files.course_features import load_course_features
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.files.course_features import features_digest, load_course_features
 from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.read import read_course, read_sources
 from coursebuild.core.model import (
@@ -41,7 +43,13 @@ from coursebuild.core.scripts.source_parts import check_source_parts, shown_file
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source, Span
 
+Code: TypeAlias = Literal["run", "known", "none", "refuse"]
+"""What becomes of a course's own features: they run; they do if they have run before; they are left
+out; the course is refused.
+"""
 MAP = "content/course.toml"
+_CODE = "code"
+"""The kind of entries that name features which have run."""
 MAP_TEXT = 1_000_000
 """Characters that the course map may have; the map itself says how long other texts may be."""
 
@@ -84,29 +92,35 @@ def load(
     parser: Parser | None = None,
     open_texts: Mapping[str, str] = {},
     *,
-    trusted: bool = True,
+    code: Code = "run",
 ) -> Parsed[Course | None]:
     """Read and parse everything below `root`; no course where its map cannot be used.
 
     `open_texts` is as for `read_course`.
 
     Raises:
-        EffectError: the course brings code that would run here, and is not `trusted`.
+        EffectError: the course brings code that would run here, and `code` refuses it.
     """
-    loader = _Loader(root, Parser() if parser is None else parser, open_texts, trusted=trusted)
+    loader = _Loader(root, Parser() if parser is None else parser, open_texts, code)
     course = loader.load()
     return Parsed(course, tuple(loader.diagnostics))
 
 
-def load_course(root: Path) -> Course:
-    """The course below `root`, whatever is wrong in its lessons.
+def load_course(root: Path, *, code: Code = "known") -> Course:
+    """The course below `root`, whatever is wrong in its lessons, for commands that only look.
 
     Raises:
-        UsageError: its map cannot be used.
+        UsageError: its map cannot be used, or it brings code that its user has never run.
     """
-    course = load(root).value
+    loader = _Loader(root, Parser(), {}, code)
+    course = loader.load()
     if course is None:
         raise UsageError("the course map cannot be read; `coursebuild check` says why")
+    if loader.has_unknown_code:
+        raise UsageError(
+            f"`{course.features[0].path}` is code that you have not run in this form",
+            help="look at what it does, and run `coursebuild check`",
+        )
     return course
 
 
@@ -114,12 +128,13 @@ class _Loader:
     """The state of one loading."""
 
     def __init__(
-        self, root: Path, parser: Parser, open_texts: Mapping[str, str], *, trusted: bool
+        self, root: Path, parser: Parser, open_texts: Mapping[str, str], code: Code
     ) -> None:
         read = read_course(root, open_texts)
         self.root = root
         self.open_texts = open_texts
-        self.trusted = trusted
+        self.code = code
+        self.has_unknown_code = False
         self.parser = parser
         self.files = read.value
         self.unreadable = list(read.value.unreadable)
@@ -215,10 +230,31 @@ class _Loader:
         parsed_map = self.parser.read_map(self.files.map)
         self.diagnostics += parsed_map.diagnostics
         if parsed_map.value is not None:
-            if not self.trusted:
-                _refuse_code(self.root, parsed_map.value)
-            self.diagnostics += load_course_features(self.root, parsed_map.value)
+            self._load_features(parsed_map.value)
         return parsed_map.value
+
+    def _load_features(self, course: Course) -> None:
+        """Load the features of the course's own, as far as their code may run.
+
+        What has run once at the user's command may run whenever the course is read.
+        """
+        if self.code == "refuse":
+            _refuse_code(self.root, course)
+        if self.code == "none":
+            return
+        if course.features:
+            store, key = Memo(self.root), features_digest(self.root, course)
+            is_known = store.peek(_CODE, key, bytes) is not None
+            if self.code == "known" and not is_known:
+                self.has_unknown_code = True
+                message = "its features are code that you have not run in this form"
+                help = "look at what they do, and run `coursebuild check`"
+                span = course.features[0].span
+                self.diagnostics.append(diagnose("feature-broken", span, message, help=help))
+                return
+            if not is_known:
+                store.put(_CODE, key, b"")
+        self.diagnostics += load_course_features(self.root, course)
 
     def _parse_declarations(self) -> tuple[Declarations, ...]:
         """Parse the files beside the models; such a file without its model is a mistake."""

@@ -131,7 +131,11 @@ class BackgroundRebuild:
         course = session.read_saved_course()
         if course is not None:
             self._begin_step("running scripts and labs")
-            self._verify(course)
+            try:
+                self._verify(course)
+            except RunStoppedError:
+                if session.code == "run":
+                    raise
             self._begin_step("drawing pages")
             session.make_site(self._pause)
         self._finish()
@@ -217,6 +221,8 @@ class BackgroundRebuild:
     def _run_unless_edited(self, course: Course) -> RunAll:
         """Make a function that runs scripts until one of them is edited while it runs."""
         session, edits, keys = self._session, self._edits, script_keys(course)
+        if session.code != "run":
+            return _refuse_runs
 
         def is_any_edited(running: frozenset[str]) -> bool:
             nonlocal edits
@@ -240,6 +246,10 @@ class BackgroundRebuild:
             server_options = replace(options, run_all=self._run_unless_edited(course))
             runs = run(scripts, server_options, "running scripts again", memory)
             session.take_second_runs(runs)
+
+
+def _refuse_runs(*_: object, **__: object) -> NoReturn:
+    raise RunStoppedError
 
 
 def subtract_diagnostics(

@@ -40,7 +40,7 @@ from coursebuild.core.scripts.source_parts import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.load import MAP, load
+from coursebuild.pipeline.load import MAP, Code, load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.shown_reports import shown_reports
@@ -72,6 +72,8 @@ class Session:
         """Grows with each change of what an open page may show."""
         self.edits = 0
         """Grows with each save."""
+        self.code: Code = "run"
+        """`known` until the user does something that may run the course's code."""
         self.calm = threading.Event()
         """Set while nobody is saving: background work waits for it."""
         self.calm.set()
@@ -106,6 +108,12 @@ class Session:
         self._trials = PublishedTrials()
         self.files = Files(options, self._assets, self._documents, self._is_sound)
         self._site = site
+
+    def run_code(self) -> None:
+        """Run scripts and features from now on."""
+        with self.condition:
+            self.code = "run"
+            self.notify(is_saved=True)
 
     def start(self) -> None:
         """Read the course on all cores, while this process has no threads and can be copied."""
@@ -253,7 +261,7 @@ class Session:
         while True:
             edits = self.edits
             with self._reading_lock:
-                parsed_course = load(self.root, documents, self.open_texts)
+                parsed_course = load(self.root, documents, self.open_texts, code=self.code)
                 course = parsed_course.value
                 reports = Parsed(Reports()) if course is None else shown_reports(self.root, course)
                 with self.condition:
@@ -272,7 +280,7 @@ class Session:
             sources = read_sources(self.root, sorted(texts)).value
             if all(source.text == texts[source.path] for source in sources):
                 return self.course
-            return load(self.root, self._documents).value
+            return load(self.root, self._documents, code=self.code).value
 
     def _take_course(
         self, course: Course | None, diagnostics: Iterable[Diagnostic], reports: Reports

@@ -15,7 +15,8 @@ import pytest
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.trust import seal
-from support.scratch_course import GOOD, Folder, Make
+from support.editor import Editor
+from support.scratch_course import GOOD, Folder, Make, block
 from support.workflows import git
 
 LOOKING = (
@@ -129,6 +130,49 @@ def test_looking_at_what_a_branch_brings_does_nothing_else(
             assert course.text(course.lesson()) == GOOD, arguments
     subprocess.run(["git", "status"], cwd=root, check=True, capture_output=True)
     assert not (home / "owned").exists()
+
+
+TOUCH = "from pathlib import Path\nPath({!r}).touch()\n"
+
+
+def test_commands_that_only_look_run_no_code_that_has_not_run_before(
+    make: Make, home: Path
+) -> None:
+    course = make(GOOD)
+    title = 'title = "Scratch"'
+    course.replace("content/course.toml", title, title + '\nfeatures = ["features/mine.py"]')
+    feature = "from coursebuild.core.features import Feature\nFEATURE = Feature(name='mine')\n"
+    course.write("features/mine.py", TOUCH.format(str(home / "owned")) + feature)
+    for arguments in (("fmt", "--check"), ("explain", "1.1"), ("rename", "1.1", "1.2")):
+        result = course.main(*arguments)
+        assert result.status == 2 and result.err == (
+            "coursebuild: `features/mine.py` is code that you have not run in this form; "
+            "look at what it does, and run `coursebuild check`\n"
+        )
+        assert not (home / "owned").exists(), arguments
+    assert course.main("check").status == 0
+    (home / "owned").unlink()
+    assert course.main("explain", "1.1").status == 0
+    course.write("features/mine.py", course.text("features/mine.py") + "#")
+    assert course.main("explain", "1.1").status == 2
+
+
+@pytest.mark.site
+def test_folder_that_is_opened_in_an_editor_runs_nothing_until_it_is_saved(
+    make: Make, home: Path
+) -> None:
+    mark = home / "owned"
+    course = make("## A\n\n" + block("a.py", TOUCH.format(str(mark)) + "print(1)", "2"))
+    editor = Editor(course)
+    editor.write(course.lesson(), course.text(course.lesson()) + "\nLesson 9.9 is not there.\n")
+    editor.until(course.lesson(), "link-lesson")
+    editor.write(course.lesson(), course.text(course.lesson()))
+    editor.until(course.lesson())
+    assert not mark.exists()
+    editor.save(course.lesson())
+    editor.until(course.lesson(), "script-writes", "output-drift")
+    assert mark.exists()
+    assert editor.close() == 0
 
 
 def test_published_site_is_the_one_of_a_course_without_a_store(make: Make, home: Path) -> None:

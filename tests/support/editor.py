@@ -73,6 +73,8 @@ class Editor:
 
     def save(self, path: str) -> None:
         self.folder.write(path, self.texts[path])
+        params = types.DidSaveTextDocumentParams(self.identifier(path))
+        self._do(self.client.text_document_did_save, params)
 
     def leave(self, path: str) -> None:
         """Close a file, without saving it."""

@@ -1,10 +1,12 @@
 """The features of a course's own: Python files that its map names, run in this process.
 
-Entry point: `load_course_features`. These files are trusted as the course's scripts are.
+Entry points: `load_course_features`; `features_digest`. Whoever calls it has to know that this code
+may run: see `pipeline.load`.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import sys
 from pathlib import Path
@@ -23,7 +25,6 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
     """Load the features of a course into this process; return diagnostics about them."""
     features: list[Feature] = []
     diagnostics: list[Diagnostic] = []
-    digest = hashlib.sha256()
 
     def tell(entry: NamedPath, message: str, mend: str = "correct the file") -> None:
         help = f"{mend}, or take it out of `features` in the map"
@@ -35,7 +36,6 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
         except EffectError as error:
             tell(entry, error.message, "write it, as `coursebuild new feature NAME` does")
             continue
-        digest.update(entry.path.encode() + b"\0" + code + b"\0")
         feature = _run(entry.path, code)
         if isinstance(feature, str):
             tell(entry, feature)
@@ -43,8 +43,17 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
             tell(entry, f"{entry.path}: {reason}")
         else:
             features.append(feature)
-    use_course_features(features, digest.hexdigest() if course.features else "")
+    use_course_features(features, features_digest(root, course) if course.features else "")
     return tuple(diagnostics)
+
+
+def features_digest(root: Path, course: Course) -> str:
+    """A hash of the files of a course's own features."""
+    digest = hashlib.sha256()
+    for entry in course.features:
+        with contextlib.suppress(EffectError):
+            digest.update(entry.path.encode() + b"\0" + read_bytes(root, entry.path) + b"\0")
+    return digest.hexdigest()
 
 
 def _run(path: str, code: bytes) -> Feature | str:

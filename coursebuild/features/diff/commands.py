@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _load_state(root: Path) -> CourseState:
-    return CourseState(load_course(root), functools.partial(read_recorded, root))
+    return CourseState(load_course(root, code="run"), functools.partial(read_recorded, root))
 
 
 @contextlib.contextmanager

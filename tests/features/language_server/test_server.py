@@ -82,6 +82,7 @@ def editor(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[E
     editor = Editor(folder)
     for path in (FIRST_LESSON, SECOND_LESSON, MAP):
         editor.write(path, folder.text(path))
+    editor.save(FIRST_LESSON)  # from now on scripts run
     wait_for_results(editor)
     yield editor
     assert editor.close() == 0

@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _new_lesson(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
-    course = load_course(root)
+    course = load_course(root, code="none")
     id, title = arguments.id, arguments.title
     if any("\ud800" <= char <= "\udfff" for char in title):
         raise UsageError("the title is not UTF-8")
@@ -104,7 +104,7 @@ def _new_template(root: Path, arguments: argparse.Namespace) -> list[FileChange]
 
 
 def _new_feature(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
-    course, name = load_course(root), arguments.name
+    course, name = load_course(root, code="none"), arguments.name
     if not re.fullmatch("[a-z][a-z0-9]*", name) or keyword.iskeyword(name):
         raise UsageError(f"`{name}` is no name of a feature: use lower-case letters")
     if name in {*CORE_FENCES, *fence_names(), *(feature.name for feature in features())}:

@@ -2,6 +2,8 @@
 
 Entry point: `Server`. Answers are about the texts as they are in the editor, which sends the whole
 text at each change: partial changes would count other line ends than a course has.
+
+To open a folder runs nothing that lies in it. Scripts and features run from the first save on.
 """
 
 from __future__ import annotations
@@ -60,12 +62,14 @@ class Server:
         self._edited_paths: set[str] = set()
         """Paths of texts that were edited and not read since."""
         self._edited = threading.Condition()
+        session.code = "known"
         self._loop: asyncio.AbstractEventLoop | None = None
         """The loop of the thread that answers; `None` until the client is ready."""
         feature = self.client.feature
         feature(types.INITIALIZED)(lambda params: self._begin())
         for method, get_text in _TEXTS.items():
             feature(method)(partial(self._take_text, get_text))
+        feature(types.TEXT_DOCUMENT_DID_SAVE)(lambda params: session.run_code())
         for method, answer in _ANSWERS.items():
             feature(method, _OPTIONS.get(method))(partial(self._answer, answer))
 
