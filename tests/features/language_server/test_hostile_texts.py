@@ -39,7 +39,7 @@ def tokens(markdown: str) -> Iterator[Token]:
         yield from token.children or ()
 
 
-def shown(markdown: str) -> str:
+def visible_text(markdown: str) -> str:
     """What a reader sees of a description, which has no markup but ours."""
     texts = []
     for token in tokens(markdown):
@@ -66,15 +66,15 @@ def test_escaped_texts_are_text(text: str) -> None:
         markdown = f"{before}{escape_text(text)}{after}"
         if text.strip() or "*" not in before:
             expected = re.sub(r"^- |\*\*|`", "", before) + unread(text) + after.replace("**", "")
-            assert shown(markdown) == unread(expected)
+            assert visible_text(markdown) == unread(expected)
     assert ADDRESS.search(escape_text(text)) is None
 
 
 @given(TEXTS)
 def test_quoted_code_stays_in_its_marks(text: str) -> None:
-    assert shown(f"{fence('text', text)}\n\nafter") == unread(f"{text} after")
+    assert visible_text(f"{fence('text', text)}\n\nafter") == unread(f"{text} after")
     if text.strip():
-        assert shown(f"- {code_span(text)} after") == unread(f"{text} after")
+        assert visible_text(f"- {code_span(text)} after") == unread(f"{text} after")
 
 
 # --- the server
@@ -160,7 +160,7 @@ def test_no_field_of_a_course_is_markup_in_an_editor(editor: Editor) -> None:
     editor.wait_for(lambda: editor.hover_text(LESSON, "`5.2|5`{out}"))  # the script has run
     editor.wait_for(lambda: editor.hover_text(FORMULAS, "$2 \\ome|ga"))  # formulas are typeset
     hovers = [(path, needle, editor.hover_text(path, needle)) for path, needle, _ in HOVERS]
-    assert [(*place, shown(text)) for *place, text in hovers] == [
+    assert [(*place, visible_text(text)) for *place, text in hovers] == [
         (path, needle, unread(text)) for path, needle, text in HOVERS
     ]
     assert [text for *_, text in hovers if ADDRESS.search(text)] == []
