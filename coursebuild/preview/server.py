@@ -146,7 +146,7 @@ class _Handler(BaseHTTPRequestHandler):
                 self.send_error(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE)
                 return False
         if not _is_clear([self.raw_requestline, *head]):
-            self.send_error(HTTPStatus.BAD_REQUEST)
+            self._send_message(HTTPStatus.BAD_REQUEST, "the request cannot be read")
             return False
         stream, self.rfile = self.rfile, BytesIO(b"".join(head))
         try:
