@@ -44,8 +44,12 @@ class BrowserHook(BuildHookInterface[Any]):
         if version == "editable":
             _compile(Path(self.root))
         elif self.target_name == "wheel":
-            rules = {str(Path(self.root, "docs/reference/rules.md")): "coursebuild/docs/rules.md"}
-            build_data["force_include"].update(files | rules)
+            texts = {
+                "docs/reference/rules.md": "coursebuild/docs/rules.md",
+                "requirements.txt": "coursebuild/locks/requirements.txt",
+            }
+            files |= {str(Path(self.root, path)): place for path, place in texts.items()}
+            build_data["force_include"].update(files)
             build_data["sbom_files"].append(str(bundle.SBOM.relative_to(self.root)))
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:

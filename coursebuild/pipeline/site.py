@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from html import escape
+from html import unescape
 from typing import TYPE_CHECKING
 
 from msgspec import Struct, field
@@ -22,7 +22,14 @@ from coursebuild.core.engine.prepared import (
     prepared_folder,
 )
 from coursebuild.core.files.resources import Bundle, template_texts
-from coursebuild.core.model import Course
+from coursebuild.core.model import (
+    Course,
+    HtmlBlock,
+    Lesson,
+    RawInline,
+    document_blocks,
+    document_inlines,
+)
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, Results, SiteFile
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.added_files import SiteContext, added_files
@@ -32,8 +39,10 @@ from coursebuild.core.pages.compressed import compressed_files
 from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.syntax.html import find_address
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.source import Source
+from coursebuild.core.text.source import Source, Span
 from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.downloads import Downloads
@@ -120,7 +129,7 @@ class SiteMaker:
         page_files = tuple(pages.files(names))
         diagnostics: tuple[Diagnostic, ...] = ()
         if entries is None and not pages.are_sound({file.path for file in files}):
-            diagnostics = tuple(broken_links([*page_files, *files], self.course.base_url))
+            diagnostics = tuple(broken_links(self.course, [*page_files, *files]))
         all_files = tuple(sorted((*page_files, *files), key=lambda file: file.path))
         return Site(all_files, file_list, diagnostics, tuple(pages.drawn_paths), names, pages.keys)
 
@@ -173,8 +182,11 @@ def _cut_font(store: Memo, job: FontJob) -> bytes:
     return prepared_file("fonts", job.key) or store.get_or_create("fonts", job.key, make)
 
 
-def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnostic]:
-    """Find links of built pages that lead nowhere; most are found in the sources already."""
+def broken_links(course: Course, files: Sequence[SiteFile]) -> Iterator[Diagnostic]:
+    """Find links of built pages that lead nowhere; most are found in the sources already.
+
+    The place is that of the raw HTML that wrote the link; of other links, the place in the page.
+    """
     from coursebuild.core.pages.links import check_links
 
     pages = {
@@ -183,11 +195,29 @@ def broken_links(files: Sequence[SiteFile], base_url: str) -> Iterator[Diagnosti
         if file.path.endswith(".html")
     }
     listed_files = (OutputFile(file.path, pages.get(file.path, b"")) for file in files)
-    for broken in check_links(listed_files, base_url):
-        page = Source(f"public/{broken.page}", pages[broken.page].decode())
-        url = escape(broken.url)
-        at = max(page.text.find(f'"{url}"') + 1, 0)
-        span = page.span(at, at + len(url) if at else 0)
+    for broken in check_links(listed_files, course.base_url):
+        span = _find_in_texts(course, broken.page, broken.url)
+        if span is None:
+            page = Source(f"public/{broken.page}", pages[broken.page].decode())
+            span = page.span(*(find_address(page.text, broken.url) or (0, 0)))
         help = f"did you mean `{broken.suggestion}`?" if broken.suggestion else ""
         message = f"`{broken.url}` leads nowhere: {broken.reason}"
         yield diagnose("link-broken", span, message, help=help)
+
+
+def _find_in_texts(course: Course, page: str, url: str) -> Span | None:
+    """Find the raw HTML with an address: in the text of a page, else in one shown there."""
+    owned = sorted(course.owned_documents, key=lambda pair: urls.owner_path(pair[0]) != page)
+    for owner, summary in owned:
+        if url not in unescape(summary.source.text):
+            continue
+        lesson = isinstance(owner, Lesson)
+        document = parse_document(summary.source, course.callout_names, lesson=lesson).value
+        for node in (*document_blocks(document), *document_inlines(document)):
+            if isinstance(node, HtmlBlock | RawInline) and (at := find_address(node.html, url)):
+                # In a quiz it is a part of JSON, in a quote of lines with marks.
+                written = node.html[slice(*at)]
+                start = at[0] if node.html == node.span.text else node.span.text.find(written)
+                source, first = node.span.source, node.span.start + start
+                return source.span(first, first + len(written)) if start >= 0 else node.span
+    return None

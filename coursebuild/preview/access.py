@@ -5,7 +5,8 @@ Entry point: `Access`.
 1. A page of another origin may link to the preview and do nothing else. Browsers say where a
    request comes from (`Sec-Fetch-Site`, `Origin`), and are told to show answers to nobody else.
 2. A host name may be made to point at this machine (DNS rebinding), an address may not. So only
-   `localhost` and addresses are good hosts.
+   `localhost` and addresses are good hosts; 0.0.0.0 and [::] are not, which mean this machine to
+   some browsers that keep pages from its loopback address.
 3. Other machines need a token, first in the address, then in the cookie that it is exchanged for.
    With it any host is good, since a cookie belongs to the host that set it.
 """
@@ -13,11 +14,14 @@ Entry point: `Access`.
 from __future__ import annotations
 
 import ipaddress
+import re
 import secrets
 from email.message import Message
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from msgspec import Struct
+
+_HOST = re.compile(r"(?P<name>[a-z0-9._-]+|\[[0-9a-f:.]+\])(?::(?P<port>[0-9]{1,5}))?")
 
 
 class Access(Struct, frozen=True):
@@ -39,15 +43,21 @@ class Access(Struct, frozen=True):
             "X-Content-Type-Options": "nosniff",
         }
 
-    def refusal(self, method: str, headers: Message) -> str:
+    def refusal(self, method: str, target: str, headers: Message) -> str:
         """Why a request is refused, with or without token; empty where it is not."""
         host = headers.get("Host", "").lower()
-        if not self.token and not _is_fixed(host):
+        match = _HOST.fullmatch(host)
+        if match is None or int(match["port"] or 0) > 0xFFFF:
+            return "the request does not name its host"
+        if not self.token and not _is_fixed(match["name"]):
             return "this preview answers only as localhost"
+        scheme, separator, rest = target.lower().partition(":")
+        if separator and scheme in ("http", "https") and re.split("[/?#]", rest)[2:3] != [host]:
+            return "the request is to another host than it names"
         origin = headers.get("Origin")
         if origin is None and method == "POST":
             return "a request that changes something says where it comes from"
-        if origin is not None and origin.lower().partition("://")[2] != host:
+        if origin is not None and origin.lower() not in (f"http://{host}", f"https://{host}"):
             return "pages of other origins cannot use the preview"
         if headers.get("Sec-Fetch-Site", "none") in ("same-origin", "none"):
             return ""
@@ -87,10 +97,11 @@ def _is_same(text: str, secret: str) -> bool:
     return secrets.compare_digest(text.encode(), secret.encode())
 
 
-def _is_fixed(host: str) -> bool:
+def _is_fixed(name: str) -> bool:
     """Whether a host is `localhost` or an address, which nobody can make point elsewhere."""
     try:
-        name = urlsplit(f"//{host}").hostname or ""
-        return name == "localhost" or bool(ipaddress.ip_address(name))
+        address = ipaddress.ip_address(name.strip("[]"))
     except ValueError:
-        return False
+        return name == "localhost"
+    mapped = address.ipv4_mapped if isinstance(address, ipaddress.IPv6Address) else None
+    return not (mapped or address).is_unspecified and (address.version == 6) == ("[" in name)

@@ -12,6 +12,9 @@ Entry point: `PreviewServer`.
    such a site at this address before.
 5. `POST /.coursebuild/accept` accepts an output, a figure or a number for the author;
    `POST /.coursebuild/open` opens a place in the editor.
+6. Where a request ends is never in doubt: a proxy before the preview may send those of others over
+   the same connection. So a head is read strictly, and a connection goes on only after a request
+   without a body that was answered.
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ import threading
 from collections.abc import Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from io import BytesIO
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -42,7 +46,13 @@ _HEARTBEAT = 15.0
 """
 _IMMUTABLE = re.compile(r"/(?:[^?#]*/)?assets/[^?#]+\.[0-9a-f]{8}\.[a-z0-9]+")
 _LARGEST = 1 << 16
-"""Bytes of a request's body."""
+"""Bytes of a line of a request's head, and of its body."""
+_MOST_LINES = 100
+"""Lines of a request's head."""
+_REQUEST_LINE = re.compile(rb"[A-Z]+ [!-~]+ HTTP/1\.[01]\r\n")
+_HEADER_LINE = re.compile(rb"([\w!#$%&'*+.^`|~-]+):[ \t]*+([\t -~\x80-\xff]*+)\r\n", re.ASCII)
+_ONCE = (b"content-length", b"host", b"origin", b"sec-fetch-site", b"sec-fetch-mode")
+"""Headers by which a request is judged."""
 
 
 class PreviewServer(ThreadingHTTPServer):
@@ -120,10 +130,32 @@ class _Handler(BaseHTTPRequestHandler):
 
     protocol_version = "HTTP/1.1"
     server: PreviewServer
+    raw_requestline: bytes
     timeout = 60
     # Otherwise each body waits until its head is acknowledged.
     wbufsize = -1
     disable_nagle_algorithm = True
+
+    def parse_request(self) -> bool:
+        """Read the head of a request; where it can be read in two ways, refuse it."""
+        self.command, self.requestline, self.request_version = "", "", "HTTP/1.1"
+        head: list[bytes] = []
+        while not head or head[-1].strip(b"\r\n"):
+            head.append(self.rfile.readline(_LARGEST))
+            if len(head) > _MOST_LINES:
+                self.send_error(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE)
+                return False
+        if not _is_clear([self.raw_requestline, *head]):
+            self._send_message(HTTPStatus.BAD_REQUEST, "the request cannot be read")
+            return False
+        stream, self.rfile = self.rfile, BytesIO(b"".join(head))
+        try:
+            is_read = super().parse_request()
+        finally:
+            self.rfile = stream
+        if "Content-Length" in self.headers:
+            self.close_connection = True
+        return is_read
 
     def do_GET(self) -> None:
         """Answer with a file, or with the stream of events."""
@@ -172,7 +204,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _is_allowed(self) -> bool:
         """Whether a request may be answered; if not, answer why."""
         access = self.server.access
-        refusal = access.refusal(self.command, self.headers)
+        refusal = access.refusal(self.command, self.path, self.headers)
         if not refusal and access.has_token(self.headers):
             return True
         redirect = None if refusal else access.exchange(self.path)
@@ -182,12 +214,8 @@ class _Handler(BaseHTTPRequestHandler):
         return False
 
     def _read_body(self) -> bytes:
-        """Read the body of a request; empty if it is too long or its length is not given."""
-        length = self.headers.get("Content-Length", "")
-        if not length.isdecimal() or int(length) > _LARGEST:
-            self.close_connection = True
-            return b""
-        return self.rfile.read(int(length))
+        """Read the body of a request; empty if its length is not given."""
+        return self.rfile.read(int(self.headers.get("Content-Length", "0")))
 
     def _send_message(self, status: HTTPStatus, message: str) -> None:
         self._send(status, "application/json", json.dumps({"message": message}).encode())
@@ -208,6 +236,8 @@ class _Handler(BaseHTTPRequestHandler):
         is_immutable = status is HTTPStatus.OK and _IMMUTABLE.fullmatch(self.path)
         cache_control = "max-age=31536000, immutable" if is_immutable else "no-store"
         self.send_header("Cache-Control", cache_control)
+        if self.close_connection or status >= HTTPStatus.BAD_REQUEST:
+            self.send_header("Connection", "close")
         self.end_headers()
         if self.command != "HEAD":
             self.wfile.write(data)
@@ -220,7 +250,6 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Cache-Control", "no-store")
         self.send_header("Connection", "close")
         self.end_headers()
-        self.close_connection = True
         if self.command == "HEAD":
             return
         try:
@@ -257,6 +286,21 @@ class _Handler(BaseHTTPRequestHandler):
     def _send_event(self, event: str, data: str) -> None:
         self.wfile.write(f"event: {event}\ndata: {data}\n\n".encode("utf-8", "replace"))
         self.wfile.flush()
+
+
+def _is_clear(lines: list[bytes]) -> bool:
+    """Whether a head is one that every reader takes for the same, with a body that is not long."""
+    first, *rest, last = lines
+    headers = [match.groups() for line in rest if (match := _HEADER_LINE.fullmatch(line))]
+    names = [name.lower() for name, _ in headers]
+    lengths = [value for name, value in headers if name.lower() == b"content-length"]
+    return (
+        _REQUEST_LINE.fullmatch(first) is not None
+        and (len(headers), last) == (len(rest), b"\r\n")
+        and max(map(names.count, _ONCE)) <= 1
+        and b"transfer-encoding" not in names
+        and all(re.fullmatch(rb"[0-9]{1,9}", n) and int(n) <= _LARGEST for n in lengths)
+    )
 
 
 def _decode_texts(body: bytes) -> dict[str, str]:

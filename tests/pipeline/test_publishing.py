@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 
-from support.scratch_course import GOOD, Make, block
+from support.scratch_course import GOOD, Make, block, without_locks
 
 pytestmark = pytest.mark.site
 
@@ -93,3 +94,23 @@ def test_caches_that_are_gone_or_damaged_are_made_again(make: Make, stores: Path
     (caches / "fonts").symlink_to(stores / "fonts")
     assert folder.main("build").status == 0
     assert folder.tree() == site
+
+
+def test_builds_at_once_wait_for_each_other_without_locks(make: Make) -> None:
+    """On a file system that has none, where two would fill the same folder."""
+    folder = make(GOOD)
+    code = without_locks() + "import sys\nfrom coursebuild.cli import main\nsys.exit(main())\n"
+    assert folder.main("build").status == 0
+    site = folder.tree("public")
+    for number in range(3):
+        course_map = folder.text("content/course.toml")
+        folder.replace("content/course.toml", "[course]", f"[course]\nsummary = 'Of {number}'")
+        shutil.rmtree(folder.root / "public")
+        builds = [folder.start("build", code=code, stderr=subprocess.PIPE) for _ in range(3)]
+        texts = [build.communicate()[1] for build in builds]
+        assert [build.returncode for build in builds] == [0, 0, 0], texts
+        assert f"Of {number}" in folder.text("public/index.html")
+        folder.write("content/course.toml", course_map)
+    assert folder.main("build").status == 0
+    assert folder.tree("public") == site
+    assert ".coursebuild-lock" not in folder.entries()

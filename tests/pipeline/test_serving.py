@@ -150,10 +150,37 @@ CALLERS: tuple[tuple[dict[str, str], int], ...] = (
     ({"Host": "localhost.evil.example"}, 403),
     ({"Host": "["}, 403),
     ({"Host": ""}, 403),
+    ({"Host": "localhost"}, 200),
+    ({"Host": "[::FFFF:127.0.0.1]:PORT"}, 200),
+    ({"Host": "0.0.0.0:PORT"}, 403),  # this machine, to some browsers
+    ({"Host": "0.0.0.0"}, 403),
+    ({"Host": "[::]:PORT"}, 403),
+    ({"Host": "[0:0::0]"}, 403),
+    ({"Host": "[::ffff:0.0.0.0]"}, 403),
+    ({"Host": "::1"}, 403),
+    ({"Host": "[127.0.0.1]"}, 403),
+    ({"Host": "127.0.0.1:1.evil.example"}, 403),
+    ({"Host": "127.0.0.1.evil"}, 403),
+    ({"Host": "127.0.0.1@evil.example"}, 403),
+    ({"Host": "evil.example@127.0.0.1"}, 403),
+    ({"Host": "127.0.0.1,evil.example"}, 403),
+    ({"Host": "127.0.0.1/evil.example"}, 403),
+    ({"Host": "127.0.0.1 evil.example"}, 403),
+    ({"Host": "127.0.0.1:"}, 403),
+    ({"Host": "127.0.0.1:+1"}, 403),
+    ({"Host": "127.0.0.1:65536"}, 403),
+    ({"Host": "127.1"}, 403),
+    ({"Host": "0177.0.0.1"}, 403),
+    ({"Host": "2130706433"}, 403),
+    ({"Host": "localhost."}, 403),
+    ({"Host": "l\u014dcalhost".encode("utf-8").decode("latin-1")}, 403),
     ({"Origin": "http://127.0.0.1:PORT"}, 200),
     ({"Origin": "http://127.0.0.1:9"}, 403),
     ({"Origin": "http://evil.example"}, 403),
     ({"Origin": "null"}, 403),
+    ({"Origin": "127.0.0.1:PORT"}, 403),
+    ({"Origin": "evil://127.0.0.1:PORT"}, 403),
+    ({"Origin": "HTTP://127.0.0.1:PORT"}, 200),
     ({SITE: "same-origin"}, 200),
     ({SITE: "none", MODE: "navigate", DEST: "document"}, 200),
     ({SITE: "same-site", MODE: "cors", DEST: "empty"}, 403),  # another port of this host
@@ -176,12 +203,106 @@ def test_other_origins_can_only_link_to_the_preview(preview: Preview) -> None:
             headers = {n: v.replace("PORT", str(preview.port)) for n, v in caller.items()}
             got_status, answer_headers, body = preview.get(path, method, **headers)
             expected = {"GET": status, "PUT": 501}.get(method, 403)
-            if method == "POST" and caller == {"Origin": "http://127.0.0.1:PORT"}:
+            if method == "POST" and (status, *caller) == (200, "Origin"):
                 expected = 405
             told_more = got_status == 403 and b"Scratch" in body
             if got_status != expected or told_more or answer_headers | PRIVATE != answer_headers:
                 failures.append((path, method, caller, got_status, answer_headers))
     assert failures == []
+
+
+HEAD = b"HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n"
+SECOND = b"GET /lessons/1.1-one.html " + HEAD + b"Connection: close\r\n\r\n"
+LENGTH = b"Content-Length: %d\r\n" % len(SECOND)
+BAD_LENGTHS = (
+    *(b"", b"+5", b"-5", b"5 ", b"0x5", b"5,5", b"5;", b"5.0", b"1e1", b"1_0", b"\xb2", b"5 5"),
+    b"65537",
+    b"9" * 5000,
+)
+UNCLEAR_HEADERS = (
+    *(b"Content-Length: %b\r\n" % length for length in BAD_LENGTHS),
+    LENGTH + LENGTH,
+    LENGTH + b"content-length: 0\r\n",
+    LENGTH + b"Transfer-Encoding: chunked\r\n",
+    b"Transfer-Encoding: chunked\r\n",
+    b"transfer-encoding: identity\r\n",
+    b"Transfer-Encoding : chunked\r\n",
+    b"Content-Length : 5\r\n",
+    b"X: a\r\n folded\r\n",
+    b" X: a\r\n",
+    b"X: a\n",
+    b"X: a\rContent-Length: 5\r\n",
+    b"X: a\0b\r\n",
+    b"X\r\n",
+    b": x\r\n",
+    b"X: \x7f\r\n",
+    b"Host: 127.0.0.1:PORT\r\n",
+    b"host: evil.example\r\n",
+    b"X: a\r\n" * 200,
+    b"X: " + b"a" * 70_000 + b"\r\n",
+    b"X:" + b" " * 60_000 + b"\0\r\n",
+)
+UNCLEAR_LINES = (
+    b"GET / HTTP/1.1\nHost: 127.0.0.1:PORT\r\n",
+    b"GET /\r\n",
+    b"GET  / HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n",
+    b"GET /\tHTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n",
+    b"GET / x HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n",
+    b"GET /\xff HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n",
+    b"GET / HTTP/2.0\r\nHost: 127.0.0.1:PORT\r\n",
+    b"GET / HTTP/1.1 \r\nHost: 127.0.0.1:PORT\r\n",
+    b"G\0T / HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n",
+    b"\r\nGET / HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n",
+)
+
+
+def test_request_that_can_be_read_in_two_ways_is_refused(preview: Preview) -> None:
+    """Each is followed by another one, which a proxy would take for its body or for its own."""
+    heads = [b"%b / " % method + HEAD + h for h in UNCLEAR_HEADERS for method in (b"GET", b"POST")]
+    failures = []
+    for head in (*heads, *UNCLEAR_LINES):
+        answer = preview.exchange(head + b"\r\n" + SECOND)
+        if not re.match(rb"HTTP/1.1 4\d\d ", answer) or answer.count(b"HTTP/1.1 ") != 1:
+            failures.append((head[:200], answer[:200]))
+    assert failures == []
+
+
+def test_body_of_a_request_is_never_the_next_request(preview: Preview) -> None:
+    origin = b"Origin: http://127.0.0.1:PORT\r\n"
+    for head, status in (
+        (b"GET / " + HEAD + LENGTH, b"200"),
+        (b"HEAD / " + HEAD + LENGTH, b"200"),
+        (b"GET /nothing " + HEAD + LENGTH, b"404"),
+        (b"GET / " + HEAD + b"Content-Length: 0\r\n", b"200"),
+        (b"POST / " + HEAD + origin + LENGTH, b"405"),
+        (b"POST / " + HEAD + origin, b"405"),
+        (b"POST / " + HEAD + LENGTH, b"403"),
+        (b"PUT / " + HEAD + LENGTH, b"501"),
+        (b"GET /nothing " + HEAD, b"404"),
+        (b"GET / HTTP/1.1\r\nHost: evil.example\r\n", b"403"),
+    ):
+        answer = preview.exchange(head + b"\r\n" + SECOND)
+        assert answer.startswith(b"HTTP/1.1 %b " % status), head
+        assert answer.count(b"HTTP/1.1 ") == 1, head
+        assert b"Connection: close\r\n" in answer, head
+    answer = preview.exchange(b"GET / " + HEAD + b"\r\n" + SECOND)
+    assert answer.count(b"HTTP/1.1 200 ") == 2, "requests without a body share a connection"
+
+
+def test_address_with_a_host_names_the_host_of_the_request(preview: Preview) -> None:
+    for target, status in (
+        ("http://127.0.0.1:PORT/lessons/1.1-one.html", 200),
+        ("HTTP://127.0.0.1:PORT", 200),
+        ("http://127.0.0.1/", 403),
+        ("http://evil.example/", 403),
+        ("https://evil.example:443/", 403),
+        ("http://evil.example@127.0.0.1:PORT/", 403),
+        ("http://127.0.0.1:PORT@evil.example/", 403),
+        ("http:/127.0.0.1:PORT/", 403),
+        ("http:", 403),
+    ):
+        address = target.replace("PORT", str(preview.port))
+        assert preview.get(address, Host=f"127.0.0.1:{preview.port}")[0] == status, target
 
 
 def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> None:

@@ -79,6 +79,16 @@ class Preview:
             response = connection.getresponse()
             return response.status, dict(response.getheaders()), response.read()
 
+    def exchange(self, request: bytes) -> bytes:
+        """All that the server answers to some bytes until it closes the connection."""
+        address = ("127.0.0.1", self.port)
+        with socket.create_connection(address, timeout=120) as link, contextlib.suppress(OSError):
+            answer = b""
+            link.sendall(request.replace(b"PORT", str(self.port).encode()))
+            while data := link.recv(1 << 16):
+                answer += data
+        return answer
+
     def accept(self, body: bytes, **headers: str) -> tuple[int, Any]:
         """The server's answer to an acceptance: its status, and its body as JSON or text."""
         status, _, data = self.get(f"{PREFIX}accept", "POST", body, **headers)

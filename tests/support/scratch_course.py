@@ -213,6 +213,16 @@ def command(*arguments: str) -> list[str]:
     return [sys.executable, "-m", "coursebuild", *arguments]
 
 
+def without_locks(error: str = "ENOLCK") -> str:
+    """What a process does first that is to find no locks in its file systems."""
+    return (
+        "import errno, fcntl, os\n"
+        "def refuse(fd, operation):\n"
+        f"    raise OSError(errno.{error}, os.strerror(errno.{error}))\n"
+        "fcntl.flock = refuse\n"
+    )
+
+
 def _as_from_a_shell() -> None:
     os.setpgid(0, 0)
     for number in (signal.SIGINT, signal.SIGHUP):  # ignored where the tests run in the background

@@ -139,6 +139,7 @@ class Runner:
             "SENT": str(self.folder / "sent"),
             "GITHUB_STEP_SUMMARY": str(self.folder / "summary"),
             "GITHUB_ACTION_PATH": str(ROOT),
+            "RUNNER_TEMP": str(self.folder / "tmp"),
         }
         process = subprocess.run(
             ["bash", "-e", "-c", step["run"]],

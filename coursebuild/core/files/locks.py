@@ -5,8 +5,9 @@ a site is swapped; `try_lock` and `is_abandoned`, which tell whether the writer 
 is alive.
 
 A lock is an flock: killing its holder frees it at once, so no lock can be stale. Where a file
-system has no locks, or the project cannot be written, the work goes on without: every write of the
-tool is whole by itself, and the lock only keeps two runs from doing the same work twice.
+system has none, as on some network drives, it is a file that names its holder; the next run takes
+over that of a process which is gone from this machine. Where the folder cannot be written, the work
+goes on without: every write of the tool is whole by itself.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import fcntl
 import os
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 from coursebuild.core.files.trust import find_store, make_store
@@ -54,31 +56,66 @@ def project_lock(
         on_wait: is called once, with a message, if another run has the lock.
         name: the name of the lock's file.
     """
-    fd = None
-    try:
-        with contextlib.suppress(OSError):
-            folder = find_store(str(root.resolve()))[0]
-            fd = _lock_file(root.resolve(), Path(folder, name), on_wait)
+    folder = find_store(str(root.resolve()))[0]
+    with _held(_file_lock(root.resolve(), Path(folder, name), on_wait)):
         yield
-    finally:
-        if fd is not None:
-            os.close(fd)
 
 
 @contextlib.contextmanager
 def folder_lock(folder: Path) -> Iterator[None]:
-    """Hold a folder locked while something in it is replaced, without making a file there."""
-    try:
-        fd = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
-    except OSError:  # there is no such folder
+    """Hold a folder locked while something in it is replaced, without leaving a file there."""
+    with _held(_folder_lock(folder)):
         yield
-        return
+
+
+@contextlib.contextmanager
+def _held(lock: AbstractContextManager[None]) -> Iterator[None]:
+    """Hold a lock if it can be had; if the file system refuses, go on without."""
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):
+            stack.enter_context(lock)
+        yield
+
+
+@contextlib.contextmanager
+def _folder_lock(folder: Path) -> Iterator[None]:
+    fd = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
     try:
         if try_lock(fd) is False:
             fcntl.flock(fd, fcntl.LOCK_EX)
-        yield
+        with nullcontext() if try_lock(fd) else _named_lock(folder / ".coursebuild-lock"):
+            yield
     finally:
         os.close(fd)
+
+
+@contextlib.contextmanager
+def _file_lock(root: Path, path: Path, on_wait: Callable[[str], None] | None) -> Iterator[None]:
+    fd = _lock_file(root, path, on_wait)
+    try:
+        named_file = path.with_name(f"{path.name}-held")
+        with nullcontext() if try_lock(fd) else _named_lock(named_file, on_wait):
+            yield
+    finally:
+        os.close(fd)
+
+
+@contextlib.contextmanager
+def _named_lock(path: Path, on_wait: Callable[[str], None] | None = None) -> Iterator[None]:
+    """Hold a file that names this process, where there are no locks."""
+    from filelock import SoftFileLock, Timeout
+
+    lock = SoftFileLock(path)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        if on_wait is not None:
+            on_wait(f"{_waiting_message(str(lock.pid))} (if there is none, remove {path})")
+        lock.acquire()
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def _lock_file(root: Path, path: Path, on_wait: Callable[[str], None] | None) -> int:
@@ -89,7 +126,7 @@ def _lock_file(root: Path, path: Path, on_wait: Callable[[str], None] | None) ->
         try:
             if try_lock(fd) is False:
                 if on_wait is not None:
-                    on_wait(_waiting_message(fd))
+                    on_wait(_waiting_message(os.pread(fd, 32, 0).decode("ascii", "replace")))
                     on_wait = None
                 fcntl.flock(fd, fcntl.LOCK_EX)
             if _is_at(fd, path):
@@ -102,9 +139,8 @@ def _lock_file(root: Path, path: Path, on_wait: Callable[[str], None] | None) ->
         os.close(fd)  # .coursebuild was deleted while we waited
 
 
-def _waiting_message(fd: int) -> str:
-    holder = os.pread(fd, 32, 0).decode("ascii", "replace").strip()
-    process = f" (process {holder})" if holder.isdigit() else ""
+def _waiting_message(holder: str) -> str:
+    process = f" (process {holder.strip()})" if holder.strip().isdigit() else ""
     return f"another coursebuild{process} is at work on this course; waiting for it"
 
 

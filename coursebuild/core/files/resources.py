@@ -2,10 +2,10 @@
 
 Entry points: `assets_dir`, the folder of what is bundled for browsers, and `Bundle`, its files;
 `templates_dir`, the folder of the pages' templates, and `template_texts`; `rules_page`, the page of
-all rules.
+all rules; `locked_requirements`, what the tool was tested with.
 
-An installed package holds all of them. In a source tree they are in `site/dist`, `templates` and
-`docs`.
+An installed package holds all of them. In a source tree they are in `site/dist`, `templates`,
+`docs` and its root.
 """
 
 from __future__ import annotations
@@ -53,6 +53,16 @@ def rules_page() -> str:
         _PACKAGE / "docs", _TREE / "docs/reference", "the page of rules is missing"
     )
     return (folder / "rules.md").read_text(encoding="utf-8")
+
+
+def locked_requirements() -> str:
+    """The packages that the tool was tested with, each with its hashes, as pip reads them.
+
+    Raises:
+        EffectError: the installation is broken.
+    """
+    folder = _find_folder(_PACKAGE / "locks", _TREE, "the locked requirements are missing")
+    return (folder / "requirements.txt").read_text(encoding="utf-8")
 
 
 class Bundle(Mapping[str, bytes]):

@@ -1,7 +1,7 @@
 """Writing Markdown: links, fences, tables, escapes.
 
-Entry points: `escape_marks`, `escape_line`, `guard_lines`; `link`, `picture`, `code_span`, `fence`,
-`table`, `block_quote`, `hang`.
+Entry points: `escape_marks`, `escape_line`, `guard_lines`; `escape_text`, for readers of Markdown
+that are not ours; `link`, `picture`, `code_span`, `fence`, `table`, `block_quote`, `hang`.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ def fence(language: str, text: str) -> str:
     return f"{ticks}{language}\n{body}{ticks}"
 
 
-_FENCES = re.compile(r"^[ ]*(`{3,})", re.MULTILINE)
+_FENCES = re.compile("`{3,}")
 
 
 def code_span(text: str, ticks: str = "") -> str:
     """Text as inline code, between these ticks or as few as possible."""
-    text = text.replace("\n", " ")
+    text = re.sub("[\r\n]", " ", text)
     runs = set(map(len, _TICKS.findall(text)))
     ticks = ticks or "`" * next(n for n in range(1, len(text) + 2) if n not in runs)
     blank = text.strip(" ") == ""
@@ -57,6 +57,15 @@ def escape_marks(text: str) -> str:
 def escape_line(text: str) -> str:
     """Escape all marks in a text and put it on one line."""
     return escape_marks(" ".join(text.split()))
+
+
+_READ_BY_SOME = re.compile(r"(?<!\\)~|@|:(?=/)|(?<=/)/|\.(?=[^\W\d_])")
+"""What strikes text out, or is part of an address that becomes a link by itself."""
+
+
+def escape_text(text: str) -> str:
+    """Put a text on one line on which no reader of Markdown finds markup, a block or an address."""
+    return guard_lines(_READ_BY_SOME.sub(r"\\\g<0>", escape_line(text)))
 
 
 def link(text: str, href: str, title: str = "") -> str:

@@ -1,6 +1,7 @@
 """Raw HTML: its tags, whether they balance, and the files that it shows.
 
-Entry points: `tags` and `tag_at`, which scan; `Balance`, which tracks open elements; `find_media`.
+Entry points: `tags` and `tag_at`, which scan; `Balance`, which tracks open elements; `find_media`;
+`find_address`, the place of an address.
 
 Elements whose end tag may be left out, void elements, comments and raw text never give a false
 alarm. An element must be closed in the block, list item or emphasis in which it was opened, as it
@@ -175,6 +176,18 @@ def find_media(html: Excerpt) -> tuple[MediaAddress, ...]:
         if attribute[0] in _MEDIA_ATTRIBUTES
         for start, end in _addresses(text, *attribute)
     )
+
+
+def find_address(text: str, url: str) -> tuple[int, int] | None:
+    """The place where HTML first names an address in an attribute, however it is escaped there."""
+    places = (
+        place
+        for tag in tags(text)
+        for attribute in _attributes(text, tag)
+        for place in _addresses(text, *attribute)
+        if attribute[0] in _LINK_ATTRIBUTES | _MEDIA_ATTRIBUTES
+    )
+    return next((place for place in places if unescape(text[slice(*place)]) == url), None)
 
 
 def _attributes(text: str, tag: Tag) -> Iterator[tuple[str, int, int]]:

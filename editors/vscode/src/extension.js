@@ -59,7 +59,8 @@ async function start(folder) {
     await client.start();
   } catch {
     clients.delete(folder);
-    reportMissing(`The language server does not start: ${command}`, "pip install 'coursebuild[lsp]'");
+    output.appendLine(`${command} does not start`); // not in the message, where a path could be read as a link
+    reportMissing('The language server does not start.', "pip install 'coursebuild[lsp]'");
   }
 }
 

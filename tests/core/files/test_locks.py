@@ -16,6 +16,7 @@ import pytest
 
 from coursebuild.core.files.locks import is_abandoned, project_lock
 from support.runners import SOURCE_TREE
+from support.scratch_course import without_locks
 from support.waiting import wait_until
 
 HOLD = """
@@ -30,9 +31,9 @@ print("done", flush=True)
 """Holds the lock of a course until its input is closed."""
 
 
-def holder(root: Path) -> subprocess.Popen[str]:
+def holder(root: Path, before: str = "") -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-c", HOLD, str(root)],
+        [sys.executable, "-c", before + HOLD, str(root)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -73,6 +74,31 @@ def test_second_run_says_so_and_waits(tmp_path: Path, is_removed: bool) -> None:
             assert line(second) == "held"
             assert (tmp_path / ".coursebuild/lock").read_text() == f"{second.pid}\n"
             assert second.communicate()[0] == "done\n"
+
+
+@pytest.mark.site
+@pytest.mark.parametrize("error", ["ENOLCK", "ENOSYS", "EOPNOTSUPP"])
+def test_second_run_says_so_and_waits_without_locks(tmp_path: Path, error: str) -> None:
+    """A file that a killed run has left is no lock, and none is left by one that ends."""
+    before = without_locks(error)
+    with holder(tmp_path, before) as first:
+        assert line(first) == "held"
+        with holder(tmp_path, before) as second:
+            said, _, cure = line(second).partition(" (if there is none, ")
+            holder_name = f"another coursebuild (process {first.pid})"
+            assert said == f"{holder_name} is at work on this course; waiting for it"
+            assert cure == f"remove {tmp_path / '.coursebuild/lock-held'})"
+            first.send_signal(signal.SIGKILL)
+            first.wait()
+            assert line(second) == "held"
+            second.send_signal(signal.SIGKILL)
+            second.wait()
+            with holder(tmp_path, before) as third:
+                assert third.communicate()[0].splitlines()[-2:] == ["held", "done"]
+    assert sorted(path.name for path in (tmp_path / ".coursebuild").iterdir()) == [
+        ".gitignore",
+        "lock",
+    ]
 
 
 def test_another_thread_waits(tmp_path: Path) -> None:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import tomllib
 from pathlib import Path
 
 import pytest
 
+from coursebuild import __version__
 from support.scratch_course import Folder
 
 pytestmark = pytest.mark.site
 
 REPORT = """\
-wrote 11 files to {0}
+wrote 13 files to {0}
 
   coursebuild -C {1} serve    look at the course, and write
   coursebuild -C {1} build    verify it, and write the site to public/
@@ -58,6 +60,16 @@ def test_new_course_has_what_git_and_an_editor_need(tmp_path: Path) -> None:
             schema = data.decode().splitlines()[0].removeprefix("#:schema ")
             assert (folder.root / "content" / schema).is_file()
             assert tomllib.loads(data.decode())["verify"] == {"compare": "digits"}
+
+
+def test_new_course_names_its_packages_with_hashes(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    assert folder.main("init").status == 0
+    text = folder.text(".github/requirements.txt")
+    requirements = re.split(r"(?m)^(?=[\w.-]+==)", text)[1:]
+    assert len(requirements) > 30
+    assert [r for r in requirements if not re.search(r"--hash=sha256:[0-9a-f]{64}\b", r)] == []
+    assert f"\ncoursebuild=={__version__}\n" in folder.text(".github/coursebuild.txt")
 
 
 def test_nothing_is_overwritten(tmp_path: Path) -> None:

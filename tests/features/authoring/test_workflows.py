@@ -28,7 +28,11 @@ DOCUMENTED = {fence.value("file"): fence.text for fence in FENCES if fence.value
 COURSE = ".github/workflows/course.yml"
 WEEKLY = ".github/workflows/weekly.yml"
 PINNED_ACTION = re.compile(
-    r"actions/[a-z/-]+@(v\d+|[0-9a-f]{40})|\./|OWNER/coursebuild@v" + re.escape(__version__)
+    r"[\w-]+/[\w/-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+\b.*|\./|OWNER/coursebuild@v"
+    + re.escape(__version__)
+)
+INSTALLATION = re.compile(
+    r"pip (install (--require-hashes|--no-deps( --no-build-isolation)?) .*|check)"
 )
 SUDO = (
     "sudo apt-get install --quiet --yes bubblewrap",
@@ -102,13 +106,42 @@ def test_course_code_runs_with_no_secret_and_no_right_to_write() -> None:
 def test_actions_are_pinned_and_no_expression_becomes_code() -> None:
     (example,) = (yaml.safe_load(fence.text) for fence in FENCES if fence.is_("action"))
     steps = [step for job in jobs() for step in job["steps"]] + example + ACTION["runs"]["steps"]
-    actions = [step["uses"] for step in steps if "uses" in step]
+    texts = [path.read_text() for path in (ROOT / ".github/workflows").iterdir()]
+    texts += [fence.text for fence in FENCES] + [(ROOT / "action.yml").read_text()]
+    actions = [name for text in texts for name in re.findall(r"uses: *(.*)", text)]
+    assert len(actions) > 20
     assert [name for name in actions if not PINNED_ACTION.fullmatch(name)] == []
+    hashes = dict(re.findall(r"([\w/-]+)@([0-9a-f]{40} # v\d+)", "\n".join(actions)))
+    assert hashes["actions/cache"] == hashes["actions/cache/restore"]
     assert [line for line in commands(steps) if "${{" in line] == []
     for step in steps:
         if step.get("uses", "").startswith("actions/checkout@"):
             assert step["with"]["persist-credentials"] is False
     assert example[0]["with"].keys() == ACTION["inputs"].keys()
+
+
+def test_packages_are_installed_by_their_hashes() -> None:
+    """All but the tool itself, whose hash nobody knows before its release."""
+    steps = [step for job in jobs() for step in job["steps"]] + ACTION["runs"]["steps"]
+    lines = [line.strip() for text in commands(steps) for line in text.splitlines()]
+    installations = [line for line in lines if re.search(r"\bpip\b", line)]
+    assert len(installations) >= 8
+    assert [line for line in installations if not INSTALLATION.fullmatch(line)] == []
+
+
+def test_pull_request_leaves_no_cache_and_runs_scripts_in_the_sandbox_only() -> None:
+    job = workflow()["jobs"]["check"]
+    actions = [step["uses"].partition("@")[0] for step in job["steps"] if "uses" in step]
+    assert actions == ["actions/checkout", "actions/setup-python", "actions/cache/restore"]
+    assert "cache" not in str([step.get("with") for step in job["steps"][:2]])
+    called = [line for line in commands(job["steps"]) if line.startswith("coursebuild ")]
+    assert [line.split()[1:3] for line in called] == [
+        ["check", "--sandbox"],
+        ["build", "--sandbox"],
+        ["diff", "HEAD^"],
+    ]
+    keys = {"runs-on", "timeout-minutes", "steps", "if"}
+    assert job.keys() == keys, "no environment, permission or secret of its own"
 
 
 def test_every_command_line_is_accepted() -> None:
@@ -127,6 +160,11 @@ def test_every_command_line_is_accepted() -> None:
 
 # --------------------------------------------------------------------------- run, step by step
 
+LOCKS = {
+    ".github/requirements.txt": "numpy==2.3.0 --hash=sha256:00\n",
+    ".github/coursebuild.txt": f"coursebuild=={__version__}\n",
+}
+
 
 @pytest.fixture
 def course(tmp_path: Path, stores: Path) -> Folder:
@@ -134,6 +172,8 @@ def course(tmp_path: Path, stores: Path) -> Folder:
     folder = Folder(tmp_path / "repository")
     folder.fill([FIRST, SECOND], stores)
     folder.write(".gitignore", ".coursebuild/\nexamples/\npublic/\n")
+    for path, text in LOCKS.items():
+        folder.write(path, text)
     git(folder.root, "init", "-q", "-b", "main")
     commit(folder.root)
     return folder
@@ -154,6 +194,8 @@ def propose(runner: Runner, course: Folder, lesson: str) -> list[Step]:
     base = git(course.root, "rev-parse", "main")
     git(course.root, "checkout", "-q", "-B", "change", "main")
     course.write(course.lesson(2), lesson)
+    for path in LOCKS:
+        course.write(path, "./tool\n")  # a tool of its own
     commit(course.root)
     git(course.root, "checkout", "-q", "-B", "merged", "main")
     git(course.root, "merge", "-q", "--no-ff", "-m", "merged", "change")
@@ -161,6 +203,14 @@ def propose(runner: Runner, course: Folder, lesson: str) -> list[Step]:
     steps_by_job = runner.run(workflow(), "merged", **event)
     assert [*steps_by_job] == ["check"]
     return steps_by_job["check"]
+
+
+def installations(folder: str) -> list[str]:
+    """The calls of pip that install what the files of a folder name."""
+    return [
+        f"pip install --require-hashes -r {folder}/requirements.txt",
+        f"pip install --no-deps -r {folder}/coursebuild.txt",
+    ]
 
 
 def statuses(steps: list[Step]) -> list[int]:
@@ -184,6 +234,8 @@ def test_only_main_is_published_and_a_pull_request_gets_a_report(
 
     steps_with_mistake = propose(runner, course, SECOND.replace("```text\n2", "```text\n3"))
     assert statuses(steps_with_mistake) == [0, 0, 1, 0], "without a build, and with a report"
+    for path, text in LOCKS.items():
+        assert (runner.folder / "tmp" / Path(path).name).read_text() == text
     assert steps_with_mistake[2].out.startswith(f"::error file={course.lesson(2)},line=10,col=1,")
     assert "| `examples/two.py` | 1.2 | numeric: 1 (relative, up to 5.0e-01) |" in runner.summary
     assert "-2\n+3\n" in runner.summary
@@ -197,8 +249,9 @@ def test_only_main_is_published_and_a_pull_request_gets_a_report(
     assert "\n| the whole site | " in runner.summary
     assert [*runner.caches] == caches
     assert ">12</" not in page.read_text()
-    pip, *sudo = f"pip install coursebuild=={__version__}", *SUDO
-    assert runner.notes == [pip, pip, *sudo, pip, *sudo]
+    installed = installations(".github")
+    checked = [*installations(str(runner.folder / "tmp")), *SUDO]
+    assert runner.notes == [*installed, *checked, *checked]
 
 
 @pytest.mark.site
@@ -246,7 +299,12 @@ def test_action_installs_a_version_and_runs_a_command(course: Folder, runner: Ru
     inputs = {"version": "0.9.0", "path": course.root.name, "command": "build --out ../site"}
     assert statuses(runner.action(parent, steps, **inputs)) == [0, 0]
     assert (parent / "site/index.html").is_file()
-    assert runner.notes == [f"pip install {ROOT}", "pip install coursebuild==0.9.0"]
+    locked = "pip install --require-hashes -r requirements.txt -r requirements-build.txt"
+    alone = "pip install --no-deps --no-build-isolation"
+    assert runner.notes == [
+        *(locked, f"{alone} .", "pip check"),
+        *(locked, f"{alone} coursebuild==0.9.0", "pip check"),
+    ]
 
 
 @pytest.mark.site

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import shlex
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from coursebuild import __version__
 from coursebuild.cli.output import CLEAN, USAGE, fail, write
 from coursebuild.core.files.changes import FileChange, change_files, undo_changes
 from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.files.resources import locked_requirements
 from coursebuild.core.syntax.schemas import json_schema
 from coursebuild.pipeline.options import check_path
 from coursebuild.pipeline.progress import Progress
@@ -29,6 +31,7 @@ _PATHS_BY_FILE = {
     "extensions.json": ".vscode/extensions.json",
     "course.yml": ".github/workflows/course.yml",
     "weekly.yml": ".github/workflows/weekly.yml",
+    "coursebuild.txt": ".github/coursebuild.txt",
 }
 """Paths in a new course, for files that tools would read if they had these names here."""
 
@@ -71,4 +74,7 @@ def _read_files() -> dict[str, bytes]:
             path = file.relative_to(_COURSE).as_posix()
             data = file.read_bytes().replace(b"VERSION", __version__.encode())
             files[_PATHS_BY_FILE.get(path, path)] = data
+    _, requirements = re.split("(?m)^(?=[^#])", locked_requirements(), maxsplit=1)
+    comment = f"# What coursebuild {__version__} was tested with, as its release locks it.\n"
+    files[".github/requirements.txt"] = f"{comment}{requirements}".encode()
     return files

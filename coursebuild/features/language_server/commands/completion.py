@@ -78,7 +78,7 @@ def _make_items(
         types.CompletionItem(
             name.strip('"'),
             kind=kind,
-            detail=detail,
+            detail=" ".join(detail.split()),  # some clients put it between fences
             filter_text=name,
             text_edit=types.TextEdit(replaced_range, name),
         )

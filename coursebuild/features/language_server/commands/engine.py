@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from coursebuild.core.model.results import ModelFacts
+from coursebuild.core.pages.marks import escape_text, fence
 from coursebuild.core.text.source import Span
 
 _ASSIGNMENT = re.compile(r"(\w+)\s*=\s*mujoco\.Mj(Data|Model)\b")
@@ -61,7 +62,7 @@ def describe_name(
     declaration = members(tuple(path), code.text).get(name) if path else None
     if declaration is None:
         return None
-    text = f"```c\n{declaration}\n```\n{declaration.doc}"
+    text = f"{fence('c', str(declaration))}\n{escape_text(declaration.doc)}"
     extent = getattr(declaration, "array_extent", None)
     return span, f"{text}\n\n{_describe_shape(extent, facts)}" if extent else text
 

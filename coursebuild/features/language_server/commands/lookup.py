@@ -5,6 +5,8 @@ Entry points: `hover`, `definition`, `look_up`.
 1. In a document it is the smallest thing at the place that refers to something: a link, a term, a
    bound number, a formula, a kind of callout, a model or a name of the engine in code.
 2. In JSON and TOML it is a key, whose declaration describes it, or the id of a lesson.
+3. Editors read a description as Markdown, some with HTML and commands in it. What an author wrote
+   is text there, by `escape_text`, or code, by `code_span` and `fence`.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from coursebuild.core.model import Owner
 from coursebuild.core.model.equations import display_formulas
 from coursebuild.core.model.results import Formula, ModelFacts
 from coursebuild.core.pages.library import Library, models_named
+from coursebuild.core.pages.marks import code_span, escape_text, fence
 from coursebuild.core.scripts.bindings import PrintedOutputs
 from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.syntax.decode import field_description
@@ -96,12 +99,12 @@ def _look_up_field(library: Library, source: Source, offset: int) -> Referent | 
     key, lesson = place.key, library.lessons.get(place.text)
     if lesson is not None and key in ("id", "prerequisites"):
         definition = lesson.span if lesson.document is None else lesson.document.source.span(0, 0)
-        title = f"**Lesson {lesson.id}: {lesson.title}**"
+        title = f"**Lesson {lesson.id}: {escape_text(lesson.title)}**"
         return Referent(place.span, title, definition, model.LessonTarget(lesson.id, None))
     if key == "rule" and place.text in RULES:
         return Referent(place.span, RULES[place.text].summary)
     text = "" if key else field_description(place.field.type)
-    return Referent(place.span, f"`{place.text}`: {text}") if text else None
+    return Referent(place.span, f"{code_span(place.text)}: {text}") if text else None
 
 
 class _Lookup:
@@ -124,7 +127,8 @@ class _Lookup:
                 return self.look_up_formula(node, offset)
             case model.Callout() if _covers(node.kind_span, offset):
                 kind = self.library.callout(node.kind)
-                return Referent(node.kind_span, f"**{kind.label}**\n\n{kind.promise}")
+                label, promise = escape_text(kind.label), escape_text(kind.promise)
+                return Referent(node.kind_span, f"**{label}**\n\n{promise}")
             case model.Script() | model.PlainCode() | model.FeatureBlock() | model.CodeSpan():
                 return self.look_up_code(node, offset)
             case _:
@@ -142,21 +146,23 @@ class _Lookup:
         match target:
             case model.LessonTarget(id=id, anchor=anchor) if id in library.lessons:
                 lesson = library.lessons[id]
-                objectives = "\n".join(f"- {objective}" for objective in lesson.objectives)
-                title = f"**Lesson {id}: {lesson.title}** ({lesson.status})"
-                return self.describe_owner(lesson, anchor, title, lesson.summary, objectives)
+                objectives = "\n".join(f"- {escape_text(text)}" for text in lesson.objectives)
+                title = f"**Lesson {id}: {escape_text(lesson.title)}** ({lesson.status})"
+                summary = escape_text(lesson.summary)
+                return self.describe_owner(lesson, anchor, title, summary, objectives)
             case model.PageTarget(id=id, anchor=anchor) if id in library.pages:
-                return self.describe_owner(
-                    library.pages[id], anchor, f"**{library.pages[id].title}**"
-                )
+                page = library.pages[id]
+                return self.describe_owner(page, anchor, f"**{escape_text(page.title)}**")
             case model.LevelTarget(id=id) if id in library.levels:
                 level = library.levels[id]
-                return f"**Level {id}: {level.title}**\n\n{level.summary}", level.span
+                title = f"**Level {escape_text(id)}: {escape_text(level.title)}**"
+                return _paragraphs(title, escape_text(level.summary)), level.span
             case model.ModelTarget(name=name):
                 return self.describe_model(name)
             case model.ExampleTarget(path=path) if path in library.scripts:
                 script, owner = library.scripts[path]
-                return f"`{path}`, a script of {owner.id}: {owner.title}", script.path_span
+                text = f"{code_span(path)}, a script of {owner.id}: {escape_text(owner.title)}"
+                return text, script.path_span
             case model.TermTarget(id=id) if id in library.terms:
                 return self.describe_term(id, library.terms[id])
             case model.UrlTarget(url=url) if url.startswith("#"):
@@ -164,7 +170,7 @@ class _Lookup:
             case model.UrlTarget(url=url):
                 path = model.local_file(url, self.document.source.path)
                 is_file = path in library.course.files
-                return (f"`{path}`", Source(path, "").span()) if is_file else None
+                return (code_span(path), Source(path, "").span()) if is_file else None
             case _:
                 return None
 
@@ -185,8 +191,8 @@ class _Lookup:
         tex = next((f.tex for f in display_formulas(document) if name and f.id == name), None)
         if place is None:
             return None
-        line = place.first_line().text.lstrip("# ")
-        return line if tex is None else f"```tex\n{tex.strip()}\n```", place
+        line = escape_text(place.first_line().text.lstrip("# "))
+        return line if tex is None else fence("tex", tex.strip()), place
 
     def describe_model(self, name: str) -> tuple[str, Span] | None:
         """Return a description of a model with its sizes, and its place."""
@@ -199,7 +205,8 @@ class _Lookup:
             f"nu = {facts.nu}; {facts.integrator}, timestep {facts.timestep:g} s"
         )
         source = model_file.source
-        text = _paragraphs(f"**{source.path}**", model_file.description, sizes or "")
+        description = escape_text(model_file.description)
+        text = _paragraphs(f"**{code_span(source.path)}**", description, sizes or "")
         return text, source.span(0, 0)
 
     def facts(self, models: Iterable[str]) -> ModelFacts | None:
@@ -213,9 +220,9 @@ class _Lookup:
             inlines = block.children if isinstance(block, model.Paragraph) else ()
             for term in model.walk_inlines(inlines):
                 if isinstance(term, model.Term) and term.id == id:
-                    inlines = model.without_links(definition_of(inlines, term))
-                    words = (i.text if isinstance(i, model.Text) else i.span.text for i in inlines)
-                    return _paragraphs(f"**{term.name}**", "".join(words).strip()), term.span
+                    text = model.plain_text(model.without_links(definition_of(inlines, term)))
+                    name = f"**{escape_text(term.name)}**"
+                    return _paragraphs(name, escape_text(text)), term.span
         return None
 
     # --- formulas, numbers, code
@@ -240,7 +247,8 @@ class _Lookup:
         if not declarations:
             return None
         lines = (
-            f"- `{math.tex.text}`: {meaning.text}{meaning.unit and f', {meaning.unit}'}"
+            f"- {code_span(math.tex.text)}: "
+            + escape_text(meaning.text + (meaning.unit and f", {meaning.unit}"))
             for math in declarations
             if (meaning := math.meaning)
         )
@@ -255,7 +263,8 @@ class _Lookup:
             for window in number.windows(printed.lines(verdict)):
                 if number.shows(window) and window.line.locate is not None:
                     place = window.line.locate(window.numbers[0].start, window.numbers[-1].end)
-                    text = f"`{verdict.recording.script}` printed\n```text\n{window.line.text}\n```"
+                    printed_line = fence("text", window.line.text)
+                    text = f"{code_span(verdict.recording.script or '')} printed\n{printed_line}"
                     return Referent(binding.span, text, place)
         return None
 
