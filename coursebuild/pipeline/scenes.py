@@ -13,13 +13,13 @@ Entry points: `find_scenes(root, names)`, `scene_digest`.
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
 from msgspec import Struct
 
 from coursebuild.core.checks.compiled import (
+    INCLUDED_ROOT,
     check_scenarios,
     diagnose_model,
     diagnose_orphan_scenarios,
@@ -38,8 +38,6 @@ from coursebuild.core.text.diagnostics import (
 )
 from coursebuild.numerics.reports.cases import exact_file
 from coursebuild.pipeline.options import UsageError
-
-_PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
 
 
 class CourseScene(Struct, frozen=True):
@@ -163,7 +161,9 @@ def _find_main_models(root: Path, models: Sequence[MjcfModel]) -> list[MjcfModel
     parts = {
         path for model in models for path in model_files(root, model.source.path, model.source.text)
     }
-    return [m for m in models if m.source.path not in parts and not _PART.match(m.source.text)]
+    return [
+        m for m in models if m.source.path not in parts and not INCLUDED_ROOT.match(m.source.text)
+    ]
 
 
 # --- declarations

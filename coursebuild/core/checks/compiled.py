@@ -35,7 +35,8 @@ from coursebuild.core.registry import features, kind_of_block
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Excerpt, Source, Span
 
-_INCLUDED_ROOT = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
+INCLUDED_ROOT = re.compile(r"\s*+(?:<(?:\?.*?\?|!--.*?--)>\s*+)*+<mujocoinclude\b", re.DOTALL)
+"""How a file begins that is meant to be included by others."""
 
 
 class MjcfText(Struct, frozen=True):
@@ -147,7 +148,7 @@ def _included_models(course: Course, models: Mapping[str, CompileResult]) -> set
     return {
         model.name
         for model in course.models
-        if model.source.path in paths or _INCLUDED_ROOT.match(model.source.text)
+        if model.source.path in paths or INCLUDED_ROOT.match(model.source.text)
     }
 
 
