@@ -25,9 +25,10 @@ from coursebuild.core.checks.compiled import (
     diagnose_orphan_scenarios,
 )
 from coursebuild.core.files.read import CourseFiles, read_course
-from coursebuild.core.model import Declarations, MjcfModel
+from coursebuild.core.model import Declarations, Limits, MjcfModel
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.run.mjcf import compile_all, model_files, readable_error
+from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -73,7 +74,10 @@ def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Parsed[tuple[CourseS
     declarations, diagnostics = _read_declarations(read.value, selection, all_models=not names)
     diagnostics += [d for d in read.diagnostics if d.span.path.startswith("models/")]
     scenes: list[CourseScene] = []
-    results = compile_all(root, [(model.source.path, model.source.text) for model in selection])
+    course = None if read.value.map is None else parse_course_map(read.value.map).value
+    limits = Limits() if course is None else course.limits
+    texts = [(model.source.path, model.source.text) for model in selection]
+    results = compile_all(root, texts, limits=limits)
     for model, result in zip(selection, results, strict=True):
         if result.facts is None:
             diagnostics.append(diagnose_model(model, result, readable_error))
