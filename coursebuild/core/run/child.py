@@ -4,7 +4,8 @@ Entry point: `JsonChild`, a context manager.
 
 1. The child runs a file of this package in a temporary folder and a clean environment. It says
    `ready`, then answers each line with one line.
-2. It is started with the first request, and again after it died. A request gives `None` when the
+2. It ends with the thread that uses this, also if that is killed.
+3. It is started with the first request, and again after it died. A request gives `None` when the
    child did not answer; `death()` says why.
 """
 
@@ -22,6 +23,7 @@ import tempfile
 import time
 from typing import Any, Self
 
+from coursebuild.core.engine.lifetime import bound_command
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.core.model import Limits
@@ -119,7 +121,7 @@ class JsonChild:
         self._folder = self._folder or self._resources.enter_context(temporary_folder())
         with tempfile.TemporaryFile() as errors:
             self._process = process = subprocess.Popen(
-                [self._python, "-E", "-P", self._script],
+                bound_command([self._python, "-E", "-P", self._script]),
                 cwd=self._folder,
                 env=clean_environment(os.environ),
                 stdin=subprocess.PIPE,
