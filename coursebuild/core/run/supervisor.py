@@ -40,6 +40,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
 from coursebuild.core.engine.lifetime import end_with_parent
+from coursebuild.core.files.temporary import remove_folder
 from coursebuild.core.run.script_process import (
     Job,
     PreloadedPackages,
@@ -361,23 +362,6 @@ def _report(
     }
     data = json.dumps(report, ensure_ascii=False).encode()
     return LENGTH.pack(len(data)) + data
-
-
-def remove_folder(folder: str) -> None:
-    """Remove a script's temporary folder, even if the script has removed permissions in it."""
-    try:
-        os.rmdir(folder)  # noqa: PTH106 (mostly it is empty)
-        return
-    except FileNotFoundError:
-        return
-    except OSError:
-        pass
-    shutil.rmtree(folder, ignore_errors=True)
-    if Path(folder).exists():
-        with contextlib.suppress(OSError):
-            for parent, _, _ in os.walk(folder):
-                Path(parent).chmod(0o700)
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _receive(fd: int) -> bytes | None:
