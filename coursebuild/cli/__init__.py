@@ -1,7 +1,8 @@
 """The command line: arguments → pipeline → exit status.
 
 Entry point: `main(arguments)`. Exit status 0: clean; 1: something is wrong in the course; 2: wrong
-usage. Heavy imports happen in the command that needs them.
+usage. Heavy imports happen in the command that needs them; here there are none but in `main`, which
+first lets Ctrl-C end this process without a word.
 
 - `unchanged`: a command that has nothing to do, for which little is loaded
 - `running`: runs a command, and decides the status that it ends with
@@ -15,12 +16,8 @@ usage. Heavy imports happen in the command that needs them.
 
 from __future__ import annotations
 
-import atexit
 import os
 import sys
-
-from coursebuild.cli.output import CLEAN, FAILURE, INTERRUPTED, USAGE, say, write
-from coursebuild.cli.unchanged import previous_output, split_directory
 
 TYPE_CHECKING = False
 """True for type checkers: importing `typing` takes a tenth of a run with nothing to do."""
@@ -33,6 +30,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Without arguments the command is that of this process, which ends with it.
     """
+    alone = arguments is None
+    if alone:
+        _end_by_interrupt()
+    from coursebuild.cli.output import CLEAN, FAILURE, USAGE, say, write
+    from coursebuild.cli.unchanged import previous_output, split_directory
+
     _utf8_streams()
     if sys.platform == "win32":
         return say(USAGE, "coursebuild runs on Linux and macOS; on Windows, install it in WSL")
@@ -41,16 +44,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         directory, words = split_directory(all_words)
         output = previous_output(directory, words)
         if output is not None:
-            return _end(write(output, CLEAN), alone=arguments is None)
+            return _end(write(output, CLEAN), alone=alone)
         _occupy_streams()
         from coursebuild.cli.running import run
-    except KeyboardInterrupt:
-        return say(INTERRUPTED, "interrupted")
     except MemoryError:
         return say(FAILURE, "coursebuild: there is not enough memory to begin")
     except OSError as error:
         return say(FAILURE, f"coursebuild: it cannot be loaded: {error}")
-    return _end(run(directory, words, alone=arguments is None), alone=arguments is None)
+    return _end(run(directory, words, alone=alone), alone=alone)
+
+
+def _end_by_interrupt() -> None:
+    """Let Ctrl-C end this process at once, until a command begins that has something to clean up.
+
+    Python would show where it is, which is in an import.
+    """
+    import signal
+
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not where it is ignored
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _end(status: int, *, alone: bool) -> int:
@@ -61,6 +73,8 @@ def _end(status: int, *, alone: bool) -> int:
     """
     if not alone:
         return status
+    import atexit
+
     atexit._run_exitfuncs()  # registered by libraries
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:  # the tool may have been started without one

@@ -65,7 +65,7 @@ def signals_as_exceptions(*, alone: bool = False) -> Iterator[None]:
             default_hook(unraisable)
 
     before = {signal.SIGTERM: signal.signal(signal.SIGTERM, _handle_signal)}
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, signal.SIG_DFL):
         before[signal.SIGINT] = signal.signal(signal.SIGINT, _handle_signal)
     sys.unraisablehook = send_dropped_again
     try:

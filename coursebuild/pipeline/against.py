@@ -12,6 +12,7 @@ Entry point: `compare_with_version(options, names, version)`.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 from msgspec import Struct, field
@@ -182,12 +183,13 @@ class _Comparison(Struct):
         results_here = dict(results)
         models = [model for model in self.course.models if not results_here[model.name].error]
         root = self.options.root
-        texts_here = mjcf.compile_all(root, [(mjcf.TEXT_PATH, text.text) for text in texts])
+        compile_all = functools.partial(mjcf.compile_all, root, limits=self.course.limits)
+        texts_here = compile_all([(mjcf.TEXT_PATH, text.text) for text in texts])
         good = [t for t, result in zip(texts, texts_here, strict=True) if not result.error]
         texts_to_compile = [(model.source.path, model.source.text) for model in models]
         texts_to_compile += [(mjcf.TEXT_PATH, text.text) for text in good]
         with self.options.progress.stage(f"compiling models with MuJoCo {self.version}"):
-            results_there = mjcf.compile_all(root, texts_to_compile, python=interpreter.python)
+            results_there = compile_all(texts_to_compile, python=interpreter.python)
         places = [(model.source.path, 1) for model in models]
         places += [(text.block.span.path, text.block.span.line) for text in good]
         return tuple(

@@ -13,21 +13,22 @@ Entry points: `find_scenes(root, names)`, `scene_digest`.
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
 from msgspec import Struct
 
 from coursebuild.core.checks.compiled import (
+    INCLUDED_ROOT,
     check_scenarios,
     diagnose_model,
     diagnose_orphan_scenarios,
 )
 from coursebuild.core.files.read import CourseFiles, read_course
-from coursebuild.core.model import Declarations, MjcfModel
+from coursebuild.core.model import Declarations, Limits, MjcfModel
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.run.mjcf import compile_all, model_files, readable_error
+from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -38,8 +39,6 @@ from coursebuild.core.text.diagnostics import (
 )
 from coursebuild.numerics.reports.cases import exact_file
 from coursebuild.pipeline.options import UsageError
-
-_PART = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
 
 
 class CourseScene(Struct, frozen=True):
@@ -75,7 +74,10 @@ def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Parsed[tuple[CourseS
     declarations, diagnostics = _read_declarations(read.value, selection, all_models=not names)
     diagnostics += [d for d in read.diagnostics if d.span.path.startswith("models/")]
     scenes: list[CourseScene] = []
-    results = compile_all(root, [(model.source.path, model.source.text) for model in selection])
+    course = None if read.value.map is None else parse_course_map(read.value.map).value
+    limits = Limits() if course is None else course.limits
+    texts = [(model.source.path, model.source.text) for model in selection]
+    results = compile_all(root, texts, limits=limits)
     for model, result in zip(selection, results, strict=True):
         if result.facts is None:
             diagnostics.append(diagnose_model(model, result, readable_error))
@@ -163,7 +165,9 @@ def _find_main_models(root: Path, models: Sequence[MjcfModel]) -> list[MjcfModel
     parts = {
         path for model in models for path in model_files(root, model.source.path, model.source.text)
     }
-    return [m for m in models if m.source.path not in parts and not _PART.match(m.source.text)]
+    return [
+        m for m in models if m.source.path not in parts and not INCLUDED_ROOT.match(m.source.text)
+    ]
 
 
 # --- declarations

@@ -240,7 +240,7 @@ def compile_models(
     texts_to_compile = [(model.source.path, model.source.text) for model in course.models]
     texts_to_compile += [(mjcf.TEXT_PATH, text.text) for text in texts]
     results = mjcf.compile_or_recall(
-        options.root, options.store, texts_to_compile, stage, course.limits.memory
+        options.root, options.store, texts_to_compile, stage, course.limits
     )
     models = tuple(zip((model.name for model in course.models), results, strict=False))
     compiled_blocks = tuple(zip(texts, results[len(models) :], strict=True))

@@ -124,6 +124,29 @@ def test_signal_waits_while_a_module_is_imported_or_a_lock_is_held(
         exec(compile(code, place, "exec"), {"heard": assert_takes_effect, **names})
 
 
+LOADING = (
+    *("coursebuild.cli.unchanged", "coursebuild.core.engine.up_to_date", "hashlib"),
+    *("coursebuild.cli.running", "coursebuild.cli.interrupts", "argparse"),
+)
+
+
+def test_ctrl_c_while_the_tool_is_loaded_ends_it_without_a_word() -> None:
+    """A traceback through imports is of no use to anybody; there is nothing to clean up yet."""
+    code = (
+        "import os, signal, sys\n"
+        "def interrupt(event, arguments):\n"
+        "    if event == 'import' and arguments[0] == sys.argv[-1]:\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "sys.addaudithook(interrupt)\n"
+        "from coursebuild.cli import main\n"
+        "main()\n"
+    )
+    for module in LOADING:
+        result = run_code(code, "check", module)
+        assert (result.returncode, result.stdout, result.stderr) == (-signal.SIGINT, "", ""), module
+
+
 def test_afterwards_all_is_as_it_was(capsys: pytest.CaptureFixture[str]) -> None:
     before = [signal.getsignal(number) for number in EXCEPTIONS], sys.unraisablehook
     with signals_as_exceptions():

@@ -7,7 +7,8 @@ import pytest
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from support.growth import processor_time_growth
-from support.scratch_course import GOOD, Make, block
+from support.scratch_course import GOOD, Make, block, kill_at_end, processes, wait_until_alone
+from support.waiting import wait_until
 
 MAP = "content/course.toml"
 
@@ -43,6 +44,23 @@ def test_a_map_or_model_that_is_too_long_is_told_and_not_read(make: Make) -> Non
     assert result.status == 1
     assert "course.toml has 1_100_" in result.out and "and may have 1_000_000" in result.out
     assert "make more courses of it" in result.out
+
+
+def test_a_killed_check_leaves_no_compiler_and_the_next_one_its_folder_no_more(make: Make) -> None:
+    folder = make(GOOD)
+    endless = '<replicate count="300000000"><geom size="1"/></replicate>'
+    folder.write("models/a.xml", f"<mujoco><worldbody>{endless}</worldbody></mujoco>\n")
+    folder.write(MAP, folder.text(MAP) + "\n[limits]\nmodels = 10_000\n")
+    with kill_at_end(folder.start("check")) as process:
+        wait_until(lambda: len(processes(folder)) > 1, "the process that compiles")
+        process.kill()
+        process.wait()
+        wait_until_alone(folder)
+    (left,) = folder.tmp.iterdir()
+    folder.write("models/a.xml", "<mujoco/>\n")
+    with kill_at_end(folder.start("check")) as process:
+        assert process.wait() == 0
+    assert [*folder.tmp.iterdir()] == [], left
 
 
 def test_a_script_gets_the_memory_that_the_course_allows(make: Make) -> None:

@@ -35,7 +35,8 @@ from coursebuild.core.registry import features, kind_of_block
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Excerpt, Source, Span
 
-_INCLUDED_ROOT = re.compile(r"\s*(?:<(?:\?.*?\?|!--.*?--)>\s*)*<mujocoinclude\b", re.DOTALL)
+INCLUDED_ROOT = re.compile(r"\s*+(?:<(?:\?.*?\?|!--.*?--)>\s*+)*+<mujocoinclude\b", re.DOTALL)
+"""How a file begins that is meant to be included by others."""
 
 
 class MjcfText(Struct, frozen=True):
@@ -123,8 +124,15 @@ def diagnose_model(
 ) -> Diagnostic:
     """The diagnostic of a model that does not compile."""
     span = line_span(model.source.excerpt(), result.line, 0, model.source.span(0, 0))
+    if result.timeout:
+        return _diagnose_timeout(span, f"the model `{model.name}`", result)
     message = f"the model `{model.name}` does not compile: {readable(result.error)}"
     return diagnose("model-error", span, message)
+
+
+def _diagnose_timeout(span: Span, subject: str, result: CompileResult) -> Diagnostic:
+    help = "make it smaller, or set `models` in `[limits]` of the map: seconds for all models"
+    return diagnose("model-timeout", span, f"{subject} {result.error}", help=help)
 
 
 def diagnose_orphan_scenarios(source: Source, models: Collection[str]) -> Diagnostic:
@@ -147,7 +155,7 @@ def _included_models(course: Course, models: Mapping[str, CompileResult]) -> set
     return {
         model.name
         for model in course.models
-        if model.source.path in paths or _INCLUDED_ROOT.match(model.source.text)
+        if model.source.path in paths or INCLUDED_ROOT.match(model.source.text)
     }
 
 
@@ -164,6 +172,12 @@ def _check_text(
     text: MjcfText, result: CompileResult, readable: Callable[[str], str]
 ) -> Iterator[Diagnostic]:
     block = text.block
+    subject = "this block"
+    if isinstance(block, FeatureBlock):
+        subject = f"the model in this {kind_of_block(block).name}"
+    if result.timeout:
+        yield _diagnose_timeout(block.span.first_line(), subject, result)
+        return
     if isinstance(block, Mjcf) and block.error is not None:
         span = block.error_span or block.span.first_line()
         if not result.error:
@@ -183,10 +197,8 @@ def _check_text(
         return
     if result.error:
         span = line_span(text.code, result.line, text.lines_before, block.span.first_line())
-        subject, help = "this block", ""
-        if isinstance(block, FeatureBlock):
-            subject = f"the model in this {kind_of_block(block).name}"
-        elif block.fragment is None and "<mujoco" not in text.text:
+        help = ""
+        if isinstance(block, Mjcf) and block.fragment is None and "<mujoco" not in text.text:
             help = 'if it is a part of a model say so: `fragment="worldbody"`'
         message = f"{subject} does not compile: {readable(result.error)}"
         yield diagnose("mjcf-error", span, message, help=help)

@@ -7,8 +7,8 @@ Entry points: `Workers`, a context manager; `can_fork`, whether there can be any
 2. `map` gives each task to the worker it is reserved for, or else to the first idle one, and yields
    the results in the order of the tasks. Tasks are made while workers do earlier ones.
 3. The task of a worker that died is done in this process. An exception in a worker is raised here.
-4. Workers are killed when the work is over, however it ends: they have nothing to save. If this
-   process is killed, they notice and exit.
+4. Workers are killed when the work is over, however it ends, and when this process is: they have
+   nothing to save.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ from multiprocessing.connection import Connection, Pipe, wait
 from typing import Any, Generic, NoReturn, Self, TypeVar
 
 from msgspec import Struct
+
+from coursebuild.core.engine.lifetime import end_with_parent
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -163,11 +165,13 @@ class Workers(Generic[Task, Result]):
 
     def _fork(self, number: int) -> None:
         ours, theirs = Pipe()
+        parent = os.getpid()
         # A signal to all processes of the terminal must not run this process's handlers there.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
         try:
             process = os.fork()
             if process == 0:
+                end_with_parent(parent)
                 _serve(self._work, theirs, before)
             self._workers[number] = _Worker(number, process, ours)
         except OSError:

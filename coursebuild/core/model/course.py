@@ -166,7 +166,15 @@ class Limits(Struct, frozen=True, forbid_unknown_fields=True):
     )
     memory: Annotated[
         int, Meta(ge=1, le=1 << 20, description="MiB for compiling a model, and for trying a lab")
-    ] = 1024
+    ] = 896
+    models: Annotated[
+        float,
+        Meta(
+            gt=0,
+            le=100_000,
+            description="seconds of processor time for compiling all models; one may take half",
+        ),
+    ] = 8.0
 
 
 class Course(Struct, frozen=True):

@@ -236,6 +236,8 @@ class CompileResult(Struct, frozen=True):
     line: int | None = None
     """Line of the error in the text that was compiled, from 1."""
     facts: ModelFacts | None = None
+    timeout: bool = False
+    """Whether there was no time to compile it, which `error` says as the end of a sentence."""
 
 
 class ModelFacts(Struct, frozen=True):

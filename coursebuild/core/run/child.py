@@ -4,7 +4,8 @@ Entry point: `JsonChild`, a context manager.
 
 1. The child runs a file of this package in a temporary folder and a clean environment. It says
    `ready`, then answers each line with one line.
-2. It is started with the first request, and again after it died. A request gives `None` when the
+2. It ends with the thread that uses this, also if that is killed.
+3. It is started with the first request, and again after it died. A request gives `None` when the
    child did not answer; `death()` says why.
 """
 
@@ -22,12 +23,14 @@ import tempfile
 import time
 from typing import Any, Self
 
+from coursebuild.core.engine.lifetime import bound_command
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.temporary import temporary_folder
+from coursebuild.core.model import Limits
 from coursebuild.core.run.script_environment import clean_environment
 
-MEMORY = 1024
-"""MiB that a child may take."""
+LIMITS = Limits()
+"""Those of a course whose map sets none."""
 _START = 120.0
 """Seconds in which the child must be ready."""
 
@@ -36,7 +39,7 @@ class JsonChild:
     """The child and its folder."""
 
     def __init__(
-        self, script: str, seconds: float, python: str | None = None, memory: int = MEMORY
+        self, script: str, seconds: float, python: str | None = None, memory: int = LIMITS.memory
     ) -> None:
         """A child ends itself, by SIGPROF, after `seconds` of processor time for a request.
 
@@ -46,11 +49,13 @@ class JsonChild:
         self.memory = memory
         self._python = python or sys.executable
         self._script = script
-        self._seconds = seconds
+        self._seconds = self._limit = seconds
         self._resources = contextlib.ExitStack()
         self._folder = ""
         self._process: subprocess.Popen[bytes] | None = None
         self._interrupted = False
+        self.timed_out = False
+        """Whether the last request that was not answered took too long."""
 
     def __enter__(self) -> Self:
         return self
@@ -60,8 +65,10 @@ class JsonChild:
         self._resources.close()
         self._folder = ""
 
-    def ask(self, request: Any) -> Any:
+    def ask(self, request: Any, seconds: float | None = None) -> Any:
         """The child's answer; `None` if it died, or said nothing for too long.
+
+        `seconds`: another limit for this request.
 
         Raises:
             EffectError: MuJoCo cannot be loaded, or `interrupt` was called.
@@ -70,10 +77,11 @@ class JsonChild:
         assert process.stdin is not None
         if self._interrupted:
             raise EffectError("interrupted")
+        self._limit = self._seconds if seconds is None else seconds
         with contextlib.suppress(BrokenPipeError):  # it died, which reading will show
             process.stdin.write(json.dumps(request).encode() + b"\n")
             process.stdin.flush()
-        line = self._read_line(10 * self._seconds)
+        line = self._read_line(10 * self._limit)
         return None if line is None else json.loads(line)
 
     def stop(self) -> None:
@@ -101,8 +109,10 @@ class JsonChild:
             self._process.wait(1.0)
         status = self._process.returncode
         self.stop()
-        if status is None or status == -signal.SIGPROF:
-            return f"took longer than {self._seconds:g} s"
+        self.timed_out = status is None or status == -signal.SIGPROF
+        if self.timed_out:
+            return f"took longer than {self._limit:g} s"
+        assert status is not None
         if status < 0:
             return f"crashed ({signal.Signals(-status).name})"
         return f"ended with status {status}"
@@ -111,7 +121,7 @@ class JsonChild:
         self._folder = self._folder or self._resources.enter_context(temporary_folder())
         with tempfile.TemporaryFile() as errors:
             self._process = process = subprocess.Popen(
-                [self._python, "-E", "-P", self._script],
+                bound_command([self._python, "-E", "-P", self._script]),
                 cwd=self._folder,
                 env=clean_environment(os.environ),
                 stdin=subprocess.PIPE,

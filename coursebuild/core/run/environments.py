@@ -30,6 +30,7 @@ import venv
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from coursebuild.core.engine.lifetime import bound_command
 from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import folder_lock
 from coursebuild.core.files.trust import TEMPORARY, state_folder
@@ -208,7 +209,7 @@ def _run(command: Sequence[str]) -> tuple[int, str]:
     outer = {name: value for name, value in os.environ.items() if not name.startswith(excluded)}
     ours = {"PIP_USER": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1", "LC_ALL": "C.UTF-8"}
     with subprocess.Popen(
-        command,
+        bound_command(command),
         env={"PIP_RETRIES": "1", **outer, **ours},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,

@@ -3,12 +3,14 @@
 Entry points: `compile_or_recall`, for results kept under a `model_key`; `compile_all`;
 `model_files`, what a model is made of; `readable_error`, for people.
 
-1. One child compiles everything; it starts again if a model crashes it or takes too long.
+1. One child compiles everything; it starts again if a model crashes it or takes too long. One
+   model may take half of the processor time that all may take together.
 2. A text is compiled as if it stood in `models/`, so that its includes and assets are found there.
 3. The messages are MuJoCo's own and whole, without the paths of this machine; a line is read from
    them if it is one of the compiled text, and not of a file that it includes.
 4. A result, also an error, is kept under a hash of the text, its place, and the state of every
-   other file that MuJoCo looks for. If one of these changed meanwhile, nothing is kept.
+   other file that MuJoCo looks for. If one of these changed meanwhile, or time was up, nothing is
+   kept.
 """
 
 from __future__ import annotations
@@ -17,23 +19,28 @@ import contextlib
 import functools
 import os
 import re
+import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 
 import msgspec
 
-from coursebuild.core.engine.digests import file_state
+from coursebuild.core.engine.digests import SPECIAL, file_state
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.model import Limits
 from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.run import mjcf_worker, mujoco_files
-from coursebuild.core.run.child import MEMORY, JsonChild
+from coursebuild.core.run.child import LIMITS, JsonChild
 from coursebuild.core.run.mujoco_files import ModelFiles
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.values import fingerprint
 
-TIMEOUT = 60.0
-"""Seconds that one model may take; large meshes take some."""
+_ONE = 0.5
+"""The part of the time of all models that one may take, so that one alone leaves the others some.
+"""
+_LEAST = 0.01
+"""Seconds; where less is left, nothing is compiled any more."""
 OWN_FAULT = "MuJoCo's compiler "
 """How messages begin that are about the process that compiles."""
 _NO_MEMORY = re.compile(r"unknown exception|allocate memory|MemoryError|bad_alloc", re.IGNORECASE)
@@ -47,8 +54,7 @@ def compile_all(
     root: Path,
     texts: Sequence[tuple[str, str]],
     *,
-    timeout: float = TIMEOUT,
-    memory: int = MEMORY,
+    limits: Limits = LIMITS,
     python: str | None = None,
 ) -> tuple[CompileResult, ...]:
     """Compile models, all in one child; a result for each.
@@ -56,8 +62,7 @@ def compile_all(
     Args:
         root: the course folder.
         texts: each with the path where it stands, or would (`TEXT_PATH`).
-        timeout: seconds that one may take.
-        memory: MiB that they may take.
+        limits: those of the course.
         python: another interpreter than the one that runs this, with a MuJoCo of its own.
 
     Raises:
@@ -65,7 +70,7 @@ def compile_all(
     """
     if not texts:
         return ()
-    with _Compiler(root.resolve(), timeout, python, memory) as compiler:
+    with _Compiler(root.resolve(), limits, python) as compiler:
         return tuple(compiler.compile(*text) for text in texts)
 
 
@@ -74,7 +79,7 @@ def compile_or_recall(
     store: Memo,
     texts: Sequence[tuple[str, str]],
     stage: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext,
-    memory: int = MEMORY,
+    limits: Limits = LIMITS,
 ) -> tuple[CompileResult, ...]:
     """A result for each text, see `compile_all`.
 
@@ -86,10 +91,11 @@ def compile_or_recall(
     uncompiled = [model for model in keys if model not in results]
     if uncompiled:
         with stage():
-            new_results = compile_all(root, uncompiled, memory=memory)
+            new_results = compile_all(root, uncompiled, limits=limits)
         for model, result in zip(uncompiled, new_results, strict=True):
             results[model] = result
-            if not result.error.startswith(OWN_FAULT) and model_key(root, *model) == keys[model]:
+            is_lasting = not result.timeout and not result.error.startswith(OWN_FAULT)
+            if is_lasting and model_key(root, *model) == keys[model]:
                 with contextlib.suppress(UnicodeEncodeError):  # a name of a file that is no text
                     store.put_value(_KIND, keys[model], result)
     return tuple(results[model] for model in texts)
@@ -112,16 +118,31 @@ def _code() -> tuple[bytes, ...]:
 class _Compiler(JsonChild):
     """The child that compiles."""
 
-    def __init__(self, root: Path, timeout: float, python: str | None, memory: int) -> None:
-        super().__init__(mjcf_worker.__file__, timeout, python, memory=memory)
+    def __init__(self, root: Path, limits: Limits, python: str | None) -> None:
+        super().__init__(mjcf_worker.__file__, limits.models, python, memory=limits.memory)
         self.root = root
-        self.timeout = timeout
+        self.seconds = self.left = limits.models
 
     def compile(self, path: str, text: str) -> CompileResult:
-        reply = self.ask((str(self.root / path), text, self.timeout))
+        limit = min(_ONE * self.seconds, self.left)
+        if limit < _LEAST:
+            return self._no_time_left()
+        for file in model_files(self.root, path, text):
+            if file_state(str(self.root / file)) == SPECIAL:  # to read it may take for ever
+                return CompileResult(f"'{file}' is a device or a pipe")
+        start = time.monotonic()
+        reply = self.ask((str(self.root / path), text, limit), limit)
         if reply is None:
-            return CompileResult(f"{OWN_FAULT}{self.death()}")
-        error, facts = reply
+            death = self.death()
+            if not self.timed_out:
+                self.left -= time.monotonic() - start
+                return CompileResult(f"{OWN_FAULT}{death}")
+            self.left -= limit
+            if limit < _ONE * self.seconds:
+                return self._no_time_left()
+            return CompileResult(f"takes more than {limit:g} s to compile", timeout=True)
+        error, facts, seconds = reply
+        self.left -= seconds
         if facts is not None:
             facts |= {"includes": existing_files(self.root, path, text)}
             return CompileResult("", facts=msgspec.convert(facts, ModelFacts))
@@ -129,6 +150,10 @@ class _Compiler(JsonChild):
         if _NO_MEMORY.search(message):
             return CompileResult(f"{OWN_FAULT}takes more than {self.memory} MiB of memory for it")
         return CompileResult(message, error_line(message, text))
+
+    def _no_time_left(self) -> CompileResult:
+        message = f"was not compiled: others took the {self.seconds:g} s that all may take"
+        return CompileResult(message, timeout=True)
 
     def _without_paths(self, message: str) -> str:
         """The message as it would be on any machine."""

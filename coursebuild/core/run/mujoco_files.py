@@ -9,7 +9,9 @@ Entry point: `ModelFiles`. Checked against the system calls of MuJoCo 3.14.0.
    component of their names.
 4. A model named by `<model file="..."/>` is a model of its own.
 
-The text is scanned, not parsed: a text that is no XML to MuJoCo may give too many files.
+The text is scanned, not parsed: a text that is no XML to MuJoCo may give too many files. It takes
+time that grows with the text, however broken or tangled the files are: each is scanned once, and a
+text that is too long, or no regular file, is not.
 """
 
 from __future__ import annotations
@@ -18,15 +20,20 @@ import functools
 import html
 import posix
 import re
+import stat
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 _MESH = frozenset(("mesh", "hfield", "skin"))
 _CUBE = tuple(f"file{side}" for side in ("right", "left", "up", "down", "front", "back"))
+_NAMING = _MESH | {"compiler", "flexcomp", "include", "model", "texture"}
+"""The elements that say where files are."""
 _DEEPEST = 32
-_COMMENTS = re.compile(rb"<!--.*?-->", re.DOTALL)
-_TAGS = re.compile(rb"<([A-Za-z_][\w:.-]*)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*)>")
-_ATTRIBUTES = re.compile(rb"([\w:.-]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+_LONGEST = 8 << 20
+"""Bytes of a file that is scanned."""
+_COMMENTS = re.compile(rb"<!--.*?(?:-->|\Z)", re.DOTALL)
+_TAGS = re.compile(rb"<([A-Za-z_][\w:.-]*+)((?:[^<>\"']|\"[^\"]*+\"|'[^']*+')*+)>")
+_ATTRIBUTES = re.compile(rb"(?<![\w:.-])([\w:.-]++)\s*+=\s*+(?:\"([^\"]*+)\"|'([^']*+)')")
 
 
 class ModelFiles:
@@ -45,12 +52,12 @@ class ModelFiles:
 
     def scan_path(self, path: str | bytes) -> None:
         """Note a model's file and the files that it is made of."""
-        self._scan_model(_decode(path) if isinstance(path, bytes) else path, 0)
+        self._scan_model(_decode(path) if isinstance(path, bytes) else path, 0, set())
 
     def scan_text(self, text: str | bytes, folder: str = "") -> None:
         """Note the files of a model given as text; relative ones belong to `folder`."""
         data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
-        self._scan_text(data, folder and f"{folder.rstrip('/')}/", 0)
+        self._scan_text(data, folder and f"{folder.rstrip('/')}/", 0, set())
 
     def scan_spec(self, spec: Any) -> None:
         """Note the assets of an `MjSpec`, which are read when it is compiled."""
@@ -63,16 +70,20 @@ class ModelFiles:
             for file in (element.file, *element.cubefiles):
                 self._find_asset(find(spec.texturedir, file))
 
-    def _scan_model(self, path: str, depth: int) -> None:
+    def _scan_model(self, path: str, depth: int, scanned: set[str]) -> None:
+        """`scanned`: the models that have been, to which this is added."""
         if _base_name(path) in self._given_names:
             return
         self._note(path)
+        if path in scanned:
+            return
+        scanned.add(path)
         data = _read_file(path)
         if data is not None:
-            self._scan_text(data, path[: path.rfind("/") + 1], depth)
+            self._scan_text(data, path[: path.rfind("/") + 1], depth, scanned)
 
-    def _scan_text(self, data: bytes, folder: str, depth: int) -> None:
-        tags = list(self._read_tags(data, folder, "", 0))
+    def _scan_text(self, data: bytes, folder: str, depth: int, scanned: set[str]) -> None:
+        tags = list(self._read_tags(data, folder, "", 0, set()))
         if not self._assets:
             return
         compiler: dict[str, str] = {}
@@ -96,18 +107,13 @@ class ModelFiles:
             elif tag == "model" and file and depth < _DEEPEST:
                 path = self._find_asset([*_join("", file), *_join(folder, file)])
                 if path:
-                    self._scan_model(path, depth + 1)
+                    self._scan_model(path, depth + 1, scanned)
 
     def _read_tags(
-        self, data: bytes, folder: str, subfolder: str, depth: int
+        self, data: bytes, folder: str, subfolder: str, depth: int, included: set[str]
     ) -> Iterator[tuple[str, dict[str, str]]]:
-        """Every tag of a text and of the files that it includes, with its attributes."""
-        for tag in _TAGS.finditer(_COMMENTS.sub(b"", data)):
-            name = _decode(tag[1])
-            attributes = {
-                _decode(key): html.unescape(_decode(double_quoted or single_quoted))
-                for key, double_quoted, single_quoted in _ATTRIBUTES.findall(tag[2])
-            }
+        """The tags that name files, of a text and of what it includes, with their attributes."""
+        for name, attributes in _tags(data):
             if name != "include":
                 yield name, attributes
                 continue
@@ -117,9 +123,12 @@ class ModelFiles:
                 candidates += _join(folder, subfolder + file)
                 candidates += _join(folder, subfolder + subfolder.lstrip("/") + file)
             path = self._find_asset(candidates)
-            if path and depth < _DEEPEST and (inner := _read_file(path)) is not None:
+            if not path or depth >= _DEEPEST or path in included:  # MuJoCo includes a file once
+                continue
+            included.add(path)
+            if (inner := _read_file(path)) is not None:
                 inner_subfolder = path[: path.rfind("/") + 1]
-                yield from self._read_tags(inner, folder, inner_subfolder, depth + 1)
+                yield from self._read_tags(inner, folder, inner_subfolder, depth + 1, included)
 
     def _find_asset(self, candidates: list[str]) -> str:
         """Note these paths up to the first that exists, and return that; empty if none does."""
@@ -133,6 +142,22 @@ class ModelFiles:
                 continue
             return candidate
         return ""
+
+
+@functools.lru_cache(maxsize=8)
+def _tags(data: bytes) -> tuple[tuple[str, dict[str, str]], ...]:
+    """The tags of a text that name files, with their attributes: many may include the same text."""
+    return tuple(
+        (
+            _decode(tag[1]),
+            {
+                _decode(key): html.unescape(_decode(double_quoted or single_quoted))
+                for key, double_quoted, single_quoted in _ATTRIBUTES.findall(tag[2])
+            },
+        )
+        for tag in _TAGS.finditer(_COMMENTS.sub(b"", data))
+        if _decode(tag[1]) in _NAMING
+    )
 
 
 def _asset_candidates(folder: str, inner: str, file: str, *, strip: bool) -> list[str]:
@@ -159,11 +184,14 @@ def _base_name(path: str) -> str:
 
 
 def _read_file(path: str) -> bytes | None:
-    try:
-        fd = posix.open(path, posix.O_RDONLY | posix.O_CLOEXEC)
+    try:  # to open a pipe may take for ever, and a device may have no end
+        fd = posix.open(path, posix.O_RDONLY | posix.O_CLOEXEC | posix.O_NONBLOCK)
     except (OSError, ValueError):
         return None
     try:
+        state = posix.fstat(fd)
+        if not stat.S_ISREG(state.st_mode) or state.st_size > _LONGEST:
+            return None
         parts = []
         while part := posix.read(fd, 1 << 20):
             parts.append(part)

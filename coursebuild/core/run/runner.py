@@ -32,7 +32,6 @@ from msgspec.structs import replace
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
-from coursebuild.core.run import supervisor
 from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.sandbox import Sandbox, copied_folders, sandbox_difference, visible_places
 from coursebuild.core.run.script_environment import (
@@ -165,7 +164,6 @@ class ScriptServer:
                 worker.dismiss()  # all of them, before waiting for any
             for worker in busy.values():
                 worker.close()
-            supervisor.remove_folder(work.scratch)
             if not had_log:
                 with contextlib.suppress(OSError):
                     log.unlink()

@@ -39,6 +39,8 @@ import traceback
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
+from coursebuild.core.engine.lifetime import end_with_parent
+from coursebuild.core.files.temporary import remove_folder
 from coursebuild.core.run.script_process import (
     Job,
     PreloadedPackages,
@@ -63,8 +65,7 @@ _NOTES_BYTES = 1 << 20
 _OUR_FRAME = re.compile(rb'  File "%s", line \d+ in <module>\n' % re.escape(os.fsencode(PROGRAM)))
 """The frame of `worker_main` in Python's fault dumps, below the script's own frames."""
 _COUNTER = itertools.count()
-_PR_SET_PDEATHSIG = 1  # linux/prctl.h
-_PR_SET_CHILD_SUBREAPER = 36
+_PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 _SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGCHLD)
 
 
@@ -126,9 +127,8 @@ class _Supervisor:
         signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
         signal.signal(signal.SIGCHLD, lambda *_: None)
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-        self.libc = ctypes.CDLL(None) if sys.platform == "linux" else None
-        if self.libc is not None:
-            self.libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+        if sys.platform == "linux":
+            ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
         os.chdir("/")
         self.scratch = ""
 
@@ -219,10 +219,7 @@ class _Supervisor:
     def _prepare_script(self, job: Job, stdout: int, stderr: int, parent: int) -> None:
         """Prepare a script's process: its session, pipes, signals and limits."""
         os.setsid()
-        if self.libc is not None:  # the system ends it when this process ends
-            self.libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-            if os.getppid() != parent:
-                os._exit(1)
+        end_with_parent(parent)
         os.dup2(stdout, 1)
         os.dup2(stderr, 2)
         for number in _SIGNALS:  # `nohup coursebuild` must not make scripts deaf
@@ -365,23 +362,6 @@ def _report(
     }
     data = json.dumps(report, ensure_ascii=False).encode()
     return LENGTH.pack(len(data)) + data
-
-
-def remove_folder(folder: str) -> None:
-    """Remove a script's temporary folder, even if the script has removed permissions in it."""
-    try:
-        os.rmdir(folder)  # noqa: PTH106 (mostly it is empty)
-        return
-    except FileNotFoundError:
-        return
-    except OSError:
-        pass
-    shutil.rmtree(folder, ignore_errors=True)
-    if Path(folder).exists():
-        with contextlib.suppress(OSError):
-            for parent, _, _ in os.walk(folder):
-                Path(parent).chmod(0o700)
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _receive(fd: int) -> bytes | None:

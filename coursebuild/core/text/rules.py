@@ -175,6 +175,7 @@ _SUMMARIES = {
     "output-not-updatable": "A recorded output cannot be updated automatically.",
     # models and MJCF
     "model-error": "A model in models/ does not compile.",
+    "model-timeout": "The models of a course take longer to compile than they may.",
     "toml-syntax": "A file of scenarios, models/NAME.toml, is not valid TOML.",
     "scenario-model": "A file of scenarios has no model beside it, or a scenario does not fit the "
     "model.",

@@ -8,7 +8,6 @@ import functools
 import io
 import subprocess
 import tarfile
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from coursebuild.cli.arguments import options_of
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.course_root import MAP
 from coursebuild.core.files.errors import EffectError, UsageError, reason
+from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.features.diff.report import CourseState, report
 from coursebuild.features.diff.weight import weight_section
 from coursebuild.pipeline.figures import read_recorded
@@ -63,7 +63,7 @@ def _open_base(root: Path, name: str) -> Iterator[tuple[str, Path]]:
     if not commit:
         raise UsageError(f"`{name}` is neither a folder with a course nor a revision of git here")
     since = (_git(root, "merge-base", commit.decode().strip(), "HEAD") or commit).decode().strip()
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         with tarfile.open(fileobj=io.BytesIO(_git(root, "archive", since))) as archive:
             archive.extractall(folder, filter="data")
         yield f"`{name}` ({since[:7]})", Path(folder).resolve()

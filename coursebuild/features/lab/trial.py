@@ -27,8 +27,9 @@ from msgspec.structs import replace
 
 from coursebuild.core.features import Trial, TrialContext, TrialOutcome
 from coursebuild.core.files.read import read_bytes
+from coursebuild.core.model import Limits
 from coursebuild.core.model.results import TrialLine, TrialResult
-from coursebuild.core.run.child import MEMORY
+from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.mjcf import model_files, model_key
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Source, key_of
@@ -60,9 +61,9 @@ _TRANSIENT = ("timeout", "engine")
 class Engines:
     """The browser's engine and the native one; each starts when it is first needed."""
 
-    def __init__(self, root: Path, memory: int = MEMORY) -> None:
-        self.native = NativeEngine(root, memory=memory)
-        self.browser = LabEngine(memory)
+    def __init__(self, root: Path, limits: Limits = LIMITS) -> None:
+        self.native = NativeEngine(root, memory=limits.memory, compiling=limits.models)
+        self.browser = LabEngine(limits.memory)
 
     def __enter__(self) -> Self:
         return self
@@ -87,7 +88,7 @@ class LabTrials:
     ) -> None:
         """`seconds`: the processor time that a trial may take."""
         self._context, self._seconds = context, seconds
-        self._engines = engines or Engines(context.root, context.course.limits.memory)
+        self._engines = engines or Engines(context.root, context.course.limits)
 
     def run(self, trials: Sequence[Trial]) -> TrialOutcome:
         """Run the trials in turn, and end the engines."""

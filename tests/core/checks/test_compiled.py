@@ -81,6 +81,8 @@ PART = "<!-- a part -->\n<mujocoinclude/>\n"
     [
         (PART, GOOD, []),
         ("<?xml version='1.0'?>" + PART, GOOD, []),
+        (100 * "<!-- many -->\n" + PART, GOOD, []),
+        (100 * "<!-- many -->\n" + BOX, GOOD, ["model-error: "]),
         (BOX, CompileResult("", None, facts(includes=("models/part.xml",))), []),
         (BOX, GOOD, ["model-error: "]),
         ("<x/>" + PART, GOOD, ["model-error: "]),

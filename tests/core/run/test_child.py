@@ -85,13 +85,15 @@ def test_half_an_answer_has_the_same_time_limit(tmp_path: Path) -> None:
         assert child.ask(1)["got"] == 1, "another child"
 
 
-def test_it_ends_with_its_parent(tmp_path: Path) -> None:
-    """However the parent ends, the child's input closes."""
+@pytest.mark.parametrize("request_code", ["'wait'", "{'do': 'while True: pass'}"])
+def test_it_ends_with_its_parent(tmp_path: Path, request_code: str) -> None:
+    """However the parent ends, and whatever the child does at that moment."""
     make(tmp_path)
     code = (
         "from coursebuild.core.run.child import JsonChild\n"
         f"one = JsonChild({str(tmp_path / 'worker.py')!r}, 120.0)\n"
         "print(one.ask(1)['pid'], flush=True)\n"
+        f"one.ask({request_code})\n"
         "import signal; signal.pause()\n"
     )
     env = {**os.environ, "TMPDIR": str(tmp_path)}

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
+import os
+import resource
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from coursebuild.core.files.errors import EffectError
+from coursebuild.core.model import Limits
 from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.run import mjcf, mjcf_worker
-from coursebuild.core.run.mjcf import TEXT_PATH, TIMEOUT, compile_all, model_files, readable_error
+from coursebuild.core.run.child import LIMITS
+from coursebuild.core.run.mjcf import TEXT_PATH, compile_all, model_files, readable_error
+from support.growth import processor_time_growth
 from support.model_files import TETRAHEDRON, png
 
 pytestmark = pytest.mark.site
@@ -61,8 +67,8 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def texts(root: Path, xmls: Sequence[str], timeout: float = TIMEOUT) -> tuple[CompileResult, ...]:
-    return compile_all(root, [(TEXT_PATH, xml) for xml in xmls], timeout=timeout)
+def texts(root: Path, xmls: Sequence[str], limits: Limits = LIMITS) -> tuple[CompileResult, ...]:
+    return compile_all(root, [(TEXT_PATH, xml) for xml in xmls], limits=limits)
 
 
 def includes(root: Path, xmls: Sequence[str]) -> list[tuple[str, ...] | None]:
@@ -213,19 +219,74 @@ def test_warnings_do_not_litter_the_course(
     assert capfd.readouterr() == ("", "")
 
 
+ENDLESS = (
+    '<mujoco><worldbody><replicate count="300000000"><geom size="1"/></replicate>'
+    "</worldbody></mujoco>"
+)
+
+
 def test_a_model_without_end_or_of_any_size_is_ended(root: Path) -> None:
-    endless = (
-        '<mujoco><worldbody><replicate count="300000000"><geom size="1"/></replicate>'
-        "</worldbody></mujoco>"
-    )
+    """One model may take half of the time, so that the others of the course are still judged."""
     large = '<mujoco><size memory="90000G"/></mujoco>'
-    for limit in (0.5, 8.0, 120.0):  # slow machines need a longer limit
-        results = texts(root, [endless, large, "<mujoco/>"], timeout=limit)
-        assert results[0].error == f"MuJoCo's compiler took longer than {limit:g} s"
+    for seconds in (1.0, 16.0, 240.0):  # slow machines need a longer limit
+        results = texts(root, [ENDLESS, large, "<mujoco/>"], Limits(models=seconds))
+        assert results[0].error == f"takes more than {seconds / 2:g} s to compile"
         if results[2].error == "":
             break
-    message = "MuJoCo's compiler takes more than 1024 MiB of memory for it"
+    message = "MuJoCo's compiler takes more than 896 MiB of memory for it"
     assert [result.error for result in results[1:]] == [message, ""]
+
+
+def test_models_that_take_all_the_time_of_a_course_leave_none_for_others(root: Path) -> None:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    xmls = [ENDLESS.replace("3", str(i)) for i in range(1, 10)]
+    results = texts(root, [*xmls, "<mujoco/>"], Limits(models=1.0))
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    exhausted = "was not compiled: others took the 1 s that all may take"
+    assert [result.error for result in results[2:]] == 8 * [exhausted]
+    assert all(result.timeout for result in results)
+    assert after.ru_utime - before.ru_utime < 4, "as long as two models, with starting MuJoCo"
+
+
+def test_what_is_no_regular_file_is_not_read(root: Path) -> None:
+    """To open a pipe may take for ever, and so may reading from a device."""
+    os.mkfifo(root / "models/pipe.xml")
+    (root / "models/zero.xml").symlink_to("/dev/zero")
+    mesh = '<mujoco><asset><mesh file="pipe.xml"/></asset></mujoco>'
+    xmls = [INCLUDE.format("pipe"), INCLUDE.format("zero"), mesh, "<mujoco/>"]
+    assert [result.error for result in texts(root, xmls)] == [
+        "'models/pipe.xml' is a device or a pipe",
+        "'models/zero.xml' is a device or a pipe",
+        "'models/pipe.xml' is a device or a pipe",
+        "",
+    ]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<" + "a" * 60_000,
+        "<!--" * 20_000,
+        f"<mesh {'a' * 60_000}>",
+        "<a '\"" * 20_000,
+    ],
+)
+def test_files_are_looked_for_in_time_that_grows_with_the_text(root: Path, text: str) -> None:
+    numbers = itertools.count()  # the same text is not read again
+
+    def look(size: int) -> None:
+        model_files(root, TEXT_PATH, f"{text[: 500 * size]}{next(numbers)}")
+
+    assert processor_time_growth(look, 10) < 30
+
+
+def test_files_that_include_each_other_in_many_ways_are_read_once(root: Path) -> None:
+    """Each includes the next one twice: 2^30 ways."""
+    for i in range(30):
+        file = root / f"models/f{i}.xml"
+        file.write_text("<mujoco>" + 2 * f'<include file="f{i + 1}.xml"/>' + "</mujoco>")
+    files = {f"models/f{i}.xml" for i in range(1, 31)}
+    assert {*model_files(root, "models/f0.xml", (root / "models/f0.xml").read_text())} == files
 
 
 BAD_WORKER = f"""\

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 import warnings
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from coursebuild.features.lab.picture.draw import FreeCamera, Solid, draw
 from coursebuild.features.lab.picture.shapes import Kind, flat_surface, grid_faces, surface
 from coursebuild.features.lab.picture.static import png
+from coursebuild.features.lab.picture.studio import Floor
 from coursebuild.features.lab.picture.textures import TextureMapping, texture_of
 from support.png_files import read_png
 
@@ -125,6 +127,19 @@ def test_many_small_triangles_look_as_few_large_ones() -> None:
     assert np.array_equal(covered(pictures[0]), covered(pictures[1]))
     colours = [p[covered(p)].astype(int) for p in pictures]
     assert np.abs(colours[0] - colours[1]).max() <= 12  # brightness is worked out at corners
+
+
+def test_the_shadows_of_hundreds_of_bodies_take_little_memory() -> None:
+    """A ball has 868 triangles; with all that is known of their corners they took 1 GB."""
+    places = [(x / 8, y / 8, 0.0) for x in range(-10, 10) for y in range(-10, 10)]
+    balls = [replace(solid("sphere", at, (0.05,) * 3), body=True) for at in places]
+    tracemalloc.start()
+    try:
+        draw(balls, FRONT, SIZE, floor=Floor(-0.1, 4.0, (0.0, 0.0, 0.0)))
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 100 << 20
 
 
 @pytest.mark.parametrize("rgba", [RED, (1.0, 0.0, 0.0, 0.5)])

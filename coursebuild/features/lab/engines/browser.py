@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.run.child import MEMORY
+from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.v8 import Heartbeat, Isolate, LimitError, ScriptError, StoppedError
 from coursebuild.features.lab.compile import LabCode
 from coursebuild.features.lab.engines.files import script_path, wasm_path
@@ -30,7 +30,7 @@ _PIECES = Path(__file__).with_name("pieces.js")
 class LabEngine:
     """Runs trials, one after the other; a context manager for use in one thread."""
 
-    def __init__(self, memory: int = MEMORY, patience: float = _PATIENCE) -> None:
+    def __init__(self, memory: int = LIMITS.memory, patience: float = _PATIENCE) -> None:
         """`memory`: MiB of JavaScript objects; WebAssembly's memory comes on top.
 
         `patience`: seconds of processor time that a trial may take without progress.

@@ -9,7 +9,7 @@ import base64
 from pathlib import Path
 from typing import Any
 
-from coursebuild.core.run.child import MEMORY, JsonChild
+from coursebuild.core.run.child import LIMITS, JsonChild
 
 _WORKER = Path(__file__).with_name("native_worker.py")
 
@@ -25,12 +25,19 @@ class NativeEngine(JsonChild):
         root: the course's folder.
         seconds: processor time that one request may take.
         memory: MiB that the child may take.
+        compiling: processor time that a model may take to compile.
     """
 
-    def __init__(self, root: Path, seconds: float = 120.0, memory: int = MEMORY) -> None:
+    def __init__(
+        self,
+        root: Path,
+        seconds: float = 120.0,
+        memory: int = LIMITS.memory,
+        compiling: float = LIMITS.models,
+    ) -> None:
         super().__init__(str(_WORKER), seconds, memory=memory)
         self._root = root.resolve()
-        self._limit = seconds
+        self._compiling = compiling
 
     def save(self, path: str, text: str) -> bytes:
         """Compile a text as if it stood at a path of the course, and return the MJB file.
@@ -42,7 +49,7 @@ class NativeEngine(JsonChild):
             EffectError: MuJoCo cannot be loaded.
         """
         request = {"task": "save", "path": str(self._root / path), "text": text}
-        return base64.b64decode(self._request(request)["mjb"])
+        return base64.b64decode(self._request(request, self._compiling)["mjb"])
 
     def parity(self, mjb: bytes, run: dict[str, Any], horizon: int) -> dict[str, Any]:
         """Repeat a recorded run of the browser's engine; say where and by how much it differs.
@@ -71,8 +78,9 @@ class NativeEngine(JsonChild):
         library = str(Path(__file__).resolve().parents[4])
         return self._request({"task": "script", "library": library, **request})
 
-    def _request(self, request: dict[str, Any]) -> dict[str, Any]:
-        reply: dict[str, Any] | None = self.ask({**request, "limit": self._limit})
+    def _request(self, request: dict[str, Any], seconds: float | None = None) -> dict[str, Any]:
+        limit = self._seconds if seconds is None else min(seconds, self._seconds)
+        reply: dict[str, Any] | None = self.ask({**request, "limit": limit}, limit)
         if reply is None:
             raise NativeError(self.death())
         if reply["error"]:

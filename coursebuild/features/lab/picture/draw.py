@@ -201,7 +201,7 @@ class _Canvas:
             # Only the outside is drawn, as in the live view.
             front = not (solid.open or solid.plane)
             film.add(0, solid.surface, solid.position, solid.rotation, front=front)
-            self._colour(film, 0, solid, None)
+            self._colour(film, np.flatnonzero(film.solid == 0), solid, None)
         foremost = [solid for solid in solids if solid.opaque and solid.front]
         if foremost:
             self._paint_opaque(GBuffer(self.eye), foremost, None, None)
@@ -215,13 +215,17 @@ class _Canvas:
     ) -> None:
         for i, solid in enumerate(solids):
             buffer.add(i, solid.surface, solid.position, solid.rotation, front=False)
+        # To look for each solid in the whole picture would take long with hundreds of them.
+        order = np.argsort(buffer.solid, axis=None, kind="stable")
+        ends = np.searchsorted(buffer.solid.ravel()[order], np.arange(len(solids) + 1))
         for i, solid in enumerate(solids):
-            self._colour(buffer, i, solid, reflection if solid is mirror else None)
+            samples = order[ends[i] : ends[i + 1]]
+            self._colour(buffer, samples, solid, reflection if solid is mirror else None)
 
     def put_behind(self, background: Texture) -> None:
         """Fill what is not covered with the sky."""
         width, height = self.eye.size
-        for y, x in _batches(self.colour[..., 3] < 1):
+        for y, x in _batches(np.flatnonzero(self.colour[..., 3] < 1), width):
             sight = np.column_stack(
                 (x + 0.5 - width / 2, height / 2 - y - 0.5, np.full(len(x), self.eye.focal))
             )
@@ -232,10 +236,16 @@ class _Canvas:
     def _depth(self, solid: Solid) -> float:
         return float(self.eye.axes[2] @ (solid.position - self.eye.position))
 
-    def _colour(self, buffer: GBuffer, i: int, solid: Solid, reflection: _Canvas | None) -> None:
-        """Mix a solid of a buffer into the picture."""
+    def _colour(
+        self,
+        buffer: GBuffer,
+        samples: NDArray[np.int64],
+        solid: Solid,
+        reflection: _Canvas | None,
+    ) -> None:
+        """Mix a solid into the picture at the samples, counted row by row, that show it."""
         alpha = 1.0 if solid.opaque else solid.rgba[3]
-        for y, x in _batches(buffer.solid == i):
+        for y, x in _batches(samples, self.eye.size[0]):
             colour = self._shade(buffer, solid, reflection, (y, x))
             opaque_colour = np.column_stack((np.clip(colour, 0.0, 1.0), np.ones(len(y))))
             self.colour[y, x] = alpha * opaque_colour + (1 - alpha) * self.colour[y, x]
@@ -272,9 +282,7 @@ def _lengths(vectors: Array) -> Array:
     return np.asarray(np.linalg.norm(vectors, axis=1).clip(1e-12)[:, None])
 
 
-def _batches(mask: NDArray[np.bool_]) -> Iterator[Samples]:
-    """Yield the samples of a mask, not too many at once."""
-    rows, columns = np.nonzero(mask)
-    for start in range(0, len(rows), _AT_ONCE):
-        part = slice(start, start + _AT_ONCE)
-        yield rows[part], columns[part]
+def _batches(samples: NDArray[np.int64], width: int) -> Iterator[Samples]:
+    """Yield samples, counted row by row, not too many at once."""
+    for start in range(0, len(samples), _AT_ONCE):
+        yield np.divmod(samples[start : start + _AT_ONCE], width)

@@ -1,11 +1,13 @@
 """Rasterizes triangles: finds the nearest surface at each sample, and its attributes there.
 
-Entry point: `GBuffer(eye).add(index, surface, position, rotation)`.
+Entry points: `GBuffer(eye).add(index, surface, position, rotation)`; `nearest_depth`, without
+attributes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TypeAlias
 
 import numpy as np
 from msgspec import Struct
@@ -17,6 +19,8 @@ _FAR_AWAY = 1e12
 """m; vertices beyond, or not finite, are not drawn: a diverged simulation throws things out."""
 _AT_ONCE = 1 << 18
 """Samples that are processed together, unless a single triangle has more."""
+_FACES_AT_ONCE = 1 << 16
+"""Triangles that are processed together: hundreds of bodies have a million, of 264 bytes each."""
 POSITION, NORMAL, UV, _ATTRIBUTES = slice(0, 3), slice(3, 6), slice(6, 8), 8
 """Columns of the attributes of a surface at a sample, in the solid's own frame."""
 
@@ -58,13 +62,7 @@ class GBuffer:
         uv = np.zeros((len(in_view), 2)) if surface.uv is None else surface.uv
         # One row for each vertex: its place in the camera's frame, and its attributes.
         vertices = np.column_stack((in_view, surface.vertices, surface.normals, uv))
-        is_finite = np.all(np.abs(np.nan_to_num(vertices, nan=np.inf)) < _FAR_AWAY, axis=1)
-        triangles = vertices[surface.faces[np.all(is_finite[surface.faces], axis=1)]]
-        if front:
-            a, b, c = triangles[..., :3].transpose(1, 0, 2)
-            volume = np.einsum("ij,ij->i", a, np.cross(b, c))
-            triangles = triangles[volume * np.linalg.det(eye.axes) < 0]
-        for part, shares, x, y in self._fragments(self._clip(triangles)):
+        for part, shares, x, y in _fragments(eye, vertices, surface.faces, front=front):
             # What is linear on the surface is linear in 1/z on the screen.
             weights = shares / part[..., 2]
             depth = 1.0 / weights.sum(axis=1)
@@ -84,56 +82,82 @@ class GBuffer:
             self.solid[at] = index
             self.attributes[at] = attributes[order]
 
-    def _clip(self, triangles: Array) -> Array:
-        """Cut triangles (n, 3, columns) at the near plane, and return the parts beyond it."""
-        hidden_corners = (triangles[..., 2] <= self.eye.near).sum(axis=1)
-        parts = [triangles[hidden_corners == 0]]
-        for triangle in triangles[(hidden_corners > 0) & (hidden_corners < 3)]:
-            polygon = []
-            for first, second in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
-                a, b = first[2] - self.eye.near, second[2] - self.eye.near
-                if a > 0:
-                    polygon.append(first)
-                if (a > 0) != (b > 0):
-                    polygon.append(first + (second - first) * (a / (a - b)))
-            parts += [
-                np.array([[polygon[0], polygon[k], polygon[k + 1]]])
-                for k in range(1, len(polygon) - 1)
-            ]
-        return np.concatenate(parts)
 
-    def _fragments(
-        self, triangles: Array
-    ) -> Iterator[tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]]:
-        """Yield the samples that triangles cover.
+def nearest_depth(eye: Eye, vertices: Array, faces: NDArray[np.int64]) -> Array:
+    """Return the depth of the nearest triangle at each sample; infinite where there is none."""
+    width, height = eye.size
+    nearest = np.full((height, width), np.inf)
+    with np.errstate(over="ignore", invalid="ignore"):
+        in_view = rotate(vertices - eye.position, eye.axes)
+    for part, shares, x, y in _fragments(eye, in_view, faces, front=False):
+        depth = 1.0 / (shares / part[..., 2]).sum(axis=1)
+        np.minimum.at(nearest, (y, x), depth)
+    return nearest
 
-        Each has its triangle, the shares of the triangle's corners in it, its column and its row.
-        """
-        width, height = self.eye.size
-        scale = self.eye.focal / triangles[..., 2]
-        px = width / 2 + scale * triangles[..., 0]
-        py = height / 2 - scale * triangles[..., 1]
-        left, right = _span(px, width)
-        top, bottom = _span(py, height)
-        columns = right - left
-        counts = np.maximum(columns, 0) * np.maximum(bottom - top, 0)
-        ends = np.cumsum(counts)
-        start = 0
-        while start < len(counts):
-            offset = ends[start - 1] if start else 0
-            end = max(int(np.searchsorted(ends, offset + _AT_ONCE, side="right")), start + 1)
-            index = np.repeat(np.arange(start, end), counts[start:end])
-            place = np.arange(len(index)) - (ends - counts - offset)[index]
-            x, y = left[index] + place % columns[index], top[index] + place // columns[index]
-            shares, inside = _cover(px[index].T, py[index].T, x + 0.5, y + 0.5)
-            yield triangles[index[inside]], shares.T[inside], x[inside], y[inside]
-            start = end
+
+Fragments: TypeAlias = Iterator[tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]]
+"""Samples that triangles cover, each with its triangle, the shares of the triangle's corners in it,
+its column and its row."""
+
+
+def _fragments(eye: Eye, vertices: Array, faces: NDArray[np.int64], *, front: bool) -> Fragments:
+    """Yield the samples that faces cover; the first columns of `vertices` are places in view."""
+    is_finite = np.all(np.abs(np.nan_to_num(vertices, nan=np.inf)) < _FAR_AWAY, axis=1)
+    faces = faces[np.all(is_finite[faces], axis=1)]
+    for start in range(0, len(faces), _FACES_AT_ONCE):
+        triangles = vertices[faces[start : start + _FACES_AT_ONCE]]
+        if front:
+            a, b, c = triangles[..., :3].transpose(1, 0, 2)
+            volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+            triangles = triangles[volume * np.linalg.det(eye.axes) < 0]
+        yield from _project(eye, _clip(triangles, eye.near))
+
+
+def _clip(triangles: Array, near: float) -> Array:
+    """Cut triangles (n, 3, columns) at the near plane, and return the parts beyond it."""
+    hidden_corners = (triangles[..., 2] <= near).sum(axis=1)
+    parts = [triangles[hidden_corners == 0]]
+    for triangle in triangles[(hidden_corners > 0) & (hidden_corners < 3)]:
+        polygon = []
+        for first, second in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+            a, b = first[2] - near, second[2] - near
+            if a > 0:
+                polygon.append(first)
+            if (a > 0) != (b > 0):
+                polygon.append(first + (second - first) * (a / (a - b)))
+        parts += [
+            np.array([[polygon[0], polygon[k], polygon[k + 1]]]) for k in range(1, len(polygon) - 1)
+        ]
+    return np.concatenate(parts)
+
+
+def _project(eye: Eye, triangles: Array) -> Fragments:
+    """Yield the samples that triangles beyond the near plane cover."""
+    width, height = eye.size
+    scale = eye.focal / triangles[..., 2]
+    px = width / 2 + scale * triangles[..., 0]
+    py = height / 2 - scale * triangles[..., 1]
+    left, right = _span(px, width)
+    top, bottom = _span(py, height)
+    columns = right - left
+    counts = np.maximum(columns, 0) * np.maximum(bottom - top, 0)
+    ends = np.cumsum(counts)
+    start = 0
+    while start < len(counts):
+        offset = ends[start - 1] if start else 0
+        end = max(int(np.searchsorted(ends, offset + _AT_ONCE, side="right")), start + 1)
+        index = np.repeat(np.arange(start, end), counts[start:end])
+        place = np.arange(len(index)) - (ends - counts - offset)[index]
+        x, y = left[index] + place % columns[index], top[index] + place // columns[index]
+        shares, inside = _cover(px[index].T, py[index].T, x + 0.5, y + 0.5)
+        yield triangles[index[inside]], shares.T[inside], x[inside], y[inside]
+        start = end
 
 
 def _span(places: Array, size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the range of samples of a row or column that triangles reach."""
-    low = np.clip(np.floor(places.min(axis=1)), 0, size)
-    high = np.clip(np.floor(places.max(axis=1)) + 1, 0, size)
+    """Return the range of samples of a row or column whose middle triangles reach."""
+    low = np.clip(np.ceil(places.min(axis=1) - 0.5), 0, size)
+    high = np.clip(np.floor(places.max(axis=1) - 0.5) + 1, 0, size)
     return low.astype(np.int64), high.astype(np.int64)
 
 

@@ -12,7 +12,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from coursebuild.features.lab.picture.light import LAMP
-from coursebuild.features.lab.picture.raster import Eye, GBuffer, rotate
+from coursebuild.features.lab.picture.raster import Eye, GBuffer, nearest_depth, rotate
 from coursebuild.features.lab.picture.shapes import Array, Surface, join_surfaces
 
 _CELLS, _REACH, _LIFT = 10, 2.2, 0.0005
@@ -66,17 +66,15 @@ class Floor(Struct, frozen=True):
         """Return the part of the light that does not reach each sample."""
         joined_surface = join_surfaces(bodies)
         height = self.height + self._lift
+        elevation = joined_surface.vertices[:, 2:] - height
         shade = np.zeros_like(depth)
         for i in range(_POINTS):
             angle, radius = _GOLDEN * i, _WIDTH * np.sqrt((i + 0.5) / _POINTS)
             slope = radius * np.array((np.cos(angle), np.sin(angle))) + LAMP[:2]
-            elevation = joined_surface.vertices[:, 2:] - height
             flat = joined_surface.vertices[:, :2] - elevation * slope / LAMP[2]
             vertices = np.column_stack((flat, np.full(len(flat), height)))
-            film = GBuffer(eye)
-            shadow = Surface(vertices, joined_surface.normals, joined_surface.faces)
-            film.add(0, shadow, np.zeros(3), np.eye(3), front=False)
-            shade += (film.solid >= 0) & (film.depth < depth * (1 + _DEPTH_TOLERANCE))
+            shadow = nearest_depth(eye, vertices, joined_surface.faces)
+            shade += shadow < depth * (1 + _DEPTH_TOLERANCE)
         return shade / _POINTS
 
 
