@@ -250,8 +250,8 @@ def test_only_main_is_published_and_a_pull_request_gets_a_report(
     assert [*runner.caches] == caches
     assert ">12</" not in page.read_text()
     installed = installations(".github")
-    checked = [*installations(str(runner.folder / "tmp")), *SUDO]
-    assert runner.notes == [*installed, *checked, *checked]
+    check = [*installations(str(runner.folder / "tmp")), *SUDO]
+    assert runner.notes == [*installed, *check, *check]
 
 
 @pytest.mark.site
