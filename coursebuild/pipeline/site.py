@@ -216,8 +216,8 @@ def _find_in_texts(course: Course, page: str, url: str) -> Span | None:
         for node in (*document_blocks(document), *document_inlines(document)):
             if isinstance(node, HtmlBlock | RawInline) and (at := find_address(node.html, url)):
                 # In a quiz it is a part of JSON, in a quote of lines with marks.
-                written = node.html[slice(*at)]
-                start = at[0] if node.html == node.span.text else node.span.text.find(written)
+                value = node.html[slice(*at)]
+                start = at[0] if node.html == node.span.text else node.span.text.find(value)
                 source, first = node.span.source, node.span.start + start
-                return source.span(first, first + len(written)) if start >= 0 else node.span
+                return source.span(first, first + len(value)) if start >= 0 else node.span
     return None

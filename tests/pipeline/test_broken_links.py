@@ -33,10 +33,10 @@ def test_broken_link_in_raw_html_is_reported_at_its_place(make: Make) -> None:
     folder = make("Text\n")
     title = "title = '<a href=\"gone.html\">'"
     folder.replace("content/course.toml", 'title = "Lesson one"', title)
-    found = {}
+    places = {}
     for text in LINKS:
         folder.write(folder.lesson(), f"{text}\n")
         result = folder.main("build")
         assert result.status == 1, text
-        found[text] = re.findall(r"(?:error|warning)\[.*\n *--> (.*)", result.out)
-    assert found == {text: [f"{folder.lesson()}:{place}"] for text, place in LINKS.items()}
+        places[text] = re.findall(r"(?:error|warning)\[.*\n *--> (.*)", result.out)
+    assert places == {text: [f"{folder.lesson()}:{place}"] for text, place in LINKS.items()}

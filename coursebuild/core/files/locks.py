@@ -57,19 +57,19 @@ def project_lock(
         name: the name of the lock's file.
     """
     folder = find_store(str(root.resolve()))[0]
-    with _held(_file_lock(root.resolve(), Path(folder, name), on_wait)):
+    with _hold_if_possible(_file_lock(root.resolve(), Path(folder, name), on_wait)):
         yield
 
 
 @contextlib.contextmanager
 def folder_lock(folder: Path) -> Iterator[None]:
     """Hold a folder locked while something in it is replaced, without leaving a file there."""
-    with _held(_folder_lock(folder)):
+    with _hold_if_possible(_folder_lock(folder)):
         yield
 
 
 @contextlib.contextmanager
-def _held(lock: AbstractContextManager[None]) -> Iterator[None]:
+def _hold_if_possible(lock: AbstractContextManager[None]) -> Iterator[None]:
     """Hold a lock if it can be had; if the file system refuses, go on without."""
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError):

@@ -23,15 +23,15 @@ def block_quote(text: str) -> str:
     return "\n".join(f"> {line}" if line.strip() else ">" for line in text.split("\n"))
 
 
-def fence(language: str, text: str) -> str:
-    """Code between fences longer than any in it."""
-    runs = _FENCES.findall(text)
+def fence(language: str, text: str, *, wary: bool = False) -> str:
+    """Code between fences longer than any in it; `wary`: than any backticks in it."""
+    runs = (_TICKS if wary else _FENCES).findall(text)
     ticks = "`" * max([3, *(len(run) + 1 for run in runs)])
     body = text if text.endswith("\n") or not text else f"{text}\n"
     return f"{ticks}{language}\n{body}{ticks}"
 
 
-_FENCES = re.compile("`{3,}")
+_FENCES = re.compile(r"(?:^|\r)[ ]*(`{3,})", re.MULTILINE)
 
 
 def code_span(text: str, ticks: str = "") -> str:

@@ -84,9 +84,9 @@ def test_second_run_says_so_and_waits_without_locks(tmp_path: Path, error: str) 
     with holder(tmp_path, before) as first:
         assert line(first) == "held"
         with holder(tmp_path, before) as second:
-            said, _, cure = line(second).partition(" (if there is none, ")
+            message, _, cure = line(second).partition(" (if there is none, ")
             holder_name = f"another coursebuild (process {first.pid})"
-            assert said == f"{holder_name} is at work on this course; waiting for it"
+            assert message == f"{holder_name} is at work on this course; waiting for it"
             assert cure == f"remove {tmp_path / '.coursebuild/lock-held'})"
             first.send_signal(signal.SIGKILL)
             first.wait()
@@ -98,6 +98,7 @@ def test_second_run_says_so_and_waits_without_locks(tmp_path: Path, error: str) 
     assert sorted(path.name for path in (tmp_path / ".coursebuild").iterdir()) == [
         ".gitignore",
         "lock",
+        "owner",
     ]
 
 

@@ -72,7 +72,9 @@ def test_escaped_texts_are_text(text: str) -> None:
 
 @given(TEXTS)
 def test_quoted_code_stays_in_its_marks(text: str) -> None:
-    assert visible_text(f"{fence('text', text)}\n\nafter") == unread(f"{text} after")
+    for wary in (False, True):
+        block = fence("text", text, wary=wary)
+        assert visible_text(f"{block}\n\nafter") == unread(f"{text} after")
     if text.strip():
         assert visible_text(f"- {code_span(text)} after") == unread(f"{text} after")
 

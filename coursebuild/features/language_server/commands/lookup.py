@@ -192,7 +192,7 @@ class _Lookup:
         if place is None:
             return None
         line = escape_text(place.first_line().text.lstrip("# "))
-        return line if tex is None else fence("tex", tex.strip()), place
+        return line if tex is None else fence("tex", tex.strip(), wary=True), place
 
     def describe_model(self, name: str) -> tuple[str, Span] | None:
         """Return a description of a model with its sizes, and its place."""
@@ -263,7 +263,7 @@ class _Lookup:
             for window in number.windows(printed.lines(verdict)):
                 if number.shows(window) and window.line.locate is not None:
                     place = window.line.locate(window.numbers[0].start, window.numbers[-1].end)
-                    printed_line = fence("text", window.line.text)
+                    printed_line = fence("text", window.line.text, wary=True)
                     text = f"{code_span(verdict.recording.script or '')} printed\n{printed_line}"
                     return Referent(binding.span, text, place)
         return None
