@@ -1,7 +1,7 @@
 """Merge conflicts that git left in a file.
 
 Entry point: `find_conflict`. Git writes its marks at the start of a line, so a conflict can be
-shown on purpose: in a block of kind `diff` or `markdown`, or indented in a list item or a quotation.
+shown on purpose: in a block of kind `diff` or `markdown`, or indented in a list or a quotation.
 """
 
 from __future__ import annotations

@@ -46,9 +46,9 @@ def test_every_mistake_is_reported() -> None:
 def test_ordinary_prose_and_escaped_markup_are_no_mistakes() -> None:
     cases = read_cases(FOLDER / "innocent.md")
     failures = {
-        f"{case.line}: {case.title}": found
+        f"{case.line}: {case.title}": rules
         for case in cases
-        if (found := mistakes("content/lessons/1.1-x.md", case.input))
+        if (rules := mistakes("content/lessons/1.1-x.md", case.input))
     }
     assert len(cases) >= 90
     assert failures == {}
@@ -59,7 +59,7 @@ def test_what_this_repository_publishes_has_no_unread_markup(folder: str) -> Non
     failures = {}
     for path in sorted((ROOT / folder).rglob("*.md")):
         name = path.relative_to(ROOT).as_posix()
-        found = [m for m in mistakes(name, path.read_text("utf-8")) if m.split()[0] in MARKUP]
-        if found:
-            failures[name] = found
+        rules = [m for m in mistakes(name, path.read_text("utf-8")) if m.split()[0] in MARKUP]
+        if rules:
+            failures[name] = rules
     assert failures == {}
