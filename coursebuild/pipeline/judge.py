@@ -6,7 +6,7 @@ Entry points: `judge`; `depends_on`, the files that a report depends on.
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from fnmatch import fnmatchcase
 
 from coursebuild.core.model import Course, Silence
@@ -54,7 +54,7 @@ def judge(
         lesson_count = len(course.written_lessons)
     else:
         lesson_count = sum(lesson.path in documents for lesson in course.lessons)
-    relevant = sort_diagnostics(diagnostics)
+    relevant = sort_diagnostics(_without_consequences([*diagnostics]))
     if documents is not None and course is not None:
         paths = {*documents, course.map.path}
         relevant = tuple(d for d in relevant if d.span.path in paths or d.rule in _RULES_OF_RUNS)
@@ -73,6 +73,18 @@ def judge(
         cached=sum(line.cached for line in scripts),
     )
     return Report(reported, tuple(scripts), summary, remarks, labs)
+
+
+def _without_consequences(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
+    """The diagnostics without what only follows from a merge conflict or a wrong encoding."""
+    broken = {d.span.path for d in diagnostics if d.rule == "merge-conflict"}
+    misread = {d.span.path for d in diagnostics if d.rule == "file-encoding"}
+    for diagnostic in diagnostics:
+        rule, path = diagnostic.rule, diagnostic.span.path
+        if rule == "merge-conflict" or (
+            path not in broken and not (rule == "control-character" and path in misread)
+        ):
+            yield diagnostic
 
 
 def _is_silenced(diagnostic: Diagnostic, silences: Sequence[Silence]) -> bool:

@@ -40,6 +40,7 @@ from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.scripts.source_parts import check_source_parts, shown_files
+from coursebuild.core.text.conflicts import find_conflict
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source, Span
 
@@ -52,6 +53,11 @@ _CODE = "code"
 """The kind of entries that name features which have run."""
 MAP_TEXT = 1_000_000
 """Characters that the course map may have; the map itself says how long other texts may be."""
+
+_TEXTS = tuple(
+    ".css .csv .html .js .json .md .mjs .py .svg .toml .tsv .txt .vtt .xml .yaml .yml".split()
+)
+"""The ends of names of files in which a merge conflict is looked for."""
 
 
 class Parser:
@@ -103,6 +109,7 @@ def load(
     """
     loader = _Loader(root, Parser() if parser is None else parser, open_texts, code)
     course = loader.load()
+    loader.find_conflicts(course)
     return Parsed(course, tuple(loader.diagnostics))
 
 
@@ -203,6 +210,27 @@ class _Loader:
             )
             self.unreadable.append(source.path)
         return tuple(short)
+
+    def find_conflicts(self, course: Course | None) -> None:
+        """Report merge conflicts in all texts but lessons and pages, which their parser reports."""
+        sources = [*self.files.declarations, *(model.source for model in self.files.models)]
+        sources += [] if self.files.map is None else [self.files.map]
+        paths = {*self.files.files}
+        if course is not None:
+            paths |= {*shown_files(course), *(feature.path for feature in course.features)}
+            paths |= {file.path for file in course.theme.css}
+            sources += course.theme.templates
+            for package in course.packages:
+                folder = self.root / package.path
+                files = folder.glob("*.py" if package.path == "." else "**/*.py")
+                paths |= {file.relative_to(self.root).as_posix() for file in files}
+        paths -= {source.path for source in (*sources, *self.files.lessons, *self.files.pages)}
+        paths -= {document.source.path for document in ([] if course is None else course.documents)}
+        for path in sorted(path for path in paths if path.endswith(_TEXTS)):
+            text = self._read_text(path)
+            sources += [] if text is None else [Source(path, text)]
+        conflicts = (find_conflict(source) for source in sources)
+        self.diagnostics += (conflict for conflict in conflicts if conflict is not None)
 
     def _load_theme(self, theme: Theme) -> Theme:
         """Return the theme with its files."""

@@ -181,13 +181,14 @@ class _Updater:
         )
 
     def _add_source_parts(self, edits: dict[Source, list[Edit]]) -> None:
-        """Add the edits of parts of files; leave out lessons that are not UTF-8."""
+        """Add the edits of parts of files; leave out lessons that are not to be written over."""
         for diagnostic in self.diagnostics:
             path = diagnostic.span.path
             if diagnostic.rule == "source-part" and path in (self.documents or [path]):
                 edits.setdefault(diagnostic.span.source, []).extend(diagnostic.edits)
-        misread_paths = {d.span.path for d in self.diagnostics if d.rule == "file-encoding"}
-        for source in [source for source in edits if source.path in misread_paths]:
+        doubtful = ("file-encoding", "merge-conflict")
+        doubtful_paths = {d.span.path for d in self.diagnostics if d.rule in doubtful}
+        for source in [source for source in edits if source.path in doubtful_paths]:
             del edits[source]
 
     def _write(self, edits: Mapping[Source, list[Edit]]) -> tuple[list[str], list[Diagnostic]]:

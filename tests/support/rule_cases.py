@@ -64,7 +64,7 @@ slug = "second"
 title = "The second lesson"
 status = "complete"
 """,
-    FIRST: "## The first lesson\n",
+    FIRST: "## The first lesson\n\nIt begins.\n",
     SECOND: """\
 ## The second lesson
 

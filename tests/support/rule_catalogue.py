@@ -16,7 +16,13 @@ from coursebuild.core.text.rules import RULES, Rule
 
 _LINES = 16
 """How much of a file an example shows."""
-_LANGUAGES = {"md": "markdown", "toml": "toml", "py": "python fragment", "xml": "xml"}
+_LANGUAGES = {
+    "json": "json",
+    "md": "markdown",
+    "py": "python fragment",
+    "toml": "toml",
+    "xml": "xml",
+}
 
 
 class ExampleFile(Struct, frozen=True):

@@ -58,18 +58,19 @@ def _check_features(course: Course, documents: Collection[Document]) -> Iterator
 
 
 def _check_empty_lesson(course: Course, document: Document) -> Iterator[Diagnostic]:
-    """Report a complete lesson that shows nothing; a draft may be empty."""
+    """Report a lesson without anything to read; a draft may have headings at least."""
     source = document.source
     for lesson in course.lessons:
-        is_complete = lesson.document is document and lesson.status == "complete"
-        if is_complete and is_blank(document_blocks(document)):
-            yield diagnose(
-                "lesson-empty",
-                source.span(0, 0),
-                f"lesson {lesson.id} is complete, and there is nothing to read in {source.path}",
-                help='write it, say `status = "draft"` in the map, '
-                'or say `status = "planned"` and remove the file',
-            )
+        if lesson.document is not document or not is_blank(document_blocks(document)):
+            continue
+        help = 'say `status = "planned"` in the map and remove the file'
+        if lesson.status == "complete":
+            message = f"lesson {lesson.id} is complete, and there is nothing to read in it"
+            help = f'write it, say `status = "draft"` in the map, or {help}'
+            yield diagnose("lesson-empty", source.span(0, 0), message, help=help)
+        elif not document.blocks:
+            message = f"lesson {lesson.id} is a draft, and its file is empty"
+            yield diagnose("draft-empty", source.span(0, 0), message, help=f"begin it, or {help}")
 
 
 def _check_title(course: Course, document: Document) -> Iterator[Diagnostic]:

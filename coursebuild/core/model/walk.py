@@ -158,9 +158,10 @@ def sibling_groups(document: Document) -> Iterator[tuple[Block, ...]]:
 
 
 def is_blank(blocks: Iterable[Block]) -> bool:
-    """Whether no block shows anything: only comments, and paragraphs of odd blanks."""
+    """Whether there is nothing to read: only headings, comments, and paragraphs of odd blanks."""
     return all(
-        (isinstance(block, Paragraph) and not block.children)
+        isinstance(block, Heading)
+        or (isinstance(block, Paragraph) and not block.children)
         or (isinstance(block, HtmlBlock) and is_comment(block))
         for block in blocks
     )

@@ -17,6 +17,10 @@ from coursebuild.core.text.diagnostics import Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt, Span
 
 _HEAD = re.compile(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
+_BROKEN_HEAD = re.compile(
+    r"(?=[^\w\n\\]{0,3}!|\[[\w-]+!)[^\w\n\\]{1,3}([A-Za-z][\w-]*)[^\w\s(]{0,2}+(?!\()([^\n]*)(?:\n|$)"
+)
+"""A line that was surely meant to be the first of a callout if the word is a kind."""
 FALLBACK = "note"
 """The kind that a callout of an unknown kind gets, so that its content is still checked."""
 
@@ -38,7 +42,7 @@ def read_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None
     """
     match = _HEAD.match(paragraph.text)
     if match is None:
-        return None
+        return _read_broken_head(paragraph, kinds)
     name, kind, diagnostic = trim(paragraph.slice(*match.span(1))), FALLBACK, None
     if match[3][:1].strip():
         start = match.start(3)
@@ -57,3 +61,15 @@ def read_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None
     title, rest = trim(paragraph.slice(*match.span(3))), trim(paragraph.slice(match.end()))
     head = Head(kind, name.span(), title, bool(match[2]), rest)
     return Parsed(head, () if diagnostic is None else (diagnostic,))
+
+
+def _read_broken_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None:
+    match = _BROKEN_HEAD.match(paragraph.text)
+    if match is None or match[1].lower() not in kinds:
+        return None
+    kind, title = match[1].lower(), trim(paragraph.slice(*match.span(2)))
+    place = paragraph.span(0, match.start(2)) if title.text else paragraph.span(0, match.end())
+    head = Head(kind, place, title, False, trim(paragraph.slice(match.end())))
+    message = f"`{trim(paragraph.slice(0, match.start(2))).text}` does not begin a callout"
+    help = f"write `> [!{kind}] Title`"
+    return Parsed(head, (diagnose("callout-unknown", place.first_line(), message, help=help),))

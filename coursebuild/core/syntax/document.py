@@ -5,7 +5,8 @@ Entry point: `parse_document`. It never raises, whatever the text:
 1. Line ends, NUL and a byte order mark are normalized; front matter is reported and left out.
 2. `tree` reads the blocks and, with `inlines`, their content; other modules read our fences.
 3. Footnotes are read last, in the order of their numbers.
-4. Terms and labels in wrong places are found in the whole document (`_check_placement`).
+4. Terms and labels in wrong places are found in the whole document (`_check_placement`). Where a
+   merge conflict was left, that is all there is to say.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from coursebuild.core.syntax.headings import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import read_markdown
 from coursebuild.core.syntax.tree import TextReader
+from coursebuild.core.text.conflicts import find_conflict
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Source
 
@@ -59,7 +61,13 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     anchor = "" if title is None else slug(title.text)
     is_free = not state.anchors.has(anchor)
     document = Document(source, blocks, state.notes.finish(), anchor if is_free else "")
+    conflict = find_conflict(source)
+    if conflict is not None:  # the rest follows from it
+        return Parsed(document, (conflict,))
     state.diagnostics += _check_placement(document)
+    if (at := source.text.find("\0")) >= 0:
+        message, help = "a NUL character stands here", "delete it; readers would see `\ufffd`"
+        state.report(diagnose("control-character", source.span(at, at + 1), message, help=help))
     return Parsed(document, sort_diagnostics(state.diagnostics))
 
 

@@ -6,7 +6,6 @@ look misspelt or need a feature that is not installed.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator, Sequence
 
@@ -15,17 +14,25 @@ from msgspec import Struct
 
 from coursebuild.core.model import CodeBlock
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
-from coursebuild.core.syntax.info import FenceKeys, kind_of, read_keys, split_words
+from coursebuild.core.syntax.info import (
+    FenceKeys,
+    check_foreign_key,
+    kind_of,
+    read_keys,
+    split_words,
+)
 from coursebuild.core.syntax.spans import NO_TEXT, PositionedToken, trim
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, misspelt
 from coursebuild.core.text.source import Excerpt, Span
 
-_LANGUAGES = frozenset({"cython", "ino", "jython", "mcf", "python2", "python3", "tex", "txt"})
-"""Names of languages and file types that look like misspelt kinds of ours."""
+_TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
+"""Names of ordinary code and text that no highlighter knows."""
 
 _FOREIGN = {"math": "a formula on a line of its own stands between two `$$`"}
 """Kinds of blocks that other tools read, with what to write here."""
 
+_OBJECT = re.compile(r'\s*\{\s*"[^"\n]*"\s*:[\s\S]*\}\s*\Z')
+"""A JSON object, perhaps with mistakes."""
 INDENTED_FENCE = re.compile(r"\s*(`{3,}|~{3,})[ \t]*([\w+-]*)[^`\n]*")
 """The first line of an indented block that was surely meant to be a fence."""
 
@@ -114,57 +121,75 @@ def line_prefix(place: Span) -> str:
 
 
 def check_kind(fence: Fence) -> Iterator[Diagnostic]:
-    """Report what looks wrong with the kind of a code block that is none of ours."""
+    """Report what looks wrong with the kind of a block that is shown as code."""
     package = missing_package(fence.kind)
     if package:
         message = f"nothing that is installed reads a block of kind `{fence.kind}`"
         yield diagnose("feature-missing", fence.head, message, help=f"install {package}")
     kind = kind_of(fence.info)
     name, kinds = kind.text.lower(), (*CORE_FENCES, *fence_names())
-    likely = "lab simlab" if name == "simlab" else nearest(name, kinds, cutoff=0.75)
-    if not name:
-        return
     words = split_words(fence.info).value
+    yield from (diagnostic for word in words if (diagnostic := check_foreign_key(kind.text, word)))
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown and never run, and this one has a `file`"
         help = "a script is a block of kind `python`"
         yield diagnose("script-kind", kind.span(), message, help=help)
-    elif name in _FOREIGN or (name.startswith("{") and likely is None):
+    elif name in _FOREIGN or name.startswith("{"):
         message = f"a block of kind `{kind.text}` is shown as code here"
-        help = _FOREIGN.get(
-            name, "a callout is a quotation: `> [!note]`, and `> ` before each line"
-        )
-        yield diagnose("markup-foreign", kind.span(), message, help=help)
-    elif likely is not None and name not in _LANGUAGES:
-        message = f"`{kind.text}` is no kind of ours, so this is an ordinary code block"
-        yield diagnose("fence-kind-near", kind.span(), message, help=f"did you mean `{likely}`?")
+        yield diagnose("markup-foreign", kind.span(), message, help=_help_with_foreign(name))
+    elif "=" in name:
+        message = f"the kind of this block is missing before `{kind.text}`"
+        help = "the first word says what a block is, as in ```` ```python file=examples/a.py ````"
+        yield diagnose("fence-info", kind.span(), message, help=help)
+    elif (likely := _find_misspelt(name, kinds)) is not None:
+        message = f"`{kind.text}` is not a known kind of block"
+        help = f"did you mean `{likely}`?"
+        yield diagnose("fence-kind-near", kind.span(), message, help=help)
     elif not package and (diagnostic := _check_unread_json(fence)) is not None:
         yield diagnostic
 
 
+def _help_with_foreign(name: str) -> str:
+    """What to write in place of a kind that other tools read."""
+    language = name.strip("{}=. ")
+    if name in _FOREIGN:
+        return _FOREIGN[name]
+    if is_known_kind(language):
+        example = " file=examples/….py" if language == "python" else ""
+        return f"write ```` ```{language}{example} ````"
+    if language and _is_language(language):
+        return f"code to be shown is of kind `{language}`; scripts are in Python"
+    return "a callout is a quotation: `> [!note]`, and `> ` before each line"
+
+
+def _find_misspelt(name: str, kinds: Sequence[str]) -> str | None:
+    """The kind for which a name was surely meant; no name of a language is taken for another."""
+    if name == "simlab":
+        return "lab simlab"
+    if name in kinds:
+        return name
+    likely = misspelt(name, kinds)
+    return None if likely is None or _is_language(name) else likely
+
+
 def _check_unread_json(fence: Fence) -> Diagnostic | None:
-    """Report a JSON object in a block of a kind that neither we nor a highlighter know."""
-    body = fence.body.text.strip()
-    if not fence.kind or not body.startswith("{") or not body.endswith("}"):
+    """Report a JSON object in a block without a kind, or of one that no highlighter knows."""
+    if not _OBJECT.match(fence.body.text) or (fence.kind and _is_language(fence.kind)):
         return None
-    try:
-        if not isinstance(json.loads(body), dict):
-            return None
-    except (ValueError, RecursionError):
-        return None
-    if _is_language(fence.kind):
-        return None
-    message = f"nothing reads a block of kind `{fence.kind}`: its JSON is shown as code"
     help = "a lab is of kind `lab`, a quiz of kind `quiz`; JSON to be shown is of kind `json`"
+    if not fence.kind:
+        message = "nothing reads a block without a kind, and this one holds JSON"
+        return diagnose("fence-unread", fence.head, message, help=help)
+    message = f"nothing reads a block of kind `{fence.kind}`: its JSON is shown as code"
     return diagnose("fence-unread", kind_of(fence.info).span(), message, help=help)
 
 
 def _is_language(name: str) -> bool:
-    """Whether code of a kind is highlighted."""
+    """Whether a kind is a language that is highlighted, or plain text."""
     from pygments.lexers import find_lexer_class_by_name  # slow to import, and rarely needed
     from pygments.util import ClassNotFound
 
     try:
         return find_lexer_class_by_name(name) is not None
     except ClassNotFound:
-        return name.lower() in ("json5", "jsonc", "hjson")
+        return name.lower() in _TEXTS

@@ -132,6 +132,8 @@ def check_heading(
         diagnostics.append(diagnose("heading-empty", span, "the heading has no text"))
     if lesson and level == 1:
         help = "the title comes from the course map; begin with `## `"
+        if span.text.rstrip().endswith("\n======="):
+            help = "a merge conflict may have left the line of `=` behind: delete it"
         message = "a lesson has no heading of level 1"
         diagnostics.append(diagnose("heading-top", span, message, help=help))
     if previous is not None and level > previous + 1:

@@ -29,6 +29,17 @@ _PART = re.compile(r"(?:^|(?<=,))[^,]*")
 _ESCAPE = re.compile(r"""\\(["\\])""")
 
 
+_NO_TITLE = "a block has no title: write it into the text above"
+_NO_NUMBERS = "the lines of a block are not numbered: leave it out"
+_NO_MARKS = "lines are not highlighted: leave it out, and say in the text which ones matter"
+_FOREIGN_KEYS = {
+    **dict.fromkeys(("caption", "filename", "title"), _NO_TITLE),
+    **dict.fromkeys(("linenos", "linenostart", "linenums", "startline"), _NO_NUMBERS),
+    **dict.fromkeys(("emphasize-lines", "highlight", "hl_lines"), _NO_MARKS),
+}
+"""Keys of MkDocs and others, with what to do instead."""
+
+
 class Word(Struct, frozen=True):
     """A word of an info string: `key`, or `key=value`."""
 
@@ -99,7 +110,9 @@ def read_keys(
     words_by_key: dict[str, Word] = {}
     for word in words:
         key = word.key
-        if key not in keys:
+        if key not in keys and (foreign := check_foreign_key(kind, word)) is not None:
+            diagnostics.append(foreign)
+        elif key not in keys:
             message = f"`{kind}` has no key `{key}`" if keys else f"`{kind}` takes no keys"
             help = did_you_mean(key, keys)
             diagnostics.append(diagnose("fence-key-unknown", word.key_span, message, help=help))
@@ -116,6 +129,17 @@ def read_keys(
         else:
             words_by_key[key] = word
     return Parsed(FenceKeys(name, tuple(words_by_key.values())), tuple(diagnostics))
+
+
+def check_foreign_key(kind: str, word: Word) -> Diagnostic | None:
+    """The diagnostic of a key that only other tools read."""
+    help = _FOREIGN_KEYS.get(word.key.lower())
+    if help is None or word.value is None:
+        return None
+    if kind == "python" and help == _NO_TITLE:
+        help += "; a script has `file=examples/….py`, which is shown above it"
+    message = f"`{kind}` has no key `{word.key}`"
+    return diagnose("fence-key-unknown", word.key_span, message, help=help)
 
 
 def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:

@@ -68,17 +68,9 @@ def _emphasis(state: StateInline, silent: bool) -> bool:
     return True
 
 
-_BRACE = re.compile(r"\{\s*([A-Za-z]{2,20})")
 _BINDING = re.compile(
     r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}|\{(given)(?:="([^{}"]+)")?\}"""
 )
-
-
-def _looks_like_out(key: str) -> bool:
-    """Whether the key of an attribute is `out` or `given`, or looks like it."""
-    key = key.lower()
-    misspellings = ("ou", "ot", "ut", "otu", "uot", "oput", "oout", "oit", "gien", "gven", "gvien")
-    return key.startswith(("out", "giv")) or key in misspellings
 
 
 def _code_span(state: StateInline, silent: bool) -> bool:
@@ -89,19 +81,15 @@ def _code_span(state: StateInline, silent: bool) -> bool:
     start = state.pos
     if not backtick(state, silent):
         return False
-    key = _BRACE.match(state.src, state.pos, state.posMax)
-    if key is None or not _looks_like_out(key[1]) or not state.src[start : state.pos].strip("`"):
-        return True
     end = state.pos
     match = _BINDING.match(state.src, end, state.posMax)
-    if match:
-        state.pos = match.end()
+    if match is None or not state.src[start:end].strip("`"):
+        return True
+    state.pos = match.end()
     if not silent:
         token = state.tokens[-1]
-        token.type = "number_unbound"
-        if match:
-            token.type = "number_given" if match[3] else "number_binding"
-            token.info = match[1] or match[2] or match[4] or ""
+        token.type = "number_given" if match[3] else "number_binding"
+        token.info = match[1] or match[2] or match[4] or ""
         token.map = [start + len(token.markup), end - len(token.markup)]
     return True
 

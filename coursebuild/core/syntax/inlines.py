@@ -53,14 +53,13 @@ from coursebuild.core.syntax.markdown import References
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.safe_html import find_forbidden
 from coursebuild.core.syntax.spans import PositionedToken
-from coursebuild.core.syntax.unread_markup import check_unread_markup
+from coursebuild.core.syntax.unread_markup import check_inline_code, check_unread_markup
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 MAX_DEPTH = 60
 """How deep emphasis may nest; deeper marks are dropped."""
 
-_BRACES = re.compile(r"\{[^}\n]{0,60}\}?")
 _DEFINITION_HEAD = re.compile(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 
 
@@ -88,7 +87,7 @@ def read_inlines(
     tokens = inline_tokens(content.text, {"references": references}, html=html)
     reader = _TokenReader(content, state, references, balance, mentions)
     if html:
-        return reader.read(tokens)
+        return reader.read(tokens, html=True)
     balance.enter()
     inlines = reader.read(tokens)
     balance.leave()
@@ -117,7 +116,7 @@ class _TokenReader:
         self.open_literals = 0
         """How many elements of HTML are open in which every character stands for itself."""
 
-    def read(self, tokens: Iterable[PositionedToken]) -> tuple[Inline, ...]:
+    def read(self, tokens: Iterable[PositionedToken], *, html: bool = False) -> tuple[Inline, ...]:
         for token in tokens:
             kind = token.type
             if kind in ("text", "text_special"):
@@ -125,7 +124,9 @@ class _TokenReader:
                 if text:
                     literal = kind == "text" or text == token.markup
                     self.pieces.append(TextPiece(text, token.start, token.end, literal))
-                    if literal and not self.open_literals:
+                    opening = self.stack[-1].token
+                    is_address = opening is not None and opening.markup == "autolink"
+                    if literal and not self.open_literals and not is_address:
                         self.texts.append((token.start, text))
             elif kind == "softbreak":
                 self.pieces.append(TextPiece("\n", token.start, token.end, False))
@@ -138,7 +139,7 @@ class _TokenReader:
             else:
                 self._add_leaf(token)
         self._flush()
-        for diagnostic in check_unread_markup(self.content, self.texts):
+        for diagnostic in check_unread_markup(self.content, self.texts, html=html):
             self.report(diagnostic)
         return tuple(self.stack[0].nodes)
 
@@ -254,8 +255,9 @@ class _TokenReader:
             case "math":
                 node = self._read_math(token, span)
             case "code_inline":
+                self.state.diagnostics += check_inline_code(token.content, span)
                 node = CodeSpan(span, token.content)
-            case "number_binding" | "number_given" | "number_unbound":
+            case "number_binding" | "number_given":
                 node = self._read_number(token, span)
             case "html_inline":
                 node = self._read_html(token, span)
@@ -285,16 +287,8 @@ class _TokenReader:
             self.state.anchors.take(label.id, label.span)
         return Math(span, tex, display, label)
 
-    def _read_number(self, token: PositionedToken, span: Span) -> CodeSpan | NumberBinding:
+    def _read_number(self, token: PositionedToken, span: Span) -> NumberBinding:
         assert token.map is not None
-        if token.type == "number_unbound":
-            braces = _BRACES.match(self.content.text, token.end)
-            assert braces is not None
-            place = self.content.span(braces.start(), braces.end())
-            message = f"`{braces[0]}` does not say where the number is from"
-            help = 'write `{out}`, `{out=examples/x.py}`, `{given}` or `{given="its source"}`'
-            self.report(diagnose("binding-attribute", place, message, help=help))
-            return CodeSpan(span, token.content)
         start, end = token.map
         if end - start == len(token.content) + 2:
             start, end = start + 1, end - 1

@@ -15,12 +15,13 @@ from coursebuild.core.model.blocks import volatile_pattern
 from coursebuild.core.syntax.fence import Fence, is_known_kind
 from coursebuild.core.syntax.info import FenceKeys, Word
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, misspelt
 from coursebuild.core.text.patterns import matches_empty_text, pattern_mistake
-from coursebuild.core.text.source import Span
+from coursebuild.core.text.source import Excerpt, Span
 
-FIGURE = "Figure:"
+OUTPUT, FIGURE = "Output", "Figure:"
 _CAPTION = re.compile(r"\s*Output\b.*:\s*", re.DOTALL)
+_FIRST_WORD = re.compile(r"([^\W\d_]{3,12})\b[ \t]*(:?)")
 _NEAR_CAPTION = re.compile(
     r"\s*(?:(?:the|expected|recorded|sample|printed|its)\s+){0,2}outputs?\b.{0,40}\s*",
     re.IGNORECASE | re.DOTALL,
@@ -42,6 +43,24 @@ _MODES = {"rtol": "rtol", "atol": "rtol", **{key: key for key in _FLAGS}}
 def is_caption(inlines: tuple[Inline, ...]) -> bool:
     """Whether a paragraph begins with the word "Output" and ends with a colon."""
     return _CAPTION.fullmatch(plain_text(inlines)) is not None
+
+
+def find_misspelt_caption(content: Excerpt, word: str) -> Diagnostic | None:
+    """The diagnostic of a paragraph that begins with a misspelt `word` and ends with a colon.
+
+    One that consists of the word may lack the colon.
+    """
+    match = _FIRST_WORD.match(content.text)
+    is_alone = match is not None and match.end() == len(content.text)
+    if match is None or not (is_alone or match[2] or content.text.endswith(":")):
+        return None
+    if match[1] == word and (match[2] or not is_alone):
+        return None
+    if match[1] != word and misspelt(match[1], [word]) is None:
+        return None
+    message = f"`{content.text[: match.end()].rstrip()}` is not a caption"
+    place = content.span(0, len(match[0].rstrip()))
+    return diagnose("recording-misspelt", place, message, help=f"did you mean `{word}:`?")
 
 
 def check_near_caption(inlines: tuple[Inline, ...], span: Span, kind: str) -> list[Diagnostic]:

@@ -7,11 +7,12 @@ need not parse, or `show`, if it is copied from a file.
 
 from __future__ import annotations
 
+import ast
 import re
 import shlex
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from coursebuild.core.model import PlainCode, Script, SourcePart
@@ -19,7 +20,7 @@ from coursebuild.core.model.blocks import FigureName
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.info import FenceKeys, Word, split_words
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
-from coursebuild.core.text.source import Excerpt
+from coursebuild.core.text.source import Excerpt, Span
 
 DEFAULT_TIMEOUT = 60.0
 """Seconds."""
@@ -101,6 +102,8 @@ def _build_script(
         help = "write `record=once`"
         diagnostics.append(diagnose("fence-key-value", record.value_span, message, help=help))
     figures = tuple(_read_figures(keys.get("figure"), diagnostics))
+    if keys.get("figure") is None and keys.get("norun") is None:
+        diagnostics += _find_windows(fence.body)
     if mistake:
         return None
     return Script(
@@ -226,6 +229,44 @@ def path_mistake(path: str) -> str:
     return ""
 
 
+_SHOWS = re.compile(
+    r"(?:matplotlib\.pyplot|plotly\.io)\.show|mediapy\.show_\w+|IPython\.display\.(?:display|Image|Video)"
+)
+"""Functions that show a picture in a window or a notebook."""
+
+
+def _find_windows(code: Excerpt) -> Iterator[Diagnostic]:
+    """Report the first picture that a script without figures shows and does not save."""
+    if "show" not in code.text and "display" not in code.text:
+        return
+    try:
+        tree = ast.parse(code.text)
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        return
+    nodes = list(ast.walk(tree))
+    names: dict[str, str] = {}
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            names |= {a.asname: a.name for a in node.names if a.asname}
+        elif isinstance(node, ast.ImportFrom):
+            names |= {a.asname or a.name: f"{node.module}.{a.name}" for a in node.names}
+    for call in nodes:
+        if not isinstance(call, ast.Call):
+            continue
+        name = ast.unparse(call.func)
+        first, dot, rest = name.partition(".")
+        if _SHOWS.fullmatch(f"{names.get(first, first)}{dot}{rest}"):
+            row = code.lines()[call.lineno - 1]
+            at = max(row.text.find(name), 0)
+            message = f"`{name}` opens a window, and the page has no figure"
+            help = (
+                'save it, `plt.savefig("x.svg")`, say `figure=x.svg` on the fence, and write '
+                "`Figure: what it shows` below"
+            )
+            yield diagnose("figure-window", row.span(at, at + len(name)), message, help=help)
+            return
+
+
 def _check_syntax(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
     """Report where and why a piece of Python does not parse, if it does not."""
     error = _compile_error(code.text)
@@ -245,11 +286,29 @@ def _check_syntax(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
     def lesson_line(match: re.Match[str]) -> str:
         return f"{match[1]} line {rows[int(match[2]) - 1].span().line}"
 
+    if isinstance(error, IndentationError) and (tab := _find_mixed_tab(rows)) is not None:
+        message = "this line is indented by a tab, and others by blanks"
+        yield diagnose("python-syntax", tab, message, help="indent all lines by blanks")
+        return
     message, _, help = _LINE_REFERENCE.sub(lesson_line, error.msg).partition(". ")
+    if row.text.lstrip().startswith(("%", "!")):
+        help = f"`{row.text.split()[0]}` is a command of Jupyter: leave it out"
     if not help and not script:
         help = "write `fragment` after `python` if it is not meant to be complete"
     message, help = _lower_first(message), _lower_first(help)
     yield diagnose("python-syntax", row.span(start, end), message, help=help)
+
+
+def _find_mixed_tab(rows: Sequence[Excerpt]) -> Span | None:
+    """The first tab before code of which other lines are indented by blanks."""
+    indentations = [re.match(r"[ \t]*", row.text) for row in rows]
+    if not any(match and match[0].startswith(" ") for match in indentations):
+        return None
+    for row, match in zip(rows, indentations, strict=True):
+        if match and "\t" in match[0]:
+            at = match[0].index("\t")
+            return row.span(at, at + 1)
+    return None
 
 
 def _lower_first(sentence: str) -> str:

@@ -22,16 +22,18 @@ from coursebuild.core.syntax.callout import Head, read_head
 from coursebuild.core.syntax.dispatch import read_block
 from coursebuild.core.syntax.fence import INDENTED_FENCE, is_known_kind, read_fence
 from coursebuild.core.syntax.headings import Attributes, check_heading, read_attributes
-from coursebuild.core.syntax.html import Balance, find_media, tags
+from coursebuild.core.syntax.html import LITERAL, Balance, find_media, tags
 from coursebuild.core.syntax.inlines import read_inlines
 from coursebuild.core.syntax.markdown import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
+    OUTPUT,
     check_missing_body,
     check_near_caption,
     diagnose_missing_caption,
     diagnose_wrong_body,
+    find_misspelt_caption,
     is_caption,
     read_figure,
     record_fence,
@@ -40,6 +42,7 @@ from coursebuild.core.syntax.recording import (
 from coursebuild.core.syntax.safe_html import find_forbidden
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
 from coursebuild.core.syntax.tables import read_table
+from coursebuild.core.syntax.unread_markup import check_unread_markup
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -121,16 +124,39 @@ class TextReader:
         content = trim(token.text)
         children = self.inlines(content)
         span = content.span()
-        if not self.nested and "Output" in content.text[:16] and is_caption(children):
+        if not self.nested and self._is_caption(content, children):
             recording = self._read_recording(children, span)
             if recording is not None:
                 return recording
         elif not self.nested and (kind := self._peek_fence_kind()) is not None:
             self.state.diagnostics += check_near_caption(children, span, kind)
-        if not self.nested and content.text.startswith(FIGURE):
+        if not self.nested and self._is_figure(content):
             children, shows_image = read_figure(children, span, self.state.figures)
             return model.Paragraph(span, children, token.hidden, shows_image)
         return model.Paragraph(span, children, token.hidden)
+
+    def _is_caption(self, content: Excerpt, inlines: tuple[model.Inline, ...]) -> bool:
+        """Whether a paragraph is the caption of an output; a misspelt one is, with a diagnostic."""
+        if OUTPUT in content.text[:16] and is_caption(inlines):
+            return True
+        token = self._peek()
+        if token is None or (token.type, token.info.split()[:1]) not in _BODIES:
+            return False
+        if self.state.script is None and not self.state.has_invalid_script:
+            return False
+        mistake = find_misspelt_caption(content, OUTPUT)
+        if mistake is not None:
+            self.state.report(mistake)
+        return mistake is not None
+
+    def _is_figure(self, content: Excerpt) -> bool:
+        """Whether a paragraph shows a figure; a misspelt one does, with a diagnostic."""
+        if content.text.startswith(FIGURE) or not self.state.figures:
+            return content.text.startswith(FIGURE)
+        mistake = find_misspelt_caption(content, FIGURE[:-1])
+        if mistake is not None:
+            self.state.report(mistake)
+        return mistake is not None
 
     def _peek(self) -> PositionedToken | None:
         return self.tokens[self.index] if self.index < len(self.tokens) else None
@@ -215,10 +241,23 @@ class TextReader:
             if self.nested or any(isinstance(child, model.Math) for child in children):
                 return model.HtmlFlow(content.span(), children)
         else:
-            for tag in tags(html.text):
-                self.balance.add(tag, html)
+            self._check_html_block(html)
         text = html.text if html.text.endswith("\n") else html.text + "\n"
         return model.HtmlBlock(self._span(token), text, find_media(html), find_forbidden(html))
+
+    def _check_html_block(self, html: Excerpt) -> None:
+        """Check the tags of a block of HTML, and the texts between them."""
+        texts: list[tuple[int, str]] = []
+        end, literals = 0, 0
+        for tag in tags(html.text):
+            self.balance.add(tag, html)
+            if not literals:
+                texts.append((end, html.text[end : tag.start]))
+            if tag.name in LITERAL and not tag.is_complete:
+                literals = max(0, literals + (-1 if tag.is_end_tag else 1))
+            end = tag.end
+        texts.append((end, html.text[end:]))
+        self.state.diagnostics += check_unread_markup(html, texts, html=True)
 
     def _read_thematic_break(self, token: PositionedToken) -> model.ThematicBreak:
         return model.ThematicBreak(self._span(token))
@@ -320,6 +359,12 @@ class TextReader:
         return None
 
 
+_BODIES: tuple[tuple[str, list[str]], ...] = (
+    ("fence", ["text"]),
+    ("fence", []),
+    ("table_open", []),
+)
+"""Types of tokens, with the kinds of fences, that may be the body of a recorded output."""
 _READERS: dict[str, Callable[[TextReader, PositionedToken], model.Block | None]] = {
     "paragraph_open": TextReader._read_paragraph,
     "heading_open": TextReader._read_heading,

@@ -108,6 +108,22 @@ def nearest(name: str, names: Iterable[str], *, cutoff: float = 0.6) -> str | No
     return matches[0] if matches else None
 
 
+def misspelt(word: str, names: Iterable[str]) -> str | None:
+    """The one of `names` that a word differs from by a letter, or by two if the name is long.
+
+    A letter may be dropped, added, changed or swapped with the next one, or be a capital.
+    """
+    import difflib
+
+    lower = word.lower()
+    for name in sorted(set(names) - {word}):
+        blocks = difflib.SequenceMatcher(None, lower, name.lower(), False).get_matching_blocks()
+        difference = max(len(word), len(name)) - sum(block.size for block in blocks)
+        if difference <= (1 if len(name) < 5 else 2) and difference < len(name):
+            return name
+    return None
+
+
 def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     """A help text that proposes the nearest known name, or lists the names if they are few.
 

@@ -43,7 +43,8 @@ _SUMMARIES = {
     "nothing shows it or links to it.",
     "lesson-missing": "The course map names a lesson whose file is missing.",
     "lesson-planned-file": "A lesson that the map calls planned has a file.",
-    "lesson-empty": "A complete lesson has nothing to read in its file.",
+    "lesson-empty": "A complete lesson has nothing to read in its file, or headings only.",
+    "draft-empty": "The file of a draft is empty.",
     "prerequisite-unknown": "A prerequisite is not a lesson of the map.",
     "prerequisite-cycle": "Lessons require each other in a circle.",
     "page-missing": "The course map names a page whose file is missing.",
@@ -88,8 +89,14 @@ _SUMMARIES = {
     "feature-missing": "A fence needs a feature that is not installed.",
     "math-syntax": "A formula does not parse.",
     "math-unclosed": "Display math is never closed.",
-    "math-unread": "A dollar sign and TeX stand in a text, and no formula was read.",
-    "markup-foreign": "Markup of another tool stands in a text, which shows it as it is written.",
+    "math-unread": "A dollar sign that was meant for a formula stands in a text.",
+    "markup-unread": "Markdown, or an attribute in braces, is not whole, so that readers would see "
+    "it as it is written.",
+    "markup-foreign": "Markup of another tool stands in a text, which would show it as it is "
+    "written.",
+    "control-character": "A text has a character that no reader can see.",
+    "merge-conflict": "A file of the course holds both versions of a merge, with the marks between "
+    "them.",
     "equation-label": "The label of a formula cannot be read, or stands where none may.",
     # terms and symbols
     "term-attribute": "The attribute by which a text defines a term cannot be read.",
@@ -105,6 +112,7 @@ _SUMMARIES = {
     "footnote-unused": "A footnote is written and never referred to.",
     "footnote-repeated": "A footnote is written twice.",
     "figure-unshown": "A script draws a figure that no paragraph below it shows.",
+    "figure-window": "A script shows a figure in a window, so that its page has none.",
     "figure-missing": "A script does not draw the figure that it names.",
     "figure-unreadable": "What a script drew cannot be shown.",
     "figure-drift": "A recorded figure differs from what its script draws now.",
@@ -144,6 +152,7 @@ _SUMMARIES = {
     "python-syntax": "A Python block does not parse.",
     "recording-caption": "A `text` block looks like a recorded output, and is compared with "
     "nothing.",
+    "recording-misspelt": "The caption of a recorded output or a figure looks misspelt.",
     "recording-orphan": "A recorded output has no script above it.",
     "recording-body": "`Output:` is followed by something that is not a `text` fence or a table "
     "with rows.",
@@ -220,8 +229,8 @@ _SUMMARIES = {
 """The meaning of each rule in one sentence."""
 _WARNINGS = frozenset(
     """
-    file-unlisted no-scripts theme-contrast template-outdated heading-skip fence-kind-near
-    fence-unread math-unread markup-foreign symbol-repeated footnote-unused image-alt
+    draft-empty file-unlisted no-scripts theme-contrast template-outdated heading-skip
+    symbol-repeated footnote-unused image-alt
     recording-caption script-unrepeatable script-penetration script-writes script-connects
     output-noise report-stale bench-unrecorded lab-penetration lab-far lab-reset package-reduced
     """.split()

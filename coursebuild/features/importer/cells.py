@@ -19,6 +19,8 @@ _OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULT
 """An option of a cell, as Quarto and as MyST write it."""
 _DEFINITION = re.compile(r"(?:@|(?:async )?def |class )")
 _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
+_WINDOW = re.compile(r"^plt\.show\(\)[ \t]*\n?", re.MULTILINE)
+"""What opens a window where there is none."""
 _FIGURE = re.compile(r"\b(?:plt|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
 _ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 """What colours text in a terminal."""
@@ -75,6 +77,7 @@ def runnable_code(cell: Segment, context: LessonContext) -> str:
     text = _MAGIC.sub("", text)
     if _FIGURE.search(text):
         context.add_leftover("a figure: save it by `plt.savefig`, and name it by `figure=`")
+        text = _WINDOW.sub("", text)
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError, RecursionError) as error:

@@ -81,7 +81,8 @@ def test_a_byte_order_mark_is_skipped() -> None:
 
 
 def test_nul_is_a_replacement_character() -> None:
-    assert plain_html(parse("a\0b `c\0`")) == "<p>a\ufffdb <code>c\ufffd</code></p>\n"
+    document = parse("a\0b `c\0`", "control-character")
+    assert plain_html(document) == "<p>a\ufffdb <code>c\ufffd</code></p>\n"
 
 
 def test_an_unclosed_fence_without_final_line_end_has_one() -> None:
