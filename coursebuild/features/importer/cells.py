@@ -20,8 +20,8 @@ _OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULT
 _DEFINITION = re.compile(r"(?:@|(?:async )?def |class )")
 _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
 _FIGURE = re.compile(r"\b(?:plt|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
-_ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
-"""What colours text in a terminal."""
+_ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
+"""What colours text or moves the cursor in a terminal."""
 _MAGIC = re.compile(r"^[ \t]*(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 
 
