@@ -7,8 +7,8 @@
 3. What differs between the dialects is written as coursebuild reads it (`prose`, `blocks`,
    `cells`), and the lessons are put together (`convert`).
 4. The course is written to a new folder, each script runs once, and says by that which keys its
-   fence needs (`commands`). Then all of it is checked. What an import that was killed had written is
-   taken back to how it was converted, and all is done again from there.
+   fence needs (`commands`). Then all of it is checked. What an import that was killed had written
+   is taken back to how it was converted, and all is done again from there.
 
 What has no counterpart is listed with its place, and never dropped in silence. The folder itself is
 only read.
