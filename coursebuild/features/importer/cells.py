@@ -22,8 +22,8 @@ _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
 _WINDOW = re.compile(r"^plt\.show\(\)[ \t]*\n?", re.MULTILINE)
 """What opens a window where there is none."""
 _FIGURE = re.compile(r"\b(?:plt|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
-_ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
-"""What colours text in a terminal."""
+_ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
+"""What colours text or moves the cursor in a terminal."""
 _MAGIC = re.compile(r"^[ \t]*(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 
 
