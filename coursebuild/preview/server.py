@@ -43,6 +43,8 @@ _HEARTBEAT = 15.0
 _IMMUTABLE = re.compile(r"/(?:[^?#]*/)?assets/[^?#]+\.[0-9a-f]{8}\.[a-z0-9]+")
 _LARGEST = 1 << 16
 """Bytes of a request's body."""
+_DRAWING_POLICY = "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+"""Of an SVG at its own address: a preview shows a course before it is judged."""
 
 
 class PreviewServer(ThreadingHTTPServer):
@@ -202,6 +204,8 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_response(status)
         for name, value in (further_headers or {}).items():
             self.send_header(name, value)
+        if kind == "image/svg+xml":
+            self.send_header("Content-Security-Policy", _DRAWING_POLICY)
         self.send_header("Content-Type", kind)
         self.send_header("Content-Length", str(len(data)))
         # Browsers may keep files with a hash of their content in their name, such as fonts.
