@@ -1,21 +1,26 @@
-"""Figures of scripts, recorded in files of the course.
+"""Figures of scripts, recorded in files of the course, and other drawings there.
 
-Entry points: `read_recorded`, `write_figures`.
+Entry points: `read_recorded`, `write_figures`, `check_drawings`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import functools
+import hashlib
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
+from coursebuild.core.drawing.safe_svg import read_svg
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Course
 from coursebuild.core.model.figures import RecordedFigure, recorded_figures
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.scripts.figures import describe_difference, prepare_figure
+from coursebuild.core.scripts.figures import SVG_HELP, describe_difference, prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.source import Source
 from coursebuild.pipeline.options import Options
 
 
@@ -66,3 +71,25 @@ def write_figures(
         else:
             remarks.append(f"{'would draw' if dry_run else 'drew'} {figure.path}")
     return remarks, failures
+
+
+def check_drawings(course: Course, options: Options) -> Iterator[Diagnostic]:
+    """Judge the files in SVG, which are published as they are."""
+    if course.html == "trusted":
+        return
+    for path in course.files:
+        if path.lower().endswith((".svg", ".svgz")):
+            data = read_recorded(options.root, path) or b""
+            key = step_key("drawing", hashlib.sha256(data).hexdigest())
+            fault = options.store.get_or_create("drawings", key, functools.partial(_fault, data))
+            if fault:
+                message = f"`{path}` {fault.decode()}"
+                help = f'{SVG_HELP}, unless the map says `html = "trusted"`'
+                place = Source(path, "").span(0, 0)
+                yield diagnose("image-forbidden", place, message, help=help)
+
+
+def _fault(data: bytes) -> bytes:
+    """Why a drawing must not be published, in words; empty where it may."""
+    drawing = read_svg(data)
+    return drawing.encode() if isinstance(drawing, str) else b""

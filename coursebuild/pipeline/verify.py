@@ -43,7 +43,7 @@ from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.scripts.repeat import repeat_findings
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.pipeline.figures import read_recorded
+from coursebuild.pipeline.figures import check_drawings, read_recorded
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recorded_runs import check_recorded_runs
@@ -123,6 +123,7 @@ def verify(
         *check_runs(course, runs),
         *_diagnose_nothing(course, () if shard is not None else runs),
         *figure_findings(course, runs, functools.partial(read_recorded, options.root)),
+        *check_drawings(course, options),
     )
     interpreter = options.interpreter
     python = python_version() if interpreter is None else interpreter.version

@@ -53,6 +53,8 @@ _REQUEST_LINE = re.compile(rb"[A-Z]+ [!-~]+ HTTP/1\.[01]\r\n")
 _HEADER_LINE = re.compile(rb"([\w!#$%&'*+.^`|~-]+):[ \t]*+([\t -~\x80-\xff]*+)\r\n", re.ASCII)
 _ONCE = (b"content-length", b"host", b"origin", b"sec-fetch-site", b"sec-fetch-mode")
 """Headers by which a request is judged."""
+_DRAWING_POLICY = "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+"""Of an SVG at its own address: a preview shows a course before it is judged."""
 
 
 class PreviewServer(ThreadingHTTPServer):
@@ -230,6 +232,8 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_response(status)
         for name, value in (further_headers or {}).items():
             self.send_header(name, value)
+        if kind == "image/svg+xml":
+            self.send_header("Content-Security-Policy", _DRAWING_POLICY)
         self.send_header("Content-Type", kind)
         self.send_header("Content-Length", str(len(data)))
         # Browsers may keep files with a hash of their content in their name, such as fonts.

@@ -6,6 +6,7 @@ import contextlib
 import re
 import sys
 from collections.abc import Iterator
+from http.client import HTTPConnection
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,14 @@ def test_pages_and_files_have_their_types(preview: Preview) -> None:
         assert headers["X-Content-Type-Options"] == "nosniff"
         assert int(headers["Content-Length"]) == len(body)
         assert (b"/.coursebuild/preview.js" in body) == kind.startswith("text/html")
+
+
+def test_a_drawing_runs_nothing_and_loads_nothing_before_it_is_judged(preview: Preview) -> None:
+    with contextlib.closing(HTTPConnection("127.0.0.1", preview.port)) as connection:
+        connection.request("GET", "/files/pic%20%C3%A4.svg")
+        policies = connection.getresponse().headers.get_all("Content-Security-Policy", [])
+    drawing = "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+    assert policies == [drawing, "frame-ancestors 'none'"]
 
 
 def test_every_address_of_a_page_is_there(preview: Preview) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, RECOMMENDED_CONTRAST, legible
+from coursebuild.core.drawing.safe_svg import read_svg
 from coursebuild.core.model.theme import Theme, ThemeFile
 from coursebuild.core.pages.font_files import course_face
 from coursebuild.core.pages.fonts import Face
@@ -16,8 +17,7 @@ _ACCENT = "#17487a", "#9fc6ef"
 """The accent of the style sheet, on light and dark pages."""
 _BOLD = 600
 """The weight of headings."""
-_BOX = re.compile(r"""<svg\b[^>]*?\sviewBox=["']\s*\S+?[\s,]+\S+?[\s,]+([\d.]+)[\s,]+([\d.]+)""")
-_SIDE = r"""<svg\b[^>]*?\s{}=["']\s*([\d.]+)"""
+_SIDE = re.compile(r"\s*+(\d+(?:\.\d*)?|\.\d+)")
 
 
 def theme_faces(theme: Theme) -> list[tuple[Face, bytes]]:
@@ -64,12 +64,12 @@ def picture_size(file: ThemeFile) -> tuple[float, float] | None:
     if file.ending == "png":
         width, height = (int.from_bytes(file.data[at : at + 4], "big") for at in (16, 20))
         return width, height
-    box = _BOX.search(file.text)
-    sides = box.groups() if box else [_side(file.text, name) for name in ("width", "height")]
-    numbers = [float(side) for side in sides if side and re.fullmatch(r"\d+\.?\d*|\.\d+", side)]
-    return (numbers[0], numbers[1]) if len(numbers) == 2 and min(numbers) > 0 else None
-
-
-def _side(svg: str, name: str) -> str | None:
-    match = re.search(_SIDE.format(name), svg)
-    return match and match[1]
+    root = read_svg(file.data)
+    if isinstance(root, str):
+        return None
+    box = root.get("viewBox", "").replace(",", " ").split()
+    sides = box[2:] if len(box) == 4 else [root.get("width", ""), root.get("height", "")]
+    numbers = [float(match[1]) for side in sides if (match := _SIDE.match(side))]
+    if len(numbers) < 2 or not 1e-6 < min(numbers) <= max(numbers) < 1e6:
+        return None
+    return numbers[0], numbers[1]

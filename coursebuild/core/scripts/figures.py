@@ -3,12 +3,14 @@
 Entry points: `figure_findings`; `prepare_figure`, what is recorded of a figure;
 `describe_difference`.
 
-1. Dates, comments and ids, which change from run to run, are taken out of a drawing in SVG, so that
+1. A figure is judged as text of somebody else's: `core.drawing.safe_svg` says what an SVG may hold;
+   of a PNG what draws is recorded, and nothing else.
+2. Dates, comments and ids, which change from run to run, are taken out of a drawing in SVG, so that
    the same drawing gives the same bytes.
-2. Two drawings in SVG are the same where elements, attributes and texts are, and numbers differ by
+3. Two drawings in SVG are the same where elements, attributes and texts are, and numbers differ by
    less than a thousandth of the drawing's size. Two in PNG are the same where the root mean square
    of what pixels differ by is below one of 255 steps.
-3. Data in CSV are the same where texts are, and numbers differ by less than a thousandth of the
+4. Data in CSV are the same where texts are, and numbers differ by less than a thousandth of the
    largest in their column.
 """
 
@@ -19,9 +21,11 @@ import io
 import itertools
 import math
 import re
+import struct
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Sequence
 
+from coursebuild.core.drawing.safe_svg import SVG, XLINK, read_svg
 from coursebuild.core.model import Course
 from coursebuild.core.model.figures import RecordedFigure, recorded_figures, unshown_figures
 from coursebuild.core.model.results import Outcome, ScriptRun
@@ -33,13 +37,20 @@ number in a column of data."""
 PIXEL_TOLERANCE = 1.0
 """How much pixels may differ: root mean square over all channels, of 255 steps."""
 
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-_SVG = "{http://www.w3.org/2000/svg}"
-_XLINK = "{http://www.w3.org/1999/xlink}href"
-_URL = re.compile(r"url\(#([^()\s]+)\)")
-_FAR = re.compile(r"""@import[^;]*|url\(\s*["']?(?!#|data:image/|["'\s])[^()]*\)""")
-"""The parts of a style that load another file."""
-_ACTIVE = ("script", "foreignObject", "iframe", "audio", "video")
+MAX_PIXELS = 25_000_000
+"""Pixels that a PNG may have."""
+MAX_TABLE = 4 << 20
+"""Bytes that data may have."""
+SVG_HELP = "an SVG may hold what draws a still picture, and refer to its own parts alone"
+
+_NUMBER = re.compile(r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?")
+_HREFS = ("href", f"{XLINK}href")
+_ID = re.compile(r"""(url\(\s*["']?#)([^()\s"']+)""")
+_RULE_PART = re.compile(r"[^{};]*+[{};]?")
+"""What ends in a brace are selectors."""
+_SELECTED = re.compile(r"(#)([\w:-]+)")
+_PNG_PARTS = frozenset(b"IHDR PLTE IDAT IEND tRNS bKGD cHRM cICP gAMA iCCP pHYs sBIT sRGB".split())
+"""The chunks of a PNG that say what is drawn."""
 
 ReadFile = Callable[[str], bytes | None]
 """A file of the course by its path; `None` where there is none."""
@@ -75,7 +86,9 @@ def _compare_figure(
         return
     figure_file = prepare_figure(figure.name, data)
     if isinstance(figure_file, str):
-        yield diagnose("figure-unreadable", figure.span, f"`{figure.name}` {figure_file}")
+        help = SVG_HELP if figure_file.startswith("holds") else ""
+        message = f"`{figure.name}` {figure_file}"
+        yield diagnose("figure-unreadable", figure.span, message, help=help)
         return
     update = f"`coursebuild update {owner}`"
     if recorded is None:
@@ -93,10 +106,14 @@ def _compare_figure(
 def prepare_figure(name: str, data: bytes) -> bytes | str:
     """The bytes to record of a figure; or why it cannot be shown, in words."""
     if name.endswith(".png"):
-        return data if _png_size(data) is not None else "is no PNG"
+        drawing = _png_drawing(data)
+        size = _png_size(drawing)
+        return size if isinstance(size, str) else drawing
     if name.endswith(".csv"):
+        if len(data) > MAX_TABLE:
+            return f"is larger than {MAX_TABLE >> 20} MiB"
         return b"\n".join(data.splitlines()) + b"\n"
-    tree = _read_svg(data)
+    tree = _read_drawing(data)
     return tree if isinstance(tree, str) else ET.tostring(tree, encoding="utf-8") + b"\n"
 
 
@@ -111,58 +128,45 @@ def describe_difference(name: str, old: bytes, new: bytes) -> str:
 # --- SVG
 
 
-def _read_svg(data: bytes) -> ET.Element | str:
+def _read_drawing(data: bytes) -> ET.Element | str:
     """The drawing without what changes from run to run; or why it cannot be shown, in words."""
-    if b"<!ENTITY" in data:
-        return "declares entities"
-    try:
-        root = ET.fromstring(data)
-    except (ET.ParseError, ValueError, LookupError) as error:
-        return f"is no SVG: {error}"
-    if root.tag != f"{_SVG}svg":
-        return "is no SVG: its root is another element"
-    ET.register_namespace("", _SVG[1:-1])
-    ET.register_namespace("xlink", _XLINK[1:-5])
-    names: dict[str, str] = {}
+    root = read_svg(data)
+    if isinstance(root, str):
+        return root
+    ET.register_namespace("", SVG[1:-1])
+    ET.register_namespace("xlink", XLINK[1:-1])
     for parent in list(root.iter()):
         for child in list(parent):
-            if child.tag == f"{_SVG}metadata":
+            if child.tag == f"{SVG}metadata":
                 parent.remove(child)
-    for element in root.iter():
-        reason = _reason_unshowable(element)
-        if reason:
-            return reason
+    names: dict[str, str] = {}
     for element in root.iter():
         if "id" in element.attrib:
             names.setdefault(element.attrib["id"], f"x{len(names) + 1}")
+
+    def rename(match: re.Match[str]) -> str:
+        return match[1] + names.get(match[2], match[2])
+
     for element in root.iter():
         for key, value in element.attrib.items():
-            element.attrib[key] = _rename_ids(key, value, names)
+            if key == "id":
+                element.attrib[key] = names[value]
+            elif key in _HREFS and value.startswith("#"):
+                element.attrib[key] = "#" + names.get(value[1:], value[1:])
+            elif key in ("aria-labelledby", "aria-describedby"):
+                element.attrib[key] = " ".join(names.get(word, word) for word in value.split())
+            else:
+                element.attrib[key] = _ID.sub(rename, value)
+        if element.tag == f"{SVG}style" and element.text:
+            parts = _RULE_PART.findall(element.text)
+            element.text = "".join(
+                (_SELECTED if part.endswith("{") else _ID).sub(rename, part) for part in parts
+            )
     return root
 
 
-def _reason_unshowable(element: ET.Element) -> str:
-    """Why an element cannot be shown, in words: it is active, or loads something; else empty."""
-    kind = element.tag.removeprefix(_SVG)
-    if kind in _ACTIVE or any(key.lower().startswith("on") for key in element.attrib):
-        return f"holds active content, `{kind}`"
-    links = (element.attrib[key] for key in (_XLINK, "href") if key in element.attrib)
-    target = next((link for link in links if not link.startswith(("#", "data:image/"))), "")
-    styles = (*element.attrib.values(), *([element.text or ""] if kind == "style" else ()))
-    target = target or next((match[0] for style in styles if (match := _FAR.search(style))), "")
-    return f"leads to `{target}`" if target else ""
-
-
-def _rename_ids(key: str, value: str, names: dict[str, str]) -> str:
-    if key == "id":
-        return names[value]
-    if key in (_XLINK, "href") and value.startswith("#"):
-        return "#" + names.get(value[1:], value[1:])
-    return _URL.sub(lambda match: f"url(#{names.get(match[1], match[1])})", value)
-
-
 def _svg_difference(old_data: bytes, new_data: bytes) -> str:
-    old_root, new_root = _read_svg(old_data), _read_svg(new_data)
+    old_root, new_root = _read_drawing(old_data), _read_drawing(new_data)
     if isinstance(old_root, str) or isinstance(new_root, str):
         return f"the recorded file {old_root}" if isinstance(old_root, str) else str(new_root)
     old_words, new_words = list(_words(old_root)), list(_words(new_root))
@@ -205,25 +209,41 @@ def _size(root: ET.Element) -> float:
 # --- PNG
 
 
-def _png_size(data: bytes) -> tuple[int, int] | None:
+def _png_size(data: bytes) -> tuple[int, int] | str:
+    """Width and height of a PNG; or why it cannot be shown, in words."""
     from PIL import Image
 
+    width, height = (int.from_bytes(data[at : at + 4], "big") for at in (16, 20))
+    if width * height > MAX_PIXELS:  # known before a decoder takes memory for them
+        return f"has more than {MAX_PIXELS // 1_000_000} million pixels"
     try:
         with Image.open(io.BytesIO(data), formats=("PNG",)) as image:
             image.load()
             return image.size
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
-        return None
+    except (OSError, ValueError, SyntaxError, struct.error):
+        return "is no PNG"
+
+
+def _png_drawing(data: bytes) -> bytes:
+    """A PNG without its texts and dates, other frames, and whatever follows its end."""
+    parts, at = [data[:8]], 8
+    while at < len(data) and not parts[-1].startswith(b"IEND", 4):
+        end = at + 12 + int.from_bytes(data[at : at + 4], "big")
+        if data[at + 4 : at + 8] in _PNG_PARTS:
+            parts.append(data[at:end])
+        at = end
+    return b"".join(parts)
 
 
 def _png_difference(old: bytes, new: bytes) -> str:
     from PIL import Image, ImageChops, ImageStat
 
-    sizes = _png_size(old), _png_size(new)
-    if sizes[0] is None:
-        return "the recorded file is no PNG"
-    if sizes[0] != sizes[1] or sizes[1] is None:
-        return "it has {}×{} pixels where {}×{} are recorded".format(*(sizes[1] or ()), *sizes[0])
+    old, new = _png_drawing(old), _png_drawing(new)
+    old_size, new_size = _png_size(old), _png_size(new)
+    if isinstance(old_size, str) or isinstance(new_size, str):
+        return f"the recorded file {old_size}" if isinstance(old_size, str) else str(new_size)
+    if old_size != new_size:
+        return "it has {}×{} pixels where {}×{} are recorded".format(*new_size, *old_size)
     images = [Image.open(io.BytesIO(data)).convert("RGBA") for data in (old, new)]
     change = ImageChops.difference(*images)
     square = sum(value**2 for value in ImageStat.Stat(change).rms) / 4
@@ -237,10 +257,13 @@ def _png_difference(old: bytes, new: bytes) -> str:
 
 
 def _csv_difference(old_data: bytes, new_data: bytes) -> str:
-    old, new = (
-        list(csv.reader(io.StringIO(data.decode("utf-8", "replace"))))
-        for data in (old_data, new_data)
-    )
+    try:
+        old, new = (
+            list(csv.reader(io.StringIO(data.decode("utf-8", "replace"))))
+            for data in (old_data, new_data)
+        )
+    except csv.Error as error:
+        return f"a table cannot be read: {error}"
     if [len(row) for row in old] != [len(row) for row in new]:
         return "the table has other rows or columns"
     columns = zip(itertools.zip_longest(*old), itertools.zip_longest(*new), strict=True)

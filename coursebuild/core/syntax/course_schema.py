@@ -166,7 +166,8 @@ class SecurityTable(Struct, frozen=True, forbid_unknown_fields=True):
     html: Annotated[
         Literal["none", "safe", "trusted"],
         Meta(
-            description="raw HTML in texts: none, none that runs or loads anything, or any at all"
+            description="raw HTML in texts: none, none that runs or loads anything, or any at all; "
+            "then any SVG file, too"
         ),
     ] = "safe"
 

@@ -118,6 +118,8 @@ _SUMMARIES = {
     "figure-drift": "A recorded figure differs from what its script draws now.",
     "image-remote": "A picture, a video or a frame comes from another host; a page shows only what "
     "the course holds.",
+    "image-forbidden": "An SVG in the course has parts that are not allowed; its file would be "
+    "published as it is.",
     "image-alt": "An image has no text alternative.",
     "html-unbalanced": "Raw HTML opens an element that it does not close, or closes one that is "
     "not open.",

@@ -1,0 +1,95 @@
+"""What an SVG may hold."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.drawing.safe_svg import read_svg
+from support.hostile_svg import HARMLESS, HOSTILE, mutants
+
+ROOT = Path(__file__).parents[3]
+DRAWINGS = sorted(
+    (*(ROOT / "content").rglob("*.svg"), *(ROOT / "tests/fixtures/drawings").glob("*.svg"))
+)
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:x="{}">\n{}</svg>'
+NOTES = "http://www.inkscape.org/namespaces/inkscape"
+UNHARMED = frozenset(("image of SVG as PNG", "100,000 namespaces", "CSS of 300,000 escapes"))
+"""Files that may be shown: nothing comes of what they try."""
+
+WORDINGS = {
+    "<script/>": "holds `<script>` in line 2",
+    '\n<x:script x:a=""/>': "holds `<script>` of the namespace `urn:x` in line 3",
+    '<g x:href=""/>': "holds `href` of the namespace `urn:x` of `<g>` in line 2",
+    '<g onload="f()"/>': "holds `onload` of `<g>` in line 2",
+    '<a href="java&#10;script:f()"/>': "holds the link `java script:f()` of `<a>` in line 2",
+    '<g style="fill: red; src: x; behaviour: x"/>': "holds the property `behaviour` of `<g>` in "
+    "line 2",
+    '<g style="fill: u\\72l(//x)"/>': "holds a `url()` that leads elsewhere of `<g>` in line 2",
+    '<g mask="im\\61ge-set(x)"/>': "holds `image-set()` of `<g>` in line 2",
+    '<g fill="a:b"/>': "holds `fill:a:` of `<g>` in line 2",
+    '<g style="}"/>': "holds an unpaired `}` of `<g>` in line 2",
+    '<g style="fill: `x`"/>': "holds ``x`` of `<g>` in line 2",
+    "<style>@import 'x'</style>": "holds `@import` of a style sheet in line 2",
+    "<style>a{b{}}</style>": "holds the property `b` of a style sheet in line 2",
+    "<?x?>": "holds `<?x?>` in line 2",
+    "<g>" * 100: "holds more than 100 elements inside each other in line 2",
+    '<g id="a"><use href="#a"/></g>': "repeats more than 100 elements inside each other",
+    "&x;": "is no SVG: undefined entity: line 2, column 0",
+}
+
+
+def test_each_reason_has_its_words() -> None:
+    wordings = {inside: read_svg(SVG.format("urn:x", inside).encode()) for inside in WORDINGS}
+    assert wordings == WORDINGS
+
+
+WHOLE = {
+    b"": "is no SVG: no element found: line 1, column 0",
+    b"<p/>": "is no SVG: its root is another element",
+    b"\xff\xfe<\0": "is no SVG in UTF-8",
+    b"<?xml version='1.0' encoding='utf-7'?><svg/>": "is no SVG in UTF-8, but in `utf-7`",
+    b"<!DOCTYPE svg [<!ENTITY a 'a'>]>": "holds a document type of its own in line 1",
+    b"x" * (5 << 20): "is larger than 4 MiB",
+}
+
+
+def test_each_reason_why_a_file_is_no_drawing_has_its_words() -> None:
+    assert {data: read_svg(data) for data in WHOLE} == WHOLE
+
+
+def test_hostile_files_are_refused_in_words() -> None:
+    readings = {name: read_svg(data) for name, data in HOSTILE}
+    assert {name for name, reading in readings.items() if not isinstance(reading, str)} == UNHARMED
+    wordings = [reading for reading in readings.values() if isinstance(reading, str)]
+    assert [
+        wording for wording in wordings if not re.match("holds|is|draws|repeats", wording)
+    ] == []
+    assert max(map(len, wordings)) < 200
+
+
+def test_what_only_looks_like_an_attack_is_shown() -> None:
+    assert {name: r for name, data in HARMLESS if isinstance(r := read_svg(data), str)} == {}
+
+
+def test_what_programs_draw_is_shown() -> None:
+    faults = {
+        file.name: r for file in DRAWINGS if isinstance(r := read_svg(file.read_bytes()), str)
+    }
+    assert faults == {}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_written_again_is_as_safe(seed: int) -> None:
+    """A drawing that passes also passes as the elements that were read of it."""
+    count = 0
+    for name, data in (*HARMLESS, *mutants(1_000, seed)):
+        drawing = read_svg(data)
+        if not isinstance(drawing, str):
+            again = read_svg(ET.tostring(drawing, encoding="utf-8"))
+            assert not isinstance(again, str), f"{name}: {again}"
+            count += 1
+    assert count > len(HARMLESS)
