@@ -26,10 +26,10 @@ from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages.added_files import NotedPage
 from coursebuild.core.pages.common_files import PageFacts
-from coursebuild.core.pages.frame import Names, PageFrame
+from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.links import Reference, has_anchor
-from coursebuild.core.pages.page_list import PageEntry, page_list, page_title
+from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.text.source import key_of
 from coursebuild.core.values import decode, encode
@@ -132,33 +132,14 @@ class Pages:
 
     def files(self, names: Names) -> Iterator[CachedFile]:
         """The pages in their frames."""
-        key = self._frame_key(names)
-        frame = PageFrame(self._library, names)
+        frame = PageFrame(FrameInputs.of(self._library, names), self._library.assets)
+        key = step_key("frame", frame.inputs)
         for path, page in self._pages.items():
             make = functools.partial(self._make_file, path, frame)
             yield CachedFile(path, key_of(page.key, key), make)
 
     def _make_file(self, path: str, frame: PageFrame) -> bytes:
         return frame_page(self._load(path), frame)
-
-    def _frame_key(self, names: Names) -> str:
-        """The key of all that a frame shows besides its page."""
-        course, results = self._library.course, self._library.results
-        return step_key(
-            "frame",
-            course.language,
-            course.title,
-            course.key,
-            course.base_url,
-            course.repository,
-            course.licence,
-            tuple((page.id, page.title, page.menu) for page in course.pages),
-            tuple((p.path, page_title(self._library, p)) for p in self._library.added_pages),
-            results.engine,
-            results.python,
-            course.theme.template_texts,
-            names,
-        )
 
     # --- keys
 

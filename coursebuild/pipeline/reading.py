@@ -29,14 +29,14 @@ from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Document, document_scripts
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.summary import without_prose
-from coursebuild.core.pages.assets import strings_for
+from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.frame import parts_of
 from coursebuild.core.pages.page_inputs import PageHead, PageInputs
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.renderer import Renderer, known_mathml
-from coursebuild.core.pages.templates import Texts, templates_of
+from coursebuild.core.pages.templates import Texts
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import summarize
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -336,9 +336,7 @@ class PageReader:
     ) -> Renderer:
         """Return a renderer with words, templates, and the formulas of a document."""
         if (language, templates) not in self._renderers:
-            texts = template_texts()
-            compiled_templates = templates_of(texts, prepared_folder(), templates)
-            strings = strings_for(texts, language)
-            self._renderers = {(language, templates): Renderer(strings, compiled_templates)}
+            assets = Assets(template_texts(), {}, prepared_folder())
+            self._renderers = {(language, templates): assets.renderer(language, templates)}
         renderer = self._renderers[language, templates]
         return renderer if whole is None else replace(renderer, formulas=whole.formulas)
