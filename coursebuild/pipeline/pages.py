@@ -32,7 +32,7 @@ from coursebuild.core.pages.links import Reference, has_anchor
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.text.source import key_of
-from coursebuild.core.values import decode, encode
+from coursebuild.core.values import decode
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.fingerprints import results_fingerprint
 from coursebuild.pipeline.reading import PAGES, DrawnPage, PageRequest, SourceText
@@ -225,10 +225,12 @@ def text_of(entry: PageEntry, library: Library) -> SourceText | None:
 
 
 def page_request(entry: PageEntry, library: Library) -> PageRequest:
-    """Make the request to draw a page; its key is a hash of all that it shows and of its text."""
-    course, text = library.course, text_of(entry, library)
-    inputs = encode(entry.inputs(library))
-    text_key = "" if text is None else text.key
-    templates = course.theme.template_texts
-    key = step_key("page", course.language, course.base_url, templates, inputs, text_key)
-    return PageRequest(inputs, text, course.language, course.base_url, templates, key)
+    """Make the request to draw a page."""
+    course = library.course
+    return PageRequest.of(
+        entry.inputs(library),
+        text_of(entry, library),
+        course.language,
+        course.base_url,
+        course.theme.template_texts,
+    )

@@ -127,7 +127,21 @@ class PageRequest(Struct, frozen=True):
     templates: Texts
     """The course's own templates."""
     key: str
-    """The key under which it is stored."""
+    """The key under which it is stored: a hash of all the others, and of the tool."""
+
+    @classmethod
+    def of(
+        cls,
+        inputs: PageInputs,
+        text: SourceText | None,
+        language: str,
+        base_url: str,
+        templates: Texts,
+    ) -> PageRequest:
+        """A request with its key."""
+        encoded_inputs, text_key = encode(inputs), "" if text is None else text.key
+        key = step_key("page", language, base_url, templates, encoded_inputs, text_key)
+        return cls(encoded_inputs, text, language, base_url, templates, key)
 
 
 class DrawnPage(Struct, frozen=True):
