@@ -31,7 +31,8 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.links import Reference, has_anchor
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import PageRecord
-from coursebuild.core.text.source import key_of
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.fingerprints import results_fingerprint
@@ -129,6 +130,16 @@ class Pages:
 
         links = set[Reference]().union(*(page.record.references for page in self._pages.values()))
         return all(exists(*link) for link in links)
+
+    def repeated_ids(self) -> Iterator[Diagnostic]:
+        """Report ids that several elements of a page have."""
+        for path, page in self._pages.items():
+            for name, start, end in page.record.repeated_ids:
+                document = page.entry.document(self._library)
+                source = Source(f"public/{path}", "") if document is None else document.source
+                message = f"the id `{name}` is already used on the finished page"
+                help = "give one of the two another id"
+                yield diagnose("anchor-repeated", source.span(start, end), message, help=help)
 
     def files(self, names: Names) -> Iterator[CachedFile]:
         """The pages in their frames."""

@@ -323,7 +323,7 @@ class PageReader:
             document = None if whole is None else whole.document
             renderer = self._renderer_for(request.language, request.templates, whole)
             head, html, context = draw(inputs, document, renderer)
-            page_record, body = record(head, html, request.base_url)
+            page_record, body = record(head, html, request.base_url, context)
             notes = page_notes(inputs, context, body)
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
             page_record = replace(page_record, notes=tuple(digests))

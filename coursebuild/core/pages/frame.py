@@ -44,6 +44,9 @@ PAGE_WORDS = (
 )
 """Interface texts that the page's script shows."""
 
+FRAME_IDS = frozenset(("_words",))
+"""The ids in `base.html`."""
+
 LOGO_HEIGHT = 28
 """Pixels, as in the style sheet."""
 
