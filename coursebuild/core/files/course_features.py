@@ -5,6 +5,8 @@ Entry point: `load_course_features`. These files are trusted as the course's scr
 
 from __future__ import annotations
 
+import ast
+import contextlib
 import hashlib
 import sys
 from pathlib import Path
@@ -24,6 +26,7 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
     features: list[Feature] = []
     diagnostics: list[Diagnostic] = []
     digest = hashlib.sha256()
+    imports: set[str] = set()
 
     def tell(entry: NamedPath, message: str, mend: str = "correct the file") -> None:
         help = f"{mend}, or take it out of `features` in the map"
@@ -36,6 +39,7 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
             tell(entry, error.message, "write it, as `coursebuild new feature NAME` does")
             continue
         digest.update(entry.path.encode() + b"\0" + code + b"\0")
+        imports |= _imported_modules(code)
         feature = _run(entry.path, code)
         if isinstance(feature, str):
             tell(entry, feature)
@@ -43,8 +47,21 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
             tell(entry, f"{entry.path}: {reason}")
         else:
             features.append(feature)
-    use_course_features(features, digest.hexdigest() if course.features else "")
+    features_hash = digest.hexdigest() if course.features else ""
+    use_course_features(features, features_hash, frozenset(imports))
     return tuple(diagnostics)
+
+
+def _imported_modules(code: bytes) -> set[str]:
+    """The top-level modules that a file imports anywhere; none if it does not parse."""
+    modules: set[str] = set()
+    with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        for node in ast.walk(ast.parse(code)):
+            if isinstance(node, ast.Import):
+                modules.update(alias.name.partition(".")[0] for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                modules.add(node.module.partition(".")[0])
+    return modules
 
 
 def _run(path: str, code: bytes) -> Feature | str:
