@@ -275,9 +275,9 @@ def _name_failures(offer: Any, feature: str = "", field: str = "") -> Any:
     subject = f"`{field}` of the feature `{feature}`"
 
     @functools.wraps(offer)
-    def call(*arguments: Any, **named: Any) -> Any:
+    def call(*arguments: Any, **keywords: Any) -> Any:
         with _named_failure(subject, arguments):
-            result = offer(*arguments, **named)
+            result = offer(*arguments, **keywords)
         return _iterate(result, subject, arguments) if isgenerator(result) else result
 
     return call

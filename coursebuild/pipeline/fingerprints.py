@@ -94,5 +94,5 @@ def results_fingerprint(results: Results, reports: Reports) -> str:
         )
         for t in results.trials
     )
-    shown = asdict(results) | {"runs": runs, "verdicts": verdicts, "trials": trials}
-    return fingerprint((tool_digest(), shown, reports), _WITHOUT_PLACES)
+    parts = asdict(results) | {"runs": runs, "verdicts": verdicts, "trials": trials}
+    return fingerprint((tool_digest(), parts, reports), _WITHOUT_PLACES)

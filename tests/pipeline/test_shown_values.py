@@ -48,10 +48,11 @@ class UndrawnDocuments(Documents):
 
 def read_library(folder: Folder, documents: Documents) -> Library:
     """A course that was built, as the next build has it."""
-    checked = read_and_verify(folder.options(), documents, static=True)
-    assert not isinstance(checked, Report) and checked.is_sound
+    checked_course = read_and_verify(folder.options(), documents, static=True)
+    assert not isinstance(checked_course, Report) and checked_course.is_sound
     assets = Assets(template_texts(), Bundle(), prepared_folder())
-    return Library(checked.course, checked.verification.results, assets, checked.reports)
+    results = checked_course.verification.results
+    return Library(checked_course.course, results, assets, checked_course.reports)
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +79,8 @@ def test_no_page_stays_when_a_value_changes_that_it_is_made_of(
         except (KeyError, StopIteration):
             broken.add(name)
             continue
-        kept = Pages(changed, documents, store, page_list(changed)).keys
-        stale += [f"{name}: {path}" for path, key in keys.items() if kept[path] != key]
+        kept_keys = Pages(changed, documents, store, page_list(changed)).keys
+        stale += [f"{name}: {path}" for path, key in keys.items() if kept_keys[path] != key]
     assert stale == []
     assert broken == BROKEN
 

@@ -26,11 +26,11 @@ def changes(value: object) -> dict[str, Any]:
 
     Each field of a type is changed once, in the first value of that type where it is not empty.
     """
-    found: dict[str, tuple[bool, Any]] = {}
+    values_by_name: dict[str, tuple[bool, Any]] = {}
     for name, is_filled, changed in _changes(value):
-        if name not in found or (is_filled and not found[name][0]):
-            found[name] = is_filled, changed
-    return {name: changed for name, (_, changed) in found.items()}
+        if name not in values_by_name or (is_filled and not values_by_name[name][0]):
+            values_by_name[name] = is_filled, changed
+    return {name: changed for name, (_, changed) in values_by_name.items()}
 
 
 def _changes(value: Any) -> Iterator[tuple[str, bool, Any]]:
@@ -40,7 +40,7 @@ def _changes(value: Any) -> Iterator[tuple[str, bool, Any]]:
         for name, hint in _hints(type(value)).items():
             part = getattr(value, name)
             label = f"{type(value).__name__}.{name}"
-            yield label, bool(part), replace(value, **{name: other(part, hint)})
+            yield label, bool(part), replace(value, **{name: replacement(part, hint)})
             for inner, is_filled, changed in _changes(part):
                 yield inner, is_filled, replace(value, **{name: changed})
     elif isinstance(value, tuple):
@@ -56,7 +56,7 @@ def _changes(value: Any) -> Iterator[tuple[str, bool, Any]]:
 @functools.cache
 def _hints(kind: type[Struct]) -> dict[str, Any]:
     """The types of the fields of a struct, also of those that its module imports for types only."""
-    names = {known.__name__: known for known in _subclasses(Struct)}
+    names = {struct.__name__: struct for struct in _subclasses(Struct)}
     hints = get_type_hints(kind, localns=names)
     return {name: hints[name] for name in kind.__struct_fields__}
 
@@ -67,7 +67,7 @@ def _subclasses(kind: type) -> Iterator[type]:
         yield from _subclasses(subclass)
 
 
-def other(value: Any, hint: Any) -> Any:
+def replacement(value: Any, hint: Any) -> Any:
     """Another value of a type."""
     kind = get_origin(hint) or hint
     members = get_args(hint)
@@ -78,7 +78,7 @@ def other(value: Any, hint: Any) -> Any:
             next(member for member in members if member is not NoneType) if members else str
         )
     if isinstance(value, tuple) and members and members[-1] is not ...:
-        return tuple(map(other, value, members))
+        return tuple(map(replacement, value, members))
     match value:
         case bool():
             return not value

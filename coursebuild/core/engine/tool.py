@@ -70,15 +70,16 @@ def _package_versions(
         record = "\n" + "".join(_lines_of(f"{folder}/RECORD"))
         if any(f"\n{module}{end}" in record for module in foreign_modules for end in "/."):
             pending.append((name, frozenset()))
-    found: dict[str, frozenset[str]] = {}
+    extras_by_name: dict[str, frozenset[str]] = {}
     while pending:
         name, extras = pending.pop()
-        known = found.get(name)
-        if known is None or not extras <= known:
-            found[name] = extras | (known or frozenset())
-            pending += _requirements(folders[name], found[name]) if name in folders else ()
+        if name not in extras_by_name or not extras <= extras_by_name[name]:
+            extras_by_name[name] = extras | extras_by_name.get(name, frozenset())
+            if name in folders:
+                pending += _requirements(folders[name], extras_by_name[name])
     # One that is missing may be installed next.
-    return tuple(os.path.basename(folders.get(name, name)) for name in sorted(found))  # noqa: PTH119
+    places = (folders.get(name, name) for name in sorted(extras_by_name))
+    return tuple(map(os.path.basename, places))
 
 
 @functools.lru_cache(maxsize=8)
@@ -114,8 +115,8 @@ def _requirements(folder: str, extras: frozenset[str]) -> Iterator[tuple[str, fr
         if match is not None:
             for_extras = {_normalize(extra) for extra in _EXTRA.findall(match[3])}
             if not for_extras or for_extras & extras:
-                asked = re.findall(r"[\w.-]+", match[2] or "")
-                yield _normalize(match[1]), frozenset(map(_normalize, asked))
+                extra_names = re.findall(r"[\w.-]+", match[2] or "")
+                yield _normalize(match[1]), frozenset(map(_normalize, extra_names))
 
 
 def _lines_of(path: str) -> Iterator[str]:

@@ -149,9 +149,10 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
         def has_id(block: Block) -> bool:
             return name in ids_and_addresses(str(self.blocks((block,))))[0]
 
-        found = {id(block): block for block in document_blocks(self.document) if has_id(block)}
-        outer = {key for key, b in found.items() if any(id(c) in found for c in child_blocks(b))}
-        places = [block.span.first_line() for key, block in found.items() if key not in outer]
+        blocks = [block for block in document_blocks(self.document) if has_id(block)]
+        ids = {id(block) for block in blocks}
+        inner = (b for b in blocks if not any(id(child) in ids for child in child_blocks(b)))
+        places = [block.span.first_line() for block in inner]
         return next(iter((*places[1:], *places)), self.document.source.span(0, 0))
 
     # what blocks need

@@ -82,10 +82,10 @@ def elements_with(
     html: str, attributes: Iterable[str]
 ) -> Iterator[tuple[str, Mapping[str, str | None]]]:
     """The names and attributes of elements that have any of these attributes, each once."""
-    page, found = _parse(html), set[int]()
+    page, node_ids = _parse(html), set[int]()
     for node in page.css(",".join(f"[{name}]" for name in attributes)):
-        if node.mem_id not in found:  # a node matches once for each of its attributes
-            found.add(node.mem_id)
+        if node.mem_id not in node_ids:  # a node matches once for each of its attributes
+            node_ids.add(node.mem_id)
             yield node.tag or "", node.attributes
 
 

@@ -66,16 +66,22 @@ def test_packages_count_that_the_tool_or_a_feature_needs(tmp_path: Path) -> None
     def versions(*names: str, modules: tuple[str, ...] = ()) -> list[str]:
         # A name of its own each time, so that nothing is remembered.
         marks.append(str(tmp_path / str(len(marks))))
-        found = package_versions(frozenset(names), frozenset(modules), (*marks, *path))
-        return [name.removesuffix(".dist-info") for name in found]
+        names_found = package_versions(frozenset(names), frozenset(modules), (*marks, *path))
+        return [name.removesuffix(".dist-info") for name in names_found]
 
     marks: list[str] = []
-    own = ["coursebuild-0.1.0", "jinja2-3.1.6", "markupsafe-3.0.4", "old_name-2.0", "quick-1"]
-    assert versions("coursebuild") == own
+    own_packages = [
+        "coursebuild-0.1.0",
+        "jinja2-3.1.6",
+        "markupsafe-3.0.4",
+        "old_name-2.0",
+        "quick-1",
+    ]
+    assert versions("coursebuild") == own_packages
     install(site, "black", "26.2")
-    assert versions("coursebuild") == own
+    assert versions("coursebuild") == own_packages
     install(site, "markupsafe", "3.0.5")
-    assert versions("coursebuild") == [part.replace("3.0.4", "3.0.5") for part in own]
+    assert versions("coursebuild") == [part.replace("3.0.4", "3.0.5") for part in own_packages]
     # Features of packages, and modules that those of a course import.
     mermaid = ["mermaid_fences-1.0", "mmdr-0.4.0", "novasvg"]
     assert versions("Mermaid.fences") == mermaid
