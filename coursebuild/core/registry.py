@@ -11,12 +11,15 @@ import hashlib
 import importlib
 import importlib.util
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from importlib.metadata import EntryPoint, entry_points
+from inspect import isgenerator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.features import (
     Exporter,
@@ -34,9 +37,12 @@ from coursebuild.core.model import Course, Document, FeatureBlock
 from coursebuild.core.model.results import Results, ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.rules import RULES
+from coursebuild.core.text.source import Span
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.assets import Assets
+    from coursebuild.core.syntax.fence import Fence
+    from coursebuild.core.syntax.texts import TextParser
 
 
 GROUP = "coursebuild.features"
@@ -74,6 +80,7 @@ _PAGE_NAME = re.compile("[a-z][a-z0-9-]*")
 
 _of_course: tuple[Feature, ...] = ()
 _digest = ""
+_imports: frozenset[str] = frozenset()
 
 
 def features() -> tuple[Feature, ...]:
@@ -81,12 +88,13 @@ def features() -> tuple[Feature, ...]:
     return _register((*installed_features(), *_of_course))
 
 
-def use_course_features(features: Iterable[Feature], digest: str) -> None:
-    """Set the course's own features, and a hash of their code."""
-    global _of_course, _digest
+def use_course_features(features: Iterable[Feature], digest: str, imports: frozenset[str]) -> None:
+    """Set the course's own features, a hash of their code, and the modules that it imports."""
+    global _of_course, _digest, _imports
     for name in _names(_of_course, "rules"):
         RULES.pop(name, None)
-    _of_course, _digest = _register(features), digest
+    _of_course, _digest = _register(map(_name_failures, features)), digest
+    _imports = imports
     for table in (_by_fence, _by_block, page_kinds):
         table.cache_clear()
 
@@ -94,6 +102,16 @@ def use_course_features(features: Iterable[Feature], digest: str) -> None:
 def features_digest() -> str:
     """A hash over the code of all features except coursebuild's own."""
     return hashlib.sha256("\0".join((_digest, *_package_lines())).encode()).hexdigest()
+
+
+def feature_packages() -> tuple[frozenset[str], frozenset[str]]:
+    """What features need besides their code.
+
+    The names of the distributions that offer features, and the modules that the course's own ones
+    import.
+    """
+    names = frozenset(point.dist.name for point in _entry_points() if point.dist is not None)
+    return names, _imports
 
 
 def find_clash(candidate: Feature, installed: Iterable[Feature]) -> str:
@@ -239,7 +257,73 @@ def installed_features() -> tuple[Feature, ...]:
         if reason := find_clash(feature, available):
             raise RuntimeError(f"the entry point {point.value} cannot be used: {reason}")
         available.append(feature)
-    return _register(available)
+    return _register(map(_name_failures, available))
+
+
+def _name_failures(offer: Any, feature: str = "", field: str = "") -> Any:
+    """A feature, or a part of it, whose functions say whose they are where they raise."""
+    if isinstance(offer, Feature | FenceKind | PageKind | ModelPart | Exporter | Trials):
+        name = offer.name if isinstance(offer, Feature) else feature
+        parts = {f: _name_failures(getattr(offer, f), name, f) for f in offer.__struct_fields__}
+        if isinstance(offer, FenceKind):
+            parts["parse"] = _name_failures(_check_result(offer), name, "parse")
+        return replace(offer, **parts)
+    if isinstance(offer, tuple):
+        return tuple(_name_failures(part, feature, field) for part in offer)
+    if not callable(offer) or isinstance(offer, type):
+        return offer
+    subject = f"`{field}` of the feature `{feature}`"
+
+    @functools.wraps(offer)
+    def call(*arguments: Any, **keywords: Any) -> Any:
+        with _named_failure(subject, arguments):
+            result = offer(*arguments, **keywords)
+        return _iterate(result, subject, arguments) if isgenerator(result) else result
+
+    return call
+
+
+def _iterate(values: Iterator[Any], subject: str, arguments: Iterable[object]) -> Iterator[Any]:
+    with _named_failure(subject, arguments):
+        yield from values
+
+
+@contextmanager
+def _named_failure(subject: str, arguments: Iterable[object]) -> Iterator[None]:
+    """Note with an exception what has failed, and for which text; its traceback shows the note."""
+    try:
+        yield
+    except Exception as error:
+        places = []
+        for argument in arguments:
+            span = getattr(argument, "span", None)
+            document = getattr(argument, "document", argument)
+            if isinstance(span, Span):
+                places.append(f"{span.path}:{span.line}")
+            elif isinstance(document, Document):
+                places.append(document.source.path)
+        error.add_note(f"this is {subject}" + (f", for {places[-1]}" if places else ""))
+        raise
+
+
+def _check_result(kind: FenceKind[Any]) -> Callable[[Fence, TextParser], Parsed[Any]]:
+    """The parsing function of a kind of fence, which raises where it returns something else."""
+
+    def parse(fence: Fence, texts: TextParser) -> Parsed[Any]:
+        parsed_block: object = kind.parse(fence, texts)
+        if not isinstance(parsed_block, Parsed):
+            got = f"a value of the type {type(parsed_block).__name__}"
+        elif not isinstance(parsed_block.value, kind.block | None):
+            got = f"`Parsed` with a value of the type {type(parsed_block.value).__name__}"
+        else:
+            return parsed_block
+        name = kind.block.__name__
+        raise TypeError(
+            f"`parse` returned {got}; return `Parsed(block, diagnostics)`, "
+            f"where the block is of the type {name}, or None"
+        )
+
+    return parse
 
 
 @functools.cache

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from msgspec import Struct
-from msgspec.structs import replace
+from msgspec.structs import asdict, replace
 
 from coursebuild.core.engine.tool import tool_digest
 from coursebuild.core.model import (
@@ -76,15 +76,23 @@ def course_fingerprint(course: Course, documents: Iterable[tuple[Document, str]]
 
 
 def results_fingerprint(results: Results, reports: Reports) -> str:
-    """The fingerprint of results, without times and without what no page shows."""
-    runs = tuple((r.path, r.outcome, r.status, r.stdout, r.missing) for r in results.runs)
+    """The fingerprint of results, without what no page shows, such as times.
+
+    Only what is left out is named here: a new field counts.
+    """
+    runs = tuple(
+        replace(run, stderr="", seconds=0.0, cached=False, trace=None) for run in results.runs
+    )
     verdicts = tuple(
-        (v.recording.span.path, v.recording.script, v.status, v.comparison)
-        for v in results.verdicts
+        asdict(verdict) | {"recording": (verdict.recording.span.path, verdict.recording.script)}
+        for verdict in results.verdicts
     )
     trials = tuple(
-        (t.span.path, replace(t.line, seconds=0.0, steps_per_second=None, cached=False), t.output)
+        (
+            t.span.path,
+            replace(t, line=replace(t.line, seconds=0.0, steps_per_second=None, cached=False)),
+        )
         for t in results.trials
     )
-    rest = results.formulas, results.models, results.python, results.engine
-    return fingerprint((tool_digest(), runs, verdicts, trials, rest, reports), _WITHOUT_PLACES)
+    parts = asdict(results) | {"runs": runs, "verdicts": verdicts, "trials": trials}
+    return fingerprint((tool_digest(), parts, reports), _WITHOUT_PLACES)

@@ -26,13 +26,14 @@ from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages.added_files import NotedPage
 from coursebuild.core.pages.common_files import PageFacts
-from coursebuild.core.pages.frame import Names, PageFrame
+from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.links import Reference, has_anchor
-from coursebuild.core.pages.page_list import PageEntry, page_list, page_title
+from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import PageRecord
-from coursebuild.core.text.source import key_of
-from coursebuild.core.values import decode, encode
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.source import Source, key_of
+from coursebuild.core.values import decode
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.fingerprints import results_fingerprint
 from coursebuild.pipeline.reading import PAGES, DrawnPage, PageRequest, SourceText
@@ -130,35 +131,26 @@ class Pages:
         links = set[Reference]().union(*(page.record.references for page in self._pages.values()))
         return all(exists(*link) for link in links)
 
+    def repeated_ids(self) -> Iterator[Diagnostic]:
+        """Report ids that several elements of a page have."""
+        for path, page in self._pages.items():
+            for name, start, end in page.record.repeated_ids:
+                document = page.entry.document(self._library)
+                source = Source(f"public/{path}", "") if document is None else document.source
+                message = f"the id `{name}` is already used on the finished page"
+                help = "give one of the two another id"
+                yield diagnose("anchor-repeated", source.span(start, end), message, help=help)
+
     def files(self, names: Names) -> Iterator[CachedFile]:
         """The pages in their frames."""
-        key = self._frame_key(names)
-        frame = PageFrame(self._library, names)
+        frame = PageFrame(FrameInputs.of(self._library, names), self._library.assets)
+        key = step_key("frame", frame.inputs)
         for path, page in self._pages.items():
             make = functools.partial(self._make_file, path, frame)
             yield CachedFile(path, key_of(page.key, key), make)
 
     def _make_file(self, path: str, frame: PageFrame) -> bytes:
         return frame_page(self._load(path), frame)
-
-    def _frame_key(self, names: Names) -> str:
-        """The key of all that a frame shows besides its page."""
-        course, results = self._library.course, self._library.results
-        return step_key(
-            "frame",
-            course.language,
-            course.title,
-            course.key,
-            course.base_url,
-            course.repository,
-            course.licence,
-            tuple((page.id, page.title, page.menu) for page in course.pages),
-            tuple((p.path, page_title(self._library, p)) for p in self._library.added_pages),
-            results.engine,
-            results.python,
-            course.theme.template_texts,
-            names,
-        )
 
     # --- keys
 
@@ -244,10 +236,12 @@ def text_of(entry: PageEntry, library: Library) -> SourceText | None:
 
 
 def page_request(entry: PageEntry, library: Library) -> PageRequest:
-    """Make the request to draw a page; its key is a hash of all that it shows and of its text."""
-    course, text = library.course, text_of(entry, library)
-    inputs = encode(entry.inputs(library))
-    text_key = "" if text is None else text.key
-    templates = course.theme.template_texts
-    key = step_key("page", course.language, course.base_url, templates, inputs, text_key)
-    return PageRequest(inputs, text, course.language, course.base_url, templates, key)
+    """Make the request to draw a page."""
+    course = library.course
+    return PageRequest.of(
+        entry.inputs(library),
+        text_of(entry, library),
+        course.language,
+        course.base_url,
+        course.theme.template_texts,
+    )

@@ -29,14 +29,14 @@ from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Document, document_scripts
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.summary import without_prose
-from coursebuild.core.pages.assets import strings_for
+from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.frame import parts_of
 from coursebuild.core.pages.page_inputs import PageHead, PageInputs
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.renderer import Renderer, known_mathml
-from coursebuild.core.pages.templates import Texts, templates_of
+from coursebuild.core.pages.templates import Texts
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import summarize
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -127,7 +127,21 @@ class PageRequest(Struct, frozen=True):
     templates: Texts
     """The course's own templates."""
     key: str
-    """The key under which it is stored."""
+    """The key under which it is stored: a hash of all the others, and of the tool."""
+
+    @classmethod
+    def of(
+        cls,
+        inputs: PageInputs,
+        text: SourceText | None,
+        language: str,
+        base_url: str,
+        templates: Texts,
+    ) -> PageRequest:
+        """A request with its key."""
+        encoded_inputs, text_key = encode(inputs), "" if text is None else text.key
+        key = step_key("page", language, base_url, templates, encoded_inputs, text_key)
+        return cls(encoded_inputs, text, language, base_url, templates, key)
 
 
 class DrawnPage(Struct, frozen=True):
@@ -309,7 +323,7 @@ class PageReader:
             document = None if whole is None else whole.document
             renderer = self._renderer_for(request.language, request.templates, whole)
             head, html, context = draw(inputs, document, renderer)
-            page_record, body = record(head, html, request.base_url)
+            page_record, body = record(head, html, request.base_url, context)
             notes = page_notes(inputs, context, body)
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
             page_record = replace(page_record, notes=tuple(digests))
@@ -336,9 +350,7 @@ class PageReader:
     ) -> Renderer:
         """Return a renderer with words, templates, and the formulas of a document."""
         if (language, templates) not in self._renderers:
-            texts = template_texts()
-            compiled_templates = templates_of(texts, prepared_folder(), templates)
-            strings = strings_for(texts, language)
-            self._renderers = {(language, templates): Renderer(strings, compiled_templates)}
+            assets = Assets(template_texts(), {}, prepared_folder())
+            self._renderers = {(language, templates): assets.renderer(language, templates)}
         renderer = self._renderers[language, templates]
         return renderer if whole is None else replace(renderer, formulas=whole.formulas)

@@ -127,9 +127,9 @@ class SiteMaker:
         if self.course.base_url:
             files.append(OutputFile(urls.SITEMAP, meta.sitemap(self.course, pages.indexed)))
         page_files = tuple(pages.files(names))
-        diagnostics: tuple[Diagnostic, ...] = ()
+        diagnostics = tuple(pages.repeated_ids())
         if entries is None and not pages.are_sound({file.path for file in files}):
-            diagnostics = tuple(broken_links(self.course, [*page_files, *files]))
+            diagnostics += tuple(broken_links(self.course, [*page_files, *files]))
         all_files = tuple(sorted((*page_files, *files), key=lambda file: file.path))
         return Site(all_files, file_list, diagnostics, tuple(pages.drawn_paths), names, pages.keys)
 

@@ -19,7 +19,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model import Document
 from coursebuild.core.model.results import OutputFile, SiteFile
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.frame import PageFrame
+from coursebuild.core.pages.frame import FrameInputs, PageFrame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.pipeline.documents import Documents
@@ -100,7 +100,7 @@ class Files:
     def _set_frame(self) -> None:
         names = self._sites[-1][0].names
         assert self._library is not None and names is not None
-        self._frame = PageFrame(self._library, names)
+        self._frame = PageFrame(FrameInputs.of(self._library, names), self._assets)
         self._framed_pages.clear()
 
     # --- lookup

@@ -178,7 +178,7 @@ class Session:
 
     def base(self) -> str:
         """The path under which the published site will be, with a slash at both ends."""
-        return "/" if self.course is None else urls.base_path(self.course)
+        return "/" if self.course is None else urls.base_path(self.course.base_url)
 
     def notify(self, *, is_saved: bool = False) -> None:
         """Say that there is news; `is_saved`: files were saved, so everything is checked again."""

@@ -227,3 +227,60 @@ def test_page_that_cannot_be_added_is_reported(inventory: Folder) -> None:
         result = inventory.main("check")
         assert result.status == 1
         assert f"error[feature-broken]: features/inventory.py: {message}" in result.out
+
+
+TIMELINE = SHOUT.replace(
+    "    text: str\n", "    text: str\n\n    def anchors(self):\n        return IDS\n"
+)
+DRAWN = 'lambda page, block: Markup(f"<p id=year-{block.text}>{block.text}</p>")'
+
+
+def test_equal_ids_of_blocks_of_a_feature_are_reported(course: Folder) -> None:
+    """Those that a block declares by `check`; all others, by `build`, on the finished page."""
+    draw = 'lambda page, block: Markup(f"<p>{escape(block.text.upper())}</p>")'
+    two = "## One\n\n```shout\n1905\n```\n\n> ```shout\n> 1905\n> ```\n"
+    course.write(course.lesson(), two)
+    for ids, drawing, command, message in (
+        ('(f"year-{self.text}",)', draw, "check", "the id `year-1905` is already used\n"),
+        ("()", DRAWN, "build", "the id `year-1905` is already used on the finished page\n"),
+    ):
+        code = TIMELINE.replace("IDS", ids).replace(draw, drawing)
+        course.write("features/shout.py", code)
+        for _ in range(2):  # the second one finds the page drawn
+            result = course.main(command)
+            assert result.status == 1
+            start = f"error[anchor-repeated]: {message}  --> {course.lesson()}:7:3\n"
+            assert result.out.startswith(start), result.out
+    assert not (course.root / "public").exists()
+    course.write(course.lesson(), two.replace("> 1905", "> 1906"))
+    assert course.main("build").status == 0
+
+
+FAILURES = {
+    "parse=parse": ("parse=lambda fence, texts: 1 / 0", "`parse` of the feature `shout`", ":3"),
+    "Parsed(Shout(fence.span, fence.body.text.strip()))": (
+        "Shout(fence.span, fence.body.text.strip())",
+        "`parse` of the feature `shout`",
+        ":3",
+    ),
+    "Markup(f": ("1 / 0 or Markup(f", "`draw` of the feature `shout`", ":3"),
+    "    rules=": (
+        "    check=lambda course, documents: (1 / 0 for _ in documents),\n    rules=",
+        "`check` of the feature `shout`",
+        "",
+    ),
+}
+
+
+def test_a_feature_that_fails_is_named_with_the_lesson(course: Folder) -> None:
+    summary = "    text: str\n\n    def summary(self):\n        return self\n"
+    code = SHOUT.replace("    text: str\n", summary)
+    for old, (new, subject, line) in FAILURES.items():
+        assert old in code
+        course.write("features/shout.py", code.replace(old, new, 1))
+        error = course.run("build").err
+        last_lines = error[error.rindex("\nTraceback") :]
+        assert f"this is {subject}" in last_lines
+        assert f"for {course.lesson()}{line}\n" in last_lines, error
+        if "Shout(fence" in new:
+            assert "TypeError: `parse` returned a value of the type Shout; return `Parsed(" in error

@@ -5,7 +5,8 @@ Entry points: `check_course`; `check_document`, the same for one document.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+import functools
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 
 from coursebuild.core.checks.links import LinkTargets, check_links, link_targets
 from coursebuild.core.model import (
@@ -54,7 +55,24 @@ def _check_features(course: Course, documents: Collection[Document]) -> Iterator
     """Yield what features find wrong in some documents of a course."""
     for feature in features():
         if feature.check is not None:
-            yield from feature.check(course, documents)
+            try:
+                yield from feature.check(course, documents)
+            except Exception as error:
+                path = _find_failing(functools.partial(feature.check, course), documents)
+                error.add_note(f"it fails for {path}" if path else "it fails for no text alone")
+                raise
+
+
+def _find_failing(
+    check: Callable[[Collection[Document]], Iterable[Diagnostic]], documents: Iterable[Document]
+) -> str:
+    """The path of the first document whose check raises an exception; empty if none does."""
+    for document in documents:
+        try:
+            tuple(check((document,)))
+        except Exception:
+            return document.source.path
+    return ""
 
 
 def _check_empty_lesson(course: Course, document: Document) -> Iterator[Diagnostic]:

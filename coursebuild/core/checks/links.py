@@ -21,8 +21,6 @@ from coursebuild.core.model import (
     Course,
     Document,
     ExampleTarget,
-    FeatureBlock,
-    Heading,
     HtmlBlock,
     Image,
     LessonTarget,
@@ -32,14 +30,13 @@ from coursebuild.core.model import (
     ModelTarget,
     PageTarget,
     RawInline,
-    Recording,
-    Script,
     Target,
     Term,
     TermTarget,
     UrlTarget,
     block_inlines,
     computed_once,
+    document_anchors,
     document_blocks,
     document_scripts,
     find_inlines,
@@ -49,12 +46,9 @@ from coursebuild.core.model import (
     listing_anchor,
     local_file,
     model_anchors,
-    output_anchor,
-    output_numbers,
     resolve,
     walk_inlines,
 )
-from coursebuild.core.model.equations import display_formulas
 from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Span
@@ -63,7 +57,6 @@ _NamedTarget: TypeAlias = (
     LessonTarget | LevelTarget | PageTarget | ModelTarget | ExampleTarget | TermTarget
 )
 
-_HTML_ID = re.compile(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
 _HTML_ANCHOR = re.compile(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
 
 
@@ -105,37 +98,13 @@ def link_targets(course: Course) -> LinkTargets:
 def anchors(document: Document) -> Mapping[str, Span]:
     """The ids that a link may name in a document, and the spans to which they lead.
 
-    Ids of its title, headings, quizzes, listings, outputs, formulas and terms, and those in raw
-    HTML; for lines of scripts, see `_check_anchor`. They are kept with the document.
+    For lines of scripts, see `_check_anchor`. They are kept with the document.
     """
-    return computed_once(document, "anchors", lambda: dict(_anchors(document)))
 
+    def collect() -> dict[str, Span]:
+        return {id: span for id, _, span in document_anchors(document)}
 
-def _anchors(document: Document) -> Iterator[tuple[str, Span]]:
-    if document.title_anchor:
-        yield document.title_anchor, document.source.span(0, 0)
-    numbers = output_numbers(document)
-    # A summary does not say where formulas stand.
-    yield from ((formula.id, document.source.span(0, 0)) for formula in document.equations)
-    if document.summaries is None:
-        for displayed in filter(lambda formula: formula.id, display_formulas(document)):
-            yield displayed.id, document.source.span(displayed.start, displayed.start)
-    for block in document_blocks(document):
-        if isinstance(block, Heading):
-            yield block.anchor, block.span
-        elif isinstance(block, FeatureBlock):
-            yield from ((id, block.span) for id in block.anchors())
-        elif isinstance(block, Script):
-            yield listing_anchor(block.path), block.span
-        elif isinstance(block, Recording) and block.script is not None:
-            yield output_anchor(block.script, numbers[block.span.start]), block.span
-        elif isinstance(block, HtmlBlock):
-            yield from ((id, block.span) for id in _HTML_ID.findall(block.html))
-        for inline in walk_inlines(block_inlines(block)):
-            if isinstance(inline, RawInline):
-                yield from ((id, inline.span) for id in _HTML_ID.findall(inline.html))
-            elif isinstance(inline, Term):
-                yield inline.anchor, inline.span
+    return computed_once(document, "anchors", collect)
 
 
 def check_links(course: Course, document: Document, targets: LinkTargets) -> Iterator[Diagnostic]:

@@ -3,9 +3,9 @@
 Entry points: `tool_digest()`; `typesetter_digest()`, of what typesets formulas; `code_digest`, of
 parts of the code, by content; `step_key`, the keys of what the tool makes.
 
-A digest covers the names and versions of all installed packages, since the tool may import any of
-them. Of files it covers sizes and times, so that none has to be read; a tool that was installed
-again therefore makes everything again, even if it is the same.
+A digest covers the packages that the tool and its features may import (`package_versions`), by
+name and version. Of files it covers sizes and times, so that none has to be read; a tool that was
+installed again therefore makes everything again, even if it is the same.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ import contextlib
 import functools
 import hashlib
 import os
+import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.resources import assets_dir, templates_dir
-from coursebuild.core.registry import features_digest
+from coursebuild.core.registry import feature_packages, features_digest
 from coursebuild.core.values import fingerprint
 
 _CORE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120
@@ -28,7 +29,8 @@ _CORE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH
 
 def tool_digest() -> str:
     """A hash over everything that the tool consists of, including Python and others' features."""
-    return hashlib.sha256(f"{_tool()}\0{features_digest()}".encode()).hexdigest()
+    parts = _tool(), features_digest(), *package_versions(*feature_packages())
+    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()
 
 
 @functools.cache
@@ -42,20 +44,93 @@ def typesetter_digest() -> str:
     return _digest(str(assets_dir() / "temml"), os.path.join(_CORE, "run"))  # noqa: PTH118
 
 
-@functools.cache
-def _installed_packages() -> str:
-    """The names and versions of all installed packages, from their `.dist-info` folders."""
-    packages: list[str] = []
-    for folder in sys.path:
+def package_versions(
+    names: frozenset[str],
+    modules: frozenset[str] = frozenset(),
+    path: Sequence[str] = sys.path,
+) -> tuple[str, ...]:
+    """The names and versions of packages and of all that they need, from their `.dist-info`.
+
+    Given are the names of some, and modules that others hold. Without a package of a name, as where
+    the tool was never installed, all installed ones count.
+    """
+    return _package_versions(names, modules, tuple(path))
+
+
+@functools.lru_cache(maxsize=8)
+def _package_versions(
+    names: frozenset[str], modules: frozenset[str], path: tuple[str, ...]
+) -> tuple[str, ...]:
+    folders = _dist_info_folders(path)
+    pending = [(_normalize(name), frozenset[str]()) for name in names]
+    if not all(name in folders for name, _ in pending):
+        return tuple(sorted(os.path.basename(folder) for folder in folders.values()))  # noqa: PTH119
+    foreign_modules = modules - sys.stdlib_module_names
+    for name, folder in folders.items() if foreign_modules else ():
+        record = "\n" + "".join(_lines_of(f"{folder}/RECORD"))
+        if any(f"\n{module}{end}" in record for module in foreign_modules for end in "/."):
+            pending.append((name, frozenset()))
+    extras_by_name: dict[str, frozenset[str]] = {}
+    while pending:
+        name, extras = pending.pop()
+        if name not in extras_by_name or not extras <= extras_by_name[name]:
+            extras_by_name[name] = extras | extras_by_name.get(name, frozenset())
+            if name in folders:
+                pending += _requirements(folders[name], extras_by_name[name])
+    # One that is missing may be installed next.
+    places = (folders.get(name, name) for name in sorted(extras_by_name))
+    return tuple(map(os.path.basename, places))
+
+
+@functools.lru_cache(maxsize=8)
+def _dist_info_folders(path: tuple[str, ...]) -> dict[str, str]:
+    """The `.dist-info` folders that Python finds, by name of the package."""
+    folders: dict[str, str] = {}
+    for folder in path:
         with contextlib.suppress(OSError):
-            names = os.listdir(folder or ".")  # noqa: PTH208
-            packages += sorted(name for name in names if name.endswith(".dist-info"))
-    return "\0".join(packages)
+            for entry in sorted(os.listdir(folder or ".")):  # noqa: PTH208
+                if entry.endswith(".dist-info"):
+                    name = _normalize(entry.partition("-")[0])
+                    folders.setdefault(name, os.path.join(folder, entry))  # noqa: PTH118
+    return folders
+
+
+def _normalize(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+_REQUIREMENT = re.compile(r"Requires-Dist: *([\w.-]+) *(?:\[([^\]]*)\])?(.*)")
+_EXTRA = re.compile(r"""\bextra *== *["']([\w.-]+)["']""")
+
+
+def _requirements(folder: str, extras: frozenset[str]) -> Iterator[tuple[str, frozenset[str]]]:
+    """What a package needs with some of its extras, each with the extras asked of it.
+
+    Markers of systems do not matter: what they exclude is not installed.
+    """
+    for line in _lines_of(f"{folder}/METADATA"):
+        if line == "\n":  # a description follows
+            return
+        match = _REQUIREMENT.match(line)
+        if match is not None:
+            for_extras = {_normalize(extra) for extra in _EXTRA.findall(match[3])}
+            if not for_extras or for_extras & extras:
+                extra_names = re.findall(r"[\w.-]+", match[2] or "")
+                yield _normalize(match[1]), frozenset(map(_normalize, extra_names))
+
+
+def _lines_of(path: str) -> Iterator[str]:
+    with (
+        contextlib.suppress(OSError),
+        open(path, encoding="utf-8", errors="surrogateescape") as file,  # noqa: PTH123
+    ):
+        yield from file
 
 
 def _digest(*folders: str) -> str:
+    own_packages = package_versions(frozenset({"coursebuild"}))
     digest = hashlib.sha256(
-        f"{sys.version}\0{_installed_packages()}\0".encode("utf-8", "surrogateescape")
+        "\0".join((sys.version, *own_packages, "")).encode("utf-8", "surrogateescape")
     )
     for folder in folders:
         for line in _lines(folder, ""):

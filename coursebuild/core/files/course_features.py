@@ -6,6 +6,7 @@ may run: see `pipeline.load`.
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import hashlib
 import sys
@@ -25,6 +26,7 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
     """Load the features of a course into this process; return diagnostics about them."""
     features: list[Feature] = []
     diagnostics: list[Diagnostic] = []
+    imports: set[str] = set()
 
     def tell(entry: NamedPath, message: str, mend: str = "correct the file") -> None:
         help = f"{mend}, or take it out of `features` in the map"
@@ -36,6 +38,7 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
         except EffectError as error:
             tell(entry, error.message, "write it, as `coursebuild new feature NAME` does")
             continue
+        imports |= _imported_modules(code)
         feature = _run(entry.path, code)
         if isinstance(feature, str):
             tell(entry, feature)
@@ -43,7 +46,8 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
             tell(entry, f"{entry.path}: {reason}")
         else:
             features.append(feature)
-    use_course_features(features, features_digest(root, course) if course.features else "")
+    features_hash = features_digest(root, course) if course.features else ""
+    use_course_features(features, features_hash, frozenset(imports))
     return tuple(diagnostics)
 
 
@@ -54,6 +58,18 @@ def features_digest(root: Path, course: Course) -> str:
         with contextlib.suppress(EffectError):
             digest.update(entry.path.encode() + b"\0" + read_bytes(root, entry.path) + b"\0")
     return digest.hexdigest()
+
+
+def _imported_modules(code: bytes) -> set[str]:
+    """The top-level modules that a file imports anywhere; none if it does not parse."""
+    modules: set[str] = set()
+    with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        for node in ast.walk(ast.parse(code)):
+            if isinstance(node, ast.Import):
+                modules.update(alias.name.partition(".")[0] for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                modules.add(node.module.partition(".")[0])
+    return modules
 
 
 def _run(path: str, code: bytes) -> Feature | str:

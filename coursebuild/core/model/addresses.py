@@ -1,19 +1,47 @@
 """Relative addresses in a document, and the anchors of listings, outputs and models.
 
-Entry points: `local_file`, `resolve`; `listing_anchor`, `line_anchor`, `output_anchor` and
-`model_anchors`. A link to the file of a lesson or page means the lesson or page itself, so that the
-same link works on the site and where the files are read.
+Entry points: `local_file`, `resolve`; `document_anchors`, all of a document; `listing_anchor`,
+`line_anchor`, `output_anchor` and `model_anchors`. A link to the file of a lesson or page means the
+lesson or page itself, so that the same link works on the site and where the files are read.
 """
 
 from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from typing import TypeAlias
 from urllib.parse import unquote, urlsplit
 
+from coursebuild.core.model.blocks import (
+    Block,
+    Document,
+    Equation,
+    FeatureBlock,
+    Heading,
+    HtmlBlock,
+    Recording,
+    Script,
+)
 from coursebuild.core.model.course import Course
-from coursebuild.core.model.inlines import LessonTarget, PageTarget, Target, UrlTarget
+from coursebuild.core.model.equations import DisplayFormula, display_formulas
+from coursebuild.core.model.inlines import (
+    Inline,
+    LessonTarget,
+    PageTarget,
+    RawInline,
+    Target,
+    Term,
+    UrlTarget,
+)
+from coursebuild.core.model.walk import (
+    block_inlines,
+    document_blocks,
+    find_blocks,
+    output_numbers,
+    walk_inlines,
+)
+from coursebuild.core.text.source import Source, Span
 
 
 def local_file(url: str, document_path: str) -> str:
@@ -41,6 +69,58 @@ def resolve(target: Target, course: Course, document_path: str) -> Target:
         if lesson.path == path:
             return LessonTarget(lesson.id, anchor)
     return target
+
+
+AnchorOwner: TypeAlias = Block | Inline | DisplayFormula | Equation | Source
+"""What an anchor of a document leads to; a source for the title of a page."""
+
+_HTML_ID = re.compile(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
+_NO_MARKUP = re.compile(
+    r"<!--.*?-->|(<(script|style|textarea|title)\b[^>]*>).*?</\2\s*>", re.IGNORECASE | re.DOTALL
+)
+
+
+def document_anchors(document: Document) -> Iterator[tuple[str, AnchorOwner, Span]]:
+    """The ids that a link may name in a document, with what they lead to and its place.
+
+    Ids of its title, headings, blocks of features, listings, outputs, formulas and terms, and those
+    in raw HTML; not those of single lines of listings.
+    """
+    source = document.source
+    if document.title_anchor:
+        yield document.title_anchor, source, source.span(0, 0)
+    # A summary does not say where formulas stand.
+    yield from ((formula.id, formula, source.span(0, 0)) for formula in document.equations)
+    if document.summaries is None:
+        for displayed in filter(lambda formula: formula.id, display_formulas(document)):
+            yield displayed.id, displayed, source.span(displayed.start, displayed.start)
+    numbers = output_numbers(document)
+    for block in document_blocks(document):
+        if isinstance(block, Heading):
+            yield block.anchor, block, block.span
+        elif isinstance(block, FeatureBlock):
+            yield from ((id, block, block.span) for id in block.anchors() if id)
+        elif isinstance(block, Script):
+            yield listing_anchor(block.path), block, block.span
+        elif isinstance(block, Recording) and block.script is not None:
+            yield output_anchor(block.script, numbers[block.span.start]), block, block.span
+        elif isinstance(block, HtmlBlock):
+            yield from ((id, block, block.span) for id in _html_ids(block.html))
+        for inline in walk_inlines(block_inlines(block)):
+            if isinstance(inline, RawInline):
+                yield from ((id, inline, inline.span) for id in _html_ids(inline.html))
+            elif isinstance(inline, Term):
+                yield inline.anchor, inline, inline.span
+
+
+def _html_ids(html: str) -> list[str]:
+    return _HTML_ID.findall(_NO_MARKUP.sub(r"\1", html))
+
+
+def heading_anchors(document: Document) -> frozenset[str]:
+    """The anchors of a document's headings and of its title."""
+    anchors = (heading.anchor for heading in find_blocks(document, Heading))
+    return frozenset((document.title_anchor, *anchors)) - {""}
 
 
 def listing_anchor(path: str) -> str:

@@ -310,7 +310,11 @@ class FeatureBlock(Struct, frozen=True):
         return None
 
     def anchors(self) -> tuple[str, ...]:
-        """The ids that a link may name; `check` of its feature reports those already in use."""
+        """The ids that it has on its page, where nothing else has them; links may name them."""
+        return ()
+
+    def optional_anchors(self) -> tuple[str, ...]:
+        """Those of its anchors that it leaves to a heading or title which has the same."""
         return ()
 
     def quoted_lines(self) -> tuple[tuple[str, int], ...]:

@@ -9,6 +9,7 @@ on other pages too.
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import NamedTuple
 
 from coursebuild.core.model.blocks import Document, FeatureBlock, Heading
@@ -20,7 +21,7 @@ from coursebuild.core.model.walk import (
     find_blocks,
     walk_blocks,
 )
-from coursebuild.core.text.source import key_of, unique_name
+from coursebuild.core.text.source import key_of
 
 
 class DisplayFormula(NamedTuple):
@@ -55,16 +56,24 @@ def display_formulas(document: Document) -> tuple[DisplayFormula, ...]:
         if formula.display
     ]
     used_ids = {formula.label.id for formula, _ in candidates if formula.label is not None}
+    counts = Counter[str]()
     formulas: list[DisplayFormula] = []
     for formula, has_no_id in candidates:
         label, id_ = formula.label, ""
         if not has_no_id:
-            id_ = label.id if label is not None else _make_id(formula.tex.text, used_ids)
+            id_ = label.id if label is not None else _make_id(formula.tex.text, used_ids, counts)
             used_ids.add(id_)
         formulas.append(DisplayFormula(formula.span.start, formula.tex.text, label, id_))
     return tuple(formulas)
 
 
-def _make_id(tex: str, used_ids: set[str]) -> str:
-    """Make the id of a formula without a label; a repeated formula gets a number."""
-    return unique_name(f"eq:{key_of(' '.join(tex.split()))[:8]}", used_ids)
+def _make_id(tex: str, used_ids: set[str], counts: Counter[str]) -> str:
+    """Make the id of a formula without a label; a repeated formula gets a number.
+
+    `counts` has the last number given to each.
+    """
+    base = id = f"eq:{key_of(' '.join(tex.split()))[:8]}"
+    while id in used_ids:
+        counts[base] = max(2, counts[base] + 1)
+        id = f"{base}-{counts[base]}"
+    return id

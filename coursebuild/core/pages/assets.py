@@ -17,7 +17,10 @@ from pathlib import Path
 
 from msgspec import Struct
 
+from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import DEFAULT_LANGUAGE, Strings, parse_strings
+from coursebuild.core.pages.templates import Texts, templates_of
 from coursebuild.core.registry import features
 
 SCRIPTS = {
@@ -41,6 +44,16 @@ class Assets(Struct, frozen=True):
     bytes, perhaps read on access."""
     compiled_templates: Path | None = None
     """The folder of the compiled templates; see `templates_of`."""
+
+    def renderer(
+        self,
+        language: str,
+        course_templates: Texts = (),
+        formulas: Mapping[Formula, str | MathError] = {},
+    ) -> Renderer:
+        """The renderer of pages in a language, with the templates of a course and of the tool."""
+        templates = templates_of(self.templates, self.compiled_templates, course_templates)
+        return Renderer(strings_for(self.templates, language), templates, formulas)
 
     def template(self, path: str) -> str:
         """The text of a file of `templates/` (`KeyError` where there is none)."""

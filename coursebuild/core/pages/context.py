@@ -30,17 +30,21 @@ from coursebuild.core.model import (
     Script,
     Target,
     UrlTarget,
+    child_blocks,
+    document_blocks,
     sibling_groups,
 )
 from coursebuild.core.pages import blocks, formulas, urls
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.document_inputs import file_address
 from coursebuild.core.pages.equations import number_equations
+from coursebuild.core.pages.links import ids_and_addresses
 from coursebuild.core.pages.markup import HtmlWriter, SpecialBlock
 from coursebuild.core.pages.page_inputs import DocumentInputs
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.registry import kind_of_block
+from coursebuild.core.text.source import Span
 
 
 class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
@@ -135,6 +139,21 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
                 return kind_of_block(block).draw(self, block)
             case _:
                 assert_never(block)
+
+    def find_repetition(self, name: str) -> Span:
+        """The place of the second block that draws an element with this id.
+
+        It is that of the only one if the page itself has the id, too.
+        """
+
+        def has_id(block: Block) -> bool:
+            return name in ids_and_addresses(str(self.blocks((block,))))[0]
+
+        blocks = [block for block in document_blocks(self.document) if has_id(block)]
+        ids = {id(block) for block in blocks}
+        inner = (b for b in blocks if not any(id(child) in ids for child in child_blocks(b)))
+        places = [block.span.first_line() for block in inner]
+        return next(iter((*places[1:], *places)), self.document.source.span(0, 0))
 
     # what blocks need
 

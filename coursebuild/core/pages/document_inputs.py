@@ -51,7 +51,7 @@ def document_inputs(
         trials={start: value for start, value in trials if value is not None},
         blocks={b.span.start: make(library, place, b) for b, make in values if make is not None},
         keyframes={n: library.facts[n].keyframes for n in models if n in library.facts},
-        address=urls.absolute(library.course, place.path),
+        address=urls.absolute(library.course.base_url, place.path),
     )
 
 

@@ -1,6 +1,7 @@
 """The frame of pages: head, site navigation, foot.
 
-Entry point: `PageFrame`, whose `render` puts the frame around the body of a page.
+Entry points: `FrameInputs`, what frames show of a course; `PageFrame`, whose `render` puts the
+frame around the body of a page.
 
 Pages are drawn in two steps because a page's head refers to the style sheet by a hash of its
 content, and the style sheet names the fonts, which depend on the characters of all pages.
@@ -17,11 +18,14 @@ from msgspec import Struct
 
 from coursebuild.core.features import PagePart
 from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_title
+from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.templates import Texts
 from coursebuild.core.registry import features, page_copies, page_kind
 
 PAGE_WORDS = (
@@ -39,6 +43,9 @@ PAGE_WORDS = (
     "search.failed",
 )
 """Interface texts that the page's script shows."""
+
+FRAME_IDS = frozenset(("_words",))
+"""The ids in `base.html`."""
 
 LOGO_HEIGHT = 28
 """Pixels, as in the style sheet."""
@@ -97,9 +104,9 @@ class NavLink(Struct, frozen=True):
     current: bool
 
 
-def place_of(library: Library, path: str) -> urls.Place:
+def place_of(base_url: str, path: str) -> urls.Place:
     """The place of a page: the page for missing addresses is served at any depth."""
-    return urls.Place(path, urls.base_path(library.course) if path == urls.NOT_FOUND else None)
+    return urls.Place(path, urls.base_path(base_url) if path == urls.NOT_FOUND else None)
 
 
 def parts_by_mark() -> dict[str, PagePart]:
@@ -116,31 +123,80 @@ def parts_of(body: str, kind: str) -> tuple[str, ...]:
     )
 
 
+class FrameInputs(Struct, frozen=True):
+    """All that the frame of pages shows besides the page; a hash of it is the key of the frame."""
+
+    language: str
+    title: str
+    """Of the course."""
+    course_key: str
+    """See `Course.key`."""
+    base_url: str
+    licence: str
+    source: str
+    """The address of the course's repository; empty where a reader cannot use it."""
+    menu: tuple[tuple[str, str], ...]
+    """Site paths and titles of the pages in the menu of every page, besides the home page."""
+    added_pages: tuple[tuple[str, str], ...]
+    """Those of the pages that features add."""
+    engine: str
+    """Version of MuJoCo that ran the scripts."""
+    python: str
+    templates: Texts
+    """The course's own."""
+    names: Names
+
+    @classmethod
+    def of(cls, library: Library, names: Names) -> FrameInputs:
+        """What the frame shows of a course whose shared files have these names."""
+        course, results = library.course, library.results
+        return cls(
+            language=course.language or "en",
+            title=course.title,
+            course_key=course.key,
+            base_url=course.base_url,
+            licence=course.licence,
+            source=course.repository if "{path}" not in course.repository else "",
+            menu=tuple((urls.page_path(page), page.title) for page in library.menu),
+            added_pages=tuple((k.path, page_title(library, k)) for k in library.added_pages),
+            engine=results.engine,
+            python=results.python,
+            templates=course.theme.template_texts,
+            names=names,
+        )
+
+
 class PageFrame(Struct, frozen=True):
     """The frame around every page of a site."""
 
-    library: Library
-    names: Names
+    inputs: FrameInputs
+    assets: Assets
+    """Files of the tool alone."""
 
     def render(self, head: PageHead, parts: tuple[str, ...], body: str) -> str:
-        """The whole page around a body that has these parts; see `parts_of`."""
-        library, names = self.library, self.names
-        course, kind = library.course, page_kind(head.kind)
-        language, place = course.language or "en", place_of(library, head.path)
-        html = library.render(
+        """The whole page around a body that has these parts; see `parts_of`.
+
+        The course is out of reach here: what a frame is to show of it becomes a field of its inputs
+        first.
+        """
+        inputs, names, kind = self.inputs, self.inputs.names, page_kind(head.kind)
+        renderer = self.assets.renderer(inputs.language, inputs.templates)
+        place = place_of(inputs.base_url, head.path)
+        html = renderer.render(
             "base.html",
+            frame=inputs,
             body=Markup(body),
             policy=policy(head.json_ld, form=kind is not None and kind.form),
-            head_title=meta.head_title(course, head.title, head.kind),
+            head_title=meta.head_title(inputs.title, head.title, head.kind),
             description=head.description,
-            social=meta.social(course, head),
-            canonical=urls.absolute(course, head.path) if head.path != urls.NOT_FOUND else "",
+            social=meta.social(inputs.title, inputs.base_url, head),
+            canonical=""
+            if head.path == urls.NOT_FOUND
+            else urls.absolute(inputs.base_url, head.path),
             json_ld=head.json_ld,
             copies=_copies(head.path),
             kind=head.kind,
-            language=language,
-            direction=direction(language),
-            course_key=course.key,
+            direction=direction(inputs.language),
             root=place.href(urls.HOME).removesuffix(urls.HOME),
             robots="" if head.indexed else "noindex",
             icon=place.href(names.icon),
@@ -154,12 +210,9 @@ class PageFrame(Struct, frozen=True):
             logo_size=(names.logo_width, LOGO_HEIGHT) if names.logo_width else (),
             home=place.href(urls.HOME),
             credits=place.href(names.credits),
-            menu=_links(place, ((urls.page_path(page), page.title) for page in library.menu)),
-            own=_links(place, ((k.path, page_title(library, k)) for k in library.added_pages)),
-            course=course,
-            source=course.repository if "{path}" not in course.repository else "",
-            results=library.results,
-            page_words=_page_words(library, parts),
+            menu=_links(place, inputs.menu),
+            own=_links(place, inputs.added_pages),
+            page_words=_page_words(renderer.words, parts),
         )
         return f"{visible(html)}\n"
 
@@ -192,9 +245,9 @@ def _part_scripts(
     return tuple((name, href) for href, name in name_by_href.items())
 
 
-def _page_words(library: Library, parts: tuple[str, ...]) -> tuple[str, ...]:
+def _page_words(words: Strings, parts: tuple[str, ...]) -> tuple[str, ...]:
     """The keys of the interface texts that the page carries for its scripts."""
-    keys = library.words.texts
+    keys = words.texts
     known_parts = parts_by_mark()
     used_keys = [key for mark in parts for key in known_parts[mark].texts]
     prefixes = tuple(key for key in used_keys if key.endswith("."))

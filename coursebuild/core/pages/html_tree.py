@@ -81,9 +81,12 @@ def parse_html(html: str) -> list[HtmlContent]:
 def elements_with(
     html: str, attributes: Iterable[str]
 ) -> Iterator[tuple[str, Mapping[str, str | None]]]:
-    """The names and attributes of elements that have any of these attributes."""
-    for node in _parse(html).css(",".join(f"[{name}]" for name in attributes)):
-        yield node.tag or "", node.attributes
+    """The names and attributes of elements that have any of these attributes, each once."""
+    page, node_ids = _parse(html), set[int]()
+    for node in page.css(",".join(f"[{name}]" for name in attributes)):
+        if node.mem_id not in node_ids:  # a node matches once for each of its attributes
+            node_ids.add(node.mem_id)
+            yield node.tag or "", node.attributes
 
 
 def _parse(html: str) -> LexborHTMLParser:

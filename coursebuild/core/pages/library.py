@@ -44,7 +44,6 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets, strings_for
 from coursebuild.core.pages.renderer import Renderer, known_mathml
 from coursebuild.core.pages.strings import Strings
-from coursebuild.core.pages.templates import templates_of
 from coursebuild.core.registry import feature_trials, page_kinds, publish_trials, summarize
 from coursebuild.numerics.reports import Reports
 
@@ -229,9 +228,8 @@ class Library(Struct, frozen=True, dict=True):
     @cached_property
     def renderer(self) -> Renderer:
         """The renderer of pages."""
-        assets, theme = self.assets, self.course.theme
-        templates = templates_of(assets.templates, assets.compiled_templates, theme.template_texts)
-        return Renderer(self.words, templates, dict(self.results.formulas))
+        course, formulas = self.course, dict(self.results.formulas)
+        return self.assets.renderer(course.language, course.theme.template_texts, formulas)
 
     def render(self, template: str, **values: object) -> Markup:
         """A filled-in template; see `Renderer`."""

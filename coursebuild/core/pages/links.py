@@ -76,7 +76,7 @@ def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[Broken
     """The broken links in a site that is served at `base_url`."""
     contents = {file.path: file.data for file in files}
     pages = {
-        path: ids_and_addresses(data.decode())
+        path: ids_and_addresses(data.decode())[:2]
         for path, data in contents.items()
         if path.endswith(".html")
     }
@@ -90,18 +90,22 @@ def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[Broken
     return tuple(sorted(broken, key=lambda link: (link.page, link.url)))
 
 
-def ids_and_addresses(html: str) -> tuple[frozenset[str], frozenset[str]]:
-    """The ids in the text of a page, and the addresses in it."""
+def ids_and_addresses(html: str) -> tuple[frozenset[str], frozenset[str], frozenset[str]]:
+    """The ids in the text of a page, the addresses, and the ids that several elements have."""
     ids: set[str] = set()
+    repeated_ids: set[str] = set()
+    names: set[str] = set()
     addresses: set[str] = set()
     for tag, attributes in elements_with(html, _LINK_ATTRIBUTES):
         for name, value in attributes.items():
-            if name == "id" or (name == "name" and tag == "a"):
-                ids.add(value or "")
+            if name == "id":
+                (repeated_ids if value in ids else ids).add(value or "")
+            elif name == "name" and tag == "a":
+                names.add(value or "")
             elif name in _ADDRESSES.get(tag, ()):
                 is_list = name == "srcset"
                 addresses.update(_srcset(value or "") if is_list else (value or "",))
-    return frozenset(ids), frozenset(addresses)
+    return frozenset(ids | names), frozenset(addresses), frozenset(repeated_ids)
 
 
 def references(path: str, addresses: Iterable[str], base_url: str) -> frozenset[Reference]:

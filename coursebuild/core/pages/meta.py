@@ -23,19 +23,19 @@ from coursebuild.core.pages.page_inputs import PageHead
 Json: TypeAlias = "str | int | list[Json] | dict[str, Json]"
 
 
-def head_title(course: Course, title: str, kind: str) -> str:
+def head_title(course_title: str, title: str, kind: str) -> str:
     """The title for the browser's tab: the page, then the course."""
-    return title if kind == "home" or title == course.title else f"{title} · {course.title}"
+    return title if kind == "home" or title == course_title else f"{title} · {course_title}"
 
 
-def social(course: Course, head: PageHead) -> tuple[tuple[str, str], ...]:
+def social(course_title: str, base_url: str, head: PageHead) -> tuple[tuple[str, str], ...]:
     """Open Graph properties."""
     pairs = (
         ("og:type", "article" if head.kind == "lesson" else "website"),
-        ("og:site_name", course.title),
+        ("og:site_name", course_title),
         ("og:title", head.title),
         ("og:description", head.description),
-        ("og:url", urls.absolute(course, head.path)),
+        ("og:url", urls.absolute(base_url, head.path)),
     )
     return tuple((name, value) for name, value in pairs if value)
 
@@ -65,7 +65,7 @@ def _context(kind: str) -> dict[str, Json]:
 
 
 def _course(course: Course) -> dict[str, Json]:
-    address = urls.absolute(course, urls.HOME)
+    address = urls.absolute(course.base_url, urls.HOME)
     return _filled(
         {
             "name": course.title,
@@ -83,7 +83,7 @@ def _resource(library: Library, lesson: Lesson) -> dict[str, Json]:
             "@type": "LearningResource",
             "name": lesson.title,
             "description": lesson.summary,
-            "url": urls.absolute(library.course, urls.lesson_path(lesson)),
+            "url": urls.absolute(library.course.base_url, urls.lesson_path(lesson)),
             "inLanguage": library.course.language,
             "learningResourceType": "lesson",
             "teaches": list(lesson.objectives),
@@ -107,7 +107,7 @@ def _script(data: dict[str, Json]) -> Markup:
 def sitemap(course: Course, paths: Iterable[str]) -> bytes:
     """The sitemap of the given pages; the course must have a base address."""
     rows = "".join(
-        f"<url><loc>{escape(urls.absolute(course, path), quote=False)}</loc></url>\n"
+        f"<url><loc>{escape(urls.absolute(course.base_url, path), quote=False)}</loc></url>\n"
         for path in paths
     )
     return (
@@ -120,5 +120,5 @@ def robots(course: Course) -> bytes:
     """A robots.txt that allows everything and names the sitemap."""
     lines = ["User-agent: *", "Allow: /"]
     if course.base_url:
-        lines.append(f"Sitemap: {urls.absolute(course, urls.SITEMAP)}")
+        lines.append(f"Sitemap: {urls.absolute(course.base_url, urls.SITEMAP)}")
     return ("\n".join(lines) + "\n").encode()

@@ -270,7 +270,7 @@ def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
 
 def not_found_inputs(library: Library) -> PageInputs:
     """The inputs of the page for missing addresses."""
-    place = place_of(library, urls.NOT_FOUND)
+    place = place_of(library.course.base_url, urls.NOT_FOUND)
     values = {"home": place.href(urls.HOME)}
     title = library.words("notfound.title")
     head = PageHead(urls.NOT_FOUND, "notfound", title, "", indexed=False)

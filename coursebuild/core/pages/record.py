@@ -1,11 +1,12 @@
 """Records of drawn pages: what the rest of the site must know of a page.
 
-Entry point: `record(head, body, base_url)`.
+Entry point: `record(head, body, base_url, page)`.
 
 1. Formulas are glued to punctuation and units (`formulas.glue_formulas`), inline styles become
    classes (`styles.hoist_styles`), and forbidden characters are made visible
    (`characters.visible`).
-2. The record has the characters, anchors and addresses of the result.
+2. The record has the characters, anchors and addresses of the result, and the ids that stand there
+   twice, whoever has drawn them.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from msgspec import Struct
 from coursebuild.core.pages import fonts, formulas, styles
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.common_files import page_characters
+from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.frame import FRAME_IDS
 from coursebuild.core.pages.links import Reference, ids_and_addresses, merge_line_ids, references
 from coursebuild.core.pages.page_inputs import PageHead
 
@@ -36,17 +39,26 @@ class PageRecord(Struct, frozen=True, array_like=True):
     """Anchors, sorted; see `links.merge_line_ids`."""
     references: tuple[Reference, ...]
     """The targets of its links, sorted, each once."""
+    repeated_ids: tuple[tuple[str, int, int], ...] = ()
+    """Ids that several elements have, sorted; each with the start and end of its place in the
+    page's document (`PageContext.find_repetition`), or zeros."""
     notes: tuple[tuple[str, str], ...] = ()
     """The features' notes of the page: a feature's name and a digest; see `added_files`."""
 
 
-def record(head: PageHead, body: str, base_url: str) -> tuple[PageRecord, str]:
-    """The record of a page just drawn, and its body as it will be published."""
+def record(
+    head: PageHead, body: str, base_url: str, page: PageContext | None = None
+) -> tuple[PageRecord, str]:
+    """The record of a page just drawn, and its body as it will be published.
+
+    `page` is the document on it, if any.
+    """
     # A plain string, since `Markup` would escape what is inserted.
     html, declarations = styles.hoist_styles(formulas.glue_formulas(str(body)))
     text, mathematics = page_characters(html)
     html = visible(html)
-    ids, addresses = ids_and_addresses(html)
+    ids, addresses, repeated_ids = ids_and_addresses(html)
+    repeated_ids |= ids & FRAME_IDS
     page_record = PageRecord(
         kind=head.kind,
         title=head.title,
@@ -56,5 +68,11 @@ def record(head: PageHead, body: str, base_url: str) -> tuple[PageRecord, str]:
         declarations=tuple(sorted(declarations)),
         ids=tuple(sorted(merge_line_ids(ids))),
         references=tuple(sorted(references(head.path, addresses, base_url))),
+        repeated_ids=tuple((name, *_place(name, page)) for name in sorted(repeated_ids)),
     )
     return page_record, html
+
+
+def _place(name: str, page: PageContext | None) -> tuple[int, int]:
+    span = None if page is None else page.find_repetition(name)
+    return (0, 0) if span is None else (span.start, span.end)

@@ -18,7 +18,7 @@ from urllib.parse import quote, unquote, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.core.model import Course, Lesson, Level, Owner, Page
+from coursebuild.core.model import Lesson, Level, Owner, Page
 from coursebuild.core.registry import page_kinds
 
 HOME = "index.html"
@@ -95,16 +95,16 @@ def dark_path(path: str) -> str:
     return f"{file_path(path).removesuffix('.svg')}.dark.svg"
 
 
-def absolute(course: Course, path: str) -> str:
+def absolute(base_url: str, path: str) -> str:
     """The full address of a site path; empty if the course has no base address."""
-    if not course.base_url:
+    if not base_url:
         return ""
-    return course.base_url.rstrip("/") + "/" + encode("" if path == HOME else path)
+    return base_url.rstrip("/") + "/" + encode("" if path == HOME else path)
 
 
-def base_path(course: Course) -> str:
-    """The path of the course's base address, with a slash at both ends."""
-    path = urlsplit(course.base_url).path.strip("/")
+def base_path(base_url: str) -> str:
+    """The path of a course's base address, with a slash at both ends."""
+    path = urlsplit(base_url).path.strip("/")
     return f"/{path}/" if path else "/"
 
 

@@ -5,8 +5,9 @@ Entry point: `parse_document`. It never raises, whatever the text:
 1. Line ends, NUL and a byte order mark are normalized; front matter is reported and left out.
 2. `tree` reads the blocks and, with `inlines`, their content; other modules read our fences.
 3. Footnotes are read last, in the order of their numbers.
-4. Terms and labels in wrong places are found in the whole document (`_check_placement`). Where a
-   merge conflict was left, that is all there is to say.
+4. Terms and labels in wrong places are found in the whole document (`_check_placement`), and what
+   has the id of something else (`_check_ids`). Where a merge conflict was left, that is all there
+   is to say.
 """
 
 from __future__ import annotations
@@ -15,26 +16,29 @@ import re
 from collections.abc import Iterator
 
 from coursebuild.core.model import (
+    AnchorOwner,
     Document,
+    FeatureBlock,
     Heading,
     Paragraph,
+    Script,
     Term,
     block_formulas,
     block_inlines,
+    document_anchors,
     document_blocks,
-    find_blocks,
-    find_inlines,
+    heading_anchors,
     walk_inlines,
 )
 from coursebuild.core.model.blocks import title_line
-from coursebuild.core.model.equations import feature_block_ids
+from coursebuild.core.model.equations import DisplayFormula, feature_block_ids
 from coursebuild.core.syntax.headings import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import read_markdown
 from coursebuild.core.syntax.tree import TextReader
 from coursebuild.core.text.conflicts import find_conflict
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, sort_diagnostics
-from coursebuild.core.text.source import Excerpt, Source
+from coursebuild.core.text.source import Excerpt, Source, Span
 
 _YAML = re.compile(
     r"---[ \t]*\n(?:#[ \t].*\n)*"  # the first line, comments
@@ -64,7 +68,7 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     conflict = find_conflict(source)
     if conflict is not None:  # the rest follows from it
         return Parsed(document, (conflict,))
-    state.diagnostics += _check_placement(document)
+    state.diagnostics += (*_check_placement(document), *_check_ids(document))
     if (at := source.text.find("\0")) >= 0:
         message, help = "a NUL character stands here", "delete it; readers would see `\ufffd`"
         state.report(diagnose("control-character", source.span(at, at + 1), message, help=help))
@@ -94,7 +98,7 @@ def _check_placement(document: Document) -> tuple[Diagnostic, ...]:
     if not any(mark in document.source.text for mark in _MARKS):
         return ()
     elsewhere = feature_block_ids(document)
-    diagnostics = [*_check_ids_of_terms(document)]
+    diagnostics: list[Diagnostic] = []
     for block in document_blocks(document):
         is_elsewhere = id(block) in elsewhere
         if is_elsewhere or not isinstance(block, Paragraph):
@@ -112,11 +116,36 @@ def _check_placement(document: Document) -> tuple[Diagnostic, ...]:
     return tuple(diagnostics)
 
 
-def _check_ids_of_terms(document: Document) -> Iterator[Diagnostic]:
-    """Report headings whose explicit ids are those of terms."""
-    terms = {term.anchor: term.span for term in find_inlines(document, Term)}
-    for heading in find_blocks(document, Heading):
-        if heading.anchor in terms:
-            notes = [Note("it is that of this term", terms[heading.anchor])]
-            message = f"the id `{heading.anchor}` is already used"
-            yield diagnose("anchor-repeated", heading.span, message, notes=notes)
+def _check_ids(document: Document) -> Iterator[Diagnostic]:
+    """Report each node with an id that something above it has.
+
+    Some repetitions have a rule of their own; see `_is_reported`.
+    """
+    headings = heading_anchors(document)
+    owners: dict[str, tuple[AnchorOwner, Span]] = {}
+    reported_places: set[int] = set()
+    anchors = sorted(document_anchors(document), key=lambda anchor: anchor[2].start)
+    for name, node, span in anchors:
+        if isinstance(node, FeatureBlock) and name in headings.intersection(
+            node.optional_anchors()
+        ):
+            continue
+        entry = node, span
+        first, first_span = owners.setdefault(name, entry)
+        if owners[name] is entry or _is_reported(first, node) or span.start in reported_places:
+            continue
+        reported_places.add(span.start)
+        message, help = f"the id `{name}` is already used", "give one of the two another id"
+        notes = [Note("first used here", first_span.first_line())]
+        yield diagnose("anchor-repeated", span.first_line(), message, help=help, notes=notes)
+
+
+def _is_reported(first: AnchorOwner, second: AnchorOwner) -> bool:
+    """Whether it is a mistake by another rule, or found already, that two nodes have one id."""
+    if isinstance(first, FeatureBlock) and isinstance(second, FeatureBlock):
+        keys, other_keys = first.progress_keys(), second.progress_keys()
+        return keys is not None and other_keys is not None and keys[0] == other_keys[0]
+    labelled_types = Heading | DisplayFormula  # see `headings.Anchors`
+    return (isinstance(first, labelled_types) and isinstance(second, labelled_types)) or (
+        isinstance(first, Script | Term) and type(first) is type(second)
+    )

@@ -58,7 +58,7 @@ def render_lesson(
 
 def site_address(context: ExportContext, path: str, anchor: str) -> str:
     """Return the address of a page on the site; empty if the course has none."""
-    address = urls.absolute(context.course, path)
+    address = urls.absolute(context.course.base_url, path)
     return f"{address}#{urls.quote_anchor(anchor)}" if address and anchor else address
 
 

@@ -55,5 +55,5 @@ def _optional_part(library: Library) -> list[str]:
 
 def _row(library: Library, path: str, title: str, text: str) -> str:
     copy = urls.copy_path(path, ".md")
-    address = urls.absolute(library.course, copy) or urls.encode(copy)
+    address = urls.absolute(library.course.base_url, copy) or urls.encode(copy)
     return f"- {link(escape_line(title), address)}" + (f": {escape_line(text)}" if text else "")

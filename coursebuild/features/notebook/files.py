@@ -33,7 +33,8 @@ def notebook_files(site: SiteContext) -> Iterator[CachedFile]:
     for page in site.pages:
         lesson = site.library.lessons[page.id]
         archive = site.archives.get(urls.lesson_zip_path(lesson))
-        key = step_key("notebook", page.digest, archive.key if archive else "")
+        language = site.library.words.language
+        key = step_key("notebook", language, page.digest, archive.key if archive else "")
         path = urls.copy_path(page.path, ".ipynb")
         yield CachedFile(
             path, key, functools.partial(_write_notebook, site, lesson, page.path, archive)

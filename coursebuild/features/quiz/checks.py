@@ -31,7 +31,7 @@ from coursebuild.features.quiz.model import ChoiceQuestion, Quiz
 
 
 def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
-    """Report repeated ids, anchors in use, and output questions about scripts that nothing runs.
+    """Report repeated ids, and output questions about scripts that nothing runs.
 
     Only `documents` are checked; ids are compared with those of the whole course.
     """
@@ -51,25 +51,6 @@ def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Dia
                     notes=[Note("the first one is here", first[quiz.id].id_span)],
                 )
             yield from _check_scripts(quiz, norun)
-        yield from _check_anchors(document)
-
-
-def _check_anchors(document: Document) -> Iterator[Diagnostic]:
-    """Report questions whose anchor a heading or another quiz of the document has."""
-    named_quizzes = [quiz for quiz in find_blocks(document, Quiz) if quiz.id]
-    places = {h.anchor: h.span for h in find_blocks(document, Heading)}
-    places |= {quiz.id: quiz.id_span for quiz in named_quizzes}
-    for quiz in named_quizzes:
-        for key in quiz.keys:
-            first = places.get(quiz.anchor(key))
-            if first is not None:
-                yield diagnose(
-                    "anchor-repeated",
-                    first,
-                    f"the id `{quiz.anchor(key)}` is already used",
-                    help="it is the address of a question; choose another one here",
-                    notes=[Note("in this quiz", quiz.id_span)],
-                )
 
 
 def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | None]:

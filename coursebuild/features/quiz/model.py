@@ -127,8 +127,12 @@ class Quiz(FeatureBlock, frozen=True):
         return replace(self, questions=tuple(bare))
 
     def anchors(self) -> tuple[str, ...]:
-        """The anchors of the quiz and of its questions."""
-        return (self.id, *map(self.anchor, self.keys))
+        """The anchors of the quiz and of its questions; none where its id cannot be read."""
+        return (self.id, *map(self.anchor, self.keys)) if self.id else ()
+
+    def optional_anchors(self) -> tuple[str, ...]:
+        """Its id: a heading that has the same stands for the quiz that it is above."""
+        return (self.id,)
 
     def quoted_lines(self) -> tuple[tuple[str, int], ...]:
         """The lines of output that questions ask for, as (script, line)."""

@@ -26,6 +26,7 @@ from coursebuild.core.model import (
     Mode,
     Recording,
     find_blocks,
+    heading_anchors,
     plain_text,
 )
 from coursebuild.core.model.results import Outcome
@@ -45,14 +46,12 @@ if TYPE_CHECKING:
 
 def quiz(page: PageContext, block: Quiz) -> Markup:
     """Draw a quiz with its questions."""
-    headings = find_blocks(page.document, Heading)
     return page.template(
         "quiz/quiz.html",
         quiz=block,
         page=page,
         titled=bool(block.title) and not is_heading(page.document, block.title),
-        # A heading of the same id stands for the quiz that it is above.
-        anchored=all(heading.anchor != block.id for heading in headings),
+        anchored=block.id not in heading_anchors(page.document),
         kind_of=_kind,
         grading_attributes=functools.partial(_grading_attributes, page),
         output_line=functools.partial(output_line, page),

@@ -173,9 +173,10 @@ FORMULAS = (
 def test_package_of_hard_cases_is_whole_and_its_losses_are_reported(make_course: Make) -> None:
     """Text that a page cannot hold either is a mistake of the author's, and not tried here."""
     hostile = [
-        {**ANY["mcq"], "q": text, "explain": text, "hints": [text], "label": text[:40],
-         "options": [text, "b"], "answer": 0, "feedback": [text, text]}
+        {**ANY["mcq"], "q": text, "explain": bare, "hints": [bare], "label": bare[:40],
+         "options": [bare, "b"], "answer": 0, "feedback": [bare, bare]}
         for text in HOSTILE if text not in REFUSED_TEXTS
+        for bare in [text.replace(" id='y'", "")]  # a page has an id once
     ]  # fmt: skip
     formula_question = {**ANY["zero"], "q": f"Inline ${FORMULAS}$ and\n\n$${FORMULAS}$$"}
     twice = [ANY["zero"], {**ANY["zero"], "q": "Again?"}]
