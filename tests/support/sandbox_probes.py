@@ -24,9 +24,9 @@ from coursebuild.core.model.results import Outcome, ScriptRun
 
 SECRET = "hush"
 """What nobody in the sandbox may print."""
-_KEY = "coursebuild-probe"
+KEY_NAME = "coursebuild-probe"
 _KEYRING = -3  # the session's; see keyctl(2)
-_CALLS = {
+CALLS = {
     name: numbers[platform.machine() != "x86_64"]
     for name, numbers in {
         "add_key": (248, 217),
@@ -48,6 +48,7 @@ _CALLS = {
         "finit_module": (313, 273),
     }.items()
 }
+"""The numbers of system calls on this machine."""
 _HELPERS = """
 import ctypes, fcntl, glob, mmap, os, platform, resource, signal, socket, struct, sys
 
@@ -173,6 +174,7 @@ ATTEMPTS: dict[str, str | tuple[str, ...]] = {
     "socket.socket(socket.AF_VSOCK, socket.SOCK_STREAM)": _NO_FAMILY,
     "socket.socket(socket.AF_ALG, socket.SOCK_SEQPACKET)": _NO_FAMILY,
     "socket.socket(socket.AF_INET, socket.SOCK_RAW, 1)": _NO,
+    "__import__('multiprocessing').Manager()": "EOFError",
     # keys of the user
     "call('keyctl', 10, -3, b'user', b'coursebuild-probe', 0)": _NO,  # search the session's
     "call('keyctl', 11, KEY, ctypes.create_string_buffer(99), 99)": _NO,  # read
@@ -210,6 +212,7 @@ ATTEMPTS: dict[str, str | tuple[str, ...]] = {
     "os.memfd_create('x')": _NONE,
     "call('memfd_secret', 0)": _NONE,
     "mmap.mmap(-1, 1 << 20)": _NO,
+    "resource.getrlimit(resource.RLIMIT_NOFILE)[1] <= 1024": "True",
     "open('/dev/zero', 'r+b')": "PermissionError [Errno 13]",
     "call('shmget', 0, 1 << 20, 0o1600)": _NONE,
     "call('msgget', 0, 0o1600)": _NONE,
@@ -360,7 +363,7 @@ def surroundings(root: Path, home: Path) -> Iterator[Mapping[str, object]]:
         stack.callback(neighbour.kill)
         assert neighbour.stdout is not None and neighbour.stdout.readline()
         yield {
-            "CALLS": _CALLS,
+            "CALLS": CALLS,
             "KEY": _add_key(stack),
             "OTHER": neighbour.pid,
             "TESTS": os.getpid(),
@@ -401,15 +404,15 @@ def _add_key(stack: contextlib.ExitStack) -> int:
     """Put the secret into this session's keyring; 0 where the machine has no keys."""
     libc = ctypes.CDLL(None)
     data = SECRET.encode()
-    key: int = libc.syscall(_CALLS["add_key"], b"user", _KEY.encode(), data, len(data), _KEYRING)
-    stack.callback(libc.syscall, _CALLS["keyctl"], 9, key, _KEYRING)  # unlink
+    key: int = libc.syscall(CALLS["add_key"], b"user", KEY_NAME.encode(), data, len(data), _KEYRING)
+    stack.callback(libc.syscall, CALLS["keyctl"], 9, key, _KEYRING)  # unlink
     return max(key, 0)
 
 
 def attempts_script(names: Mapping[str, object]) -> str:
     """A script that makes all attempts, and prints a line for each."""
-    given = "".join(f"{name} = {value!r}\n" for name, value in names.items())
-    return _HELPERS + given + "".join(f"attempt(lambda: {attempt})\n" for attempt in ATTEMPTS)
+    definitions = "".join(f"{name} = {value!r}\n" for name, value in names.items())
+    return _HELPERS + definitions + "".join(f"attempt(lambda: {attempt})\n" for attempt in ATTEMPTS)
 
 
 def answers(run: ScriptRun) -> dict[str, str]:

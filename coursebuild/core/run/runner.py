@@ -69,7 +69,7 @@ def _ignore(value: object) -> None:
 
 _PATIENCE = 0.1
 """Seconds between two checks of whether a run is still wanted."""
-_VIGILANCE = 0.02
+_VIGILANCE = 0.05
 """Seconds between two looks at what sandboxes take."""
 _LOG = "MUJOCO_LOG.TXT"
 """The file that MuJoCo's warnings leave in the working folder, in processes of a script's own."""

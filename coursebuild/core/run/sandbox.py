@@ -34,13 +34,13 @@ from msgspec import Struct
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob, Trace
 from coursebuild.core.run.packages import site_folders
-from coursebuild.core.run.sandbox_watching import PROCESSES, SandboxWatch
+from coursebuild.core.run.sandbox_watching import PROCESSES, SUPERVISOR_MEMORY, SandboxWatch
 from coursebuild.core.run.script_environment import Interpreter, library_folder
 from coursebuild.core.run.seccomp import compile_filter
 
 SIZE = 1 << 30
 """Bytes that may be written, in memory."""
-_PROGRAM = str(Path(__file__).with_name("sandbox_main.py"))
+PROGRAM = str(Path(__file__).with_name("sandbox_main.py"))
 _SYSTEM = (
     *("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/nix/store", "/sys/devices/system/cpu"),
     *("/etc/alternatives", "/etc/fonts", "/etc/ld.so.cache", "/etc/localtime"),
@@ -112,9 +112,9 @@ def examine_sandbox(root: Path) -> tuple[Sandbox | None, tuple[Part, ...]]:
     problem = _try_sandbox(sandbox, root)
     if problem:
         return None, (*parts, Part("namespaces", problem, _ALLOW))
-    how = "by a control group and by watching" if scope else "by watching"
+    means = "by a control group and by watching" if scope else "by watching"
     parts += [Part("namespaces"), Part("a session keyring")]
-    parts += [Part(f"limits of memory and processes in all, {how}")]
+    parts += [Part(f"limits of memory and processes in all, {means}")]
     return sandbox, tuple(parts)
 
 
@@ -162,7 +162,9 @@ def _try_sandbox(sandbox: Sandbox, root: Path) -> str:
     if not state:
         output = errors.strip().removeprefix("bwrap: ")
         return f"does not work here, Bubblewrap says: {output or 'nothing'}"
-    faults = (fault for (fault, value), found in zip(_FAULTS, state, strict=True) if found != value)
+    faults = (
+        fault for (fault, value), actual in zip(_FAULTS, state, strict=True) if actual != value
+    )
     fault = next(faults, "" if is_watched else "what it takes cannot be seen in /proc")
     return fault and f"does not work here: {fault}"
 
@@ -208,8 +210,10 @@ class Sandbox(Struct, frozen=True):
         for place, path in (special_files or {}).items():
             if os.path.lexists(path):
                 options += _hide(place)
-        limits = (f"--property=MemoryMax={memory}M", "--property=MemorySwapMax=0", "--")
-        starter = (sys.executable, "-I", "-S", _PROGRAM, self.system_calls, self.program)
+        # The system counts more, such as the kernel's own memory, and says less at the limit.
+        most = memory + 2 * SUPERVISOR_MEMORY
+        limits = (f"--property=MemoryMax={most}M", "--property=MemorySwapMax=0", "--")
+        starter = (sys.executable, "-I", "-S", PROGRAM, self.system_calls, self.program)
         scope = (*self.scope, *limits) if self.scope else ()
         # What a course sets must not reach these programs.
         names = ("XDG_RUNTIME_DIR", "DBUS_SESSION_BUS_ADDRESS") if self.scope else ()

@@ -24,7 +24,7 @@ _FIELD = re.compile(rb"^(?:RssAnon|VmSwap|VmPTE|HugetlbPages):\s*(\d+) kB$", re.
 _SHARE = re.compile(rb"^(?:Pss_Anon|SwapPss):\s*(\d+) kB$", re.MULTILINE)
 _THREADS = re.compile(rb"^Threads:\s*(\d+)$", re.MULTILINE)
 _SOCKETS = re.compile(rb"^sockets: used (\d+)$", re.MULTILINE)
-_SUPERVISOR = 32
+SUPERVISOR_MEMORY = 32
 """MiB, at most, that the supervisor takes for itself, beside what its copy, the script, shares."""
 _SOCKET_SIZE = 416
 """KiB that a socket may keep, unread."""
@@ -79,7 +79,7 @@ class SandboxWatch:
         """
         if not self.is_ready():
             return ""
-        most = memory + _SUPERVISOR << 10
+        most = memory + SUPERVISOR_MEMORY << 10
         processes, threads, size = [], 0, self._size_of_files()
         for name in os.listdir(self._proc):  # noqa: PTH208 (a descriptor)
             status = self._read(f"{name}/status") if name.isdigit() else b""

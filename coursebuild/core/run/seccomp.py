@@ -193,8 +193,8 @@ def _test(condition: _Condition) -> Iterator[bytes]:
     yield _instruction(_LOAD, _ARGUMENTS + 8 * condition.argument)
     yield _instruction(_MASK, condition.mask)
     for left, value in reversed(list(enumerate(reversed(condition.values)))):
-        found, missing = (left, int(left == 0)) if condition.is_refused else (left + 1, 0)
-        yield _instruction(_EQUAL, value, found, missing)
+        if_equal, if_not = (left, int(left == 0)) if condition.is_refused else (left + 1, 0)
+        yield _instruction(_EQUAL, value, if_equal, if_not)
     yield _instruction(_RETURN, _FAIL | condition.error)
     yield _instruction(_LOAD, _NUMBER)
 

@@ -140,6 +140,7 @@ class _Supervisor:
             self.libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
             if os.getpid() == _FIRST:
                 self.libc.prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
+                _avoid_fork_server()
         os.chdir("/")
         self.scratch = ""
 
@@ -248,6 +249,17 @@ class _Supervisor:
         if most == resource.RLIM_INFINITY or most > memory:
             resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
         os.chdir(job["root"])
+
+
+def _avoid_fork_server() -> None:
+    """Let processes be spawned by default in a sandbox.
+
+    Python's default since 3.14 is a server that listens at a socket in a folder.
+    """
+    if sys.version_info >= (3, 14):
+        from multiprocessing import context
+
+        context._default_context._default_context = context._concrete_contexts["spawn"]
 
 
 def _sibling_names(job: Job) -> frozenset[str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import platform
 import socket
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -16,12 +17,15 @@ import pytest
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
+from coursebuild.core.run import sandbox
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.sandbox import examine_sandbox, find_sandbox
 from coursebuild.core.run.script_environment import Interpreter
 from support.runners import wait_until_ended
 from support.sandbox_probes import (
+    CALLS,
     EXCESSES,
+    KEY_NAME,
     SECRET,
     answers,
     attempts_script,
@@ -74,6 +78,22 @@ def test_attempts_fail_and_change_nothing(root: Path, home: Path, confine: Confi
     assert SECRET not in run.stdout + run.stderr
     left = {"examples", "lesson.md", "stream", "deep", "datagrams", "pipe", "runs", "linked-pipe"}
     assert {path.name for path in root.iterdir()} == left
+
+
+def test_a_key_of_the_user_is_out_of_reach_without_the_filter(
+    root: Path, home: Path, tmp_path: Path
+) -> None:
+    program = tmp_path / "bwrap"
+    search = "import ctypes\nprint(ctypes.CDLL(None).syscall(%d, 10, -3, b'user', b'%s', 0))"
+    program.write_text(f"#!{sys.executable}\n{search % (CALLS['keyctl'], KEY_NAME)}")
+    program.chmod(0o755)
+    with surroundings(root, home) as names:
+        outside, inside = (
+            subprocess.run([*start, program], capture_output=True, text=True).stdout
+            for start in ([sys.executable], [sys.executable, sandbox.PROGRAM, ""])
+        )
+    assert int(outside) in (names["KEY"], -1)  # -1: this machine has no keys
+    assert int(inside) == -1
 
 
 @pytest.mark.parametrize("name", EXCESSES)
@@ -334,8 +354,8 @@ class TestRefusals:
     ) -> None:
         _write_bwrap(programs, "")
         monkeypatch.setattr(platform, "machine", lambda: "riscv64")
-        sandbox, parts = examine_sandbox(root)
-        assert sandbox is None and [part.name for part in parts if part.problem] == [
+        none, parts = examine_sandbox(root)
+        assert none is None and [part.name for part in parts if part.problem] == [
             "a filter of system calls"
         ]
         with pytest.raises(EffectError) as refused:
