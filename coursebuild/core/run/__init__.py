@@ -1,7 +1,8 @@
 """Run what a course holds: scripts in processes, formulas in V8, models in MuJoCo.
 
 - `runner`: the lessons' scripts. `workers` are its processes, seen from the tool;
-  `script_environment` is the environment of scripts, `sandbox` the one for scripts of strangers
+  `script_environment` is the environment of scripts, `sandbox` the one for scripts of strangers,
+  started by the program `sandbox_main`, with the filter of `seccomp`, limited by `sandbox_watching`
 - inside these processes: `supervisor` (with `watching`) and `script_process`, both in the program
   `worker_main`
 - what a script looks at: `tracing` (with `mujoco_tracing`, `mujoco_files`) notes it,

@@ -21,7 +21,6 @@ import json
 import os
 import signal
 import sys
-import time
 from collections.abc import Callable, Iterable, Sequence
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -33,7 +32,13 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run.packages import site_folders
-from coursebuild.core.run.sandbox import Sandbox, copied_folders, sandbox_difference, visible_places
+from coursebuild.core.run.sandbox import (
+    Sandbox,
+    copied_folders,
+    sandbox_difference,
+    special_files,
+    visible_places,
+)
 from coursebuild.core.run.script_environment import (
     Interpreter,
     clean_environment,
@@ -63,9 +68,8 @@ def _ignore(value: object) -> None:
 
 _PATIENCE = 0.1
 """Seconds between two checks of whether a run is still wanted."""
-_GRACE = 60.0
-"""Seconds that a supervisor in a sandbox has to report, after its script's time limit."""
-
+_VIGILANCE = 0.05
+"""Seconds between two looks at what sandboxes take."""
 _LOG = "MUJOCO_LOG.TXT"
 """The file that MuJoCo's warnings leave in the working folder, in processes of a script's own."""
 
@@ -150,13 +154,13 @@ class ScriptServer:
         try:
             for _ in range(min(max(parallel, 1), len(work.jobs))):
                 self._start(busy, work)
-            is_polling = is_unwanted is not None or self._sandbox is not None
+            patience = None if is_unwanted is None else _PATIENCE
+            patience = patience if self._sandbox is None else _VIGILANCE
             while busy:
-                for ready in wait(busy, _PATIENCE if is_polling else None):
+                for ready in wait(busy, patience):
                     self._handle_report(busy[ready], busy, work)  # type: ignore[index]
                 for worker in busy.values():
-                    if time.monotonic() > worker.deadline:
-                        worker.kill()
+                    work.enforce_limits(worker)
                 if is_unwanted is not None and is_unwanted(work.running_paths(busy.values())):
                     raise RunStoppedError
         finally:
@@ -234,8 +238,13 @@ class _Work:
         if sandbox is not None:
             self.sources = visible_places(str(root), self.library, interpreter)
             self.copies = copied_folders(str(root), jobs, scratch)
-            command = sandbox.command
-            self.enclose = functools.partial(command, sources=self.sources, copies=self.copies)
+            self.enclose = functools.partial(
+                sandbox.command,
+                sources=self.sources,
+                copies=self.copies,
+                special_files=special_files(self.sources, self.copies),
+                memory=max(job.memory for job in jobs),
+            )
         self.runs: dict[int, ScriptRun] = {}
         self.pending = list(range(len(jobs)))
         self.announced_jobs: set[int] = set()
@@ -254,8 +263,12 @@ class _Work:
             self.announced_jobs.add(index)
             self.on_start(self.jobs[index].path)
         worker.give(index, self._message(self.jobs[index]))
-        if self.sandbox is not None:  # a script can stop its supervisor
-            worker.deadline = time.monotonic() + self.jobs[index].timeout + _GRACE
+
+    def enforce_limits(self, worker: Worker) -> None:
+        """End a supervisor's sandbox if it exceeds a limit of its job."""
+        if worker.job is not None:
+            job = self.jobs[worker.job]
+            worker.enforce_limits(job.timeout, job.memory)
 
     def read_report(self, worker: Worker) -> bool:
         """Read from a supervisor and finish its job if the report is complete.
@@ -271,9 +284,9 @@ class _Work:
                 if self.interpreter is not None and worker.status() > 0:
                     raise EffectError(f"{self.interpreter.python} cannot run scripts")
                 status = worker.status() if self.sandbox is None else -signal.SIGKILL
-                self._finish(index, _lost_run(self.jobs[index].path, status))
+                self._finish(index, _lost_run(self.jobs[index].path, status, worker.excess))
             return False
-        if worker.job is not None:
+        if worker.job is not None and worker.excess is None:
             try:
                 self._finish_job(worker, worker.job)
             except ValueError:
@@ -361,10 +374,14 @@ def _script_run(root: str, job: ScriptJob, report: ChildReport) -> ScriptRun:
     )
 
 
-def _lost_run(path: str, status: int) -> ScriptRun:
+def _lost_run(path: str, status: int, excess: tuple[Outcome, str] | None) -> ScriptRun:
     """The result of a script whose supervisor died."""
     if status >= 0:
         raise RuntimeError(f"the supervisor of {path} failed with status {status}")
+    if excess is not None:
+        outcome, text = excess
+        text = f"its sandbox was ended, as what ran in there {text}\n"
+        return ScriptRun(path, outcome, -status, "", text, 0.0)
     name = signal.Signals(-status).name
     text = f"the process that supervises this script was ended by {name}\n"
     return ScriptRun(path, Outcome.KILLED, -status, "", text, 0.0)

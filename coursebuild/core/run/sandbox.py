@@ -1,27 +1,32 @@
 """A sandbox for scripts of strangers, made by Bubblewrap (`bwrap`).
 
-Entry points: `find_sandbox`, which tries to start one; `Sandbox`.
+Entry points: `find_sandbox` and `examine_sandbox`, which try to start one; `Sandbox`.
 
 A supervisor runs in namespaces of its own, and (see `runner`) runs only one script, so that a
 script that takes over its supervisor can falsify only its own result:
 
-1. It sees Python, what is installed for it, the system's libraries and the course, all read-only.
-   All other places lie in memory, hold `SIZE` bytes, and are gone at its end: also the temporary
-   folder, where the supervisor, which is inside too, looks for figures. So no process outside ever
-   follows a link that a script has made.
+1. It sees Python, what is installed for it, the system's libraries and the course, all read-only,
+   without sockets and pipes that lie in there. All other places lie in memory, hold `SIZE` bytes,
+   and are gone at its end: also the temporary folder, where the supervisor, which is inside too,
+   looks for figures. So no process outside ever follows a link that a script has made.
 2. It has no network, sees no process but its own, and has no capability, not even in namespaces
-   of its own, of which it can make none. Its environment is that of scripts.
-3. It ends with the process that started it, and so does everything in it.
+   of its own, of which it can make none. Its environment is that of scripts. System calls are
+   filtered (`seccomp`), and its session keyring is new and empty (`sandbox_main`).
+3. Its supervisor is the first process, which no signal from inside reaches. What it takes in all is
+   limited from outside, by systemd where that is to be had, and by `sandbox_watching`.
+4. It ends with the process that started it, and so does everything in it.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
+import platform
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from msgspec import Struct
@@ -29,10 +34,13 @@ from msgspec import Struct
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob, Trace
 from coursebuild.core.run.packages import site_folders
+from coursebuild.core.run.sandbox_watching import PROCESSES, SUPERVISOR_MEMORY, SandboxWatch
 from coursebuild.core.run.script_environment import Interpreter, library_folder
+from coursebuild.core.run.seccomp import compile_filter
 
 SIZE = 1 << 30
 """Bytes that may be written, in memory."""
+PROGRAM = str(Path(__file__).with_name("sandbox_main.py"))
 _SYSTEM = (
     *("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/nix/store", "/sys/devices/system/cpu"),
     *("/etc/alternatives", "/etc/fonts", "/etc/ld.so.cache", "/etc/localtime"),
@@ -40,47 +48,125 @@ _SYSTEM = (
 _PYTHON_PARTS = ("bin", "lib", "lib64", "pyvenv.cfg")
 """The parts that an interpreter needs of the folder that it is installed in."""
 _NAMESPACES = (
-    *("--unshare-all", "--unshare-user", "--disable-userns", "--cap-drop", "ALL"),
+    *("--unshare-all", "--unshare-user", "--disable-userns", "--cap-drop", "ALL", "--as-pid-1"),
     *("--die-with-parent", "--new-session", "--clearenv", "--chdir", "/"),
 )
-_IN_MEMORY = ("--size", str(SIZE), "--tmpfs")
-_PLACES = (
-    *(*_IN_MEMORY, "/", "--proc", "/proc", "--remount-ro", "/proc"),
-    *("--dev", "/dev", *_IN_MEMORY, "/dev/shm", "--remount-ro", "/dev"),
-)
-"""The system's own places; /proc is read-only, as root can change the machine by its files."""
+_HIDDEN = ("/proc/keys", "/proc/key-users", "/proc/timer_list", "/proc/kcore")
+"""Files of the system that tell of what is outside."""
 _ALLOW = (
     "it takes Bubblewrap 0.8 or newer, and user namespaces: on Ubuntu, `sudo sysctl "
     "kernel.apparmor_restrict_unprivileged_userns=0` allows them; containers often forbid them"
 )
+_TRIAL = """
+import sys
+fields = dict(line.split()[:2] for line in open("/proc/self/status") if line.split()[1:])
+print(fields["Pid:"], fields["Seccomp:"], int(fields["CapEff:"], 16), flush=True)
+sys.stdin.read()
+"""
+"""Prints what must be as in `_FAULTS`, and ends with its input."""
+_FAULTS = (
+    ("the supervisor is not the first process in there", "1"),
+    ("system calls are not filtered in there", "2"),
+    ("scripts have capabilities in there", "0"),
+)
+"""What is wrong where a value is another one."""
+
+
+class Part(Struct, frozen=True):
+    """Something that a sandbox needs."""
+
+    name: str
+    problem: str = ""
+    """Why it is not to be had; empty where it is."""
+    help: str = ""
 
 
 def find_sandbox(root: Path) -> Sandbox:
     """The sandbox of this machine, after a trial start for the course in a folder.
 
     Raises:
-        EffectError: there is none, or it cannot be started.
+        EffectError: a part of it is not to be had.
     """
-    program = shutil.which("bwrap")
-    if program is None:
-        message = "`--sandbox` needs Bubblewrap, and there is no program `bwrap`"
-        raise EffectError(message, help="install it, as by `apt-get install bubblewrap`")
-    sandbox = Sandbox(program)
-    empty_script = [sys.executable, "-I", "-S", "-c", ""]
-    try:
-        subprocess.run(
-            sandbox.command(empty_script, {}, visible_places(str(root), library_folder(), None)),
-            env={},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-    except (OSError, subprocess.CalledProcessError) as error:
-        output = str(getattr(error, "stderr", error)).strip().removeprefix("bwrap: ")
-        message = f"`--sandbox` does not work here, Bubblewrap says: {output or 'nothing'}"
-        raise EffectError(message, help=_ALLOW) from None
+    sandbox, parts = examine_sandbox(root)
+    for part in parts:
+        if part.problem:
+            raise EffectError(f"`--sandbox` {part.problem}", help=part.help)
+    assert sandbox is not None
     return sandbox
+
+
+def examine_sandbox(root: Path) -> tuple[Sandbox | None, tuple[Part, ...]]:
+    """The sandbox of this machine, and its parts; none, and those up to the first that lacks."""
+    parts = [Part("Bubblewrap"), Part("a filter of system calls")]
+    program, machine = shutil.which("bwrap"), platform.machine()
+    if program is None:
+        problem = "needs Bubblewrap, and there is no program `bwrap`"
+        help = "install it, as by `apt-get install bubblewrap`"
+        return None, (Part("Bubblewrap", problem, help),)
+    system_calls = compile_filter(machine)
+    if system_calls is None:
+        problem = f"needs a filter of system calls, and there is none for {machine} machines"
+        return None, (parts[0], Part(parts[1].name, problem, "use an x86_64 or aarch64 machine"))
+    scope = _find_scope()
+    sandbox = Sandbox(program, system_calls.hex(), scope)
+    problem = _try_sandbox(sandbox, root)
+    if problem:
+        return None, (*parts, Part("namespaces", problem, _ALLOW))
+    means = "by a control group and by watching" if scope else "by watching"
+    parts += [Part("namespaces"), Part("a session keyring")]
+    parts += [Part(f"limits of memory and processes in all, {means}")]
+    return sandbox, tuple(parts)
+
+
+def _find_scope() -> tuple[str, ...]:
+    """The command that starts another in a control group, where systemd can make one."""
+    unified, systemd = Path("/sys/fs/cgroup/cgroup.controllers"), Path("/run/systemd/system")
+    program = shutil.which("systemd-run")
+    if program is None or not systemd.is_dir() or not unified.exists():
+        return ()
+    manager = "--system" if os.geteuid() == 0 else "--user"
+    scope = (
+        program,
+        manager,
+        "--scope",
+        "--quiet",
+        "--collect",
+        f"--property=TasksMax={PROCESSES}",
+    )
+    trial = [*scope, "--property=MemoryMax=1G", "--", "true"]
+    with contextlib.suppress(OSError, subprocess.SubprocessError):
+        subprocess.run(trial, capture_output=True, check=True, timeout=10.0)
+        return scope
+    return ()
+
+
+def _try_sandbox(sandbox: Sandbox, root: Path) -> str:
+    """Start a sandbox; say what does not work, as the end of a sentence."""
+    trial = [sys.executable, "-I", "-S", "-c", _TRIAL]
+    places = visible_places(str(root), library_folder(), None)
+    command, environment = sandbox.command(trial, {}, places)
+    pipe = subprocess.PIPE
+    try:
+        process = subprocess.Popen(
+            command, env=environment, stdin=pipe, stdout=pipe, stderr=pipe, text=True
+        )
+    except OSError as error:
+        return f"does not work here, Bubblewrap says: {error}"
+    with process:
+        assert process.stdout is not None
+        state = process.stdout.readline().split()
+        watch = SandboxWatch(process.pid)
+        is_watched = watch.is_ready() and not watch.excess(SIZE)
+        watch.close()
+        _, errors = process.communicate()
+    if not state:
+        output = errors.strip().removeprefix("bwrap: ")
+        return f"does not work here, Bubblewrap says: {output or 'nothing'}"
+    faults = (
+        fault for (fault, value), actual in zip(_FAULTS, state, strict=True) if actual != value
+    )
+    fault = next(faults, "" if is_watched else "what it takes cannot be seen in /proc")
+    return fault and f"does not work here: {fault}"
 
 
 class Sandbox(Struct, frozen=True):
@@ -88,6 +174,10 @@ class Sandbox(Struct, frozen=True):
 
     program: str
     """The path of `bwrap`."""
+    system_calls: str
+    """Their filter, as hexadecimal digits."""
+    scope: tuple[str, ...] = ()
+    """The command that starts another in a control group; empty where there is none."""
 
     def command(
         self,
@@ -95,20 +185,45 @@ class Sandbox(Struct, frozen=True):
         environment: Mapping[str, str],
         sources: Mapping[str, str],
         copies: Iterable[tuple[str, str]] = (),
-    ) -> list[str]:
-        """A command in the sandbox; to be started with an empty environment.
+        special_files: Mapping[str, str] | None = None,
+        memory: int = SIZE >> 20,
+    ) -> tuple[list[str], dict[str, str]]:
+        """The command that runs another one in the sandbox, and the environment of the former.
 
         `sources`: see `visible_places`. `copies` are folders that scripts may write into, each with
-        the place that shows its content, to be copied from there.
+        the place that shows its content, to be copied from there. `special_files` are hidden.
+        `memory` is in MiB.
         """
-        options = [self.program, *_NAMESPACES, *_PLACES]
+        in_memory = ("--size", str(min(SIZE, memory << 20)), "--tmpfs")
+        options = [*_NAMESPACES, *in_memory, "/", "--proc", "/proc"]
+        for path in filter(os.path.exists, _HIDDEN):
+            options += _hide(path)
+        # /proc is read-only, as root can change the machine by its files; /dev/zero gives memory.
+        options += ["--remount-ro", "/proc", "--dev", "/dev", *_hide("/dev/zero")]
+        options += [*in_memory, "/dev/shm", "--remount-ro", "/dev"]
         for name, value in environment.items():
             options += ["--setenv", name, value]
         for path, source in sorted(sources.items()):
             options += ["--ro-bind-try", source, path]
         for path, place in copies:
-            options += [*_IN_MEMORY, path, "--ro-bind", path, place]
-        return [*options, "--", *command]
+            options += [*in_memory, path, "--ro-bind", path, place]
+        for place, path in (special_files or {}).items():
+            if os.path.lexists(path):
+                options += _hide(place)
+        # The system counts more, such as the kernel's own memory, and says less at the limit.
+        most = memory + 2 * SUPERVISOR_MEMORY
+        limits = (f"--property=MemoryMax={most}M", "--property=MemorySwapMax=0", "--")
+        starter = (sys.executable, "-I", "-S", PROGRAM, self.system_calls, self.program)
+        scope = (*self.scope, *limits) if self.scope else ()
+        # What a course sets must not reach these programs.
+        names = ("XDG_RUNTIME_DIR", "DBUS_SESSION_BUS_ADDRESS") if self.scope else ()
+        own_environment = {name: os.environ[name] for name in names if name in os.environ}
+        return [*scope, *starter, *options, "--", *command], own_environment
+
+
+def _hide(path: str) -> tuple[str, ...]:
+    """Let a file be one that cannot be opened: devices of the system are not allowed there."""
+    return "--ro-bind", "/dev/null", path
 
 
 def visible_places(root: str, library: str, interpreter: Interpreter | None) -> dict[str, str]:
@@ -142,6 +257,33 @@ def _interpreter_parts(prefix: str, root: str) -> dict[str, str]:
         return {}
     prefixes = {real} if f"{prefix}/".startswith(f"{root}/") else {real, prefix}
     return {f"{at}/{part}": f"{real}/{part}" for at in prefixes for part in _PYTHON_PARTS}
+
+
+def special_files(sources: Mapping[str, str], copies: Iterable[tuple[str, str]]) -> dict[str, str]:
+    """The sockets, pipes and devices that scripts would see in these places, each with its path.
+
+    What is read-only can be neither changed nor made, but anybody may talk into it. In folders of
+    the system nobody but root can have made one, for all to use.
+    """
+    find = functools.cache(lambda source: tuple(_find_special_files(source)))
+    places = {**sources, **{place: path for path, place in copies}}
+    return {
+        place + path.removeprefix(source): path
+        for place, source in places.items()
+        if source not in _SYSTEM
+        for path in find(source)
+    }
+
+
+def _find_special_files(folder: str) -> Iterator[str]:
+    folders = [folder]
+    while folders:
+        with contextlib.suppress(OSError), os.scandir(folders.pop()) as entries:
+            for entry in entries:
+                if entry.is_dir(follow_symlinks=False):
+                    folders.append(entry.path)
+                elif not entry.is_file(follow_symlinks=False) and not entry.is_symlink():
+                    yield entry.path
 
 
 def copied_folders(root: str, jobs: Iterable[ScriptJob], scratch: str) -> list[tuple[str, str]]:

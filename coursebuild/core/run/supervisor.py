@@ -14,7 +14,10 @@ runs scripts in copies of itself. Where that is impossible, it starts this progr
 script. It has one thread, so that it may fork.
 
 The protocol: JSON objects, each after its length in 4 bytes; from the tool a `Job`, and back a
-`ChildReport` for each (see `workers`).
+`ChildReport` for each (see `workers`), after `STARTED` if there is something to wait for.
+
+In a sandbox this process is the first one, with number 1: signals from in there do not reach it,
+and nobody in there may look into it.
 """
 
 from __future__ import annotations
@@ -56,6 +59,8 @@ from coursebuild.core.run.watching import (
 )
 
 LENGTH = struct.Struct(">I")
+STARTED = LENGTH.pack(0)
+"""What is sent when a script has been started."""
 PROGRAM = str(Path(__file__).with_name("worker_main.py"))
 
 FIGURE_LIMIT = 4 << 20
@@ -65,7 +70,10 @@ _NOTES_BYTES = 1 << 20
 _OUR_FRAME = re.compile(rb'  File "%s", line \d+ in <module>\n' % re.escape(os.fsencode(PROGRAM)))
 """The frame of `worker_main` in Python's fault dumps, below the script's own frames."""
 _COUNTER = itertools.count()
-_PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
+_FIRST = 1
+"""The number of this process in a sandbox."""
+_PR_SET_DUMPABLE = 4  # linux/prctl.h
+_PR_SET_CHILD_SUBREAPER = 36
 _SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGCHLD)
 
 
@@ -126,9 +134,14 @@ class _Supervisor:
         os.set_blocking(wake, False)
         signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
         signal.signal(signal.SIGCHLD, lambda *_: None)
-        signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-        if sys.platform == "linux":
-            ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+        if os.getpid() != _FIRST:  # which gets only the signals that it handles
+            signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+        self.libc = ctypes.CDLL(None) if sys.platform == "linux" else None
+        if self.libc is not None:
+            self.libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+            if os.getpid() == _FIRST:
+                self.libc.prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
+                _avoid_fork_server()
         os.chdir("/")
         self.scratch = ""
 
@@ -163,7 +176,9 @@ class _Supervisor:
         try:
             try:
                 for writable, content in job["copies"]:
-                    shutil.copytree(content, writable, symlinks=True, dirs_exist_ok=True)
+                    shutil.copytree(
+                        content, writable, symlinks=True, ignore=_special_names, dirs_exist_ok=True
+                    )
                 folder = _make_temporary_folder(job["scratch"])
                 parent = os.getppid()  # now, since a script may end it as soon as it runs
                 script = self._launch(job, environment | {"TMPDIR": folder})
@@ -171,6 +186,7 @@ class _Supervisor:
                 return _report_unstartable(f"the script cannot be started: {error}\n")
             if isinstance(script, ScriptProcess):
                 return script
+            _send(self.reports, STARTED)
             try:
                 script.watch(self.jobs, parent)
             finally:
@@ -192,7 +208,7 @@ class _Supervisor:
             if not self._can_fork(job):
                 pid = _spawn(job, environment, prepare)
                 return RunningScript(pid, (out, err), None, job["timeout"], self.awake)
-            shared = mmap.mmap(-1, _NOTES_BYTES)
+            shared = _shared_memory(environment["TMPDIR"])
             gc.freeze()  # else a script's garbage collector would touch, and so copy, our memory
             pid = os.fork()
             if pid == 0:
@@ -219,6 +235,8 @@ class _Supervisor:
     def _prepare_script(self, job: Job, stdout: int, stderr: int, parent: int) -> None:
         """Prepare a script's process: its session, pipes, signals and limits."""
         os.setsid()
+        if self.libc is not None:
+            self.libc.prctl(_PR_SET_DUMPABLE, 1, 0, 0, 0)
         end_with_parent(parent)
         os.dup2(stdout, 1)
         os.dup2(stderr, 2)
@@ -230,6 +248,17 @@ class _Supervisor:
         if most == resource.RLIM_INFINITY or most > memory:
             resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
         os.chdir(job["root"])
+
+
+def _avoid_fork_server() -> None:
+    """Let processes be spawned by default in a sandbox.
+
+    Python's default since 3.14 is a server that listens at a socket in a folder.
+    """
+    if sys.version_info >= (3, 14):
+        from multiprocessing import context
+
+        context._default_context._default_context = context._concrete_contexts["spawn"]
 
 
 def _sibling_names(job: Job) -> frozenset[str]:
@@ -251,6 +280,24 @@ def _spawn(job: Job, environment: Mapping[str, str], prepare: Callable[[], None]
     )
     process.returncode = 0  # `RunningScript` reaps it
     return process.pid
+
+
+def _special_names(folder: str, names: Sequence[str]) -> list[str]:
+    """The files that cannot be copied: sockets, pipes and devices."""
+    paths = {name: Path(folder, name) for name in names}
+    return [n for n, p in paths.items() if not (p.is_symlink() or p.is_dir() or p.is_file())]
+
+
+def _shared_memory(folder: str) -> mmap.mmap:
+    """Memory for a script's notes, which its process shares with this one."""
+    if os.getpid() != _FIRST:
+        return mmap.mmap(-1, _NOTES_BYTES)
+    fd = os.open(folder, os.O_TMPFILE | os.O_RDWR)  # in a sandbox, all that is shared is a file's
+    try:
+        os.ftruncate(fd, _NOTES_BYTES)
+        return mmap.mmap(fd, _NOTES_BYTES)
+    finally:
+        os.close(fd)
 
 
 def _read_notes(shared: mmap.mmap | None, overflow: str) -> bytes:

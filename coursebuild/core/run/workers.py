@@ -16,12 +16,18 @@ from typing import TypeAlias
 import msgspec
 from msgspec import Struct
 
+from coursebuild.core.model.results import Outcome
 from coursebuild.core.run import supervisor
+from coursebuild.core.run.sandbox_watching import SandboxWatch
 
-Enclose: TypeAlias = Callable[[Sequence[str], Mapping[str, str]], list[str]]
-"""Makes, of a command and an environment, the command that runs it in a sandbox."""
+Enclose: TypeAlias = Callable[[Sequence[str], Mapping[str, str]], tuple[list[str], dict[str, str]]]
+"""Makes, of a command and its environment, those that run it in a sandbox."""
 _MAX_REPORT_SIZE = 256 << 20
 """Bytes that a report may have."""
+_START = 60.0
+"""Seconds that a sandbox may take to start its script."""
+_GRACE = 5.0
+"""Seconds that it may take to report, after its script's time limit."""
 
 
 class ChildReport(Struct, frozen=True):
@@ -59,15 +65,15 @@ class Worker:
         """The index of the job that it works on."""
         self.is_reused = False
         """Whether it comes from an earlier run and has reported nothing in this one."""
-        self.deadline = float("inf")
-        """When it must have reported, by `time.monotonic`."""
+        self.excess: tuple[Outcome, str] | None = None
+        """Why its sandbox was ended: how its script counts as ended, and the end of a sentence."""
         self._buffer = bytearray()
         job_reader, job_writer = os.pipe()
         self.reports, report_writer = os.pipe()
         self.jobs: int | None = job_writer
         command = [python, supervisor.PROGRAM, str(job_reader), str(report_writer), str(int(fork))]
-        if enclose is not None:  # what a course sets must not reach the program of the sandbox
-            command, environment = enclose(command, environment), {}
+        if enclose is not None:
+            command, environment = enclose(command, environment)
         try:
             self._process = subprocess.Popen(
                 command,
@@ -88,6 +94,10 @@ class Worker:
         for pipe in (self._process.stdout, self._process.stderr):
             assert pipe is not None
             pipe.close()  # a script's streams are pipes too; the supervisor itself prints nothing
+        self._watch = None if enclose is None else SandboxWatch(self._process.pid)
+        self._start_time = time.monotonic()
+        """When the script was started; until then, this process."""
+        self._has_started = False
 
     def give(self, index: int, message: bytes) -> None:
         """Hand over a job."""
@@ -96,6 +106,23 @@ class Worker:
         # The pipe is broken if the supervisor has died, which reading will show.
         with contextlib.suppress(BrokenPipeError), open(self.jobs, "wb", closefd=False) as pipe:
             pipe.write(supervisor.LENGTH.pack(len(message)) + message)
+
+    def enforce_limits(self, timeout: float, memory: int) -> None:
+        """End its sandbox if that takes too many seconds, too many MiB, or too many processes.
+
+        The supervisor ends its script at the first of these limits; but it is inside.
+        """
+        if self._watch is None or self.excess is not None:
+            return
+        seconds = time.monotonic() - self._start_time
+        if self._has_started and seconds > timeout + _GRACE:
+            self.excess = Outcome.TIMEOUT, "did not end at its time limit"
+        elif seconds > _START and not (self._has_started and self._watch.is_ready()):
+            self.excess = Outcome.KILLED, f"did not begin within {_START:g} s"
+        elif excess := self._watch.excess(memory):
+            self.excess = Outcome.KILLED, excess
+        if self.excess is not None:
+            self.kill()
 
     def kill(self) -> None:
         """End it at once, on Linux with what it runs."""
@@ -120,6 +147,9 @@ class Worker:
             ValueError: it is no report.
         """
         size = supervisor.LENGTH.size
+        if not self._has_started and self._buffer.startswith(supervisor.STARTED):
+            del self._buffer[:size]
+            self._start_time, self._has_started = time.monotonic(), True
         if len(self._buffer) < size:
             return None
         (length,) = supervisor.LENGTH.unpack(self._buffer[:size])
@@ -129,6 +159,7 @@ class Worker:
             return None
         report = msgspec.json.decode(self._buffer[size:], type=ChildReport)
         self._buffer.clear()
+        self._has_started = False
         return report
 
     def status(self) -> int:
@@ -136,9 +167,9 @@ class Worker:
         return self._process.wait()
 
     def close(self) -> None:
-        """Dismiss it and wait until it has killed what it runs."""
+        """Dismiss it and wait until it has killed what it runs; end its sandbox at once."""
         self.dismiss()
-        until = time.monotonic() + 10.0
+        until = time.monotonic() + (10.0 if self._watch is None else 0.0)
         try:
             while (left := until - time.monotonic()) > 0 and wait([self.reports], left):
                 if not os.read(self.reports, 1 << 16):
@@ -147,3 +178,5 @@ class Worker:
             os.close(self.reports)
             self.kill()  # if it is still there
             self._process.wait()
+            if self._watch is not None:
+                self._watch.close()

@@ -23,6 +23,7 @@ from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import try_lock
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.files.trust import FOLDER, find_store, store_key
+from coursebuild.core.run.sandbox import examine_sandbox
 from coursebuild.core.run.versions import engine_version, python_version
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.report.terminal import GREEN, RED, YELLOW, Style, visible
@@ -66,8 +67,8 @@ def run(arguments: argparse.Namespace) -> int:
     if not folder.is_dir():
         raise UsageError(f"there is no folder {arguments.root}")
     style, status = style_of(sys.stdout), CLEAN
-    probes = (_python, _mujoco, _lab_engine, _fonts, _folder, _store, _locks, _disk, _rendering)
-    for make_probes in probes:
+    required = (_python, _mujoco, _lab_engine, _fonts, _folder)
+    for make_probes in (*required, _store, _locks, _disk, _rendering, _sandbox):
         for probe in make_probes(folder):
             write(_format_line(probe, style), CLEAN)
             if probe.is_required and not probe.ok:
@@ -173,6 +174,14 @@ def _rendering(_: Path) -> Iterator[Probe]:
         )
     )
     yield Probe(f"no offscreen rendering: {error_line}", False, cure, is_required=False)
+
+
+def _sandbox(folder: Path) -> Iterator[Probe]:
+    """Probe the parts of the sandbox, up to the first that lacks."""
+    _, parts = examine_sandbox(folder)
+    for part in parts:
+        text = f"`--sandbox` {part.problem}" if part.problem else f"{part.name}, for `--sandbox`"
+        yield Probe(text, not part.problem, part.help, is_required=False)
 
 
 def _try_code(code: str, **environment: str) -> str:
