@@ -111,7 +111,7 @@ _FUNCTIONS = frozenset(
     "not is where has lang dir nth-child nth-last-child nth-of-type nth-last-of-type".split()
 )
 
-_ESCAPE = r"\\(?:([0-9a-f]{1,6})(?:\r\n|[ \t\r\n\f])?|([^0-9a-f\r\n\f]))"
+_ESCAPE = r"\\(?:[0-9a-f]{1,6}(?:\r\n|[ \t\r\n\f])?|[^0-9a-f\r\n\f])"
 _ESCAPED = re.compile(_ESCAPE, re.IGNORECASE)
 _NAME = rf"(?:[\w-]|[^\x00-\x7f]|{_ESCAPE})++"
 _TOKEN = re.compile(
@@ -353,7 +353,8 @@ def _css_tokens(css: str) -> Iterator[tuple[str, str]]:
 
 
 def _unescape(match: re.Match[str]) -> str:
-    code = int(match[1], 16) if match[1] else ord(match[2])
+    text = match[0][1:]
+    code = int(text, 16) if text[0] in "0123456789abcdefABCDEF" else ord(text)
     return chr(code) if 0 < code <= 0x10FFFF else "\ufffd"
 
 
