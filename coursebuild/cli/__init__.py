@@ -1,8 +1,8 @@
 """The command line: arguments → pipeline → exit status.
 
 Entry point: `main(arguments)`. Exit status 0: clean; 1: something is wrong in the course; 2: wrong
-usage. Heavy imports happen in the command that needs them; here there are none but in `main`, which
-first lets Ctrl-C end this process without a word.
+usage. Heavy imports happen in the command that needs them, and here in `main`, which first lets
+Ctrl-C end this process without a word.
 
 - `unchanged`: a command that has nothing to do, for which little is loaded
 - `running`: runs a command, and decides the status that it ends with
@@ -19,6 +19,8 @@ from __future__ import annotations
 import os
 import sys
 
+from coursebuild.cli.output import CLEAN, FAILURE, USAGE, say, write
+
 TYPE_CHECKING = False
 """True for type checkers: importing `typing` takes a tenth of a run with nothing to do."""
 if TYPE_CHECKING:
@@ -33,14 +35,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     alone = arguments is None
     if alone:
         _end_by_interrupt()
-    from coursebuild.cli.output import CLEAN, FAILURE, USAGE, say, write
-    from coursebuild.cli.unchanged import previous_output, split_directory
-
     _utf8_streams()
     if sys.platform == "win32":
         return say(USAGE, "coursebuild runs on Linux and macOS; on Windows, install it in WSL")
     all_words = sys.argv[1:] if arguments is None else list(arguments)
     try:
+        from coursebuild.cli.unchanged import previous_output, split_directory
+
         directory, words = split_directory(all_words)
         output = previous_output(directory, words)
         if output is not None:
