@@ -25,6 +25,7 @@ from support.markdown_files import (
 from support.scratch_course import Folder
 
 README = ROOT / "README.md"
+SECURITY = (ROOT / "SECURITY.md", DOCS / "explanation/security.md")
 FENCES = fences(README)
 LESSON = "content/lessons/1.1-free-fall.md"
 PICTURE_LIMIT = 300_000  # bytes
@@ -190,3 +191,9 @@ def defined_names(place: Path) -> set[str]:
     top = re.compile(r"^(?:def |class |(?=\w+: ))(\w+)", re.MULTILINE)
     paths = [place] if place.is_file() else place.rglob("*.py")
     return {name for path in paths for name in top.findall(path.read_text(encoding="utf-8"))}
+
+
+def test_what_is_promised_of_security_is_tested_where_it_says() -> None:
+    paths = {path for page in SECURITY for path in re.findall(r"`([\w/]+\.py)`", page.read_text())}
+    assert len(paths) > 20
+    assert [path for path in sorted(paths) if not (ROOT / "tests" / path).is_file()] == []
