@@ -131,7 +131,7 @@ def _find_scope() -> tuple[str, ...]:
         "--scope",
         "--quiet",
         "--collect",
-        f"--property=TasksMax={PROCESSES}",
+        f"--property=TasksMax={16 * PROCESSES}",
     )
     trial = [*scope, "--property=MemoryMax=1G", "--", "true"]
     with contextlib.suppress(OSError, subprocess.SubprocessError):
@@ -210,7 +210,8 @@ class Sandbox(Struct, frozen=True):
         for place, path in (special_files or {}).items():
             if os.path.lexists(path):
                 options += _hide(place)
-        # The system counts more, such as the kernel's own memory, and says less at the limit.
+        # The system counts the kernel's own memory too, and does not say what its limit was: so it
+        # is further, and holds for what happens between two looks.
         most = memory + 2 * SUPERVISOR_MEMORY
         limits = (f"--property=MemoryMax={most}M", "--property=MemorySwapMax=0", "--")
         starter = (sys.executable, "-I", "-S", PROGRAM, self.system_calls, self.program)
