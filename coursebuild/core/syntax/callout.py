@@ -13,12 +13,13 @@ from collections.abc import Collection
 from msgspec import Struct
 
 from coursebuild.core.syntax.spans import trim
-from coursebuild.core.text.diagnostics import Parsed, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Parsed, diagnose, did_you_mean, misspelt
 from coursebuild.core.text.source import Excerpt, Span
 
 _HEAD = re.compile(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
 _BROKEN_HEAD = re.compile(
-    r"(?=[^\w\n\\]{0,3}!|\[[\w-]+!)[^\w\n\\]{1,3}([A-Za-z][\w-]*)[^\w\s(]{0,2}+(?!\()([^\n]*)(?:\n|$)"
+    r"(?:\w?[^\w\s\\]{0,2}![^\w\s\\]?[ ]?([A-Za-z][\w-]*)[^\w\s(]?+"  # `!note`, `[!note`, `![note]`
+    r"|\[[^\w\s\\]?([A-Za-z][\w-]*)[!\])}]{1,2}+)-?+(?![(\[:])([^\n]*)(?:\n|$)"  # `[note]`
 )
 """A line that was surely meant to be the first of a callout if the word is a kind."""
 FALLBACK = "note"
@@ -65,11 +66,16 @@ def read_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None
 
 def _read_broken_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None:
     match = _BROKEN_HEAD.match(paragraph.text)
-    if match is None or match[1].lower() not in kinds:
+    if match is None:
         return None
-    kind, title = match[1].lower(), trim(paragraph.slice(*match.span(2)))
-    place = paragraph.span(0, match.start(2)) if title.text else paragraph.span(0, match.end())
-    head = Head(kind, place, title, False, trim(paragraph.slice(match.end())))
-    message = f"`{trim(paragraph.slice(0, match.start(2))).text}` does not begin a callout"
-    help = f"write `> [!{kind}] Title`"
-    return Parsed(head, (diagnose("callout-unknown", place.first_line(), message, help=help),))
+    kind = (match[1] or match[2]).lower()
+    if kind not in kinds:
+        kind = misspelt(kind, [name for name in kinds if len(name) > 5]) or ""
+    if not kind:
+        return None
+    title = trim(paragraph.slice(*match.span(3)))
+    place = trim(paragraph.slice(0, match.start(3)))
+    head = Head(kind, place.span(), title, False, trim(paragraph.slice(match.end())))
+    help = f"write `> [!{kind}] Title`, or a backslash before the bracket that is meant to be seen"
+    message = f"`{place.text}` does not begin a callout"
+    return Parsed(head, (diagnose("callout-unknown", place.span(), message, help=help),))

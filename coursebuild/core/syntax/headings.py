@@ -14,7 +14,7 @@ from msgspec import Struct, field
 
 from coursebuild.core.model import Image, Inline, plain_text, walk_inlines
 from coursebuild.core.syntax.spans import trim
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, misspelt
 from coursebuild.core.text.source import Excerpt, Span
 
 _CANDIDATE = re.compile(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
@@ -50,6 +50,8 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
     for word in (inner.slice(*match.span()) for match in _WORD.finditer(inner.text)):
         if _ID.fullmatch(word.text) and name is None:
             name = word
+        elif misspelt(word.text, [".further"]):
+            return _reject(title, word, f"no class `{word.text}`", "did you mean `.further`?")
         elif _CLASS.fullmatch(word.text):
             classes.append(word.text[1:])
         elif word.text.startswith("#") and name is not None:
@@ -59,9 +61,9 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
     return Parsed(Attributes(title, name, tuple(classes)))
 
 
-def _reject(title: Excerpt, place: Excerpt, message: str) -> Parsed[Attributes]:
+def _reject(title: Excerpt, place: Excerpt, message: str, help: str = _HELP) -> Parsed[Attributes]:
     """A heading without attributes, as those that it has are wrong at `place`."""
-    diagnostic = diagnose("heading-attributes", place.span(), message, help=_HELP)
+    diagnostic = diagnose("heading-attributes", place.span(), message, help=help)
     return Parsed(Attributes(title), (diagnostic,))
 
 
@@ -130,6 +132,9 @@ def check_heading(
         isinstance(inline, Image) for inline in walk_inlines(children)
     ):
         diagnostics.append(diagnose("heading-empty", span, "the heading has no text"))
+    if re.match(r"#+[^\W\d_]", plain_text(children)):
+        message, help = "a `#` would be shown before the title", "write all `#` before the blank"
+        diagnostics.append(diagnose("markup-unread", span.first_line(), message, help=help))
     if lesson and level == 1:
         help = "the title comes from the course map; begin with `## `"
         if span.text.rstrip().endswith("\n======="):

@@ -21,7 +21,7 @@ from coursebuild.core.text.source import Excerpt, Span
 
 OUTPUT, FIGURE = "Output", "Figure:"
 _CAPTION = re.compile(r"\s*Output\b.*:\s*", re.DOTALL)
-_FIRST_WORD = re.compile(r"([^\W\d_]{3,12})\b[ \t]*(:?)")
+_FIRST_WORD = re.compile(r"([^\s:*`]{3,12})(?![^\s:])[ \t]*(:?)")
 _NEAR_CAPTION = re.compile(
     r"\s*(?:(?:the|expected|recorded|sample|printed|its)\s+){0,2}outputs?\b.{0,40}\s*",
     re.IGNORECASE | re.DOTALL,

@@ -46,7 +46,7 @@ _TEX = re.compile(r"\\[A-Za-z]{2,}|[A-Za-z)}\]][_^](?:[0-9]|\{)")
 """A command, an index or an exponent."""
 _LONE_DOLLAR = re.compile(
     r"(?<![\w$])\$(?!(?-i:[A-Z_]{3,})\b)(?:[A-Za-z\\(|{]|[-+][A-Za-z])"  # as before a formula
-    r"|(?:(?<![A-Za-z])(?<!\d )[a-z]|[)}])\$(?![\w$])"  # as after one
+    r"|(?:(?<![A-Za-z])(?<!\d )[a-z]{1,2}|[)}])\$(?![\w$])"  # as after one
     r"|(?<!\$)\$ [A-Za-z](?: ?[=<>+*/^_-] ?[\w.]+)* \$(?!\$)"
 )
 """Dollar signs that were surely meant for a formula, with a character of it."""
@@ -59,7 +59,7 @@ _WIDE = r"[\u3040-\u30ff\u3400-\u9fff\uac00-\ud7af]"
 """Letters of scripts that are written without blanks."""
 _SCHEME = r"(?:lesson|model|page|term):(?=\w)"
 _ADDRESS = (
-    rf"(?:{_SCHEME}|https?:|mailto:|#\w|[\w./-]+\.(?:csv|html|jpe?g|md|pdf|png|py|svg|xml)\b)"
+    rf"(?:{_SCHEME}|https?:|mailto:|#\w|[\w./-]{1, 80}\.(?:csv|html|jpe?g|md|pdf|png|py|svg|xml)\b)"
 )
 _MACROS = """
     alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta kappa lambda mu nu xi pi rho
@@ -83,12 +83,13 @@ _FOREIGN = {
     ),
     "callout": _Kind(
         r"^ {0,3}(?:(?:!!!|\?\?\?\+?)(?:[ \t]+|(?-i:(?=[a-z])))[\w-]+|:{3,}[ \t]*\{?[.#]?[\w-]+\}?)"
-        r"|\A\[![\w-]*\]?",
+        r"|\A\[![\w-]*\]?|(?<!\\)\[![\w-]+\]",
         "no callout begins here",
         "a callout is a quotation: `> [!note]`, and `> ` before each line of it",
     ),
     "latex": _Kind(
-        r"\\\((?:[^\n]*?[\\^_=+][^\n]*?|[ ]?[A-Za-z][ ]?)\\\)|^\\\[\s[\s\S]*?\\\]|\$\0+\$"
+        r"\\\((?:[^\n]{0,80}?[\\^_=+][^\n]{0,80}?|[ ]?[A-Za-z][ ]?)\\\)"
+        r"|^\\\[\s[\s\S]{0,2000}?\\\]|\$\0+\$"
         r"|\\(?:begin|ref|eqref|cite\w*)\{[^{}\n\0]*\}|(?<![\w:\\])\\(?!end\{)[A-Za-z]{2,}\{[^{}\n\0]*\}"
         rf"|(?<![\w:\\/])\\(?-i:{'|'.join(_MACROS.split())})(?![\w\\/])",
         "there is no formula here",
@@ -96,7 +97,7 @@ _FOREIGN = {
     ),
     "attributes": _Kind(
         r"\{:?[ \t]*[.#][A-Za-z][\w:.-]*[^{}\n\0]*\}?|\{:[^{}\n\0]+\}|\{#?eq:[^{}\n\0]*\}?"
-        r"|(?<![{\w&\0])#[A-Za-z][\w:.-]*\}",
+        r"|(?<![{\w&\0])[#.][A-Za-z][\w:.-]*\}",
         "only headings have attributes, and formulas labels: `{#eq:name}`",
         "in a heading, `## Title {#id .class}` ends the line; write HTML where a text needs a "
         "class or a size",
@@ -167,7 +168,8 @@ _BROKEN = {
     "binding": _Kind(
         rf"(?:`{_NUMBER}[^`{{}}\n\0]{{0,20}}|(?:{_NUMBER})?`?)"
         r"\{[ \t]*(?:out|given)\b[^{}\n\0]*\}?"
-        r"|(?<=\0)[A-Za-z]{1,3}\{[A-Za-z]{1,6}\}|(?<=\0)[({\[]?(?:out|given)[)}\]]",
+        r"|(?<=\0)[A-Za-z]{1,3}\{[A-Za-z]{1,6}\}|(?<=\0)[^\s\0]{0,2}(?:out|given)[)}\]]"
+        r"|(?<=\0)\{\{(?:out|given)[^{}\n\0]*\}+|(?<=\0)\}",
         "only a number in backticks is bound, by braces directly after it",
         "put the number into backticks: `` `4.47`{out} ``",
         "binding-attribute",
@@ -180,18 +182,22 @@ _BROKEN = {
     ),
     "braces": _Kind(r"(?<=[\0\]])\{(?![ \t]*[.#:%{])(?:[^{}\n\0]*\}|\w*)", "", ""),
     "link": _Kind(
-        r"(?<!\\)!?\[[^\[\]\n]*(?<!\\)\][ \t]+\(" + _ADDRESS + r"[^)\n]*\)"
-        r"|(?:(?<!\\)!?\[[^\[\]\n]*)?(?<!\\)\]\([^\s)]*\)?"
-        r"|\([^()\n]+\)\[" + _ADDRESS + r"[^\]\n]*\]"
+        r"(?<!\\)!?\[[^\[\]\n]{0,200}(?<!\\)\][ \t]+\(" + _ADDRESS + r"[^)\n]*\)"
+        r"|(?:(?<!\\)!?\[[^\[\]\n]{0,200})?(?<!\\)\]\([^\s)]*\)?"
+        r"|\([^()\n]{1,200}\)\[" + _ADDRESS + r"[^\]\n]*\]"
         r"|(?<!\\)!\[[^\[\]\n\0]*\]"
-        rf"|(?<![\w:/.])(?-i:{_SCHEME})[\w.#/-]*\w",
+        rf"|(?<![\w:/.])(?-i:{_SCHEME})[\w.#/-]*\w"
+        r"|(?<!\\)\[[^\[\]\n]{0,200}\(" + _ADDRESS + r"[^()\s]*\)(?![^\[\n]*\])"
+        r"|(?<!\\)\[[^\[\]\n]{0,200}\]?\(?\]?\S?" + _ADDRESS + r"[^()\s\]]*\)(?![^\[\n]*\])"
+        r"|(?<!\\)\[[^\[\]\n]{0,200}\]#\([^()\s]*\)|(?<=\0)\]|\[(?=\0)",
         "this is not a complete link",
         "a link is `[text](address)`, with no blank before the `(` and none in the address",
         "markup-unread",
         once=True,
     ),
     "heading": _Kind(
-        r"^[ \t]*#{2,6}(?=[^\s#])|^[ \t]*#{7,}(?=\s)",
+        r"^[ \t]*#{2,6}(?=[^\s#])|^[ \t]*#{7,}(?=\s)"
+        r"|^(?-i:[^\sA-Z#\0]#{1,5} (?=[A-Z])|#{1,5}[^\w\s#\0] (?=[A-Z]))",
         "no heading begins here",
         "a heading is `## Title`, with two to six `#` and a blank after them",
         "markup-unread",
@@ -255,7 +261,7 @@ _BROKEN = {
         rf"{_BEFORE}(?:\*\*\*?|__|~~)(?=[^\W_]|[\"'“„(\[$\\\0])"
         rf"|(?:(?<=[^\W\d_])|(?<=[\"'”\].!?…\0]))(?:\*\*|__|~~)(?!\*){_AFTER}"
         rf"|(?<={_WIDE})\*\*|\*\*(?={_WIDE})"
-        r"|(?<=[ \t(])\*(?=[^\W\d_]{3})",
+        r"|(?<=[ \t(])\*(?=[^\W\d_]{3})|(?<=\0)\*|\*(?=\0)",
         "no emphasis begins or ends here",
         "put the same mark at both ends, in the same paragraph and with no blank inside it; write "
         "a backslash before each character that is meant to be seen",
@@ -341,7 +347,10 @@ def _check_dollars(
     if not any("$" in text for _, text in texts):
         return
     lone = _LONE_DOLLAR.search(masked)
-    if lone is not None:
+    beside = next((m.start() for m in re.finditer(r"(?<=\0)\$|\$(?=\0)", masked)), None)
+    if beside is not None and "$$" in content.text[max(beside - 1, 0) : beside + 2]:
+        at = beside
+    elif lone is not None:
         at = masked.index("$", lone.start())
     elif any(_DOLLAR.search(text) for _, text in texts) and _TEX.search(masked):
         at = masked.index("$")
@@ -369,10 +378,19 @@ def _diagnose(content: Excerpt, name: str, kind: _Kind, match: re.Match[str]) ->
             return _diagnose_braces(markup, span, before[-1:])
         case "binding" if before.endswith("`") and markup.startswith("{"):
             return _diagnose_braces(markup, span, "`")
+        case "binding" if markup == "}":
+            help = "delete it, or write `\\}` for a brace that readers are to see"
         case "binding":
             number, _, braces = markup.replace("`", "").rpartition("{")
             if re.match("[-+\u2212\\d]", number) and braces.endswith("}"):
                 help = help.replace("4.47", number).replace("{out}", "{" + braces)
+        case "link" if markup in ("[", "]"):
+            is_beside_mark = before[-1:] in ("]", ")") if markup == "]" else after[:1] == "["
+            if not is_beside_mark or whole.count("[") == whole.count("]"):
+                return None
+        case "emphasis" if markup == "*" and "**" not in before[-1:] + markup + after[:1]:
+            if match[0] == "*" and not re.match(r"[^\W\d_]{3}", after):
+                return None
         case "latex" if markup.startswith("$") and markup[1] != "`":
             return None  # no code stands between the dollars
         case "role" if not after.startswith("`"):
