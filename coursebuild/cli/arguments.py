@@ -25,8 +25,11 @@ def options_of(arguments: argparse.Namespace) -> Options:
     else:
         store = Memo(root)
     sandbox = find_sandbox(root) if getattr(arguments, "sandbox", False) else None
-    quiet, long, verbose = (getattr(arguments, n, False) for n in ("quiet", "long", "verbose"))
-    return Options(root, jobs, store, Progress(quiet=quiet), long, verbose, sandbox=sandbox)
+    quiet, long, verbose, strict = (
+        getattr(arguments, name, False) for name in ("quiet", "long", "verbose", "strict")
+    )
+    progress = Progress(quiet=quiet)
+    return Options(root, jobs, store, progress, long, verbose, strict=strict, sandbox=sandbox)
 
 
 def available_cores() -> int:
@@ -85,6 +88,15 @@ def add_sandbox(parser: argparse.ArgumentParser) -> None:
         "--sandbox",
         action="store_true",
         help="run each script without network, and with nothing to write or to see but the course",
+    )
+
+
+def add_strict(parser: argparse.ArgumentParser) -> None:
+    """Declare `--strict`."""
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="count warnings as errors, and refuse scripts that are not run",
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from coursebuild.cli.arguments import add_running, add_sandbox
+from coursebuild.cli.arguments import add_running, add_sandbox, add_strict
 from coursebuild.cli.unchanged import run_unless_unchanged
 from coursebuild.pipeline.build import build
 
@@ -20,6 +20,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_running(parser)
     add_sandbox(parser)
+    add_strict(parser)
     parser.add_argument(
         "--out",
         default="public",

@@ -11,6 +11,7 @@ from coursebuild.cli.arguments import (
     add_long,
     add_running,
     add_sandbox,
+    add_strict,
     options_of,
 )
 from coursebuild.cli.output import CLEAN, print_report, style_of, write
@@ -27,6 +28,7 @@ examples:
   coursebuild check 4.2                  one lesson
   coursebuild check -v                   why each script runs
   coursebuild check --format github      annotations in GitHub Actions
+  coursebuild check --strict             in CI: warnings are errors
   coursebuild check --sandbox            somebody else's branch
   coursebuild check --against 3.13.0     what another version of MuJoCo changes
 """
@@ -54,6 +56,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     add_long(parser)
     add_sandbox(parser)
+    add_strict(parser)
     parser.add_argument(
         "--sensitivity",
         action="store_true",
@@ -106,7 +109,7 @@ def _compare_with_version(arguments: argparse.Namespace) -> int:
 
     conflicts = [] if arguments.format in ("text", "json") else [f"--format {arguments.format}"]
     conflicts += _special_options(arguments)
-    conflicts += ["--sandbox"] if arguments.sandbox else []
+    conflicts += [f"--{name}" for name in ("sandbox", "strict") if getattr(arguments, name)]
     if conflicts:
         raise UsageError(f"--against cannot be combined with {conflicts[0]}")
     options = options_of(arguments)

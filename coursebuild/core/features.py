@@ -342,8 +342,9 @@ class Feature(Struct, frozen=True, kw_only=True):
     """The diagnostics about some documents of the course that parsing did not find."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None
     """The diagnostics about finished runs of scripts."""
-    unproven: Callable[[Course], Iterable[Diagnostic | str]] | None = None
-    """What nothing in the course proves, and summary lines, for `check --truth`."""
+    unproven: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic | str]] | None = None
+    """What nothing in the course proves, given the runs of its scripts, and summary lines, for
+    `check --truth`."""
     check_models: (
         Callable[[Course, Callable[[FeatureBlock], ModelFacts | None]], Iterable[Diagnostic]] | None
     ) = None

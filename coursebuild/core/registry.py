@@ -199,10 +199,11 @@ def page_copies() -> tuple[PageCopy, ...]:
     return tuple(sorted(copies, key=lambda copy: not copy.download))
 
 
-def unproven(course: Course) -> tuple[Diagnostic | str, ...]:
-    """What nothing in the course proves, and summary lines."""
+def unproven(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic | str, ...]:
+    """What nothing in the course proves, given the runs of its scripts, and summary lines."""
+    runs = tuple(runs)
     makers = (feature.unproven for feature in features() if feature.unproven is not None)
-    return tuple(entry for list_unproven in makers for entry in list_unproven(course))
+    return tuple(entry for list_unproven in makers for entry in list_unproven(course, runs))
 
 
 def summarize(document: Document, mathml: Mathml) -> Parsed[dict[str, Struct]]:

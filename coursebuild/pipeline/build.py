@@ -57,8 +57,9 @@ def prepare(options: Options, make: MakeSite | None = None) -> Iterator[tuple[Re
         if isinstance(checked_course, Report):
             yield checked_course, None
             return
-        if not checked_course.is_sound:
-            yield checked_course.report(), None
+        report = checked_course.report()
+        if not report.ok:
+            yield report, None
             return
         from coursebuild.core.pages.templates import TemplateFailure
         from coursebuild.pipeline.site import site_files

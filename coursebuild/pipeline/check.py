@@ -6,7 +6,7 @@ Entry points: `check(options, names)`; `read_and_verify`, which `build` and `exp
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from msgspec import Struct
@@ -57,8 +57,8 @@ def check(
             from coursebuild.pipeline.shards import write_timings
 
             write_timings(timings, _seconds_by_name(verification), _names(course))
-        claims = unproven(course) if truth else ()
-        diagnostics = [claim for claim in claims if isinstance(claim, Diagnostic)]
+        claims = unproven(course, verification.results.runs) if truth else ()
+        diagnostics: list[Diagnostic] = []
         remarks = [claim for claim in claims if isinstance(claim, str)]
         sensitivities: tuple[Sensitivity, ...] | None = None
         if sensitivity:
@@ -70,7 +70,8 @@ def check(
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
         if shard is not None:
             remarks.append(_describe_part(shard, verification))
-        report = checked_course.report(diagnostics)
+        listed = [claim for claim in claims if isinstance(claim, Diagnostic)]
+        report = checked_course.report(diagnostics, listed)
         return replace(report, remarks=tuple(remarks), sensitivity=sensitivities)
 
 
@@ -89,13 +90,10 @@ class CheckedCourse(Struct, frozen=True):
     """Those that pages may show."""
     diagnostics: tuple[Diagnostic, ...]
 
-    @property
-    def is_sound(self) -> bool:
-        """Whether nothing is wrong but what warnings say."""
-        return not any(d.is_error for d in self.diagnostics)
-
-    def report(self, further: Iterable[Diagnostic] = ()) -> Report:
-        """The report; `further` are diagnostics found since."""
+    def report(
+        self, further: Iterable[Diagnostic] = (), listed: Sequence[Diagnostic] = ()
+    ) -> Report:
+        """The report; `further` are diagnostics found since, for `listed` see `judge`."""
         verification = self.verification
         report = judge(
             self.course,
@@ -104,6 +102,8 @@ class CheckedCourse(Struct, frozen=True):
             scripts=verification.scripts,
             documents=self.documents,
             labs=verification.labs,
+            strict=self.options.strict or self.course.strict,
+            listed=listed,
         )
         depends = depends_on(self.course, verification.results, self.options.interpreter)
         return replace(report, depends=depends)
@@ -128,7 +128,7 @@ def read_and_verify(
     )
     course = parsed_course.value
     if course is None:
-        return judge(None, parsed_course.diagnostics, began)
+        return judge(None, parsed_course.diagnostics, began, strict=options.strict)
     selected = select(course, names, options.root)
     options = options.for_course(course)
     verification = verify(course, options, selected, static=static, shard=shard)
@@ -148,9 +148,7 @@ def _describe_part(shard: Shard, verification: Verification) -> str:
 
 def _seconds_by_name(verification: Verification) -> dict[str, float]:
     """How long scripts and labs took, or took when they were last run."""
-    seconds = {
-        s.path: s.seconds for s in verification.scripts if s.status not in ("skipped", "norun")
-    }
+    seconds = {s.path: s.seconds for s in verification.scripts if s.did_run}
     return seconds | {lab.name: lab.seconds for lab in verification.labs if lab.tried}
 
 

@@ -8,16 +8,19 @@ from __future__ import annotations
 import time
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from fnmatch import fnmatchcase
+from typing import TypeAlias
 
-from coursebuild.core.model import Course, Silence
-from coursebuild.core.model.results import Outcome, Results, TrialLine
+from msgspec.structs import replace
+
+from coursebuild.core.model import Course, Script, Silence, document_scripts
+from coursebuild.core.model.results import Results, TrialLine
 from coursebuild.core.run.dependencies import sought_files
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.scripts.source_parts import shown_files
-from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnostics
 from coursebuild.report import Report, ScriptLine, Summary
+from coursebuild.report.values import unproven_things
 
-_NOT_RUN = ("skipped", "norun")
 _RULES_OF_RUNS = (
     "script-failed",
     "script-timeout",
@@ -29,6 +32,7 @@ _RULES_OF_RUNS = (
     "script-penetration",
     "script-writes",
     "script-connects",
+    "script-unproven",
 )
 """Rules broken only by scripts that were to run; the line may be in another lesson."""
 
@@ -42,37 +46,82 @@ def judge(
     labs: tuple[TrialLine, ...] = (),
     documents: Collection[str] | None = None,
     remarks: tuple[str, ...] = (),
+    strict: bool = False,
+    listed: Sequence[Diagnostic] = (),
 ) -> Report:
     """Make the report of a command that began at this moment of `time.monotonic`.
 
     `documents` limits it to these lessons and pages, by path: to mistakes in them and in the map,
-    and those of the scripts that ran.
+    and those of the scripts that ran. `strict`: warnings count as errors, and a script that was not
+    run is one, unless the map lets it pass. `listed` are warnings that somebody asked for, such as
+    a list of numbers; they stay warnings.
     """
+    unrun = () if course is None else tuple(_unrun_scripts(course, scripts))
+    if strict and course is not None:
+        diagnostics = (*diagnostics, *_refuse_unproven(course, unrun))
     if course is None:
         lesson_count = 0
     elif documents is None:
         lesson_count = len(course.written_lessons)
     else:
         lesson_count = sum(lesson.path in documents for lesson in course.lessons)
-    relevant = sort_diagnostics(_without_consequences([*diagnostics]))
+    relevant = sort_diagnostics(_without_consequences([*diagnostics, *listed]))
     if documents is not None and course is not None:
         paths = {*documents, course.map.path}
         relevant = tuple(d for d in relevant if d.span.path in paths or d.rule in _RULES_OF_RUNS)
     silences = course.silences if course is not None else ()
-    reported = tuple(d for d in relevant if not _is_silenced(d, silences))
+    mild = {d.rule for d in listed}
+    reported = tuple(
+        replace(d, strict=strict and d.rule not in mild)
+        for d in relevant
+        if not _is_silenced(d, silences)
+    )
     errors = sum(d.is_error for d in reported)
     summary = Summary(
         lessons=lesson_count,
         scripts=len(scripts),
-        ran=sum(line.status not in _NOT_RUN for line in scripts),
+        ran=sum(line.did_run for line in scripts),
         skipped=sum(line.status == "skipped" for line in scripts),
         errors=errors,
         warnings=len(reported) - errors,
         silenced=len(relevant) - len(reported),
         seconds=0.0 if began is None else time.monotonic() - began,
         cached=sum(line.cached for line in scripts),
+        unproven=len(unrun),
+        reasons=tuple(dict.fromkeys(name for _, _, names in unrun for name in names)),
     )
     return Report(reported, tuple(scripts), summary, remarks, labs)
+
+
+_Unrun: TypeAlias = tuple[Script, ScriptLine, tuple[str, ...]]
+"""A script that was not run, and why: missing modules, or a key of its fence."""
+
+
+def _unrun_scripts(course: Course, lines: Iterable[ScriptLine]) -> Iterator[_Unrun]:
+    by_path = {s.path: s for document in course.documents for s in document_scripts(document)}
+    for line in lines:
+        if not line.did_run and line.path in by_path:
+            script = by_path[line.path]
+            yield script, line, line.missing or ("norun" if script.norun else "record=once",)
+
+
+def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diagnostic]:
+    """Diagnose scripts that were not run and that the map does not let pass."""
+    allowed_paths = {entry.path for entry in course.unproven}
+    for script, line, reasons in scripts:
+        if line.path in allowed_paths or reasons == ("record=once",):  # that is a mistake by itself
+            continue
+        names = " and ".join(f"`{name}`" for name in reasons)
+        are = "are" if len(reasons) > 1 else "is"
+        reason = f"{names} {are} not installed" if line.missing else "its fence says `norun`"
+        cure = f"install {names}" if line.missing else "let it run"
+        yield diagnose(
+            "script-unproven",
+            script.span.first_line(),
+            f"`{line.path}` was not run, so that nothing proves {unproven_things(line) or 'it'}:"
+            f" {reason}",
+            help=f'{cure}, or let it pass: `unproven = ["{line.path}"]` in `[verify]` of the map',
+        )
 
 
 def _without_consequences(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
@@ -110,7 +159,7 @@ def depends_on(
     if interpreter is not None:
         files |= {interpreter.python, f"{interpreter.prefix}/pyvenv.cfg", *interpreter.packages}
     for run in results.runs:
-        if run.outcome in (Outcome.NORUN, Outcome.SKIPPED):
+        if not run.did_run:
             continue  # installed packages are compared in any case
         if run.trace is None or run.trace.opaque or "." in run.trace.folders:
             return None

@@ -49,6 +49,8 @@ class Options(Struct, frozen=True):
     """Runs scripts, where a `ScriptServer` stays warm from run to run."""
     interpreter: Interpreter | None = None
     """The interpreter of scripts, if it is another than ours; see `for_course`."""
+    strict: bool = False
+    """Whether warnings count as errors, whatever the map says."""
     sandbox: Sandbox | None = None
     """The sandbox of each script; with one, no other code of the course runs."""
 

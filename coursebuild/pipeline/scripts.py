@@ -21,6 +21,7 @@ from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.memory import Memory, longest_first
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
 from coursebuild.core.scripts.failures import is_lost
+from coursebuild.core.scripts.findings import count_unproven
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.recorded_runs import recorded_runs
@@ -181,9 +182,13 @@ def recorded_outputs(course: Course, documents: Collection[str] | None = None) -
 
 
 def script_lines(
-    extractions: Sequence[Extraction], runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]
+    extractions: Sequence[Extraction],
+    runs: Sequence[ScriptRun],
+    verdicts: Sequence[Verdict],
+    course: Course,
 ) -> tuple[ScriptLine, ...]:
     """Make the lines of a report about scripts."""
+    unproven = count_unproven(course, runs, verdicts)
     drifted_paths = {v.recording.script for v in verdicts if v.status == "drift"}
     lines = []
     for extraction, script_run in zip(extractions, runs, strict=True):
@@ -199,6 +204,7 @@ def script_lines(
                 script_run.seconds,
                 script_run.cached,
                 script_run.missing,
+                *unproven.get(script_run.path, ()),
             )
         )
     return tuple(lines)

@@ -14,15 +14,13 @@ from collections.abc import Collection, Iterable, Sequence
 from msgspec.structs import replace
 
 from coursebuild.core.model import Course, Recording
-from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.model.sensitivity import HALVED_RUN, RUNS, Sensitivity
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.sensitivity import is_worth_moving, sensitivity
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scripts import recorded_outputs, run
-
-_NOT_RUN = (Outcome.NORUN, Outcome.SKIPPED)
 
 
 def measure(
@@ -42,7 +40,7 @@ def measure(
     for recording in recorded_outputs(course, documents):
         assert recording.script is not None
         recordings.setdefault(recording.script, []).append(recording)
-    bases = {run.path: run for run in runs if run.outcome not in _NOT_RUN}
+    bases = {run.path: run for run in runs if run.did_run}
     pairs = [(e, bases[e.path]) for e in extract(course).value if e.path in bases]
     moved_scripts = [
         script

@@ -113,7 +113,7 @@ class _Updater:
             self.course,
             diagnostics,
             began,
-            scripts=script_lines(self.scripts, [_as_it_ran(*pair) for pair in runs], ()),
+            scripts=script_lines(self.scripts, [_as_it_ran(*p) for p in runs], (), self.course),
             documents=self.documents,
             remarks=tuple(remarks),
         )

@@ -129,7 +129,7 @@ def verify(
     python = python_version() if interpreter is None else interpreter.version
     engine = engine_version() if interpreter is None else interpreter.engine
     results = Results(runs, verdicts, (), models, python, engine, trial_results)
-    return Verification(results, diagnostics, script_lines(extractions, runs, verdicts))
+    return Verification(results, diagnostics, script_lines(extractions, runs, verdicts, course))
 
 
 def _run_with_trials(
@@ -185,8 +185,11 @@ def _diagnose_nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Dia
         message = "no lesson of the course is written"
         help = "write a file in content/lessons, and give its entry in the map a `status`"
         yield diagnose("no-lessons", place, message, help=help)
-    skipped_runs = [run for run in runs if run.outcome is Outcome.SKIPPED]
-    if skipped_runs and all(run.outcome in (Outcome.SKIPPED, Outcome.NORUN) for run in runs):
+    allowed_paths = {entry.path for entry in course.unproven}
+    skipped_runs = [
+        run for run in runs if run.outcome is Outcome.SKIPPED and run.path not in allowed_paths
+    ]
+    if skipped_runs and not any(run.did_run for run in runs):
         missing = sorted({name for run in skipped_runs for name in run.missing})
         message = "no script can run here, so that nothing was verified"
         yield diagnose("no-scripts", place, message, help=f"install {', '.join(missing)}")

@@ -77,7 +77,7 @@ class Offer(Struct, frozen=True):
 
 def report_now(session: Session) -> Report:
     """Return everything that is wrong, as a report."""
-    return judge(session.course, session.diagnostics())
+    return judge(session.course, session.diagnostics(), scripts=session.script_lines)
 
 
 def page_news(session: Session, path: str) -> str:

@@ -47,6 +47,7 @@ from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.theme import template_diagnostic
 from coursebuild.pipeline.verify import Verification
 from coursebuild.preview.files import Files
+from coursebuild.report import ScriptLine
 
 ScriptKey: TypeAlias = tuple[str, ScriptJob]
 """A script's text, and how it is run."""
@@ -87,6 +88,7 @@ class Session:
         self.verified_course: Course | None = None
         """The course that was run last."""
         self.running_diagnostics: tuple[Diagnostic, ...] = ()
+        self.script_lines: tuple[ScriptLine, ...] = ()
         self.all_due = True
         """Whether any script may print something new, since other files have changed."""
         quiet_options = replace(options, jobs=1, progress=Progress(quiet=True))
@@ -320,6 +322,7 @@ class Session:
             trials = publish_trials(results, self._assets)
         with self.condition:
             self.verified_course, self.running_diagnostics = course, verification.diagnostics
+            self.script_lines = verification.scripts
             self._results, self._trials = results, trials
             keys = script_keys(course)
             self._runs = {run.path: (keys[run.path], run) for run in results.runs}

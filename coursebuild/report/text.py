@@ -32,7 +32,13 @@ from coursebuild.report.terminal import (
     visible,
     visible_lines,
 )
-from coursebuild.report.values import Report, ScriptLine, plural, summary_line
+from coursebuild.report.values import (
+    Report,
+    ScriptLine,
+    plural,
+    summary_line,
+    unproven_things,
+)
 
 _MOST_OF_A_RULE = 20
 """Diagnostics of one rule in one file that are shown."""
@@ -73,12 +79,12 @@ def diagnostic_paragraphs(diagnostics: Sequence[Diagnostic], style: Style) -> It
 
 def script_line(line: ScriptLine, style: Style) -> str:
     """One script: verdict, path, seconds."""
-    good = line.status in ("ok", "skipped", "norun")
+    good = line.status == "ok" or not line.did_run
     verdict = style.paint(f"{line.status:<8}", GREEN if good else RED)
-    if line.status == "norun":
-        return f"{verdict} {line.path}  (not run)"
-    if line.status == "skipped":
-        return f"{verdict} {line.path}  (needs {', '.join(line.missing)})"
+    if not line.did_run:
+        reason = f"needs {', '.join(line.missing)}" if line.missing else "not run"
+        unproven = f"; unproven: {things}" if (things := unproven_things(line)) else ""
+        return f"{verdict} {line.path}  ({reason}{unproven})"
     took = "cached" if line.cached else f"{line.seconds:.2f} s"
     return f"{verdict} {line.path}  {style.paint(took, FAINT)}"
 

@@ -34,6 +34,15 @@ class ScriptLine(Struct, frozen=True):
     cached: bool
     missing: tuple[str, ...] = ()
     """The modules that a skipped script lacks."""
+    unproven_outputs: int = 0
+    """Outputs and figures that are recorded of a script that was not run."""
+    unproven_numbers: int = 0
+    """Numbers bound to these outputs."""
+
+    @property
+    def did_run(self) -> bool:
+        """Whether it was run, now or before."""
+        return self.status not in ("skipped", "norun")
 
 
 class Summary(Struct, frozen=True):
@@ -50,6 +59,10 @@ class Summary(Struct, frozen=True):
     seconds: float
     cached: int = 0
     """Those of `ran` whose result is remembered, so that they were not run again."""
+    unproven: int = 0
+    """Scripts that were not run, so that they prove nothing."""
+    reasons: tuple[str, ...] = ()
+    """What kept them from it: missing modules, `norun`."""
 
 
 class Report(Struct, frozen=True):
@@ -89,6 +102,12 @@ def plural(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
+def unproven_things(line: ScriptLine) -> str:
+    """What nothing proves because a script was not run: `1 output and 2 bound numbers`."""
+    counts = ((line.unproven_outputs, "output"), (line.unproven_numbers, "bound number"))
+    return " and ".join(plural(count, noun) for count, noun in counts if count)
+
+
 def summary_line(report: Report) -> str:
     """One line that says what was checked and what was found."""
     s = report.summary
@@ -97,11 +116,13 @@ def summary_line(report: Report) -> str:
         parts.append(f"{s.cached} cached")
     if report.labs:
         parts.append(f"{plural(len(report.labs), 'lab')} tried")
-    if s.skipped:
-        parts.append(f"{s.skipped} skipped")
     counts = [plural(s.errors, "error")] if s.errors else []
     counts += [plural(s.warnings, "warning")] if s.warnings else []
     verdict = ", ".join(counts) if counts else "everything holds"
+    if s.unproven:
+        was = "was" if s.unproven == 1 else "were"
+        unrun = f"{plural(s.unproven, 'script')} that {was} not run ({', '.join(s.reasons)})"
+        verdict = f"{verdict}, and {unrun}" if counts else f"holds, but for {unrun}"
     silenced = f" ({s.silenced} silenced)" if s.silenced else ""
     return f"{', '.join(parts)}: {verdict}{silenced}"
 

@@ -14,12 +14,14 @@ from coursebuild.core.model import (
     Document,
     Term,
     document_blocks,
+    document_scripts,
     find_inlines,
     is_blank,
 )
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.registry import features
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.syntax.fields import check_unique
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
 
 
@@ -31,7 +33,7 @@ def check_course(course: Course) -> tuple[Diagnostic, ...]:
         for document in documents
         for diagnostic in _check_core_rules(course, document, targets)
     ]
-    return (*diagnostics, *_check_features(course, documents))
+    return (*diagnostics, *_check_unproven(course), *_check_features(course, documents))
 
 
 def check_document(
@@ -89,6 +91,24 @@ def _check_empty_lesson(course: Course, document: Document) -> Iterator[Diagnost
         elif not document.blocks:
             message = f"lesson {lesson.id} is a draft, and its file is empty"
             yield diagnose("draft-empty", source.span(0, 0), message, help=f"begin it, or {help}")
+
+
+def _check_unproven(course: Course) -> Iterator[Diagnostic]:
+    """Report scripts that the map lets pass unproven and that are not there, or always run."""
+    scripts = {s.path: s for document in course.documents for s in document_scripts(document)}
+    for entry in course.unproven:
+        script = scripts.get(entry.path)
+        if script is None:
+            message = f"no lesson or page has a script `{entry.path}`"
+            help = did_you_mean(entry.path, scripts) or "remove it"
+            yield diagnose("unproven-script", entry.span, message, help=help)
+        elif not (script.norun or script.requires):
+            message = f"`{entry.path}` always runs: it says neither `norun` nor `requires`"
+            yield diagnose("unproven-script", entry.span, message, help="remove it")
+    entries = [(entry.path, entry.span) for entry in course.unproven]
+    yield from check_unique(
+        entries, "unproven-script", "the script `{}` is named twice", help="remove it here"
+    )
 
 
 def _check_title(course: Course, document: Document) -> Iterator[Diagnostic]:

@@ -213,6 +213,10 @@ class Course(Struct, frozen=True):
     """Environment variables of scripts, sorted."""
     python: NamedPath | None = None
     """The interpreter of the scripts, if not the one that runs this tool."""
+    strict: bool = False
+    """Whether warnings count as errors."""
+    unproven: tuple[NamedPath, ...] = ()
+    """The scripts that need not have been run where warnings count as errors."""
     id: str = ""
     """A name for the course that stays when its title changes; see `key`."""
     pace: Pace | None = None

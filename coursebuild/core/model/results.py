@@ -171,6 +171,11 @@ class ScriptRun(Struct, frozen=True):
     figures: tuple[tuple[str, bytes], ...] = ()
     """The files among `ScriptJob.figures` that it drew, by name."""
 
+    @property
+    def did_run(self) -> bool:
+        """Whether it was run at all, so that it can bear out what is recorded."""
+        return self.outcome not in (Outcome.SKIPPED, Outcome.NORUN)
+
 
 class DriftKind(enum.Enum):
     """The kind of a difference between the recorded output and that of a run."""

@@ -26,6 +26,7 @@ from coursebuild.core.model import (
     Recording,
     Script,
     Table,
+    find_blocks,
     line_anchor,
     listing_anchor,
     output_anchor,
@@ -135,7 +136,17 @@ def mjcf(page: PageContext, block: Mjcf) -> Markup:
 def binding(page: PageContext, node: NumberBinding) -> Markup:
     """A number that a script printed, marked with the script's name."""
     text = re.sub(r"(?<!\w)-(?=\d)", "\u2212", node.text)
-    return page.template("blocks/binding.html", text=text, path=node.script, source=node.source)
+    runs = page.inputs.runs
+    doubts = {p: r for p, r in runs.items() if r.outcome in (Outcome.SKIPPED, Outcome.NORUN)}
+    path, doubt = node.script, ""
+    if doubts and node.source is None:
+        outputs = find_blocks(page.document, Recording)
+        above = [block.script for block in outputs if block.body_span.end <= node.span.start]
+        printer = path or (above[-1] if above else None)
+        doubt = _not_run(page.words, doubts[printer]).text if printer in doubts else ""
+    return page.template(
+        "blocks/binding.html", text=text, path=path, source=node.source, doubt=doubt
+    )
 
 
 # --- outputs

@@ -32,6 +32,8 @@ def document_inputs(
     models = dict.fromkeys(name for block in feature_blocks for name in block.models())
     link_targets = (link.target for link in model.find_inlines(document, model.Link))
     targets = dict.fromkeys((*link_targets, *map(model.ModelTarget, models)))
+    bindings = model.find_inlines(document, model.NumberBinding)
+    named_scripts: dict[str, set[int]] = {b.script: set() for b in bindings if b.script}
     names = {target: equation_name(library, path, target) for target in targets}
     verdicts = ((block.span.start, library.verdict(block)) for block in recordings)
     trials = ((block.span.start, library.trial_value(block)) for block in feature_blocks)
@@ -44,7 +46,7 @@ def document_inputs(
         callouts={b.kind: library.callout(b.kind) for b in blocks if isinstance(b, model.Callout)},
         runs={
             path: _shown_run(library.runs[path], lines)
-            for path, lines in _quoted_lines(blocks).items()
+            for path, lines in (named_scripts | _quoted_lines(blocks)).items()
             if path in library.runs
         },
         verdicts={start: ShownVerdict(v.status, v.comparison) for start, v in verdicts if v},

@@ -2,7 +2,7 @@
 
 Entry points: `script_findings` (scripts that failed, and all of the next), `output_findings`
 (recorded outputs that differ from what was printed, bound numbers that no output bears out);
-`collect_evidence` (the lines by which bound numbers hold); `drift_diagnostic`.
+`collect_evidence` (the lines by which bound numbers hold); `drift_diagnostic`; `count_unproven`.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 from coursebuild.core.model import Course, Document, Owner
+from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bindings import (
     BindingEvidence,
@@ -17,6 +18,7 @@ from coursebuild.core.scripts.bindings import (
     PrintedOutputs,
     check_bindings,
     dependent_bindings,
+    document_bindings,
 )
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
 from coursebuild.core.scripts.compare import compare
@@ -126,6 +128,26 @@ def collect_evidence(
     for document in course.documents:
         check_bindings(document, outputs, evidence)
     return evidence
+
+
+def count_unproven(
+    course: Course, runs: Iterable[ScriptRun], verdicts: Iterable[Verdict]
+) -> dict[str, tuple[int, int]]:
+    """Count what nothing proves, by the scripts that were not run: outputs, and numbers bound."""
+    unrun = {run.path for run in runs if not run.did_run}
+    if not unrun:
+        return {}
+    outputs = PrintedOutputs(verdicts, ())
+    shown: list[str | None] = []
+    bound: list[str | None] = []
+    for document in course.documents:
+        shown += (verdict.recording.script for verdict in outputs.of_document(document))
+        figures = recorded_figures(document)
+        shown += (figure.script for figure in figures if not figure.path.endswith(".csv"))
+        for binding in document_bindings(document):
+            of_binding = outputs.of_binding(binding)
+            bound.append(binding.script or (of_binding[0].recording.script if of_binding else None))
+    return {path: (shown.count(path), bound.count(path)) for path in unrun}
 
 
 # --- drift

@@ -116,6 +116,11 @@ class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
         Annotated[float, Meta(ge=0, le=1)] | None,
         Meta(description="the share of the numbers in lessons that must be proven, from 0 to 1"),
     ] = None
+    strict: Annotated[bool, Meta(description="warnings are errors, as with `--strict`")] = False
+    unproven: Annotated[
+        tuple[Text, ...],
+        Meta(description="paths of scripts that `strict` lets pass where they are not run"),
+    ] = ()
 
 
 class FormatTable(Struct, frozen=True, forbid_unknown_fields=True):

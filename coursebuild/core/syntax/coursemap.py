@@ -112,6 +112,8 @@ def _build_course(
         limits=fields.limits,
         theme=theme(root.object("theme"), fields.theme or ThemeTable()),
         python=NamedPath(verify.python, gate.place("python")) if verify.python else None,
+        strict=verify.strict,
+        unproven=_named_paths(gate, "unproven", verify.unproven),
     )
 
 

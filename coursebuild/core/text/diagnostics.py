@@ -48,11 +48,13 @@ class Diagnostic(Struct, frozen=True):
     notes: tuple[Note, ...] = ()
     edits: tuple[Edit, ...] = ()
     """A correction, where one is certain enough to be offered."""
+    strict: bool = False
+    """Whether it is an error even if its rule is a warning."""
 
     @property
     def severity(self) -> Severity:
-        """The severity of its rule."""
-        return RULES[self.rule].severity
+        """The severity of its rule, or of every rule where warnings count as errors."""
+        return "error" if self.strict else RULES[self.rule].severity
 
     @property
     def is_error(self) -> bool:

@@ -52,6 +52,8 @@ _SUMMARIES = {
     "script-python": "The interpreter that the map names for scripts cannot run them.",
     "silence-rule": "An entry of `[[silence]]` names an unknown rule or an error, or gives no "
     "reason.",
+    "unproven-script": "An entry of `unproven` in the course map names no script, or one that "
+    "always runs.",
     "no-lessons": "The course has no lesson to publish.",
     "no-scripts": "No script can run here, so that nothing is verified.",
     # the theme
@@ -150,6 +152,7 @@ _SUMMARIES = {
     "script-path": "The path of a script is not one that a script may have.",
     "script-kind": "A block with a `file` is not of kind `python`, so that nothing runs it.",
     "source-part": "A block does not show what the file that it names holds.",
+    "script-unproven": "A script was not run, so that nothing proves what the course shows of it.",
     "script-repeated": "Two blocks are extracted to the same path.",
     "python-syntax": "A Python block does not parse.",
     "recording-caption": "A `text` block looks like a recorded output, and is compared with "

@@ -10,6 +10,7 @@ from msgspec import Struct
 
 from coursebuild.core.features import Feature, Mathml
 from coursebuild.core.model import Course, Document, block_formulas, document_blocks
+from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Excerpt, Span
@@ -93,7 +94,7 @@ def _summary_of(document: Document) -> FormulaSummary | None:
     return summary if isinstance(summary, FormulaSummary) else None
 
 
-def unproven(course: Course) -> Iterator[Diagnostic]:
+def unproven(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:
     """Yield a warning for each place of arithmetic that is not understood."""
     for document in course.documents:
         summary = _summary_of(document)

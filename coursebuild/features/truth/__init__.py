@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 
 from coursebuild.core.features import Feature
 from coursebuild.core.model import Course, Document, Lesson
+from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.features.truth.claims import course_claims, document_claims, sum_claims
@@ -30,9 +31,19 @@ all = "All"
 
 def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
     """Yield an error if less is proven than the course map asks for."""
+    yield from _check_share(course, ())
+
+
+def check_runs(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:
+    """Yield the same error if only numbers of scripts that were not run make up the share."""
+    if not any(_check_share(course, ())):
+        yield from _check_share(course, runs)
+
+
+def _check_share(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:
     if course.truth is None:
         return
-    claims = sum_claims(claims for _, claims in course_claims(course))
+    claims = sum_claims(claims for _, claims in course_claims(course, runs))
     if claims.proven < course.truth * claims.all:
         required = f"{100 * course.truth:g} %"
         message = f"{claims.share} of the numbers are proven, and {required} are asked for"
@@ -40,11 +51,11 @@ def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]
         yield diagnose("truth-share", course.truth_span, message, help=help)
 
 
-def unproven(course: Course) -> Iterator[Diagnostic | str]:
+def unproven(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic | str]:
     """Yield the share of proven numbers by lesson, and each number that nothing proves."""
     rows = [
         (owner.id if isinstance(owner, Lesson) else owner.title, claims)
-        for owner, claims in course_claims(course)
+        for owner, claims in course_claims(course, runs)
     ]
     for name, claims in (*rows, ("all", sum_claims(claims for _, claims in rows))):
         if claims.all:
@@ -63,6 +74,7 @@ FEATURE = Feature(
     fences=(KIND,),
     summary=lambda document, mathml: Parsed(document_claims(document)),
     check=check,
+    check_runs=check_runs,
     unproven=unproven,
     texts={"en": _TEXTS},
     rules=(

@@ -8,18 +8,22 @@ Entry points: `document_claims(document)`, `course_claims(course)`, `sum_claims(
    and recorded outputs have no claims.
 3. In formulas a side that is a number is one claim, and so is a side with symbols in which a number
    has a point. A chain whose arithmetic was checked is one claim.
-4. A number in an alternative text, where nothing can be marked, is proven if the same number is
+4. A number bound to the output of a script that was not run is not proven.
+5. A number in an alternative text, where nothing can be marked, is proven if the same number is
    bound or given in the document.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from bisect import bisect_right
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from operator import itemgetter
 
 from msgspec import Struct
 
 from coursebuild.core import model
+from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.scripts.numbers import Number, scan_prose
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.arithmetic.chains import check_arithmetic
@@ -51,6 +55,16 @@ class Claims(Struct, frozen=True):
     given: int
     """Marked as given by the author."""
     open: tuple[Span, ...]
+    places: tuple[tuple[Span, tuple[str, ...]], ...] = ()
+    """Of those that scripts print: where each stands, and the scripts of which any proves it."""
+
+    def without(self, scripts: Collection[str]) -> Claims:
+        """The claims where these scripts prove nothing."""
+        lost = tuple(at for at, proofs in self.places if proofs and {*proofs} <= {*scripts})
+        if not lost:
+            return self
+        order = sorted((*self.open, *lost), key=lambda span: span.start)
+        return Claims(self.bound - len(lost), self.computed, self.given, tuple(order))
 
     @property
     def proven(self) -> int:
@@ -74,12 +88,21 @@ class Claims(Struct, frozen=True):
         return tuple(map(str, counts))
 
 
-def course_claims(course: model.Course) -> Iterator[tuple[model.Owner, Claims]]:
-    """Yield what counts, with its claims: lessons, and pages in the menu."""
+def course_claims(
+    course: model.Course, runs: Iterable[ScriptRun] = ()
+) -> Iterator[tuple[model.Owner, Claims]]:
+    """Yield what counts, with its claims: lessons, and pages in the menu.
+
+    `runs`: those of scripts, as far as they are known.
+    """
+    unrun = {run.path for run in runs if not run.did_run}
+    for document in course.documents:
+        unrun |= {script.path for script in model.document_scripts(document) if script.norun}
     for owner, document in course.owned_documents:
         if isinstance(owner, model.Lesson) or owner.menu:
             summary = (document.summaries or {}).get("truth")
-            yield owner, summary if isinstance(summary, Claims) else document_claims(document)
+            claims = summary if isinstance(summary, Claims) else document_claims(document)
+            yield owner, claims.without(unrun)
 
 
 def sum_claims(claims: Iterable[Claims]) -> Claims:
@@ -94,7 +117,12 @@ def sum_claims(claims: Iterable[Claims]) -> Claims:
 
 def document_claims(document: model.Document) -> Claims:
     """Find the claims of a document in its text."""
-    counter = _Counter()
+    outputs = sorted(
+        (r.body_span.end, r.script)
+        for r in model.find_blocks(document, model.Recording)
+        if r.script
+    )
+    counter = _Counter(outputs)
     output_ids: set[int] = set()
     for block in model.walk_blocks(document.blocks):
         if isinstance(block, model.Recording):
@@ -103,23 +131,31 @@ def document_claims(document: model.Document) -> Claims:
             counter.formula(block.tex, block.label.source if block.label else None)
         elif not isinstance(block, model.Heading) and id(block) not in output_ids:
             counter.inlines(model.block_inlines(block))
-    for span, numbers in counter.alternatives:
-        counter.add("bound" if numbers <= counter.marked else "", span)
+    for span, number in counter.alternatives:
+        proofs = counter.marked.get(number)
+        counter.add("" if proofs is None else "bound", span, proofs or ())
     bound_count, computed_count, given_count = map(counter.kinds.count, KINDS)
-    return Claims(bound_count, computed_count, given_count, tuple(counter.open))
+    return Claims(
+        bound_count, computed_count, given_count, tuple(counter.open), tuple(counter.places)
+    )
 
 
 class _Counter:
-    def __init__(self) -> None:
+    def __init__(self, outputs: Sequence[tuple[int, str]]) -> None:
+        """`outputs` are the ends of recorded outputs, in order, with their scripts."""
+        self.outputs = outputs
         self.kinds: list[str] = []
         self.open: list[Span] = []
-        self.marked: set[str] = set()
-        self.alternatives: list[tuple[Span, set[str]]] = []
+        self.places: list[tuple[Span, tuple[str, ...]]] = []
+        self.marked: dict[str, tuple[str, ...]] = {}
+        """The scripts that print a number; none if it is given."""
+        self.alternatives: list[tuple[Span, str]] = []
 
-    def add(self, kind: str, span: Span) -> None:
+    def add(self, kind: str, span: Span, proofs: tuple[str, ...] = ()) -> None:
         """Add a claim and what proves it; an empty kind stands for no proof."""
         if kind:
             self.kinds.append(kind)
+            self.places += [(span, proofs)] if proofs else []
         else:
             self.open.append(span)
 
@@ -130,9 +166,7 @@ class _Counter:
                 case model.Text():
                     self.text(inline)
                 case model.NumberBinding():
-                    for number in scan_prose(inline.text):
-                        self.marked.add(number.text)
-                        self.add("bound" if inline.source is None else "given", inline.span)
+                    self.marked_number(inline)
                 case model.Math():
                     source = inline.source
                     if source is None and inline.label is not None:
@@ -140,7 +174,7 @@ class _Counter:
                     self.formula(inline.tex, source)
                 case model.Image():
                     numbers = {number.text for number in find_claims(inline.alt)}
-                    self.alternatives += [(inline.span, {number}) for number in sorted(numbers)]
+                    self.alternatives += [(inline.span, number) for number in sorted(numbers)]
                 case model.Link(target=model.UrlTarget() | model.TermTarget()):
                     if not _is_address(inline):
                         self.inlines(inline.children)
@@ -148,6 +182,19 @@ class _Counter:
                     self.inlines(inline.children)
                 case _:
                     pass
+
+    def marked_number(self, number: model.NumberBinding) -> None:
+        """Add the claims of a number that is bound or given."""
+        proofs: tuple[str, ...] = ()
+        if number.source is None:
+            at = bisect_right(self.outputs, number.span.start, key=itemgetter(0))
+            above = self.outputs[at - 1][1] if at else ""
+            proofs = tuple(filter(None, (number.script or above,)))
+        for part in scan_prose(number.text):
+            others = self.marked.setdefault(part.text, proofs)
+            # What one place gives, or another script prints, is proven by that.
+            self.marked[part.text] = tuple(sorted({*others, *proofs})) if others and proofs else ()
+            self.add("bound" if number.source is None else "given", number.span, proofs)
 
     def text(self, text: model.Text) -> None:
         """Add the claims of plain text."""

@@ -56,7 +56,7 @@ def parse_truth(fence: Fence, texts: TextParser) -> Parsed[TruthTable]:
 def values(library: Library, place: urls.Place, block: TruthTable) -> TruthRows:
     """Return the rows of the table."""
     rows: list[tuple[str, ...]] = []
-    claims_by_owner = list(course_claims(library.course))
+    claims_by_owner = list(course_claims(library.course, library.results.runs))
     for owner, claims in claims_by_owner:
         name = f"{owner.id} {owner.title}" if isinstance(owner, Lesson) else owner.title
         link = Markup('<a href="{}">{}</a>').format(place.href(urls.owner_path(owner)), name)
