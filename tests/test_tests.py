@@ -30,6 +30,8 @@ WAITS = frozenset(
     "becomes expect until wait_for wait_for_condition wait_for_event wait_for_load_state "
     "wait_for_url".split()
 )
+PASSING = frozenset({"loading", "Copied", "The link is copied."})
+"""States and texts that a page leaves by itself."""
 Rule = Callable[[], Iterator[tuple[str, int]]]
 
 
@@ -70,17 +72,29 @@ def functions(tree: ast.Module) -> list[ast.FunctionDef]:
 
 
 def assertions_that_look_once() -> Iterator[tuple[str, int]]:
+    for path, tree, helpers in page_modules():
+        waits = with_helpers(WAITS, helpers)
+        acts = with_helpers(ACTIONS, helpers) - waits
+        for function in functions(tree):
+            yield from ((path, line) for line in looks_once(function, waits, acts))
+
+
+def waits_for_what_passes() -> Iterator[tuple[str, int]]:
+    for path, tree, helpers in page_modules():
+        acts = with_helpers(ACTIONS, helpers)
+        for function in functions(tree):
+            yield from ((path, line) for line in passes_unseen(function, acts))
+
+
+def page_modules() -> Iterator[tuple[str, ast.Module, dict[str, set[str]]]]:
+    """The modules that drive a browser, with what the helpers call that they can use."""
     pages = trees("playwright.sync_api")
     called = {path: helper_calls(tree) for path, tree in pages.items()}
     shared = {}
     for path, helpers in called.items():
         shared |= helpers if path.startswith("support/") else {}
     for path, tree in pages.items():
-        helpers = shared | called[path]
-        waits = with_helpers(WAITS, helpers)
-        acts = with_helpers(ACTIONS, helpers) - waits
-        for function in functions(tree):
-            yield from ((path, line) for line in looks_once(function, waits, acts))
+        yield path, tree, shared | called[path]
 
 
 def helper_calls(tree: ast.Module) -> dict[str, set[str]]:
@@ -112,6 +126,40 @@ def looks_once(
             yield node.lineno
         elif called & acts:
             has_acted = True
+
+
+def passes_unseen(function: ast.FunctionDef, acts: frozenset[str]) -> Iterator[int]:
+    """The lines that wait for what may be over before it is seen.
+
+    That is what `PASSING` names, and a state after which another one of the same element is waited
+    for with nothing done in between.
+    """
+    lines: dict[str, int] = {}
+    for node in statements(function.body):
+        inner = [call for call in ast.walk(node) if isinstance(call, ast.Call)]
+        names = {called_name(call) for call in inner}
+        if any(name.startswith(("to_", "wait_for", "reach")) for name in names):
+            texts = {each.value for each in ast.walk(node) if isinstance(each, ast.Constant)}
+            if texts & PASSING:
+                yield node.lineno
+        for call in inner:
+            subject = awaited_state(call)
+            if subject in lines:
+                yield lines[subject]
+            if subject:
+                lines[subject] = node.lineno
+        if names & acts:
+            lines.clear()
+
+
+def awaited_state(call: ast.Call) -> str:
+    """The element whose state is waited for, as it is written; empty for another call."""
+    match call:
+        case ast.Call(ast.Name("reach"), [*subject, _]):
+            return ", ".join(map(ast.unparse, subject))
+        case ast.Call(ast.Attribute(subject, "to_have_attribute"), [ast.Constant("data-state"), _]):
+            return ast.unparse(subject)
+    return ""
 
 
 def statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
@@ -155,6 +203,7 @@ def patches_of_private_names() -> Iterator[tuple[str, int]]:
 
 ADVICE: dict[Rule, str] = {
     assertions_that_look_once: "use `expect`, `until` or `becomes`: the page may not be there yet",
+    waits_for_what_passes: "wait for what comes of it, or note what passes with `note_changes`",
     waits_for_time: "wait for an event, or in a loop for a condition",
     patches_of_private_names: "test what can be seen, or give the product a parameter",
 }
@@ -188,3 +237,22 @@ def test_assertion_that_looks_at_page_once_is_found() -> None:
         )
     )
     assert list(looks_once(function, WAITS, ACTIONS)) == [6]
+
+
+def test_wait_for_a_state_that_may_pass_unseen_is_found() -> None:
+    (function,) = functions(
+        ast.parse(
+            "def test(page, lab):\n"
+            "    expect(lab).to_have_attribute('data-state', 'loading')\n"
+            "    lab.get_by_role('button', name='Copied').wait_for()\n"
+            "    expect(lab.locator('.copy')).not_to_have_text('Copied')\n"
+            "    has_been(lab, 'Copied')\n"
+            "    page.click('a')\n"
+            "    reach(page, 1, 'playing')\n"
+            "    reach(page, 2, 'playing')\n"
+            "    reach(page, 1, 'paused')\n"
+            "    page.click('a')\n"
+            "    reach(page, 1, 'ended')\n"
+        )
+    )
+    assert list(passes_unseen(function, ACTIONS)) == [2, 3, 7]

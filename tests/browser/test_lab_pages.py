@@ -17,7 +17,9 @@ from support.lab_page import (
     SWING,
     fetch_text,
     floats,
+    has_been,
     lab,
+    note_changes,
     parse_link,
     press,
     reach,
@@ -76,8 +78,9 @@ def test_goal_is_reached_kept_and_its_motion_shown_to_others(
         second_page.goto(link)
         again = lab(second_page)
         expect(again.locator(".lab-live .lab-goal")).to_contain_text("Reached before.")
+        note_changes(again)
         press(again, "Play the motion of this link")
-        reach(second_page, SWING, "playing")
+        has_been(again, "playing")
         reach(second_page, SWING, "paused")
         shown_state = state_of(second_page, again)
         assert (shown_state["n"], shown_state["l"]) == (state["n"], state["l"])

@@ -13,7 +13,14 @@ from playwright.sync_api import Browser, Page, expect
 
 from support.axe import violations
 from support.built_sites import Site
-from support.lab_page import becomes, until, wait_for_condition, wait_until_settled
+from support.lab_page import (
+    becomes,
+    has_been,
+    note_changes,
+    until,
+    wait_for_condition,
+    wait_until_settled,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -195,8 +202,10 @@ def test_numbers_are_neither_copied_nor_selected(
     page = open_page()
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     script = page.locator(".script[data-script]").first
-    script.get_by_role("button", name="Copy").click()
-    script.get_by_role("button", name="Copied").wait_for()
+    button = script.get_by_role("button", name="Copy")
+    note_changes(button)
+    button.click()
+    has_been(button, "Copied")
     text = page.evaluate("navigator.clipboard.readText()")
     assert text == (sites["nasty"].public / "examples/sub/wide.py").read_text()
     selection = page.evaluate(

@@ -32,6 +32,12 @@ By [](#eq:tensor) and [it](term:inertia-tensor), $\\dot q${symbol="rate <i>" uni
 $$\\dot q = 1 \\tag{*}$$ {#eq:rate}
 
 and $$a$$ {#eq:a}.
+
+### Detail
+
+#### Its end
+
+A $w${symbol="width"}.
 """
 SECOND = """## Uses
 
@@ -42,7 +48,7 @@ The [tensor](term:inertia-tensor), the [](lesson:1.1#eq:tensor), the [](lesson:1
 > An [Äther]{term} is no thing; see [here](lesson:1.1).
 """
 THIRD = """The [عزم القصور]{term} عدد. A [慣性]{term} is. An
-[`<b>`&"']{term="<script>alert(1)</script>"} is; a [3-vector]{term} is,
+[`<b>`&"']{term="<script>alert(1)</script>"} is; a [3-vector]{term} is, an [ⱥ]{term} is,
 [this](term:principal-axis), [that](term:عزم-القصور) and [so](<term:慣性>).
 
 See [one](lesson:1.1).
@@ -75,10 +81,10 @@ def text(html: str) -> str:
 def test_the_terms_are_in_order_whatever_their_script(site: dict[str, str]) -> None:
     terms = list(entries(site["glossary/index.html"]))
     signs = ["3-vector", "scriptalert1script"]
-    latin = ["äther", "inertia-tensor", "item", "principal-axis"]
+    latin = ["äther", "inertia-tensor", "item", "principal-axis", "ⱥ"]
     assert terms == [*signs, *latin, "عزم-القصور", "慣性"]
     letters = re.findall(r'<h2 id="letter:(.*?)">(.*?)</h2>', site["glossary/index.html"])
-    assert [letter for _, letter in letters] == ["0–9", "A", "I", "P", "ع", "慣"]
+    assert [letter for _, letter in letters] == ["0–9", "A", "I", "P", "Ⱥ", "ع", "慣"]
     assert len({id for id, _ in letters}) == len(letters)
 
 
@@ -139,6 +145,7 @@ def test_the_index_of_symbols(site: dict[str, str]) -> None:
     assert rows == [
         "q˙ rate <i> 1/s 1.1 Law",
         "V volume (1.1) m³ 1.1 Core, also in 1.2 voltage (1.2)",
+        "w width 1.1 Detail",
     ]
     symbols = [text(item) for item in undeclared_part.partition("</section>")[0].split("<li>")[1:]]
     assert [item.split()[0] for item in symbols] == ["a", "I", "x", "z", "ρ"]
@@ -151,7 +158,7 @@ def test_the_foot_has_both(site: dict[str, str]) -> None:
 
 
 def test_the_search_lists_lessons_in_the_order_of_the_course(make: Make) -> None:
-    folder = make("## Swing\n", "## Fall\n", "## Spin\n")
+    folder = make("## Swing\n\nA.\n", "## Fall\n\nB.\n", "## Spin\n\nC.\n")
     assert folder.main("build", "--quiet").status == 0
     listing = folder.text("public/search/index.js").partition(',"",')[2].rstrip()
     pages = json.loads(listing[:-1])["pages"]

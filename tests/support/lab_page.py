@@ -99,6 +99,28 @@ def reach(page: Page, number: int, state: str) -> None:
     )
 
 
+NOTE_CHANGES = """element => {
+  const noted = element.noted = new Set()
+  const note = (changes) => {
+    changes.forEach(({ oldValue }) => noted.add(oldValue))
+    noted.add(element.dataset.state ?? element.textContent)
+  }
+  const states = { attributeFilter: ['data-state'], attributeOldValue: true }
+  new MutationObserver(note).observe(element, { ...states, childList: true })
+}"""
+
+
+def note_changes(element: Locator) -> None:
+    """Note each state or text of an element from now on: one may pass before a test looks."""
+    element.evaluate(NOTE_CHANGES)
+
+
+def has_been(element: Locator, value: str) -> None:
+    """Wait until an element has or has had a state or text since `note_changes`."""
+    was_noted = "(element, value) => element.noted.has(value)"
+    wait_for_condition(element.page, lambda: bool(element.evaluate(was_noted, value)))
+
+
 def press(lab: Locator, name: str) -> None:
     lab.get_by_role("button", name=name, exact=True).click()
 

@@ -46,15 +46,14 @@ def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
     paths: set[str] = set()
     verdicts: list[Verdict] = []
     for document in course.documents:
-        script_above, is_repeated = "", False
+        is_repeated = False
         for block in document_blocks(document):
             if isinstance(block, Script):
-                script_above, is_repeated = block.path, block.path in paths
+                is_repeated = block.path in paths
                 paths.add(block.path)
             elif isinstance(block, Recording) and block.script is not None:
                 comparison, run = course.comparison_of(block), by_path.get(block.script)
-                is_of_other_block = is_repeated and block.script == script_above
-                if run is None or is_of_other_block or not block.readable:
+                if run is None or is_repeated or not block.readable:
                     verdicts.append(Verdict(block, comparison, "unchecked"))
                 else:
                     verdicts.append(compare(block, comparison, run.stdout))

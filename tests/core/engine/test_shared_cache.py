@@ -59,6 +59,7 @@ def test_what_one_machine_makes_another_has(tmp_path: Path, address: str) -> Non
     first.put("digests", KEY, b"of this machine")
     first.close()
     second, second_messages = machine(tmp_path, "two", shared_cache(address))
+    assert second.get("labs", KEY, bytes) is None  # of others is only what is asked for so
     assert get_or_create(second, KEY, never) == b"\0made\xff"
     assert second.shared_group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
     assert second.get("scripts", f"{GROUP}/{KEY}", bytes, shared=True) == b"a result"

@@ -206,12 +206,18 @@ def test_every_page_has_one_heading_one_main_and_unique_ids(site: dict[str, byte
         assert len(ids) == len(set(ids)), path
 
 
+def test_title_and_heading_of_a_page_have_one_id_between_them(make: Make) -> None:
+    for about, count in (("# About\n\n## About\n", 1), ("# About\n\n## More\n", 1)):
+        page = pages(make("Text.", about=about).site())["about.html"]
+        assert page.count('id="about"') == count, about
+
+
 def test_a_docked_lab_stands_beside_its_paragraphs_in_reading_order(site: dict[str, bytes]) -> None:
     page = pages(site)["lessons/0.1-falling.html"]
     dock = page.split('<div class="dock">')[1]
     before, rest = dock.split('<div class="dock-lab">')
     lab, after = rest.split('<div class="dock-after">')
-    assert '<h2 id="second-part">' in before
+    assert '<h2 id="second-part">' in before and "Back to" not in before
     assert "Docked" in lab
     assert after.startswith("\n<p>After.</p>\n</div>")
 

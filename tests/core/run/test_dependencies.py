@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.core.engine.digests import ABSENT, FOLDER, SPECIAL
+from coursebuild.core.model.results import Outcome, ScriptRun, Trace
 from coursebuild.core.run.dependencies import (
     Dependency,
     Inputs,
     Kind,
+    dependencies_of,
     describe,
     input_changes,
     state_changes,
@@ -39,6 +41,15 @@ def test_changes_of_inputs() -> None:
         "this version of coursebuild runs scripts in another way",
     ]
     assert input_changes(INPUTS, INPUTS) == []
+
+
+def test_a_printed_folder_is_a_dependency_but_for_the_top_of_the_disk() -> None:
+    trace = Trace((), (), (), (), "")
+    run = ScriptRun("examples/a.py", Outcome.OK, 0, "/home/a/b: 2/3\n", "", 0.1, trace=trace)
+    for folder, found in (("/home/a", ["course"]), ("/home/c", []), ("/", [])):
+        places = (("course", folder), ("library", "/opt/lib"))
+        dependencies = dependencies_of(run, (), places, lambda need: need.name)
+        assert [each.name for each in dependencies if each.kind is Kind.PLACE] == found, folder
 
 
 @pytest.mark.parametrize(

@@ -111,6 +111,9 @@ def test_text_next_to_the_number_narrows_the_choice() -> None:
     assert find_mistake("`v = 6.1`{out}", printed) is None
     assert find_mistake("`P 6.1`{out}", printed) is not None
     assert find_mistake("`6.1 N`{out}", printed) is None
+    assert find_mistake("`E 6.1`{out}", printed) is not None
+    wide_columns = printed.replace("v=", "E" + " " * 100)
+    assert find_mistake("`E 6.1`{out}", wide_columns) is None
 
 
 def test_the_nearest_output_above_counts() -> None:

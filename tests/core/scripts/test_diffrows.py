@@ -30,6 +30,12 @@ def rows(recorded: str, printed: str) -> list[str]:
         ("a 1\nb 2", "a 3\nb 4", ["-a [1]", "-b [2]", "+a [3]", "+b [4]"]),
         ("one\ntwo", "one", [" one", "-[two]"]),
         ("one", "one\ntwo", [" one", "+[two]"]),
+        # half of their words make two lines one; what is between such is one after the other
+        (
+            "first\nmass one",
+            "mass two\nlast",
+            ["-[first]", "-mass [one]", "+mass [two]", "+[last]"],
+        ),
         ("the mass is 3", "the mass was 3", ["-the mass [is] 3", "+the mass [was] 3"]),
         ("a\n\nb 1", "a\n\nb 2", [" a", " ", "-b [1]", "+b [2]"]),
     ],

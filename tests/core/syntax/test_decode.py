@@ -79,7 +79,7 @@ def test_a_clean_value() -> None:
     decoding = read(
         '{"name": "box", "count": 3, "ratio": 0, "key": "k", "tags": ["a"], "pair": ["x", 2],'
         ' "angle": [1, 2.5], "shape": {"radius": 2}, "parts": [{"name": "lid", "more": [1]}],'
-        ' "limits": {"low": -1}, "slug": null}'
+        ' "limits": {"low": -1, "none": 0e5}, "slug": null}'
     )
     assert decoding.diagnostics == ()
     assert decoding.value == Body(
@@ -92,7 +92,7 @@ def test_a_clean_value() -> None:
         angle=(1.0, 2.5),
         shape=Disc(2.0),
         parts=(Part("lid"),),
-        limits={"low": -1.0},
+        limits={"low": -1.0, "none": 0.0},
     )
     assert decoding.value is not None
     assert [type(v) for v in (decoding.value.ratio, decoding.value.limits["low"])] == [float, float]

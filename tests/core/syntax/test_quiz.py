@@ -105,12 +105,21 @@ def test_the_key_of_a_question_is_its_id_or_comes_from_its_kind_and_text() -> No
     assert keys(QUESTION.replace('"R"', '"Another"').replace("is it", "\\n is   it")) == [key]
     assert keys(QUESTION.replace('"open"', '"open", "id": "own"')) == ["own"]
     assert keys(QUESTION.replace("Why", "How")) != [key]
+    composed, decomposed = (QUESTION.replace("Why", f"Wh{y}") for y in ("ý", "y\u0301"))
+    assert keys(composed) == keys(decomposed) != [key]
     output = QUESTION.replace("open", "output").replace(
         '"reference": "R"', '"of": "a.py", "line": 1'
     )
     assert keys(output) != [key]
     # Others of the quiz are no matter, wherever they stand.
     assert keys(MCQ % '"answer": 0', QUESTION)[1] == keys(QUESTION, MCQ % '"answer": 1')[0] == key
+
+
+def test_question_whose_json_is_wrong_is_left_out() -> None:
+    result = parse(f'{{"id": "x", "questions": [{QUESTION[:-1]}, }}, {QUESTION}]}}')
+    assert result.value is not None
+    assert [d.rule for d in result.diagnostics] == ["json-syntax"]
+    assert len(result.value.questions) == 1
 
 
 def test_keys_of_a_quiz_are_never_the_same() -> None:

@@ -118,8 +118,11 @@ def test_package_with_hostile_titles_in_arabic_follows_edits(make_course: Make) 
     page = files["sco/1.1-one.html"].decode()
     assert '<iframe title="1.1 &lt;/title&gt;&amp;amp;&lt;i&gt;"></iframe>' in page
     assert '<html lang="ar" dir="rtl"' in page
-    folder.write(folder.lesson(), "## One\n\n" + quiz("a", ANY["zero"]))
-    assert b"data-quiz" in package(folder)["lessons/1.1-one.html"]
+    folder.write(folder.lesson(), "## One\n\n[A log](log.csv.gz)\n\n" + quiz("a", ANY["zero"]))
+    folder.write("content/lessons/log.csv.gz", b"\x1f\x8b")
+    files = package(folder)
+    assert b"data-quiz" in files["lessons/1.1-one.html"]
+    assert b"\x1f\x8b" in files.values(), "what an author packed is not a copy for a host"
 
 
 def test_names_are_of_xml_and_apart(scorm: Package) -> None:
