@@ -70,6 +70,8 @@ _NOTES_BYTES = 1 << 20
 _OUR_FRAME = re.compile(rb'  File "%s", line \d+ in <module>\n' % re.escape(os.fsencode(PROGRAM)))
 """The frame of `worker_main` in Python's fault dumps, below the script's own frames."""
 _COUNTER = itertools.count()
+_PROCESSES = 4096
+"""Processes of its user that a script in a sandbox may see started; the tool allows fewer."""
 _FIRST = 1
 """The number of this process in a sandbox."""
 _PR_SET_DUMPABLE = 4  # linux/prctl.h
@@ -244,6 +246,10 @@ class _Supervisor:
             interrupt = number == signal.SIGINT
             signal.signal(number, signal.default_int_handler if interrupt else signal.SIG_DFL)
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash leaves no file in the project
+        if parent == _FIRST:  # before the tool has seen them; not for root
+            _, most = resource.getrlimit(resource.RLIMIT_NPROC)
+            most = _PROCESSES if most == resource.RLIM_INFINITY else min(most, _PROCESSES)
+            resource.setrlimit(resource.RLIMIT_NPROC, (most, most))
         memory, (_, most) = job["memory"] << 20, resource.getrlimit(resource.RLIMIT_DATA)
         if most == resource.RLIM_INFINITY or most > memory:
             resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))

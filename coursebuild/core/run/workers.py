@@ -122,6 +122,7 @@ class Worker:
         elif excess := self._watch.excess(memory):
             self.excess = Outcome.KILLED, excess
         if self.excess is not None:
+            self._watch.kill()
             self.kill()
 
     def kill(self) -> None:
