@@ -114,12 +114,12 @@ def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diag
         names = " and ".join(f"`{name}`" for name in reasons)
         are = "are" if len(reasons) > 1 else "is"
         reason = f"{names} {are} not installed" if line.missing else "its fence says `norun`"
-        cure = f"install {names}" if line.missing else "let it run"
+        cure = f"install {names}" if line.missing else "take `norun` away"
+        unproven = unproven_things(line) or "that it runs"
         yield diagnose(
             "script-unproven",
             script.span.first_line(),
-            f"`{line.path}` was not run, so that nothing proves {unproven_things(line) or 'it'}:"
-            f" {reason}",
+            f"`{line.path}` was not run ({reason}), so that nothing proves {unproven}",
             help=f'{cure}, or let it pass: `unproven = ["{line.path}"]` in `[verify]` of the map',
         )
 

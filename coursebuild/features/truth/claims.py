@@ -194,7 +194,7 @@ class _Counter:
             others = self.marked.setdefault(part.text, proofs)
             # What one place gives, or another script prints, is proven by that.
             self.marked[part.text] = tuple(sorted({*others, *proofs})) if others and proofs else ()
-            self.add("bound" if number.source is None else "given", number.span, proofs)
+            self.add("bound" if number.source is None else "given", number.text_span, proofs)
 
     def text(self, text: model.Text) -> None:
         """Add the claims of plain text."""
