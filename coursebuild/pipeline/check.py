@@ -70,8 +70,8 @@ def check(
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
         if shard is not None:
             remarks.append(_describe_part(shard, verification))
-        listed = [claim for claim in claims if isinstance(claim, Diagnostic)]
-        report = checked_course.report(diagnostics, listed)
+        inventory = [claim for claim in claims if isinstance(claim, Diagnostic)]
+        report = checked_course.report(diagnostics, inventory)
         return replace(report, remarks=tuple(remarks), sensitivity=sensitivities)
 
 
@@ -91,9 +91,9 @@ class CheckedCourse(Struct, frozen=True):
     diagnostics: tuple[Diagnostic, ...]
 
     def report(
-        self, further: Iterable[Diagnostic] = (), listed: Sequence[Diagnostic] = ()
+        self, further: Iterable[Diagnostic] = (), inventory: Sequence[Diagnostic] = ()
     ) -> Report:
-        """The report; `further` are diagnostics found since, for `listed` see `judge`."""
+        """The report; `further` are diagnostics found since, for `inventory` see `judge`."""
         verification = self.verification
         report = judge(
             self.course,
@@ -103,7 +103,7 @@ class CheckedCourse(Struct, frozen=True):
             documents=self.documents,
             labs=verification.labs,
             strict=self.options.strict or self.course.strict,
-            listed=listed,
+            inventory=inventory,
         )
         depends = depends_on(self.course, verification.results, self.options.interpreter)
         return replace(report, depends=depends)

@@ -47,14 +47,14 @@ def judge(
     documents: Collection[str] | None = None,
     remarks: tuple[str, ...] = (),
     strict: bool = False,
-    listed: Sequence[Diagnostic] = (),
+    inventory: Sequence[Diagnostic] = (),
 ) -> Report:
     """Make the report of a command that began at this moment of `time.monotonic`.
 
     `documents` limits it to these lessons and pages, by path: to mistakes in them and in the map,
     and those of the scripts that ran. `strict`: warnings count as errors, and a script that was not
-    run is one, unless the map lets it pass. `listed` are warnings that somebody asked for, such as
-    a list of numbers; they stay warnings.
+    run is one, unless the map lets it pass. `inventory`: warnings that somebody asked for, such
+    as a list of numbers; they stay warnings.
     """
     unrun = () if course is None else tuple(_unrun_scripts(course, scripts))
     if strict and course is not None:
@@ -65,12 +65,12 @@ def judge(
         lesson_count = len(course.written_lessons)
     else:
         lesson_count = sum(lesson.path in documents for lesson in course.lessons)
-    relevant = sort_diagnostics(_without_consequences([*diagnostics, *listed]))
+    relevant = sort_diagnostics(_without_consequences([*diagnostics, *inventory]))
     if documents is not None and course is not None:
         paths = {*documents, course.map.path}
         relevant = tuple(d for d in relevant if d.span.path in paths or d.rule in _RULES_OF_RUNS)
     silences = course.silences if course is not None else ()
-    mild = {d.rule for d in listed}
+    mild = {d.rule for d in inventory}
     reported = tuple(
         replace(d, strict=strict and d.rule not in mild)
         for d in relevant
@@ -114,12 +114,12 @@ def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diag
         names = " and ".join(f"`{name}`" for name in reasons)
         are = "are" if len(reasons) > 1 else "is"
         reason = f"{names} {are} not installed" if line.missing else "its fence says `norun`"
-        cure = f"install {names}" if line.missing else "let it run"
+        cure = f"install {names}" if line.missing else "take `norun` away"
+        unproven = unproven_things(line) or "that it runs"
         yield diagnose(
             "script-unproven",
             script.span.first_line(),
-            f"`{line.path}` was not run, so that nothing proves {unproven_things(line) or 'it'}:"
-            f" {reason}",
+            f"`{line.path}` was not run ({reason}), so that nothing proves {unproven}",
             help=f'{cure}, or let it pass: `unproven = ["{line.path}"]` in `[verify]` of the map',
         )
 

@@ -78,6 +78,8 @@ def test_json_has_diagnostics_scripts_labs_and_a_summary() -> None:
         "seconds": 60.0,
         "cached": False,
         "missing": [],
+        "unproven_outputs": 0,
+        "unproven_numbers": 0,
     }
     assert value["labs"][0] == {
         "name": "1.1-lab-1",

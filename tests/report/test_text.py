@@ -100,17 +100,19 @@ def test_report_lists_scripts_and_ends_with_a_summary() -> None:
     scripts = (
         ScriptLine("examples/a.py", "1.1", "ok", 0.25, False),
         ScriptLine("examples/b.py", "1.1", "drift", 1.0, True),
-        ScriptLine("examples/c.py", "1.2", "skipped", 0.0, False, ("torch",)),
+        ScriptLine("examples/c.py", "1.2", "skipped", 0.0, False, ("torch",), 1, 2),
         ScriptLine("examples/d.py", "1.2", "norun", 0.0, False),
     )
-    report = Report((), scripts, Summary(2, 4, 2, 1, 0, 0, 1, 1.5))
+    summary = Summary(2, 4, 2, 1, 0, 0, 1, 1.5, unproven=2, reasons=("torch", "norun"))
+    report = Report((), scripts, summary)
     assert render_report(report, "text", Style()) == (
         "ok       examples/a.py  0.25 s\n"
         "drift    examples/b.py  cached\n"
-        "skipped  examples/c.py  (needs torch)\n"
+        "skipped  examples/c.py  (needs torch; unproven: 1 output and 2 bound numbers)\n"
         "norun    examples/d.py  (not run)\n"
         "\n"
-        "2 lessons, 2 scripts run, 1 skipped: everything holds (1 silenced)\n"
+        "2 lessons, 2 scripts run: holds, but for 2 scripts that were not run (torch, norun)"
+        " (1 silenced)\n"
     )
 
 

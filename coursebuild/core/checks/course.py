@@ -20,7 +20,6 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.registry import features
-from coursebuild.core.syntax.fields import check_unique
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
 
@@ -96,19 +95,21 @@ def _check_empty_lesson(course: Course, document: Document) -> Iterator[Diagnost
 def _check_unproven(course: Course) -> Iterator[Diagnostic]:
     """Report scripts that the map lets pass unproven and that are not there, or always run."""
     scripts = {s.path: s for document in course.documents for s in document_scripts(document)}
+    first: dict[str, Span] = {}
     for entry in course.unproven:
         script = scripts.get(entry.path)
-        if script is None:
+        if first.setdefault(entry.path, entry.span) is not entry.span:
+            message = f"the script `{entry.path}` is named twice"
+            notes = [Note("the first one is here", first[entry.path])]
+            help = "remove it here"
+            yield diagnose("unproven-script", entry.span, message, help=help, notes=notes)
+        elif script is None:
             message = f"no lesson or page has a script `{entry.path}`"
             help = did_you_mean(entry.path, scripts) or "remove it"
             yield diagnose("unproven-script", entry.span, message, help=help)
         elif not (script.norun or script.requires):
             message = f"`{entry.path}` always runs: it says neither `norun` nor `requires`"
             yield diagnose("unproven-script", entry.span, message, help="remove it")
-    entries = [(entry.path, entry.span) for entry in course.unproven]
-    yield from check_unique(
-        entries, "unproven-script", "the script `{}` is named twice", help="remove it here"
-    )
 
 
 def _check_title(course: Course, document: Document) -> Iterator[Diagnostic]:

@@ -138,16 +138,16 @@ def count_unproven(
     if not unrun:
         return {}
     outputs = PrintedOutputs(verdicts, ())
-    shown: list[str | None] = []
+    recorded: list[str | None] = []
     bound: list[str | None] = []
     for document in course.documents:
-        shown += (verdict.recording.script for verdict in outputs.of_document(document))
+        recorded += (verdict.recording.script for verdict in outputs.of_document(document))
         figures = recorded_figures(document)
-        shown += (figure.script for figure in figures if not figure.path.endswith(".csv"))
+        recorded += (figure.script for figure in figures if not figure.path.endswith(".csv"))
         for binding in document_bindings(document):
             of_binding = outputs.of_binding(binding)
             bound.append(binding.script or (of_binding[0].recording.script if of_binding else None))
-    return {path: (shown.count(path), bound.count(path)) for path in unrun}
+    return {path: (recorded.count(path), bound.count(path)) for path in unrun}
 
 
 # --- drift

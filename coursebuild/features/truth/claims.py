@@ -58,7 +58,7 @@ class Claims(Struct, frozen=True):
     places: tuple[tuple[Span, tuple[str, ...]], ...] = ()
     """Of those that scripts print: where each stands, and the scripts of which any proves it."""
 
-    def without(self, scripts: Collection[str]) -> Claims:
+    def drop(self, scripts: Collection[str]) -> Claims:
         """The claims where these scripts prove nothing."""
         lost = tuple(at for at, proofs in self.places if proofs and {*proofs} <= {*scripts})
         if not lost:
@@ -102,7 +102,7 @@ def course_claims(
         if isinstance(owner, model.Lesson) or owner.menu:
             summary = (document.summaries or {}).get("truth")
             claims = summary if isinstance(summary, Claims) else document_claims(document)
-            yield owner, claims.without(unrun)
+            yield owner, claims.drop(unrun)
 
 
 def sum_claims(claims: Iterable[Claims]) -> Claims:
@@ -191,10 +191,12 @@ class _Counter:
             above = self.outputs[at - 1][1] if at else ""
             proofs = tuple(filter(None, (number.script or above,)))
         for part in scan_prose(number.text):
-            others = self.marked.setdefault(part.text, proofs)
+            scripts = self.marked.setdefault(part.text, proofs)
             # What one place gives, or another script prints, is proven by that.
-            self.marked[part.text] = tuple(sorted({*others, *proofs})) if others and proofs else ()
-            self.add("bound" if number.source is None else "given", number.span, proofs)
+            self.marked[part.text] = (
+                tuple(sorted({*scripts, *proofs})) if scripts and proofs else ()
+            )
+            self.add("bound" if number.source is None else "given", number.text_span, proofs)
 
     def text(self, text: model.Text) -> None:
         """Add the claims of plain text."""
