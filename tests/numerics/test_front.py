@@ -48,10 +48,10 @@ def test_small_differences_are_none() -> None:
 
 
 def test_costs_that_timing_cannot_tell_apart_are_equal() -> None:
-    own = FrontPoint(Interval(1.0, 0.8, 1.2), 1e-3)
+    own_point = FrontPoint(Interval(1.0, 0.8, 1.2), 1e-3)
     for high, is_cheaper in ((0.79, True), (0.8, False), (0.9, False)):
         rival = FrontPoint(Interval(0.7, 0.6, high), 1e-3)
-        assert rival.is_cheaper(own) == rival.beats(own) == is_cheaper, high
+        assert rival.is_cheaper(own_point) == rival.beats(own_point) == is_cheaper, high
 
 
 def test_errors_of_zero_and_nothing_at_all() -> None:

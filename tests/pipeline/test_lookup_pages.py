@@ -49,7 +49,8 @@ The [tensor](term:inertia-tensor), the [](lesson:1.1#eq:tensor), the [](lesson:1
 """
 THIRD = """The [عزم القصور]{term} عدد. A [慣性]{term} is. An
 [`<b>`&"']{term="<script>alert(1)</script>"} is; a [3-vector]{term} is, an [ⱥ]{term} is,
-[this](term:principal-axis), [ether](<term:a\u0308ther>), [that](term:عزم-القصور) and [so](<term:慣性>).
+[this](term:principal-axis), [ether](<term:a\u0308ther>),
+[that](term:عزم-القصور) and [so](<term:慣性>).
 
 See [one](lesson:1.1).
 """

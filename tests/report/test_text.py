@@ -66,14 +66,14 @@ def test_only_what_could_change_the_terminal_is_hidden() -> None:
 
 
 def test_text_is_cut_where_its_room_ends() -> None:
-    for text, cut in (
+    for text, visible_part in (
         ("abcd", "abcd"),
         ("abcde", "abcd"),
         ("量量", "量量"),
         ("a量量", "a量"),
         ("ab\u200dcd", "ab\u200dcd"),
     ):
-        assert clip(text, 4) == cut, text
+        assert clip(text, 4) == visible_part, text
 
 
 def test_a_span_over_several_lines_marks_the_rest_of_its_first() -> None:

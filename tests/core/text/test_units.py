@@ -46,7 +46,7 @@ def test_wrong_units_are_reported_with_the_likely_one() -> None:
 
 
 def test_units_that_are_equal_have_one_size_and_one_dimension() -> None:
-    for unit, other in (
+    for unit, same_unit in (
         ("N m", "kg m^2/s^2"),
         ("m/m", "1"),
         ("m^12", "m^6 m^6"),
@@ -55,6 +55,6 @@ def test_units_that_are_equal_have_one_size_and_one_dimension() -> None:
         ("kHz", "1/ms"),
         ("μm", "µm"),
     ):
-        assert find_unit(unit) is not None and find_unit(unit) == find_unit(other), unit
+        assert find_unit(unit) is not None and find_unit(unit) == find_unit(same_unit), unit
     assert find_unit("m^12") != find_unit("m")
     assert find_unit("strides") is None
