@@ -139,7 +139,7 @@ def passes_unseen(function: ast.FunctionDef, acts: frozenset[str]) -> Iterator[i
         inner = [call for call in ast.walk(node) if isinstance(call, ast.Call)]
         names = {called_name(call) for call in inner}
         if any(name.startswith(("to_", "wait_for", "reach")) for name in names):
-            texts = {each.value for each in ast.walk(node) if isinstance(each, ast.Constant)}
+            texts = {part.value for part in ast.walk(node) if isinstance(part, ast.Constant)}
             if texts & PASSING:
                 yield node.lineno
         for call in inner:

@@ -137,8 +137,8 @@ def _without_consequences(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnos
 
 
 def _is_silenced(diagnostic: Diagnostic, silences: Sequence[Silence]) -> bool:
-    """Whether the map silences a diagnostic; errors cannot be silenced."""
-    return not diagnostic.is_error and any(
+    """Whether the map silences a diagnostic; a map that would silence an error is not valid."""
+    return any(
         silence.rule == diagnostic.rule
         and (silence.path is None or fnmatchcase(diagnostic.span.path, silence.path))
         for silence in silences

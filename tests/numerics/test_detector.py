@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.numerics.cases import measure
-from coursebuild.numerics.detector import RunStatus, driving_force, judge
+from coursebuild.numerics.detector import Peaks, RunStatus, driving_force, judge
 from coursebuild.numerics.engine import advance, compile_model, simulate
 from coursebuild.numerics.problem import Integrator, Scenario, Setup
 from coursebuild.numerics.problems import all_problems
@@ -63,6 +63,16 @@ def test_a_state_that_is_no_number() -> None:
         model, data = spring_data(0.01)
         getattr(data, field)[0] = np.nan
         assert judge(model, data, 0.0).reasons[0] == "the state is not finite"
+
+
+def test_peaks_may_reach_every_bound_and_pass_none() -> None:
+    bounds = {"position_bound": 1.0, "velocity_bound": 2.0, "penetration_bound": 3.0}
+    setup = Setup(scenario=Scenario(0.0, 0.0), energy_bound=4.0, **bounds)
+    peaks = Peaks(position=1.0, velocity=2.0, penetration=3.0, sunk=1.0, energy=4.0)
+    assert peaks.is_within(setup)
+    for name in ("position", "velocity", "penetration", "sunk", "energy"):
+        assert not replace(peaks, **{name: getattr(peaks, name) + 0.1}).is_within(setup), name
+    assert not replace(peaks, position=np.nan).is_within(setup)
 
 
 def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.numerics.front import front, verdict
+from coursebuild.numerics.front import FrontPoint, front, verdict
+from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import WorkPrecisionRow
 from support.bench_reports import diverged_row, row
 
@@ -44,6 +45,13 @@ def test_small_differences_are_none() -> None:
     assert are_on_front((1, 1e-3), (1, 1.06e-3)) == [True, False]
     assert are_on_front((1, 1e-3), (0.98, 1.5e-3)) == [True, False], "its cost is no better"
     assert are_on_front((1, 1e-3), (0.5, 1.04e-3)) == [False, True]
+
+
+def test_costs_that_timing_cannot_tell_apart_are_equal() -> None:
+    own_point = FrontPoint(Interval(1.0, 0.8, 1.2), 1e-3)
+    for high, is_cheaper in ((0.79, True), (0.8, False), (0.9, False)):
+        rival = FrontPoint(Interval(0.7, 0.6, high), 1e-3)
+        assert rival.is_cheaper(own_point) == rival.beats(own_point) == is_cheaper, high
 
 
 def test_errors_of_zero_and_nothing_at_all() -> None:

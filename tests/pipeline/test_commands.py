@@ -89,6 +89,7 @@ WRONG_USAGE = [
     ("check --jobs -1", "'-1' is no number of jobs"),
     ("check --jobs 2.5", "'2.5' is no number of jobs"),
     ("check --jobs ²", "'²' is no number of jobs"),
+    ("check --jobs 1025", "'1025' is no number of jobs"),
     ("serve --port 65536", "'65536' is no port"),
     ("serve --port http", "'http' is no port"),
     ("schema nosuch", "there is no schema 'nosuch': choose from course, lab, model, quiz"),
@@ -284,8 +285,8 @@ def test_a_lesson_that_quotes_another_is_checked_with_its_script(make: Make) -> 
 
 
 def test_a_course_may_have_no_scripts_and_is_told_that_none_can_run(make: Make) -> None:
-    folder = make("## Only text\n")
-    for command in (["check"], ["check", "--shard", "1/3"], ["build"]):
+    folder = make("## Only text\n\nIt says so.\n")
+    for command in (["check"], ["check", "--shard", "1/3"], ["check", "--jobs", "1024"], ["build"]):
         result = folder.main(*command)
         assert (result.status, "no-scripts" in result.out) == (0, False), command
     for info, is_warned in (("norun", False), ("requires=no_such_module", True)):

@@ -49,7 +49,8 @@ The [tensor](term:inertia-tensor), the [](lesson:1.1#eq:tensor), the [](lesson:1
 """
 THIRD = """The [عزم القصور]{term} عدد. A [慣性]{term} is. An
 [`<b>`&"']{term="<script>alert(1)</script>"} is; a [3-vector]{term} is, an [ⱥ]{term} is,
-[this](term:principal-axis), [that](term:عزم-القصور) and [so](<term:慣性>).
+[this](term:principal-axis), [ether](<term:a\u0308ther>),
+[that](term:عزم-القصور) and [so](<term:慣性>).
 
 See [one](lesson:1.1).
 """
@@ -117,6 +118,7 @@ def test_an_entry_says_where_the_term_is_defined_and_used(site: dict[str, str]) 
     assert text(terms["inertia-tensor"]).endswith("Used in 1.2")
     assert text(terms["principal-axis"]).endswith("Used in 1.3")
     assert "Used in" not in terms["item"]
+    assert text(terms["äther"]).endswith("Used in 1.3")  # however its letters are composed
 
 
 def test_nothing_hostile_is_markup(site: dict[str, str]) -> None:

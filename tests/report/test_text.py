@@ -13,6 +13,7 @@ from coursebuild.report import (
     diagnostic_text,
     render_report,
 )
+from coursebuild.report.terminal import clip, visible
 
 
 def render(diagnostic: Diagnostic, width: int = 100) -> str:
@@ -56,6 +57,23 @@ def test_tabs_wide_characters_and_controls_keep_the_marks_in_place() -> None:
         "  1 |     量x␛[31mwrong",
         "    |             ^^^^^",
     ]
+
+
+def test_only_what_could_change_the_terminal_is_hidden() -> None:
+    assert visible("a\0\x1b\x7f\x85\u202e\u2028\ufeffb") == "a␀␛␡\ufffd\ufffd\ufffd\ufffdb"
+    family = "👩\u200d👧"  # joined to one picture
+    assert visible(family) == family
+
+
+def test_text_is_cut_where_its_room_ends() -> None:
+    for text, visible_part in (
+        ("abcd", "abcd"),
+        ("abcde", "abcd"),
+        ("量量", "量量"),
+        ("a量量", "a量"),
+        ("ab\u200dcd", "ab\u200dcd"),
+    ):
+        assert clip(text, 4) == visible_part, text
 
 
 def test_a_span_over_several_lines_marks_the_rest_of_its_first() -> None:
@@ -103,15 +121,15 @@ def test_report_lists_scripts_and_ends_with_a_summary() -> None:
         ScriptLine("examples/c.py", "1.2", "skipped", 0.0, False, ("torch",), 1, 2),
         ScriptLine("examples/d.py", "1.2", "norun", 0.0, False),
     )
-    summary = Summary(2, 4, 2, 1, 0, 0, 1, 1.5, unproven=2, reasons=("torch", "norun"))
-    report = Report((), scripts, summary)
+    counts = Summary(2, 4, 2, 1, 0, 0, 1, 1.5, cached=1, unproven=2, reasons=("torch", "norun"))
+    report = Report((), scripts, counts)
     assert render_report(report, "text", Style()) == (
         "ok       examples/a.py  0.25 s\n"
         "drift    examples/b.py  cached\n"
         "skipped  examples/c.py  (needs torch; unproven: 1 output and 2 bound numbers)\n"
         "norun    examples/d.py  (not run)\n"
         "\n"
-        "2 lessons, 2 scripts run: holds, but for 2 scripts that were not run (torch, norun)"
+        "2 lessons, 1 script run, 1 cached: holds, but for 2 scripts that were not run (torch, norun)"
         " (1 silenced)\n"
     )
 

@@ -59,7 +59,7 @@ def state_folder(root: str) -> str | None:
         base = os.path.join(os.path.expanduser("~"), home)
     folder = os.path.realpath(os.path.join(base, "coursebuild"))
     inside = f"{os.path.realpath(root)}{os.sep}"
-    return folder if os.path.isabs(base) and not folder.startswith(inside) else None
+    return folder if os.path.isabs(base) and not f"{folder}{os.sep}".startswith(inside) else None
 
 
 def store_key(root: str) -> bytes:

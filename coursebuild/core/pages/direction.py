@@ -61,7 +61,7 @@ def direction(language: str) -> Literal["ltr", "rtl"]:
             break
         if len(part) == 4 and part.isalpha() and not script:
             script = part
-        elif len(part) == 2 and not region:
+        elif len(part) == 2:
             region = part
     if script:
         return "rtl" if script in _FROM_THE_RIGHT else "ltr"

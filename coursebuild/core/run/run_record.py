@@ -97,6 +97,8 @@ def from_bytes(data: bytes) -> RunRecord:
 def _replace_places(text: str, places: Iterable[tuple[str, str]]) -> str:
     text = text.replace(_MARK, "\ufffd")
     for name, folder in places:
+        if folder == "/":
+            continue  # every path begins with it
         pattern = rf"(?<![\w./-]){re.escape(folder.rstrip('/'))}(?=[/\"'\s:,;)\]]|$)"
         text = re.sub(pattern, f"{_MARK}{name}{_MARK}", text)
     return text

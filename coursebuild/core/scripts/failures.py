@@ -75,7 +75,7 @@ Scripts: TypeAlias = Mapping[str, Extraction]
 
 def _find_line(match: re.Match[str], scripts: Scripts) -> tuple[Extraction, Span] | None:
     """The script and the lesson's line that a traceback names, wherever the file lies."""
-    parts = match["path"].replace("\\", "/").split("/")
+    parts = match["path"].split("/")
     if any(library in parts for library in _LIBRARIES):
         return None
     paths = ("/".join(parts[first:]) for first in range(len(parts)))

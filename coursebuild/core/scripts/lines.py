@@ -63,7 +63,7 @@ def _fold_space(match: re.Match[str]) -> str:
     before, after = text[max(start - 1, 0) : start], text[end : end + 1]
     if before == MARK:
         return " " if after and after not in _CLOSING else ""
-    return " " if before.isalnum() or before == "_" else ""
+    return " " if before.isalnum() else ""
 
 
 def same_number(recorded: Number, printed: Number, comparison: Comparison) -> bool:

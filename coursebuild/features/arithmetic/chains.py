@@ -79,7 +79,7 @@ def _without_common_unit(sides: tuple[FormulaSide, ...]) -> tuple[FormulaSide, .
     """Remove the unit at the end of sides, if it is the only unit in all of them."""
     expressions = [s.expression for s in sides if isinstance(s.expression, Expression)]
     parts = (part for expression in expressions for part in expression.walk())
-    units = {part.text for part in parts if part.kind == "unit"} - {"%", "deg"}
+    units = {part.text for part in parts if part.kind == "unit"}
     if len(units) != 1 or any(e.has("unit") for e in map(_strip_unit, expressions)):
         return sides
     return tuple(

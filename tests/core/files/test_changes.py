@@ -112,6 +112,21 @@ def test_undoing_waits_for_a_command_at_work_spares_later_edits_and_says_so(root
     assert lines == ["undid a change that was interrupted: a.md; left as edited since: b.md"]
 
 
+def test_next_change_first_undoes_that_of_a_killed_command(root: Path) -> None:
+    leave_journal(root, GOOD[:1])
+    (root / "a.md").write_bytes(b"A\r\n")
+    change_files(root, GOOD[2:])
+    assert files(root) == {"a.md": b"a\r\n"}
+    assert undo(root) == []
+
+
+def test_changes_are_taken_back_last_one_first(root: Path) -> None:
+    into_folder = FileChange("b.md", b"b", None), FileChange("b.md/c.md", None, b"c")
+    with pytest.raises(EffectError, match=r"a\.md/d\.md"):
+        change_files(root, (*into_folder, FileChange("a.md/d.md", None, b"x")))
+    assert files(root) == {"a.md": b"a\r\n", "b.md": b"b"}
+
+
 def test_journal_of_a_change_that_had_not_begun_is_removed_in_silence(root: Path) -> None:
     journal = leave_journal(root, GOOD)
     assert undo(root) == []

@@ -58,6 +58,30 @@ def test_key_is_made_once_and_for_its_user_alone(root: Path, state: Path) -> Non
     assert [path.name for path in state.iterdir()] == ["key"]
 
 
+def test_key_in_a_course_or_of_another_user_is_none(
+    root: Path, state: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert len(trust.store_key(str(root))) == 32
+    for course in (state, state.parent, state.parent.parent):
+        assert trust.store_key(str(course)) == b"", course
+    assert len(trust.store_key(f"{state}2")) == 32
+    another_user = os.geteuid() + 1
+    monkeypatch.setattr(os, "geteuid", lambda: another_user)
+    assert trust.store_key(str(root)) == b""
+
+
+def test_seal_is_of_a_name_and_of_a_key() -> None:
+    sealed = trust.seal("labs/a", b"data", b"key")
+    assert trust.unseal("labs/a", sealed, b"key") == b"data"
+    for name, data, key in (
+        ("labs/b", sealed, b"key"),
+        ("labs/a", sealed + b"x", b"key"),
+        ("labs/a", sealed, b"another"),
+        ("labs/a", trust.seal("labs/a", b"data", b""), b""),
+    ):
+        assert trust.unseal(name, data, key) is None
+
+
 @pytest.mark.parametrize("damage", ["empty", "cut", "link", "folder"])
 def test_damaged_key_is_replaced_or_done_without(root: Path, state: Path, damage: str) -> None:
     fill(root)

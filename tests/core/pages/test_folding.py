@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.pages.folding import HEAD, LONG, Part, fold
+from coursebuild.core.pages.folding import HEAD, LONG, Part, find_imports, fold
 
 
 def function(name: str, lines: int) -> str:
@@ -28,6 +28,17 @@ def test_head_and_rest_are_folded_and_the_guard_stays() -> None:
         Part(51, 75, True, names=("two", "Z")),
         Part(76, 77, False),
     )
+
+
+def test_modules_that_a_script_imports() -> None:
+    code = (
+        "import a.b as c, d\nfrom e.f import g\nfrom . import h\nfrom .i import j\n"
+        "try:\n    import k\nexcept ImportError:\n    import l\nelse:\n    import m\n"
+        "finally:\n    import n\ndef go():\n    if True:\n        from o import *\n"
+        "match 1:\n    case 1:\n        import p\n"
+    )
+    assert find_imports(code) == frozenset("adeklmnop")
+    assert find_imports(f"{code}(") == frozenset()
 
 
 def test_assignments_are_no_constants_where_something_is_done_at_once() -> None:

@@ -207,9 +207,9 @@ def test_every_page_has_one_heading_one_main_and_unique_ids(site: dict[str, byte
 
 
 def test_title_and_heading_of_a_page_have_one_id_between_them(make: Make) -> None:
-    for about, count in (("# About\n\n## About\n", 1), ("# About\n\n## More\n", 1)):
-        page = pages(make("Text.", about=about).site())["about.html"]
-        assert page.count('id="about"') == count, about
+    for page_text, count in (("# About\n\n## About\n", 1), ("# About\n\n## More\n", 1)):
+        page = pages(make("Text.", about=page_text).site())["about.html"]
+        assert page.count('id="about"') == count, page_text
 
 
 def test_a_docked_lab_stands_beside_its_paragraphs_in_reading_order(site: dict[str, bytes]) -> None:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.model import local_file
-from coursebuild.core.pages.urls import Place
+from coursebuild.core.pages.urls import Place, dark_path, file_path
 
 PATHS = [
     "index.html",
@@ -25,6 +25,12 @@ PATHS = [
 
 
 BASES = ("https://h/", "https://h/deep/er/", "file:///home/u/site/")
+
+
+def test_files_of_a_course_lie_apart_but_for_those_that_a_model_includes() -> None:
+    assert file_path("content/lessons/sketch.svg") == "files/lessons/sketch.svg"
+    assert dark_path("content/lessons/sketch.svg") == "files/lessons/sketch.dark.svg"
+    assert file_path("models/meshes/hand.obj") == "models/meshes/hand.obj"
 
 
 def test_a_browser_resolves_an_address_to_its_path() -> None:

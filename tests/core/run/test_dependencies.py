@@ -46,10 +46,10 @@ def test_changes_of_inputs() -> None:
 def test_a_printed_folder_is_a_dependency_but_for_the_top_of_the_disk() -> None:
     trace = Trace((), (), (), (), "")
     run = ScriptRun("examples/a.py", Outcome.OK, 0, "/home/a/b: 2/3\n", "", 0.1, trace=trace)
-    for folder, found in (("/home/a", ["course"]), ("/home/c", []), ("/", [])):
+    for folder, names in (("/home/a", ["course"]), ("/home/c", []), ("/", [])):
         places = (("course", folder), ("library", "/opt/lib"))
         dependencies = dependencies_of(run, (), places, lambda need: need.name)
-        assert [each.name for each in dependencies if each.kind is Kind.PLACE] == found, folder
+        assert [d.name for d in dependencies if d.kind is Kind.PLACE] == names, folder
 
 
 @pytest.mark.parametrize(

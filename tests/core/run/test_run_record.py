@@ -29,3 +29,11 @@ def test_a_traceback_is_moved_to_another_machine() -> None:
         "/ci/build/examples/a.py:3: UserWarning: ~ is /root and /home/mexico\n"
         "a/home/me/course stays, /root/courses is in the home folder\n"
     )
+
+
+def test_a_course_at_the_top_of_the_disk_and_marks_that_a_script_printed() -> None:
+    stderr = 'File "/examples/a.py", line 2: \0course\0 is half / 2\n'
+    run = ScriptRun("examples/a.py", Outcome.FAILED, 1, "", stderr, 0.25)
+    record = from_bytes(to_bytes(record_of(INPUTS, (), 0, "", run), (("course", "/"),)))
+    for course in ("/", "/ci/build"):
+        assert record.restore((("course", course),)).stderr == stderr.replace("\0", "\ufffd")

@@ -70,6 +70,8 @@ def test_exact(recorded: str, printed: str, expected: bool) -> None:
         ("x 3.14 y", "x 3.1402 z", False),
         ("12.5ms", "12.52ms", True),
         ("12.5ms", "12.52 ms", False),
+        ("a 1.0", "a \0", False),
+        ("x5 1.5j", "x5+1.5j", False),
         ("1.5+2.0j", "1.52+1.98j", True),
         ("1.5+0.0j", "1.5-0.0j", True),
     ],

@@ -27,12 +27,17 @@ def test_the_numbers_of_a_table_are_replaced_in_place() -> None:
     assert table_after(rows, printed) == (
         "| `RK4` | **−0.001 %** |  3.9e-11|\n| Euler | +6.702 % | 7.5e-04 |"
     )
+    assert table_after("| a | −1.5e-03 | 1.5e−03 |", "a -2.5e-03 -3.5e-03\n") == (
+        "| a | −2.5e-03 | -3.5e−03 |"
+    )
 
 
 def test_a_table_under_digits_keeps_its_decimals() -> None:
     rows = "| Euler | 6.6 | 7e-04 |\n| RK4 | −1.25 | 4 |"
     printed = "Euler +6.7021 9.12e-04\nRK4 -2.349 5\n"
     assert table_after(rows, printed, DIGITS) == "| Euler | 6.7 | 9e-04 |\n| RK4 | −2.35 | 5 |"
+    # a number with no more of them stays as it is printed
+    assert table_after("| a | 0.123 | 4 |", "a 1.50e-01 4\n", DIGITS) == "| a | 1.50e-01 | 4 |"
     assert table_after(rows, printed, tolerance("0.01")) == (
         "| Euler | +6.7021 | 9.12e-04 |\n| RK4 | −2.349 | 5 |"
     )

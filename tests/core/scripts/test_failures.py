@@ -73,6 +73,16 @@ def test_a_syntax_error_and_warnings() -> None:
     ]
 
 
+def test_a_crash_is_shown_at_the_line_that_its_dump_names_first() -> None:
+    stderr = (
+        "Fatal Python error: Segmentation fault\n\n"
+        "Current thread 0x00007f1200000000 (most recent call first):\n"
+        '  File "/x/examples/a.py", line 4 in go\n  File "/x/examples/a.py", line 5 in <module>\n'
+    )
+    place = describe_failure(stderr, Outcome.KILLED, 11).split("\n")[1]
+    assert place == "script-killed at 7:5 `helper.fall()`"
+
+
 def test_only_extracted_files_are_replaced() -> None:
     unrelated_lines = (
         'File "/x/site-packages/pkg/examples/a.py", line 1',

@@ -31,6 +31,13 @@ def test_filtering_is_substitution(text: str, rules: list[tuple[str, str]]) -> N
     assert mapped.text == expected
 
 
+def test_origin_of_replacements_inside_replacements() -> None:
+    first = MappedText.copy("_abcde_").replace_ranges({(1, 6): "AB"})
+    second = first.replace_ranges({(2, 2): "x"})
+    assert second.text == "_AxB_"
+    assert [second.origin(1, end) for end in (2, 3, 4, 5)] == [(1, 6)] * 3 + [(1, 7)]
+
+
 def test_a_filter_ends_where_backtracking_would_not() -> None:
     text = "a" * 5000 + "b"
     rules = (Filter(r"(a+)+$", ""), Filter(r"(a|a)*c", ""), Filter("(a*)*b$", "end"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from coursebuild.core.text.source import Excerpt, Source
-from coursebuild.core.text.units import check_unit
+from coursebuild.core.text.units import check_unit, find_unit
 
 USUAL_UNITS = (
     *("", "1", "1/s²", "kg m^2", "kg·m²", "kg.m^2", "N m/rad", "m/s^{2}", "m s^-2", "m s⁻¹"),
@@ -43,3 +43,18 @@ def test_wrong_units_are_reported_with_the_likely_one() -> None:
         assert [m.partition(": ")[2] for m in messages(word)] == [f"did you mean `{unit}`?"], word
     assert messages("strides") == ["strides: leave it out, and say in words what is counted"]
     assert [unit for unit in INVALID_UNITS if not messages(unit)] == []
+
+
+def test_units_that_are_equal_have_one_size_and_one_dimension() -> None:
+    for unit, same_unit in (
+        ("N m", "kg m^2/s^2"),
+        ("m/m", "1"),
+        ("m^12", "m^6 m^6"),
+        ("mm²", "1e-6 m²"),
+        ("J/(kg K)", "m²/(s² K)"),
+        ("kHz", "1/ms"),
+        ("μm", "µm"),
+    ):
+        assert find_unit(unit) is not None and find_unit(unit) == find_unit(same_unit), unit
+    assert find_unit("m^12") != find_unit("m")
+    assert find_unit("strides") is None

@@ -21,6 +21,12 @@ def test_terms_are_those_that_the_browser_makes() -> None:
     assert [[text, terms_of(text)] for text, _ in SHARED_CASES["terms"]] == SHARED_CASES["terms"]
 
 
+def test_lengths_of_terms() -> None:
+    words = {length: "a" * length for length in (2, 3, 24, 25, 48, 49)}
+    assert [n for n, word in words.items() if terms_of(word) == [word]] == [2, 3, 24, 25, 48]
+    assert [n for n, word in words.items() if is_fuzzy(word)] == [3, 24]
+
+
 def test_shelves_are_those_of_the_browser() -> None:
     for term, shelf, fuzzy, _ in SHARED_CASES["shelves"]:
         assert (shelf_of(term), is_fuzzy(term)) == (shelf, fuzzy), term
