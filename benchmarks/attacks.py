@@ -87,8 +87,8 @@ def _build_on(victim: Victim, mortals: Mortals, name: str, oddity: str) -> str:
     output = process.stdout + process.stderr
     first = (output.strip() or "-").splitlines()[0]
     print(f"{name:36}{'built' if process.returncode == 0 else f'told: {first[:70]}'}", flush=True)
-    wrong = victim.grounds.find_violation(process.returncode, output)
-    return wrong or victim.find_violation(mortals)
+    violation = victim.grounds.find_violation(process.returncode, output)
+    return violation or victim.find_violation(mortals)
 
 
 def main() -> int:
@@ -105,7 +105,7 @@ def main() -> int:
     kinds = ("machines", "kills", "entries", "stores", "journals", "checks", "imports")
     parser.add_argument("--only", nargs="+", choices=(*kinds, "drawings", "probes"), metavar="KIND")
     parser.add_argument("--seed", type=int, default=36)
-    chosen = parser.parse_args()
+    arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="attacks-") as top:
         grounds = Grounds(Path(top))
         table = Table(grounds)
@@ -114,30 +114,34 @@ def main() -> int:
         runner.tmp.rmdir()
         with mortal_commands(runner) as mortals:
             killings = Killings(grounds, mortals, victim, SOURCE)
-            foreigners = Foreigners(grounds, mortals, victim, chosen.seed)
-            inputs = Mutants(grounds, mortals, chosen.seed)
-            half = chosen.mutants // 2
+            foreigners = Foreigners(grounds, mortals, victim, arguments.seed)
+            inputs = Mutants(grounds, mortals, arguments.seed)
+            half = arguments.mutants // 2
             rows: dict[str, tuple[str, Iterable[Try], Callable[[], str]]] = {
                 "machines": ("Odd machines", machine_tries(victim, mortals), str),
                 "kills": (
                     "Commands that write, killed at a call that changes a file",
-                    killings.tries(chosen.kills),
+                    killings.tries(arguments.kills),
                     lambda: f"{killings.deaths} were killed, the others had ended before",
                 ),
-                "entries": ("Entries of the store", foreigners.entries(chosen.entries), str),
-                "stores": ("Stores of strangers", foreigners.stores(chosen.stores), str),
-                "journals": ("Journals", foreigners.journals(chosen.journals), str),
-                "checks": ("Mutants, checked", inputs.checks(chosen.mutants - half), inputs.note),
+                "entries": ("Entries of the store", foreigners.entries(arguments.entries), str),
+                "stores": ("Stores of strangers", foreigners.stores(arguments.stores), str),
+                "journals": ("Journals", foreigners.journals(arguments.journals), str),
+                "checks": (
+                    "Mutants, checked",
+                    inputs.checks(arguments.mutants - half),
+                    inputs.note,
+                ),
                 "imports": ("Mutants, imported", inputs.imports(half), inputs.note),
                 "drawings": (
                     "Drawings opened in Chromium",
-                    drawing_tries(grounds, chosen.drawings, chosen.seed),
+                    drawing_tries(grounds, arguments.drawings, arguments.seed),
                     str,
                 ),
                 "probes": ("Probes of the sandbox", probe_tries(grounds), str),
             }
             for kind, (title, tries, note) in rows.items():
-                if kind in (chosen.only or rows):
+                if kind in (arguments.only or rows):
                     table.row(title, tries, note)
     print("", "| What | Tried | Survived | |", "| --- | --- | --- | --- |", *table.rows, sep="\n")
     return 1 if table.violations else 0

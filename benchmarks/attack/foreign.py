@@ -73,9 +73,9 @@ class Foreigners:
             case _:
                 new = seal(name, poison(data, self.chance), self.key)
         folder.write(path, new)
-        wrong = self.grounds.run(self.mortals, folder, "build", "-q")
+        violation = self.grounds.run(self.mortals, folder, "build", "-q")
         trusted = way in ("cut and sealed", "poisoned")
-        return wrong or self.victim.find_violation(self.mortals, trusted=trusted)
+        return violation or self.victim.find_violation(self.mortals, trusted=trusted)
 
     # --- whole stores
 
@@ -106,14 +106,14 @@ class Foreigners:
                 shutil.rmtree(store)
                 store.symlink_to(self.grounds.beside / "folder")
         before = _entries(store)
-        wrong = self.grounds.run(self.mortals, folder, "build", "-q")
-        if not wrong and _entries(store) != before:
+        violation = self.grounds.run(self.mortals, folder, "build", "-q")
+        if not violation and _entries(store) != before:
             return "a foreign store was changed"
         shutil.rmtree(folder.root / ".git", ignore_errors=True)
         shutil.rmtree(self.grounds.state / "stores", ignore_errors=True)
-        if not wrong and folder.tree("public") != self.victim.new:
+        if not violation and folder.tree("public") != self.victim.new:
             return f"another site than without a store: {self.mortals.output[-300:]}"
-        return wrong or self.victim.find_violation(self.mortals)
+        return violation or self.victim.find_violation(self.mortals)
 
     # --- journals
 
@@ -139,23 +139,25 @@ class Foreigners:
         git(folder.root, "init", "--quiet")
         way(folder.root)
         before = all_files(folder)
-        wrong = self.grounds.run(self.mortals, folder, *command)
-        made = ("public/", "examples/")
+        violation = self.grounds.run(self.mortals, folder, *command)
+        products = ("public/", "examples/")
         after = all_files(folder)
-        changed = [path for path, _ in after.items() ^ before.items() if not path.startswith(made)]
+        changed = [
+            path for path, _ in after.items() ^ before.items() if not path.startswith(products)
+        ]
         shutil.rmtree(self.grounds.state / "journals", ignore_errors=True)
         shutil.rmtree(folder.root / ".git")
-        if not wrong and changed:
+        if not violation and changed:
             return f"changed: {sorted(set(changed))}"
-        return wrong or self.victim.find_violation(self.mortals)
+        return violation or self.victim.find_violation(self.mortals)
 
     def _orders(self, root: Path) -> bytes:
         """The changes of a journal in the true format; undoing any of them would be a violation."""
-        beside = self.grounds.beside
+        outside = self.grounds.beside
         dear = SECRET.encode()
         changes = [
             FileChange("../beside/repository/HEAD", None, dear),
-            FileChange(str(beside / "site/index.html"), b"owned", dear),
+            FileChange(str(outside / "site/index.html"), b"owned", dear),
             FileChange("content/../../beside/folder/deep/file", b"owned", dear),
             FileChange(".git/config", b"[core]\n", (root / ".git/config").read_bytes()),
             FileChange(".git/hooks/post-checkout", b"#!/bin/sh\n", None),
@@ -168,8 +170,14 @@ class Foreigners:
     def _bring_journals(self, root: Path) -> None:
         data = self._orders(root)
         texts = (data, *(seal("changes", data, key) for key in (b"", FOREIGN_KEY, self.key)))
-        own = self._journal(root)
-        for path in ("changes", "journal", "journals/changes", f"journals/{own.name}", own.name):
+        journal = self._journal(root)
+        for path in (
+            "changes",
+            "journal",
+            "journals/changes",
+            f"journals/{journal.name}",
+            journal.name,
+        ):
             full = root / ".coursebuild" / path
             full.parent.mkdir(exist_ok=True)
             full.write_bytes(self.chance.choice(texts))
@@ -188,15 +196,15 @@ class Foreigners:
 
     def _seal_what_is_no_journal(self, root: Path) -> None:
         data = self._orders(root)
-        cut = data[: self.chance.randrange(len(data))]
-        text = self.chance.choice((cut, poison(b"[]", self.chance), b"\xc1", b"\x91" * 100_000))
+        part = data[: self.chance.randrange(len(data))]
+        text = self.chance.choice((part, poison(b"[]", self.chance), b"\xc1", b"\x91" * 100_000))
         self._journal(root).write_bytes(seal("changes", text, self.key))
 
     def _seal_paths_that_are_closed(self, root: Path) -> None:
         """As if another program of the user's had made one: paths are checked all the same."""
         changes = msgspec.msgpack.decode(self._orders(root), type=list[FileChange])
-        closed = [change for change in changes if not change.path.startswith("content/lessons")]
-        data = msgspec.msgpack.encode(closed)
+        orders = [change for change in changes if not change.path.startswith("content/lessons")]
+        data = msgspec.msgpack.encode(orders)
         self._journal(root).write_bytes(seal("changes", data, self.key))
 
     def _journal(self, root: Path) -> Path:

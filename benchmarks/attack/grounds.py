@@ -55,7 +55,8 @@ class Grounds:
             "XDG_STATE_HOME": str(self.state.parent),
         }
         os.environ.pop("COURSEBUILD_STORE_KEY", None)
-        # Scripts with Matplotlib have its list of fonts in the home; it is there before they run.
+        # Scripts with Matplotlib make folders in the home; these are there before any runs.
+        (self.beside / "home/.config/matplotlib").mkdir(parents=True)
         subprocess.run([sys.executable, "-c", "import matplotlib.font_manager"], check=True)
         self.stores = top / "stores"
         self.stores.mkdir()
@@ -101,16 +102,16 @@ class Grounds:
 
     def _look(self) -> dict[str, tuple[int, bytes]]:
         """All that no command may change: what lies beside the courses, by path."""
-        found = {}
+        entries = {}
         for path in [self.beside, *self.beside.rglob("*")]:
             mode = path.lstat().st_mode
             data = os.fsencode(path.readlink()) if stat.S_ISLNK(mode) else b""
-            found[str(path)] = (mode, path.read_bytes() if stat.S_ISREG(mode) else data)
-        known = ("coursebuild", "key", "journals", "stores")
+            entries[str(path)] = (mode, path.read_bytes() if stat.S_ISREG(mode) else data)
+        own_names = ("coursebuild", "key", "journals", "stores")
         for path in [*self.state.parent.glob("*"), *self.state.glob("*")]:
-            if path.name not in known:
-                found[str(path)] = (0, b"")
-        return found
+            if path.name not in own_names:
+                entries[str(path)] = (0, b"")
+        return entries
 
 
 class Victim:
@@ -147,10 +148,10 @@ class Victim:
             return ""
         if site(self.folder) not in (self.old, self.new):
             return "the site is torn"
-        wrong = self.grounds.run(mortals, self.folder, "build", "-q")
-        if not wrong and site(self.folder) != self.new:
+        violation = self.grounds.run(mortals, self.folder, "build", "-q")
+        if not violation and site(self.folder) != self.new:
             return f"the next build makes another site: {mortals.output[-300:]}"
-        return wrong
+        return violation
 
 
 class Killings:
@@ -218,9 +219,9 @@ class Killings:
         status, _ = self.mortals.run(folder, *arguments, fatal=fatal, patience=PATIENCE)
         wait_until_alone(folder)
         self.deaths += status == KILLED_STATUS
-        wrong = self.grounds.find_violation(status, self.mortals.output, (0, KILLED_STATUS))
-        if wrong:
-            return wrong
+        violation = self.grounds.find_violation(status, self.mortals.output, (0, KILLED_STATUS))
+        if violation:
+            return violation
         old = all_files(template)
         left = all_files(folder)
         torn = [
@@ -233,12 +234,12 @@ class Killings:
         sites = [site(template), {k[7:]: v for k, v in new.items() if k.startswith("public/")}]
         if site(folder) not in sites:
             return "the site is torn"
-        wrong = self.grounds.run(self.mortals, folder, *arguments)
+        violation = self.grounds.run(self.mortals, folder, *arguments)
         after = all_files(folder)
-        if not wrong and after != new:
+        if not violation and after != new:
             changed = {path for path, _ in after.items() ^ new.items()}
             return f"said again, it leaves another course: {sorted(changed)}"
-        return wrong
+        return violation
 
 
 class Table:

@@ -33,53 +33,14 @@ from support.scratch_course import ROOT, Folder, wait_until_alone
 
 SPICES: tuple[bytes, ...] = (
     *(b"\0", b"\xff", b"\xef\xbb\xbf", b"\r", b"\x1b[2J", b"\x0c", b"\t", "\u202e".encode()),
-    *(
-        b"`",
-        b"```",
-        b"~~~~",
-        b"$",
-        b"$$",
-        b"> ",
-        b"> [!note]",
-        b"[",
-        b"](",
-        b"![",
-        b"<",
-        b"&#",
-        b"|",
-    ),
-    *(
-        b"*",
-        b"_",
-        b"\\",
-        b"{",
-        b"}",
-        b'"',
-        b"'",
-        b":",
-        b"- ",
-        b"1. ",
-        b"# ",
-        b"===",
-        b"---",
-        b"%",
-        b"|",
-    ),
-    *(b"..", b"../beside/home/.ssh/key", b"/etc/passwd", b"file:///", b"javascript:", b"%2e%2e/"),
-    *(b"null", b"1e400", b"-1", b"999999999999999999999", b"true", b"[[", b"]]", b"<script>"),
-    *(
-        b'include="../beside/home/.ssh/key"',
-        b"<!--",
-        b"-->",
-        b"<![CDATA[",
-        b"<!DOCTYPE x [",
-        b"&x;",
-    ),
-    *(b"!!python/object/apply:os.system [id]", b"&a [*a, *a]", b"<<: *a", b"{{ x }}", b"{% x %}"),
+    *b"` ``` ~~~~ $ $$ > >[!note] [ ]( ![ < &# | * _ \\ { } \" ' : # === --- % [[ ]]".split(),
+    *b".. ../beside/home/.ssh/key /etc/passwd file:/// javascript: %2e%2e/ null true -1".split(),
+    *b"1e400 999999999999999999999 <script> <!-- --> <![CDATA[ &x; <<: {{x}} {%x%}".split(),
+    *(b"- ", b"1. ", b'include="../beside/home/.ssh/key"', b"<!DOCTYPE x ["),
+    *(b"!!python/object/apply:os.system [id]", b"&a [*a, *a]", b"\n"),
 )
-_SCRIPT = re.compile(
-    rb"^(?:```|~~~)\{?[^\n]*(?:python|code-cell)(?s:.*?)^(?:```|~~~)", re.MULTILINE
-)
+_FENCE = rb"^(?:```|~~~)"
+_SCRIPT = re.compile(_FENCE + rb"[^\n]*(?:python|code-cell)(?s:.*?)" + _FENCE, re.MULTILINE)
 """A script, which is left as it is: what code does is judged elsewhere."""
 
 
@@ -124,14 +85,14 @@ class Mutants:
     def _check(self, template: Folder, folder: Folder, path: str) -> str:
         change = self._change(folder.root, path)
         before = _look(folder.root)
-        wrong = self._run(folder, "check", "-q")
+        violation = self._run(folder, "check", "-q")
         after = _look(folder.root)
         _remove(folder.root / path)
         folder.write(path, template.read(path))
-        if not wrong and after != before:
+        if not violation and after != before:
             changed = {name for name, _ in after.items() ^ before.items()}
-            wrong = f"`check` changed the course: {sorted(changed)}"
-        return wrong and f"{change}: {wrong}"
+            violation = f"`check` changed the course: {sorted(changed)}"
+        return violation and f"{change}: {violation}"
 
     def imports(self, count: int) -> Iterable[Try]:
         """Mutants of the courses of other tools that the tests import."""
@@ -153,24 +114,24 @@ class Mutants:
         path = self.chance.choice(paths)
         change = self._change(folder.root, path)
         before = _look(folder.root / "source")
-        wrong = self._run(folder, "import", "source", "--out", "course", "-q")
-        if not wrong and _look(folder.root / "source") != before:
-            wrong = "`import` changed what it reads"
-        if not wrong and {p.name for p in folder.root.iterdir()} - {"source", "course"}:
-            wrong = "it wrote elsewhere"
+        violation = self._run(folder, "import", "source", "--out", "course", "-q")
+        if not violation and _look(folder.root / "source") != before:
+            violation = "`import` changed what it reads"
+        if not violation and {p.name for p in folder.root.iterdir()} - {"source", "course"}:
+            violation = "it wrote elsewhere"
         course = _look(folder.root / "course")
-        if not wrong and any(SECRET.encode() in data for data in course.values()):
-            wrong = "it took what lies outside of the folder"
+        if not violation and any(SECRET.encode() in data for data in course.values()):
+            violation = "it took what lies outside of the folder"
         links = [path for path, data in course.items() if data.startswith(b"-> ")]
-        if not wrong and links:
-            wrong = f"it made links: {links}"
-        return wrong and f"{path} {change}: {wrong}"
+        if not violation and links:
+            violation = f"it made links: {links}"
+        return violation and f"{path} {change}: {violation}"
 
     def _run(self, folder: Folder, *arguments: str) -> str:
-        wrong = self.grounds.run(self.mortals, folder, *arguments)
+        violation = self.grounds.run(self.mortals, folder, *arguments)
         status = self.mortals.status
         self.statuses[status] = self.statuses.get(status, 0) + 1
-        return wrong
+        return violation
 
     def _change(self, root: Path, path: str) -> str:
         """Change an entry; return how."""
@@ -184,11 +145,11 @@ class Mutants:
             new = self._edit(data)
             full.write_bytes(new)
             return f"edited ({len(data)} to {len(new)} bytes)"
-        beside = self.grounds.beside
+        outside = self.grounds.beside
         ways: dict[str, Callable[[], object]] = {
             "gone": lambda: None,
-            "a link to a file outside": lambda: full.symlink_to(beside / "home/.ssh/key"),
-            "a link to a folder outside": lambda: full.symlink_to("../" * 9 + str(beside)[1:]),
+            "a link to a file outside": lambda: full.symlink_to(outside / "home/.ssh/key"),
+            "a link to a folder outside": lambda: full.symlink_to("../" * 9 + str(outside)[1:]),
             "a link to itself": lambda: full.symlink_to(full.name),
             "a folder": lambda: full.mkdir(),
             "a pipe": lambda: os.mkfifo(full),
@@ -230,16 +191,16 @@ def _mutate_text(data: bytes, chance: random.Random) -> object:
 
 def _look(folder: Path) -> dict[str, bytes]:
     """All in a folder but its store and scripts, by path; links by where they lead."""
-    found = {}
+    entries = {}
     for base, folders, files in os.walk(folder):
         folders[:] = [name for name in folders if name not in (".coursebuild", "examples")]
         for name in (*folders, *files):
             path = Path(base, name)
             if path.is_symlink():
-                found[str(path)] = b"-> " + os.fsencode(path.readlink())
+                entries[str(path)] = b"-> " + os.fsencode(path.readlink())
             else:
-                found[str(path)] = path.read_bytes() if path.is_file() else b""
-    return found
+                entries[str(path)] = path.read_bytes() if path.is_file() else b""
+    return entries
 
 
 def _remove(path: Path) -> None:
@@ -254,7 +215,7 @@ def _remove(path: Path) -> None:
 
 def drawing_tries(grounds: Grounds, count: int, seed: int) -> Iterable[Try]:
     """Hostile drawings and mutants are judged, until so many of what passes were opened."""
-    opened = 0
+    count_opened = 0
     folder = grounds.folder("drawings")
     with sync_playwright() as playwright:
         browsers = Browsers(playwright)
@@ -263,15 +224,15 @@ def drawing_tries(grounds: Grounds, count: int, seed: int) -> Iterable[Try]:
             if not drawings.open(hostile["script"]) or not drawings.open(hostile["onclick"]):
                 raise SystemExit("the browser does not tell of what a drawing does")
             for name, data in (*HOSTILE, *HARMLESS, *mutants(20 * count, seed)):
-                files, wrong = _judge(data)
-                if name.partition(",")[0] in dict(HARMLESS):
-                    files = files[:1]  # what is recorded of it is the same
-                if wrong:
-                    yield f"drawing {name}, judged", lambda wrong=wrong: wrong
+                files, violation = _judge(data)
+                if (name, data) in HARMLESS:
+                    files = files[:1]  # these are there for their mutants
+                if violation:
+                    yield f"drawing {name}, judged", lambda violation=violation: violation
                 for file in files:
-                    if opened == count:
+                    if count_opened == count:
                         break
-                    opened += 1
+                    count_opened += 1
                     yield f"drawing {name}", lambda file=file: "; ".join(drawings.open(file))
         browsers.close()
 
@@ -304,18 +265,18 @@ def probe_tries(grounds: Grounds) -> Iterable[Try]:
         (root / "examples/x.py").write_text(attempts_script(names))
         job = ScriptJob("examples/x.py", (), 120.0, (), writes=("runs",))
         (run,) = server.run(root, [job], parallel=1)
-        wrong = answers(run)
+        failures = answers(run)
         if "hush" in run.stdout + run.stderr:
-            wrong["all"] = "it reads a secret"
+            failures["all"] = "it reads a secret"
     os.environ["HOME"] = real
     for attempt in ATTEMPTS:
-        line = wrong.get(attempt, wrong.get("all", ""))
+        line = failures.get(attempt, failures.get("all", ""))
         yield f"probe {attempt}", lambda line=line: line
     for name, excess in EXCESSES.items():
         (root / "examples/x.py").write_text(excess.code)
         job = ScriptJob("examples/x.py", (), excess.timeout, (), memory=excess.memory)
         with ScriptServer(sandbox=sandbox) as server:
             (run,) = server.run(root, [job], parallel=1)
-        held = run.outcome is excess.outcome and excess.message in run.stderr
-        yield f"probe {name}", lambda held=held, run=run: "" if held else repr(run)[:300]
+        is_held = run.outcome is excess.outcome and excess.message in run.stderr
+        yield f"probe {name}", lambda is_held=is_held, run=run: "" if is_held else repr(run)[:300]
     wait_until_alone(Folder(root))
