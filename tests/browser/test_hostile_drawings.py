@@ -7,11 +7,8 @@ from collections.abc import Iterator, Mapping
 import pytest
 from playwright.sync_api import Browser
 
-from coursebuild.core.drawing.safe_svg import read_svg
-from coursebuild.core.pages.dark import dark_drawing
-from coursebuild.core.scripts.figures import prepare_figure
 from support.hostile_svg import HARMLESS, HOSTILE, mutants
-from support.opened_drawings import Drawings
+from support.opened_drawings import Drawings, published_files
 
 ACTIVE = (
     *("script", "XHTML script", "XHTML frame", "XHTML picture", "onclick", "set of a link"),
@@ -27,15 +24,6 @@ def drawings(
 ) -> Iterator[Drawings]:
     with Drawings(browsers["plain"], tmp_path_factory.mktemp("drawings")) as drawings:
         yield drawings
-
-
-def published_files(data: bytes) -> list[bytes]:
-    """What a site may hold of a file: itself, what is recorded of it, and that for dark pages."""
-    files = [] if isinstance(read_svg(data), str) else [data]
-    recorded = prepare_figure("x.svg", data)
-    if isinstance(recorded, bytes):
-        files += [recorded, dark_drawing(recorded.decode(), {}).encode()]
-    return files
 
 
 def test_hostile_drawings_act_where_nobody_judges_them(drawings: Drawings) -> None:

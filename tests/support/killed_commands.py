@@ -3,14 +3,17 @@
     python killed_commands.py < requests > replies
 
 A request is a line of JSON, `{"folder": …, "arguments": […], "fatal": N, "fault": …, "exchanges":
-…}`. The child runs the command in this folder. Without a fault it ends itself, without any cleaning
-up, just before its call number N that changes something in the folder or in the user's journals; a
-write that is hit writes half. With `"fault": "files"` or `"memory"` call number N that opens
-something or starts a process or a thread fails instead, and so does each that follows, as where no
-more files may be open, or no memory is left. With `"fatal": 0` it gets through. `exchanges`:
-whether the system can swap two folders in one step.
-A reply is `{"status": …, "calls": [names], "said": …}`, with all that was written for the user;
-there are no names where it died. The name of a call that may fail tells where it is made.
+…, "patience": …}`. The child runs the command in this folder. Without a fault it ends itself,
+without any cleaning up, just before its call number N that changes something in the folder or in
+the user's journals; a write that is hit writes half. With `"fault": "files"` or `"memory"` call
+number N that opens something or starts a process or a thread fails instead, and so does each that
+follows, as where no more files may be open, or no memory is left. With `"fatal": 0` it gets
+through. `exchanges`: whether the system can swap two folders in one step. `patience`: after so many
+seconds a signal ends it; 0: never.
+A reply is `{"status": …, "calls": [names], "said": …, "seconds": …, "megabytes": …}`, with all that
+was written for the user, the processor time of the command and of what it waited for, and the most
+memory that one of its processes held; there are no names where it died. The name of a call that may
+fail tells where it is made.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ import errno
 import importlib
 import json
 import os
+import signal
 import sys
 import tempfile
 from collections.abc import Callable
@@ -163,10 +167,16 @@ def serve() -> None:
             os.close(write)
             with os.fdopen(read) as pipe:
                 calls = pipe.read()
-            status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+            _, status, usage = os.wait4(child, 0)
             errors.seek(0)
-            output = errors.read().decode()
-        print(json.dumps({"status": status, "calls": calls.split(), "said": output}), flush=True)
+            reply = {
+                "status": os.waitstatus_to_exitcode(status),
+                "calls": calls.split(),
+                "said": errors.read().decode(errors="replace"),
+                "seconds": usage.ru_utime + usage.ru_stime,
+                "megabytes": usage.ru_maxrss / 1024,
+            }
+        print(json.dumps(reply), flush=True)
 
 
 def run(request: dict[str, Any], report: int) -> None:
@@ -181,6 +191,7 @@ def run(request: dict[str, Any], report: int) -> None:
     if request["fault"]:
         doom = Fault(folder, request["fatal"], request["fault"])
     doom.install()
+    signal.alarm(request["patience"])
     status = 70
     try:
         status = main(request["arguments"])

@@ -23,18 +23,26 @@ class Mortals:
         """Whether two folders can be swapped in one step."""
         self.output = ""
         """What the last one wrote for its user."""
+        self.status = 0
+        self.seconds = self.megabytes = 0.0
+        """The processor time that the last one took, and the memory of its largest process."""
 
     def run(
-        self, folder: Folder, *arguments: str, fatal: int = 0, fault: str = ""
+        self, folder: Folder, *arguments: str, fatal: int = 0, fault: str = "", patience: int = 0
     ) -> tuple[int, list[str]]:
-        """The exit status, and the names of the calls where it got through."""
+        """The exit status, and the names of the calls where it got through.
+
+        A command that takes longer than the `patience`, in seconds, ends by a signal.
+        """
         assert self.process.stdin is not None and self.process.stdout is not None
         request = {"folder": str(folder.root), "arguments": arguments, "fatal": fatal}
-        request |= {"exchanges": self.exchanges, "fault": fault}
+        request |= {"exchanges": self.exchanges, "fault": fault, "patience": patience}
         print(json.dumps(request), file=self.process.stdin, flush=True)
         reply = json.loads(self.process.stdout.readline())
         self.output = reply["said"]
-        return reply["status"], reply["calls"]
+        self.seconds, self.megabytes = reply["seconds"], reply["megabytes"]
+        self.status = reply["status"]
+        return self.status, reply["calls"]
 
     def die(self, folder: Folder, *arguments: str, fatal: int) -> None:
         """Run a command that dies at this call.

@@ -1,7 +1,8 @@
 """Drawings opened at their own address in Chromium, and what they then ask for.
 
-Entry point: `Drawings`. All other hosts are one, which answers nothing and counts who comes: a
-script that runs, a picture, a style sheet, a frame, a connection made ahead.
+Entry points: `Drawings`; `published_files`, what a site would hold of a file. All other hosts are
+one, which answers nothing and counts who comes: a script that runs, a picture, a style sheet, a
+frame, a connection made ahead.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ from typing import Any, Self
 
 from playwright.sync_api import Browser, Dialog, Error, Request
 
+from coursebuild.core.drawing.safe_svg import read_svg
+from coursebuild.core.pages.dark import dark_drawing
+from coursebuild.core.scripts.figures import prepare_figure
 from support.static_host import Host
 
 _TWO_FRAMES = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
@@ -90,3 +94,12 @@ class Drawings:
         if self._elsewhere.visits:
             traces.append(f"{self._elsewhere.visits} visits elsewhere")
         return traces
+
+
+def published_files(data: bytes) -> list[bytes]:
+    """What a site may hold of a file: itself, what is recorded of it, and that for dark pages."""
+    files = [] if isinstance(read_svg(data), str) else [data]
+    recorded = prepare_figure("x.svg", data)
+    if isinstance(recorded, bytes):
+        files += [recorded, dark_drawing(recorded.decode(), {}).encode()]
+    return files
