@@ -148,7 +148,7 @@ def test_terms_have_weights_by_place_and_frequency(make: Make) -> None:
 
 
 def test_the_file_of_a_page_is_a_script_that_hands_over_plain_values(make: Make) -> None:
-    rendered_course = make('## `<img src=x onerror="alert(1)">`\n\n`</script>` & \u2028 \x07.\n')
+    rendered_course = make('## `<img src=x onerror="alert(1)">`\n\n`</script>` & \u2028 `\x07`.\n')
     library = Library(rendered_course.course, rendered_course.results, rendered_course.assets)
     note = note_page(inputs_of(library, "lesson", "0.1"), rendered_course.page(), "")
     text = text_and_terms(note)[0].decode()

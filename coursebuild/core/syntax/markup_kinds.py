@@ -1,0 +1,264 @@
+"""The kinds of markup that readers would see as it is written.
+
+Entry points: `BROKEN`, markup of ours that is not whole; `FOREIGN`, that of other tools; `IN_HTML`,
+what is unread between tags. Patterns are searched for in a text in which NUL stands for all that
+was read, so that a mark directly after a NUL stands directly after a link, code and so on.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Kind(NamedTuple):
+    """A kind of unread markup."""
+
+    pattern: str
+    reason: str
+    """Why it is not read, after "would be shown as written: "."""
+    help: str
+    rule: str = "markup-foreign"
+    once: bool = False
+    """Whether one mistake often leaves several marks in a text, of which the first is reported."""
+
+
+_NUMBER = r"(?<![\w.])[-+\u2212]?\d[\w.,]*"
+_BEFORE = r"(?:^|(?<=[\s(\[\"'“„«‚‘—–/]))"
+"""The start of a line, or what may stand before the mark that begins an emphasis."""
+_AFTER = r"(?=[\s.,;:!?)\]\"'“”’»…—–]|$)"
+_WIDE = r"[\u3040-\u30ff\u3400-\u9fff\uac00-\ud7af]"
+"""Letters of scripts that are written without blanks."""
+_SCHEME = r"(?:lesson|model|page|term):(?=\w)"
+_ADDRESS = (
+    rf"(?:{_SCHEME}|https?:|mailto:|#\w|[\w./-]{1, 80}\.(?:csv|html|jpe?g|md|pdf|png|py|svg|xml)\b)"
+)
+_MACROS = """
+    alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta kappa lambda mu nu xi pi rho
+    sigma tau phi varphi chi psi omega Gamma Delta Theta Lambda Sigma Phi Psi Omega frac tfrac dfrac
+    sqrt sum int prod partial nabla infty cdot times approx leq geq neq pm dot ddot hat vec bar
+    mathbf mathrm mathcal boldsymbol left right quad qquad label noindent newpage pagebreak
+"""
+_ENTITIES = "amp deg gt hellip lt mdash middot nbsp ndash quot shy times"
+
+FOREIGN = {
+    "wiki": Kind(
+        r"(?<![\\\w])\[\[(?![\d\s.,;+*/-]+\])[^\[\]\n\0]+\]\]",
+        "a link is not written in this way",
+        "a link to a lesson is `[its title](lesson:1.2)`",
+    ),
+    "template": Kind(
+        r"\{\{[-~<%#/!&]?\s*[A-Za-z_][^{}\n\0]*\}\}|\{%[^%\n\0]*%\}|<%[=-]?[^%\n\0]*%>"
+        r"|\{(?:\+\+|--|~~|==|>>)[^{}\n\0]*\}",
+        "lessons are not templates",
+        "write the text itself, or put it into backticks if readers are to see it",
+    ),
+    "callout": Kind(
+        r"^ {0,3}(?:(?:!!!|\?\?\?\+?)(?:[ \t]+|(?-i:(?=[a-z])))[\w-]+|:{3,}[ \t]*\{?[.#]?[\w-]+\}?)"
+        r"|\A\[![\w-]*\]?|(?<!\\)\[![\w-]+\]",
+        "no callout begins here",
+        "a callout is a quotation: `> [!note]`, and `> ` before each line of it",
+    ),
+    "latex": Kind(
+        r"\\\((?:[^\n]{0,80}?[\\^_=+][^\n]{0,80}?|[ ]?[A-Za-z][ ]?)\\\)"
+        r"|^\\\[\s[\s\S]{0,2000}?\\\]|\$\0+\$"
+        r"|\\(?:begin|ref|eqref|cite\w*)\{[^{}\n\0]*\}|(?<![\w:\\])\\(?!end\{)[A-Za-z]{2,}\{[^{}\n\0]*\}"
+        rf"|(?<![\w:\\/])\\(?-i:{'|'.join(_MACROS.split())})(?![\w\\/])",
+        "there is no formula here",
+        "a formula is `$x$` or stands between two `$$`, and a link to one is `[](#eq:name)`",
+    ),
+    "attributes": Kind(
+        r"\{:?[ \t]*[.#][A-Za-z][\w:.-]*[^{}\n\0]*\}?|\{:[^{}\n\0]+\}|\{#?eq:[^{}\n\0]*\}?"
+        r"|(?<![{\w&\0])[#.][A-Za-z][\w:.-]*\}",
+        "only headings have attributes, and formulas labels: `{#eq:name}`",
+        "in a heading, `## Title {#id .class}` ends the line; write HTML where a text needs a "
+        "class or a size",
+    ),
+    "reference": Kind(
+        r"(?<![\w\]\0\\])\[[^\[\]\n\0]+\]\[[^\[\]\n\0]*\](?!\()",
+        "this link has no address",
+        "write a line `[name]: address`, or the address itself: `[text](address)`",
+    ),
+    "footnote": Kind(
+        r"\^\[[^\[\]\n\0]+\]",
+        "no footnote begins here",
+        "a footnote is `[^name]`, with a paragraph `[^name]: …`",
+    ),
+    "citation": Kind(
+        r"(?<!\\)\[(?:[^\[\]\n\0@]*[\s-])?@[\w:./-]+[^\[\]\n\0]*\]",
+        "there is no list of sources",
+        "link to the source, or put it into a footnote: `[^name]`",
+    ),
+    "crossref": Kind(
+        r"(?<![\w.@])@(?:fig|tbl|eq|sec|lst|thm)[-:][\w-]+",
+        "a cross-reference is not written in this way",
+        "link to a heading or a formula by its id: `[text](#id)`, `[](#eq:name)`",
+    ),
+    "highlight": Kind(
+        r"(?<![=\w])==[^\s=](?:[^=\n\0]*[^\s=])?==(?![=\w])",
+        "emphasis is not written in this way",
+        "emphasis is `*text*` or `**text**`",
+    ),
+    "script": Kind(
+        r"(?<=[^\W_])(?:~[^\W_]{1,8}~(?!~)|\^[^\W_]{1,8}\^(?![\w^]))",
+        "an index or an exponent is not written in this way",
+        "write a formula, `$\\mathrm{H_2O}$`, or HTML: `<sub>2</sub>`, `<sup>2</sup>`",
+    ),
+    "contents": Kind(
+        r"^\[TOC\]$",
+        "there is no such mark",
+        "take it away: each page lists its headings by itself",
+    ),
+    "tab": Kind(
+        r"^ {0,3}===[!+]? \"[^\"\n\0]*\"",
+        "no tab begins here",
+        "tabs are a feature: `plugins/tabs` of coursebuild",
+    ),
+    "role": Kind(
+        r"(?<![\w:]):[a-z][\w.+-]*(?::[\w.+-]+)*:(?=\0)|(?<![\w{])\{[a-z][\w:.+-]*\}(?=\0)",
+        "roles of reStructuredText are not read",
+        "write a link, a formula or code as Markdown has it",
+    ),
+    "directive": Kind(
+        r"^\.\. [\w:+-]+::",
+        "directives of reStructuredText are not read",
+        "a callout is a quotation, `> [!note]`; an image is `![what it shows](x.svg)`",
+    ),
+    "magic": Kind(
+        r"^(?:%%[a-z]\w*|%(?:config|conda|load_ext|matplotlib|pip|run|timeit|time)\b)",
+        "commands of Jupyter are not read",
+        "leave it out, or put it into backticks if readers are to see it",
+    ),
+    "emoji": Kind(
+        r"(?<![\w:])(?-i::[a-z][a-z0-9]+(?:_[a-z0-9]+)*:)(?![\w:\0])",
+        "names of emoji are not read",
+        "type the emoji itself",
+    ),
+}
+"""Markup of other tools."""
+BROKEN = {
+    "binding": Kind(
+        rf"(?:`{_NUMBER}[^`{{}}\n\0]{{0,20}}|(?:{_NUMBER})?`?)"
+        r"\{[ \t]*(?:out|given)\b[^{}\n\0]*\}?"
+        r"|(?<=\0)[A-Za-z]{1,3}\{[A-Za-z]{1,6}\}|(?<=\0)[^\s\0]{0,2}(?:out|given)[)}\]]"
+        r"|(?<=\0)\{\{(?:out|given)[^{}\n\0]*\}+|(?<=\0)\}",
+        "only a number in backticks is bound, by braces directly after it",
+        "put the number into backticks: `` `4.47`{out} ``",
+        "binding-attribute",
+    ),
+    "mark": Kind(
+        r"\{[ \t]*(?:term|symbol|further)\b[^{}\n\0]*\}",
+        "braces stand directly after what they mark",
+        'write `[word]{term}`, `$x${symbol="meaning"}`, `## Heading {.further}`',
+        "markup-unread",
+    ),
+    "braces": Kind(r"(?<=[\0\]])\{(?![ \t]*[.#:%{])(?:[^{}\n\0]*\}|\w*)", "", ""),
+    "link": Kind(
+        r"(?<!\\)!?\[[^\[\]\n]{0,200}(?<!\\)\][ \t]+\(" + _ADDRESS + r"[^)\n]*\)"
+        r"|(?:(?<!\\)!?\[[^\[\]\n]{0,200})?(?<!\\)\]\([^\s)]*\)?"
+        r"|\([^()\n]{1,200}\)\[" + _ADDRESS + r"[^\]\n]*\]"
+        r"|(?<!\\)!\[[^\[\]\n\0]*\]"
+        rf"|(?<![\w:/.])(?-i:{_SCHEME})[\w.#/-]*\w"
+        r"|(?<!\\)\[[^\[\]\n]{0,200}\(" + _ADDRESS + r"[^()\s]*\)(?![^\[\n]*\])"
+        r"|(?<!\\)\[[^\[\]\n]{0,200}\]?\(?\]?\S?" + _ADDRESS + r"[^()\s\]]*\)(?![^\[\n]*\])"
+        r"|(?<!\\)\[[^\[\]\n]{0,200}\]#\([^()\s]*\)|(?<=\0)\]|\[(?=\0)",
+        "this is not a complete link",
+        "a link is `[text](address)`, with no blank before the `(` and none in the address",
+        "markup-unread",
+        once=True,
+    ),
+    "heading": Kind(
+        r"^[ \t]*#{2,6}(?=[^\s#])|^[ \t]*#{7,}(?=\s)"
+        r"|^(?-i:[^\sA-Z#\0]#{1,5} (?=[A-Z])|#{1,5}[^\w\s#\0] (?=[A-Z]))",
+        "no heading begins here",
+        "a heading is `## Title`, with two to six `#` and a blank after them",
+        "markup-unread",
+    ),
+    "table": Kind(
+        r"^[ \t]*\|?[ \t]*:?-{2,}:?(?:[ \t]*\|[ \t]*:?-{2,}:?)+[ \t]*\|?[ \t]*$"
+        r"|^[ \t]*\|[ \t]*:?-{3,}:?[ \t]*\|[ \t]*$"
+        r"|^[ \t]*\|[ \t][^|\n]*(?:[ \t]\|[ \t][^|\n]*)+\|[ \t]*$"
+        r"|^[ \t]*\|(?:[^|\n]*\|){2,}[ \t]*\n[ \t]*\|(?:[^|\n]*\|){2,}[ \t]*$",
+        "no table was read here",
+        "a table has an empty line before it, a line `| --- | --- |` below its header, and as many "
+        "cells in the one as in the other",
+        "markup-unread",
+        once=True,
+    ),
+    "note": Kind(
+        r"(?<!\\)\[\^[^\[\]\n\0]*\]?",
+        "no footnote begins here",
+        "a footnote is `[^name]`, its name without blanks, with a paragraph `[^name]: …`",
+        "markup-unread",
+    ),
+    "conflict": Kind(
+        r"^={7}$",
+        "a merge conflict may have left it behind",
+        "delete it; a line between two parts is `---`",
+        "markup-unread",
+    ),
+    "task": Kind(
+        r"^[-*+]\[[ xX]?\](?=[ \t])|\A\[(?: [xX] ?|[xX] |)\](?=[ \t]*\w)",
+        "no task begins here",
+        "a task is `- [ ] text` or `- [x] text`",
+        "markup-unread",
+    ),
+    "fence": Kind(
+        r"^(?:'{3}|´{3}|‘{3}|’{3})[ \t]*\w*(?=[\w \t=./\"-]*$)",
+        "no block begins here",
+        "a block of code begins and ends with three backticks on a line of their own",
+        "markup-unread",
+        once=True,
+    ),
+    "html": Kind(
+        r"<!--|</[A-Za-z][\w-]*>?|<[A-Za-z][\w-]*\s+[\w-]+\s*=[^<>\n]*>?",
+        "no tag or comment was read here",
+        'close it: `<tag attribute="value">`, `</tag>`, `<!-- comment -->`',
+        "markup-unread",
+    ),
+    "entity": Kind(
+        rf"&(?:{'|'.join(_ENTITIES.split())})(?![\w;])",
+        "an entity ends with a semicolon",
+        "write the character itself, or add the `;`",
+        "markup-unread",
+    ),
+    "code": Kind(
+        r"(?<!\w)`+|`+(?!\w)",
+        "no code begins or ends here",
+        "put a backtick at both ends, in the same paragraph; write `` \\` `` for the character",
+        "markup-unread",
+        once=True,
+    ),
+    "emphasis": Kind(
+        rf"{_BEFORE}(?:\*\*\*?|__|~~)(?=[^\W_]|[\"'“„(\[$\\\0])"
+        rf"|(?:(?<=[^\W\d_])|(?<=[\"'”\].!?…\0]))(?:\*\*|__|~~)(?!\*){_AFTER}"
+        rf"|(?<={_WIDE})\*\*|\*\*(?={_WIDE})"
+        r"|(?<=[ \t(])\*(?=[^\W\d_]{3})|(?<=\0)\*|\*(?=\0)",
+        "no emphasis begins or ends here",
+        "put the same mark at both ends, in the same paragraph and with no blank inside it; write "
+        "a backslash before each character that is meant to be seen",
+        "markup-unread",
+        once=True,
+    ),
+    "character": Kind(
+        "[\ufffd\x01-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]",
+        "",
+        "delete it, or write the character that was meant",
+        "control-character",
+        once=True,
+    ),
+}
+"""Markup of ours that is not whole."""
+IN_HTML = {
+    **{name: BROKEN[name] for name in ("html", "entity", "character")},
+    "markdown": Kind(
+        r"(?<![\w*])\*\*[^\s*][^\n*]*\*\*(?!\w)|`[^`\n]+`|!?\[[^\[\]\n]*\]\([^\s()]+\)"
+        r"|^[ \t]*#{2,6}[ \t]+\S|^[ \t]*(?:`{3}|~{3})\w*|\{(?:out|given|term)\b[^{}\n]*\}",
+        "inside HTML, Markdown is read only after an empty line",
+        "leave a line empty after the opening tag and another before the closing one, or write "
+        "HTML: `<b>`, `<code>`, `<a href=…>`",
+        "markup-unread",
+        once=True,
+    ),
+    **FOREIGN,
+}
+"""What is unread between the tags of HTML, where nothing but formulas is read."""
