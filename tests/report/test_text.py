@@ -129,8 +129,8 @@ def test_report_lists_scripts_and_ends_with_a_summary() -> None:
         "skipped  examples/c.py  (needs torch; unproven: 1 output and 2 bound numbers)\n"
         "norun    examples/d.py  (not run)\n"
         "\n"
-        "2 lessons, 1 script run, 1 cached: holds, but for 2 scripts that were not run (torch, norun)"
-        " (1 silenced)\n"
+        "2 lessons, 1 script run, 1 cached: holds, but for 2 scripts that were not run"
+        " (torch, norun) (1 silenced)\n"
     )
 
 

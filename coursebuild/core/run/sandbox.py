@@ -72,7 +72,7 @@ _FAULTS = (
 """What is wrong where a value is another one."""
 
 
-class Part(Struct, frozen=True):
+class SandboxPart(Struct, frozen=True):
     """Something that a sandbox needs."""
 
     name: str
@@ -95,26 +95,29 @@ def find_sandbox(root: Path) -> Sandbox:
     return sandbox
 
 
-def examine_sandbox(root: Path) -> tuple[Sandbox | None, tuple[Part, ...]]:
+def examine_sandbox(root: Path) -> tuple[Sandbox | None, tuple[SandboxPart, ...]]:
     """The sandbox of this machine, and its parts; none, and those up to the first that lacks."""
-    parts = [Part("Bubblewrap"), Part("a filter of system calls")]
+    parts = [SandboxPart("Bubblewrap"), SandboxPart("a filter of system calls")]
     program, machine = shutil.which("bwrap"), platform.machine()
     if program is None:
         problem = "needs Bubblewrap, and there is no program `bwrap`"
         help = "install it, as by `apt-get install bubblewrap`"
-        return None, (Part("Bubblewrap", problem, help),)
+        return None, (SandboxPart("Bubblewrap", problem, help),)
     system_calls = compile_filter(machine)
     if system_calls is None:
         problem = f"needs a filter of system calls, and there is none for {machine} machines"
-        return None, (parts[0], Part(parts[1].name, problem, "use an x86_64 or aarch64 machine"))
+        return None, (
+            parts[0],
+            SandboxPart(parts[1].name, problem, "use an x86_64 or aarch64 machine"),
+        )
     scope = _find_scope()
     sandbox = Sandbox(program, system_calls.hex(), scope)
     problem = _try_sandbox(sandbox, root)
     if problem:
-        return None, (*parts, Part("namespaces", problem, _ALLOW))
+        return None, (*parts, SandboxPart("namespaces", problem, _ALLOW))
     means = "by a control group and by watching" if scope else "by watching"
-    parts += [Part("namespaces"), Part("a session keyring")]
-    parts += [Part(f"limits of memory and processes in all, {means}")]
+    parts += [SandboxPart("namespaces"), SandboxPart("a session keyring")]
+    parts += [SandboxPart(f"limits of memory and processes in all, {means}")]
     return sandbox, tuple(parts)
 
 
