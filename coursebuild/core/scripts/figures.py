@@ -237,10 +237,13 @@ def _png_difference(old: bytes, new: bytes) -> str:
 
 
 def _csv_difference(old_data: bytes, new_data: bytes) -> str:
-    old, new = (
-        list(csv.reader(io.StringIO(data.decode("utf-8", "replace"))))
-        for data in (old_data, new_data)
-    )
+    try:
+        old, new = (
+            list(csv.reader(io.StringIO(data.decode("utf-8", "replace"))))
+            for data in (old_data, new_data)
+        )
+    except csv.Error as error:
+        return f"a table cannot be read: {error}"
     if [len(row) for row in old] != [len(row) for row in new]:
         return "the table has other rows or columns"
     columns = zip(itertools.zip_longest(*old), itertools.zip_longest(*new), strict=True)

@@ -47,7 +47,9 @@ _FOREIGN: dict[str, tuple[str, str, str]] = {
         "a callout is a quotation: `> [!note]`, and `> ` before each line of it",
     ),
     "latex": (
-        r"\\\((?:[^\n]*?[\\^_=+][^\n]*?|[ ]?[A-Za-z][ ]?)\\\)|^\\\[\s[\s\S]*?\\\]|\$\0+\$"
+        # What stands between brackets holds none, so that each is looked at once.
+        r"\\\((?:(?:(?!\\[()])[^\n\\^_=+])*+[\\^_=+](?:(?!\\[()])[^\n])*+|[ ]?[A-Za-z][ ]?)\\\)"
+        r"|^\\\[\s(?:(?!\\[\[\]])[\s\S])*+\\\]|\$\0+\$"
         r"|\\(?:begin|ref|eqref|cite)\{[^{}\n\0]*\}",
         "is no formula here, and is shown as text",
         "a formula is `$x$` or stands between two `$$`, and a link to one is `[](#eq:name)`",
@@ -126,7 +128,7 @@ def _find_foreign(content: Excerpt, masked: str) -> Iterator[Diagnostic]:
         start, kind = match.start(), match.lastgroup or ""
         markup = whole[start : match.end()].strip()
         start = whole.index(markup, start)
-        before = whole[:start]
+        before = whole[max(start - 1, 0) : start]
         if kind == "binding" and before.endswith("`"):
             continue  # the parser of code spans has reported why it binds nothing
         if markup.startswith("$") and markup[1] != "`":

@@ -10,6 +10,8 @@ import json
 import re
 from collections.abc import Mapping
 
+from msgspec.structs import replace
+
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages.marks import block_quote, fence
 from coursebuild.core.registry import CORE_FENCES, fence_names
@@ -29,6 +31,8 @@ _CALLOUTS = {
     **dict.fromkeys(("exercise", "question"), "try"),
     **dict.fromkeys(("answer", "success"), "solution"),
 }
+_MAX_DEPTH = 20
+"""Blocks that may be around another."""
 _TITLED_DIRECTIVES = ("admonition", "dropdown", "sidebar", "topic", "exercise", "example", "margin")
 """Directives whose argument is a title; that of others is their first line."""
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
@@ -62,6 +66,10 @@ def convert_segment(segment: Segment, context: LessonContext) -> str:
 
 
 def _convert_nested(text: str, context: LessonContext) -> str:
+    if context.depth == _MAX_DEPTH:
+        context.add_leftover(f"blocks that nest more than {_MAX_DEPTH} deep, shown as written")
+        return fence("text", text)
+    context = replace(context, depth=context.depth + 1)
     parts = read_markdown(text, place=context.place)
     return "\n\n".join(convert_segment(part, context).strip("\n") for part in parts)
 
