@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import time
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -49,10 +50,9 @@ class Bench:
         shutil.rmtree(self.folder, ignore_errors=True)
         for part in ("seeds", "corpus", "temporary"):
             (self.folder / part).mkdir(parents=True)
-        for number, seed in enumerate([*TARGETS[name].seeds(), *read_corpus(name)]):
+        for number, seed in enumerate(first_inputs(name)):
             (self.folder / f"seeds/{number:04d}").write_bytes(seed)
-        words = ("".join(f"\\x{byte:02x}" for byte in word) for word in WORDS)
-        (self.folder / "words").write_text("".join(f'"{word}"\n' for word in words))
+        (self.folder / "words").write_text(dictionary())
 
     def attempt(self, seconds: int, runs: int, seed: int) -> Outcome:
         """Try inputs for so long, or so many; a worker that was ended is followed by another."""
@@ -105,10 +105,30 @@ class Bench:
 
 
 def read_corpus(name: str) -> list[bytes]:
-    """The corpus of a target."""
+    """The corpus of a target; `NAME-found`: inputs that showed a mistake once."""
     path = CORPUS / f"{name}.json"
     texts = json.loads(path.read_text()) if path.exists() else ()
     return [text.encode("latin-1") for text in texts]
+
+
+def first_inputs(name: str) -> list[bytes]:
+    """From which a target begins."""
+    return [*TARGETS[name].seeds(), *read_corpus(name), *read_corpus(f"{name}-found")]
+
+
+def dictionary() -> str:
+    """The words, as libFuzzer reads them."""
+    words = ("".join(f"\\x{byte:02x}" for byte in word) for word in WORDS)
+    return "".join(f'"{word}"\n' for word in words)
+
+
+def write_seeds(folder: Path) -> None:
+    """Write the first inputs and words of each target, by the names that OSS-Fuzz gives them."""
+    for name in TARGETS:
+        (folder / f"fuzz_{name}.dict").write_text(dictionary())
+        with zipfile.ZipFile(folder / f"fuzz_{name}_seed_corpus.zip", "w") as archive:
+            for number, seed in enumerate(first_inputs(name)):
+                archive.writestr(f"{number:04d}", seed)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -119,7 +139,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=int(time.time()) % 10**8)
     parser.add_argument("--keep", action="store_true", help="add to the corpus")
     parser.add_argument("--out", type=Path, default=ROOT / "build/fuzz")
+    parser.add_argument("--write-seeds", type=Path, metavar="FOLDER", help="for OSS-Fuzz, no more")
     options = parser.parse_args(arguments)
+    if options.write_seeds is not None:
+        write_seeds(options.write_seeds)
+        return 0
     names = options.targets or [*TARGETS]
     findings = []
     print(

@@ -20,7 +20,6 @@ MOST_SECONDS = 10
 MOST_MEMORY = 1024
 """MiB by which an input may increase what the process holds."""
 REPEAT_INTERVAL = 150
-"""Of so many inputs one is repeated."""
 SIZE, GROWTH = 4000, 24
 """Characters of a repeated input, and how often the time of eight times them may be theirs."""
 WORST = "worst.json"
@@ -38,9 +37,11 @@ class HungerError(Exception):
 class Attempts:
     """The inputs that are tried, and what was wrong with some, in a folder."""
 
-    def __init__(self, target: Target, folder: Path) -> None:
+    def __init__(self, target: Target, folder: Path, interval: int = REPEAT_INTERVAL) -> None:
+        """`interval`: of so many inputs one is repeated."""
         self.target = target
         self.folder = folder
+        self.interval = interval
         self.count = 0
         self.signatures: set[str] = set()
         self.worst = [0.0, 0.0]
@@ -64,7 +65,7 @@ class Attempts:
         seconds = self.seconds(data)
         if seconds > SECONDS + PER_CHARACTER * len(data):
             raise SlownessError(f"{len(data)} bytes take {seconds:.1f} s")
-        if self.target.repeatable and data and self.count % REPEAT_INTERVAL == 0:
+        if self.target.repeatable and data and self.count % self.interval == 0:
             self.repeat(data)
 
     def seconds(self, data: bytes) -> float:

@@ -164,14 +164,15 @@ def folders() -> Iterator[bytes]:
             )
     text = b"-- a/1.md --\n# One\n\nText, [a link](../b.md).\n-- b.md --\nB\n"
     for settings in (
-        b"-- _toc.yml --\nformat: jb-book\nroot: b\nparts:\n- caption: A\n  chapters:\n  - file: a/1\n",
-        b"-- myst.yml --\nproject:\n  title: T\n  toc: [{file: b}, {title: A, children: [{file: a/1}]}]\n",
+        b"-- _toc.yml --\nroot: b\nparts:\n- caption: A\n  chapters:\n  - file: a/1\n",
+        b"-- myst.yml --\nproject:\n  toc: [{file: b}, {title: A, children: [{file: a/1}]}]\n",
         b"-- _quarto.yml --\nbook:\n  chapters: [b.md, {part: A, chapters: [a/1.md]}]\n",
-        b"-- mkdocs.yml --\nsite_name: S\ndocs_dir: .\nnav: [B: b.md, A: [a/1.md]]\nx: !!python/name:a.b\n",
+        b"-- mkdocs.yml --\ndocs_dir: .\nnav: [B: b.md, A: [a/1.md]]\nx: !!python/name:a.b\n",
         b"-- mkdocs.yml --\nnav: &a [*a, !!int '', !!bool x, !!timestamp x, {? [1] : 2}]\n",
         b"-- course.json --\n"
         b'{"levels":[{"id":"1","lessons":[{"id":"1.1","file":"a/1.md","minutes":"5"}]}]}\n',
-        b"-- c.md -> ../secret.md --\n-- d -> a --\n-- e.md -> /etc/passwd --\n-- x.md -> b.md --\n",
+        b"-- c.md -> ../secret.md --\n-- d -> a --\n-- e.md -> /etc/passwd --\n",
+        b"-- x.md -> b.md --\n-- y.md -> x.md --\n-- z -> z --\n-- a/a -> .. --\n",
         b"-- 2.md --\n---\ntitle: [a, b]\ndate: 2020-13-01\n---\n# T {#t}\n",
         b"-- 3.qmd --\n```{python}\n#| eval: false\n1+\n```\n::: {.callout-tip}\nx\n:::\n",
     ):
@@ -186,7 +187,8 @@ def dialects() -> Iterator[bytes]:
         b"$$a$$ (eq)\n\\[b\\]\n\n\\begin{align}c\\label{d}\\end{align}\n",
         b"{ref}`a <b>` @sec-a [@b; c] {{d}} ![e](f.png){width=1} \\(g\\) $h$1\n",
         b'(a)=\n# H\n\n:::{note} T\n:name: x\nb\n:::\n!!! tip "T"\n    b\n??? note\n    c\n',
-        b"```{figure} a.png\n:alt: b\n\ncaption\n```\n```{code-cell} ipython3\n:tags: [x]\n%m\na\n```\n",
+        b"```{figure} a.png\n:alt: b\n\ncaption\n```\n",
+        b"```{code-cell} ipython3\n:tags: [x]\n%m\na\n```\n",
     )
 
 
@@ -196,7 +198,8 @@ _URI = b"file:///COURSE/"
 """Stands in inputs for the folder of the course."""
 _LESSON = """## One {#one}
 
-The [mass]{term} is $m${symbol="mass" unit="kg"}, as in [one](lesson:1.1#one), `1.5`{out}, Lesson 1.1.
+The [mass]{term} is $m${symbol="mass" unit="kg"}, as in [one](lesson:1.1#one),
+`1.5`{out}, Lesson 1.1.
 
 $$E = m$$ {#eq:energy}
 

@@ -218,7 +218,7 @@ def manifest(data: bytes) -> None:
         pages = {path: (out / path).read_text() for path in _SITE_PATHS}
         assert pages == {file.path: file.data.decode() for file in _site(expected)}
         assert Path(top, "beside").read_text() == "beside"
-        assert sorted(os.listdir(top)) == ["beside", "course"]
+        assert {path.name for path in Path(top).iterdir()} == {"beside", "course"}
 
 
 def _site(text: str) -> list[OutputFile]:
@@ -248,7 +248,7 @@ def manifests() -> Iterator[bytes]:
 def slices(data: bytes) -> None:
     """What was kept is refused or can be joined; what is sorted now has each term where it was.
 
-    After the first byte: kept slices; or pages, which `\\1` ends, of terms with blanks between.
+    After the first byte: kept slices; or pages, between which is the byte 1, of terms with blanks.
     """
     form, payload = data[:1], data[1:]
     plan = IndexPlan(4, 2)

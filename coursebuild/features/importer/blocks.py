@@ -15,6 +15,7 @@ from msgspec.structs import replace
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages.marks import block_quote, fence
 from coursebuild.core.registry import CORE_FENCES, fence_names
+from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.features.importer.cells import code_for_readers
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.prose import display_formula, rewrite_prose
@@ -77,8 +78,11 @@ def _convert_nested(text: str, context: LessonContext) -> str:
 def _callout_kind(kind: str, context: LessonContext) -> str:
     callout_kind = _CALLOUTS.get(kind.lower())
     if callout_kind is None:
-        context.callouts[kind.lower()] = kind.replace("-", " ").capitalize()
-    return callout_kind or kind.lower()
+        callout_kind = slug_of(kind).lstrip("0123456789-") or "note"
+        if callout_kind not in _CALLOUTS:
+            label = kind if kind.isprintable() else callout_kind
+            context.callouts[callout_kind] = label.replace("-", " ").capitalize()
+    return callout_kind
 
 
 def _write_callout(
