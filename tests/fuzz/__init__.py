@@ -3,13 +3,16 @@
     make fuzz TIME=1200
     PYTHONPATH=tests python -m fuzz [--seconds N | --runs N] [--seed N] [TARGET …]
 
-1. `targets` says what is tried, each from bytes, and from which inputs it begins.
-2. `worker` is a process that tries one target: Atheris (libFuzzer) changes the inputs, and goes on
-   with those that reach code that none reached before. What raises, takes too long for its length,
-   or takes longer and longer when it is repeated, is written down with its input.
-3. `__main__` divides the time among the targets, starts a worker again that was ended by an input
+1. `targets` lists what is tried, each a function of bytes with its first inputs: `texts` that
+   authors write, what the tool has `kept`, what is `foreign`.
+2. `attempts` tries inputs. One that raises, takes too long for its length or more than 10 s of
+   processor time or 1 GiB, or takes longer and longer when it is repeated, is written down.
+3. `worker` is a process that tries one target: Atheris (libFuzzer) changes the inputs, and goes on
+   with those that reach code that none reached before.
+4. `__main__` divides the time among the targets, starts a worker again that was ended by an input
    that hangs or takes all memory, and prints what was tried, survived and found.
 
 `corpus/` holds, in a file for each target, short inputs that reached code which none before them
-had reached; `--keep` adds those of a run.
+had reached; `--keep` adds those of a run. `NAME-found.json` there has inputs that showed a mistake.
+`oss_fuzz/` has the same targets as OSS-Fuzz asks for them.
 """

@@ -9,17 +9,21 @@ import shutil
 import subprocess
 import sys
 import time
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from fuzz.targets import ROOT, TARGETS, WORDS
+from fuzz.attempts import WORST
+from fuzz.targets import TARGETS, WORDS
+from fuzz.texts import ROOT
 
 CORPUS = Path(__file__).parent / "corpus"
 MAX_INPUTS = 40
 """Inputs that the corpus of a target may have."""
-HANGS, MEMORY = 60, 2048
-"""Seconds and MiB of an input that ends its worker."""
+HANGS, MEMORY = 120, 2048
+"""Seconds, by the clock, and MiB after which an input ends its worker. Before these there are the
+limits of `attempts`; a computation in C hears nothing of them."""
 _EXECUTION_COUNT = re.compile(r"stat::number_of_executed_units: (\d+)")
 _COVERED_EDGES = re.compile(r" cov: (\d+)")
 
@@ -31,6 +35,10 @@ class Outcome(NamedTuple):
     edges: int
     """Of the code that were reached."""
     findings: list[str]
+    seconds: float
+    """Processor time of the input that took longest."""
+    memory: float
+    """MiB of the one that took most."""
 
 
 class Bench:
@@ -40,12 +48,11 @@ class Bench:
         self.name = name
         self.folder = top / name
         shutil.rmtree(self.folder, ignore_errors=True)
-        for part in ("seeds", "corpus"):
+        for part in ("seeds", "corpus", "temporary"):
             (self.folder / part).mkdir(parents=True)
-        for number, seed in enumerate([*TARGETS[name].seeds(), *read_corpus(name)]):
+        for number, seed in enumerate(first_inputs(name)):
             (self.folder / f"seeds/{number:04d}").write_bytes(seed)
-        words = ("".join(f"\\x{byte:02x}" for byte in word) for word in WORDS)
-        (self.folder / "words").write_text("".join(f'"{word}"\n' for word in words))
+        (self.folder / "words").write_text(dictionary())
 
     def attempt(self, seconds: int, runs: int, seed: int) -> Outcome:
         """Try inputs for so long, or so many; a worker that was ended is followed by another."""
@@ -61,13 +68,17 @@ class Bench:
             edges = max([edges, *map(int, _COVERED_EDGES.findall(output))])
             if status == 0:
                 break
-        return Outcome(inputs, edges, self.findings())
+        worst = self.folder / WORST
+        seconds, memory = json.loads(worst.read_text()) if worst.exists() else (0.0, 0.0)
+        return Outcome(inputs, edges, self.findings(), seconds, memory)
 
     def worker(self, *options: str) -> tuple[int, str]:
         command = [sys.executable, "-m", "fuzz.worker", self.name, ".", "-dict=words"]
         command += [f"-timeout={HANGS}", f"-rss_limit_mb={MEMORY}", "-max_len=4096"]
+        command += ["-report_slow_units=1000000"]  # by the clock: `attempts` measures better
         command += ["-print_final_stats=1", "-verbosity=1", *options]
         paths = {"PYTHONPATH": f"{ROOT}:{ROOT / 'tests'}", "PATH": ""}
+        paths |= dict.fromkeys(("TMPDIR", "XDG_STATE_HOME"), str(self.folder / "temporary"))
         process = subprocess.run(
             command, cwd=self.folder, env=paths, capture_output=True, text=True, errors="replace"
         )
@@ -94,9 +105,30 @@ class Bench:
 
 
 def read_corpus(name: str) -> list[bytes]:
-    """The corpus of a target."""
+    """The corpus of a target; `NAME-found`: inputs that showed a mistake once."""
     path = CORPUS / f"{name}.json"
-    return [text.encode("latin-1") for text in json.loads(path.read_text())]
+    texts = json.loads(path.read_text()) if path.exists() else ()
+    return [text.encode("latin-1") for text in texts]
+
+
+def first_inputs(name: str) -> list[bytes]:
+    """From which a target begins."""
+    return [*TARGETS[name].seeds(), *read_corpus(name), *read_corpus(f"{name}-found")]
+
+
+def dictionary() -> str:
+    """The words, as libFuzzer reads them."""
+    words = ("".join(f"\\x{byte:02x}" for byte in word) for word in WORDS)
+    return "".join(f'"{word}"\n' for word in words)
+
+
+def write_seeds(folder: Path) -> None:
+    """Write the first inputs and words of each target, by the names that OSS-Fuzz gives them."""
+    for name in TARGETS:
+        (folder / f"fuzz_{name}.dict").write_text(dictionary())
+        with zipfile.ZipFile(folder / f"fuzz_{name}_seed_corpus.zip", "w") as archive:
+            for number, seed in enumerate(first_inputs(name)):
+                archive.writestr(f"{number:04d}", seed)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -107,11 +139,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=int(time.time()) % 10**8)
     parser.add_argument("--keep", action="store_true", help="add to the corpus")
     parser.add_argument("--out", type=Path, default=ROOT / "build/fuzz")
+    parser.add_argument("--write-seeds", type=Path, metavar="FOLDER", help="for OSS-Fuzz, no more")
     options = parser.parse_args(arguments)
+    if options.write_seeds is not None:
+        write_seeds(options.write_seeds)
+        return 0
     names = options.targets or [*TARGETS]
     findings = []
     print(
         f"seed {options.seed}\n{'target':14}{'tried':>10}{'survived':>10}{'found':>7}{'edges':>8}"
+        f"{'at most, s':>12}{'MiB':>7}"
     )
     for name in names:
         bench = Bench(name, options.out.resolve())
@@ -120,6 +157,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         survived = outcome.inputs - len(outcome.findings)
         print(
             f"{name:14}{outcome.inputs:10}{survived:10}{len(outcome.findings):7}{outcome.edges:8}"
+            f"{outcome.seconds:12.2f}{outcome.memory:7.0f}"
         )
         sys.stdout.flush()
         findings += outcome.findings

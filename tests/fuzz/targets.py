@@ -2,55 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Callable, Iterator
-from itertools import chain
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import msgspec
-from msgspec import Struct
-from msgspec.structs import replace
-
-from coursebuild.core.checks.course import check_course
-from coursebuild.core.model import Course, Document, Filter
-from coursebuild.core.model.results import CompileResult
-from coursebuild.core.run.run_record import from_bytes
-from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.edit import update_body
-from coursebuild.core.syntax.coursemap import parse_course_map
-from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.syntax.scenarios import parse_declarations
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Parsed
-from coursebuild.core.text.source import Source
-from coursebuild.core.values import DAMAGE, decode, encode
-from coursebuild.features.lab.export.trial import LabExport
-from coursebuild.report.terminal import Style
-from coursebuild.report.text import diagnostic_text
-from support.fixture_cases import read_cases
-from support.plain_html import plain_html
-from support.random_lessons import KINDS, PIECES
-from support.sample_lessons import (
-    DIGITS,
-    DIGITS_ELLIPSIS,
-    ELLIPSIS,
-    EXACT,
-    recording,
-    tolerance,
-    update,
-)
-
-ROOT = Path(__file__).parents[2]
-FIXTURES = ROOT / "tests/fixtures"
-PATH = "content/lessons/1.1-one.md"
-MAP = """[course]
-title = "Fuzz"
-[[level]]
-id = "1"
-title = "Level"
-lesson = [{ id = "1.1", slug = "one", title = "One", status = "complete" }]
-"""
+from fuzz import foreign, kept, texts
+from support.random_lessons import PIECES
 
 
 class Target(NamedTuple):
@@ -63,170 +19,30 @@ class Target(NamedTuple):
     """Whether an input that is repeated is one too, so that the growth of time can be measured."""
 
 
-# --- lessons
-
-
-def lesson(text: str) -> None:
-    """Read, checked, drawn and told of."""
-    parse_result = parse_document(Source(PATH, text), KINDS, lesson=True)
-    for diagnostic in parse_result.diagnostics:
-        assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text), diagnostic
-    plain_html(parse_result.value)
-    course = parse_course_map(Source("content/course.toml", MAP)).value
-    assert course is not None
-    describe(*parse_result.diagnostics, *check_course(with_document(course, parse_result.value)))
-
-
-def with_document(course: Course, document: Document) -> Course:
-    (level,) = course.levels
-    (lesson,) = level.lessons
-    lessons = (replace(lesson, document=document),)
-    return replace(course, levels=(replace(level, lessons=lessons),))
-
-
-def describe(*diagnostics: Diagnostic) -> None:
-    for diagnostic in diagnostics:
-        assert diagnostic.message and diagnostic_text(diagnostic, Style(colour=False))
-
-
-def lessons() -> Iterator[bytes]:
-    """Parts of real ones, and those of the fixtures."""
-    for path in sorted((ROOT / "content/lessons").glob("*.md")):
-        for part in re.split("^(?=## )", path.read_text("utf-8"), flags=re.MULTILINE):
-            yield part[:3000].encode()
-    for path in sorted(FIXTURES.rglob("*.md")):
-        yield from (case.input.encode() for case in read_cases(path))
-
-
-def info_string(text: str) -> None:
-    lesson(f"```{text}\nprint(1)\n```\n\nOutput:\n\n```text\n1\n```\n")
-
-
-def info_strings() -> Iterator[bytes]:
-    lines = (re.findall(rb"^```(.+)", text, re.MULTILINE) for text in lessons())
-    yield from sorted({*chain.from_iterable(lines)})
-
-
-_JSON = re.compile(rb"^```(quiz|lab|mjcf|bench|io)[^\n]*\n.*?^```$", re.MULTILINE | re.DOTALL)
-
-
-def json_bodies() -> Iterator[bytes]:
-    """Fences that a feature reads, those of the real course last: they are long."""
-    bodies = {part[0] for text in lessons() for part in _JSON.finditer(text)}
-    yield from sorted(bodies, key=len)
-
-
-# --- TOML
-
-
-def course_map(text: str) -> None:
-    describe(*parse_course_map(Source("content/course.toml", text)).diagnostics)
-
-
-def course_maps() -> Iterator[bytes]:
-    yield (ROOT / "content/course.toml").read_bytes()[:4000]
-    for path in sorted(FIXTURES.rglob("*.md")):
-        for case in read_cases(path):
-            if "[course]" in case.input:
-                yield case.input[case.input.index("[course]") :].encode()
-
-
-def declarations(text: str) -> None:
-    describe(*parse_declarations(Source("models/a.toml", text)).diagnostics)
-
-
-def declaration_files() -> Iterator[bytes]:
-    for path in sorted((ROOT / "models").glob("*.toml")):
-        yield path.read_bytes()
-
-
-# --- outputs
-
-_COMPARISONS = (EXACT, DIGITS, ELLIPSIS, DIGITS_ELLIPSIS, tolerance("0.05", "0.05"))
-_UNWRITABLE = "[`~]{3}|[\r\0\ufeff\ud800-\udfff]"
-_FILTERS = ((), (Filter(r"\d\.\d", "N"),), (Filter(r"^b.*\n", ""), Filter(" +$", "")))
-
-
-def comparison(text: str) -> None:
-    """A recorded output and a printed one, `how NUL recorded NUL printed`.
-
-    After an update all is well, or it was refused.
-    """
-    rule, _, rest = text.partition("\0")
-    recorded, _, printed = rest.partition("\0")
-    by = _COMPARISONS[len(rule) % 5]
-    filters = _FILTERS[len(rule) % 3]
-    if re.search(_UNWRITABLE, recorded + printed) or not printed.strip():
-        return
-    body = recording(recorded)
-    edit = update_body(body, replace(by, course_filters=filters), printed, printed)
-    if isinstance(edit, Edit):
-        update(body, printed, by, filters)
-    elif edit is None:
-        assert compare(body, replace(by, course_filters=filters), printed).status != "drift"
-
-
-def outputs() -> Iterator[bytes]:
-    for length in range(15):
-        yield (
-            b"x" * length + b"\0a 1.50 b\n ... 2e-3\nc |x=-0.0\0a 1.54 b\nb\n ... 2.1e-3\nc |x=nan"
-        )
-
-
-# --- entries of the memo, with a seal that is right
-
-
-class _Kind(NamedTuple):
-    read: Callable[[bytes], object]
-    write: Callable[[Any], bytes]
-
-
-_SOURCE = Source(PATH, "## One\n\nWords `1`{out}.\n")
-_ENTRIES = (
-    _Kind(lambda data: decode(msgspec.msgpack.encode(json.loads(data)), Parsed, _SOURCE), encode),
-    _Kind(from_bytes, msgspec.json.encode),
-    _Kind(lambda data: msgspec.json.decode(data, type=CompileResult), msgspec.json.encode),
-    _Kind(lambda data: msgspec.json.decode(data, type=LabExport), msgspec.json.encode),
-)
-
-
-def entry(data: bytes) -> None:
-    """It is refused, or is whole: what is read can be written."""
-    kind = _ENTRIES[data[0] % len(_ENTRIES)] if data else _ENTRIES[0]
-    try:
-        value = kind.read(data[1:])
-    except DAMAGE:
-        return
-    if isinstance(value, Struct):
-        kind.write(value)
-
-
-def entries() -> Iterator[bytes]:
-    for text in lessons():
-        source = Source(PATH, text.decode()[:300])
-        packed = encode(parse_document(source, KINDS, lesson=True))
-        yield b"\0" + json.dumps(msgspec.msgpack.decode(packed)).encode()
-    dependency = '{"kind":"file","name":"a","state":"b"}'
-    inputs = '{"path":"a.py","facts":[["a","b"]]}'
-    yield b'\1{"inputs":%s,"dependencies":[%s],"made":1,"forgotten":"","kept":{}}' % (
-        inputs.encode(),
-        dependency.encode(),
-    )
-    yield b'\2{"error":"a","line":1,"facts":null}'
-
-
 def _text(attempt: Callable[[str], None]) -> Callable[[bytes], None]:
     return lambda data: attempt(data.decode("utf-8", "surrogateescape"))
 
 
 TARGETS = {
-    "lesson": Target(lessons, _text(lesson)),
-    "info": Target(info_strings, _text(info_string)),
-    "json": Target(json_bodies, _text(lesson)),
-    "map": Target(course_maps, _text(course_map)),
-    "declarations": Target(declaration_files, _text(declarations)),
-    "comparison": Target(outputs, _text(comparison), repeatable=False),
-    "entry": Target(entries, entry, repeatable=False),
+    "lesson": Target(texts.lessons, _text(texts.lesson)),
+    "info": Target(texts.info_strings, _text(texts.info_string)),
+    "json": Target(texts.json_bodies, _text(texts.lesson)),
+    "map": Target(texts.course_maps, _text(texts.course_map)),
+    "declarations": Target(texts.declaration_files, _text(texts.declarations)),
+    "comparison": Target(texts.outputs, _text(texts.comparison), repeatable=False),
+    "figure": Target(foreign.figures, foreign.figure, repeatable=False),
+    "entry": Target(kept.entries, kept.entry, repeatable=False),
+    "journal": Target(kept.journals, kept.journal, repeatable=False),
+    "manifest": Target(kept.manifests, kept.manifest, repeatable=False),
+    "slices": Target(kept.slice_groups, kept.slices, repeatable=False),
+    "folder": Target(foreign.folders, foreign.folder, repeatable=False),
+    "dialect": Target(foreign.dialects, _text(foreign.dialect)),
+    "messages": Target(foreign.conversations, foreign.messages, repeatable=False),
 }
-WORDS = [piece.encode("utf-8", "surrogatepass") for piece in PIECES]
+WORDS = [
+    *(piece.encode("utf-8", "surrogatepass") for piece in PIECES),
+    *(b"-- a.md --\n", b" -> ", b"_toc.yml", b"mkdocs.yml", b"file:///COURSE/", b'"old":null'),
+    *(b"<style>", b"url(#", b"href=", b"xlink:", b"&#", b"\\62 ", b"<g id='"),
+    *(b"\\(", b"\\)", b"\\[", b"\\]", b"\\begin{align}", b"{{", b"[[", b":::x\n", b"!!! note\n"),
+]
 """What Atheris puts into inputs besides what it finds itself."""

@@ -32,6 +32,7 @@ from coursebuild.core.files.write import (
     remove_leftovers,
     write_atomic,
 )
+from coursebuild.core.values import DAMAGE
 
 _CLOSED = frozenset({".git", ".venv", FOLDER})
 """Folders of the project in which nothing is made."""
@@ -111,17 +112,17 @@ def _undo(root: Path, tell: Callable[[str], None] | None) -> None:
         return
     if journal is None:
         return
+    journaled = unseal(_NAME, data, store_key(str(root)))
     try:
-        journaled = unseal(_NAME, data, store_key(str(root)))
         changes = msgspec.msgpack.decode(journaled or b"", type=tuple[FileChange, ...])
-        message = _restore(root, changes)
-    except msgspec.MsgspecError:
+    except DAMAGE:
         journal.replace(journal.with_suffix(".damaged"))
         message = (
             "a command that was interrupted has left a damaged journal, so nothing was undone: "
             "look at what it was changing"
         )
     else:
+        message = _restore(root, changes)
         remove_leftovers({(root / change.path).parent for change in changes})
         journal.unlink()
     if tell is not None and message:

@@ -78,7 +78,10 @@ def resolve_inside(root: Path, path: str) -> Path:
     Raises:
         OutsideProjectError: it leads out of the project.
     """
-    target = Path(os.path.realpath(root / path))
+    try:
+        target = Path(os.path.realpath(root / path))
+    except ValueError:  # NUL
+        raise OutsideProjectError(f"{path!r} is no path") from None
     if not target.is_relative_to(os.path.realpath(root)):
         raise OutsideProjectError(f"{path} leads out of the project")
     return target
@@ -161,11 +164,16 @@ def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
 
     Raises:
         FileChangedError: it has another.
+        EffectError: it cannot be read.
     """
     try:
         current: bytes | None = target.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
         current = None
+    except IsADirectoryError:
+        raise FileChangedError(f"{path} has become a folder in the meantime") from None
+    except OSError as error:
+        raise EffectError(f"{path} cannot be read: {reason(error)}") from None
     if current == expected:
         return
     if current is None:

@@ -283,4 +283,5 @@ def _count_unequal(old: Sequence[str | None], new: Sequence[str | None]) -> int:
 
 def _number(cell: str | None) -> float:
     """The number in a cell; not a number where there is none."""
-    return float(cell) if cell and _NUMBER.fullmatch(cell.strip()) else math.nan
+    text = (cell or "").strip()
+    return float(text) if _NUMBER.fullmatch(text) else math.nan

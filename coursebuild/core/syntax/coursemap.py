@@ -159,7 +159,7 @@ def _read_ids(nodes: Iterable[ObjectNode]) -> list[str]:
 
 # ---------------------------------------------------------------------------------------- checks
 
-_RESERVED_IDS = frozenset({"index", "404"})
+RESERVED_IDS = frozenset({"index", "404"})
 """Names of pages that every site has."""
 
 
@@ -196,7 +196,7 @@ def _check_files(decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
     for node, fields in decoding.find_structs(PageTable):
         place = node.place("file")
         files.append((fields.file, place))
-        if fields.id in _RESERVED_IDS:
+        if fields.id in RESERVED_IDS:
             message = f"a page cannot have the id `{fields.id}`"
             help = "the site has a file of this name already"
             yield diagnose("field-value", node.place("id"), message, help=help)

@@ -59,8 +59,9 @@ FOREIGN = {
         "a callout is a quotation: `> [!note]`, and `> ` before each line of it",
     ),
     "latex": Kind(
-        r"\\\((?:[^\n]{0,80}?[\\^_=+][^\n]{0,80}?|[ ]?[A-Za-z][ ]?)\\\)"
-        r"|^\\\[\s[\s\S]{0,2000}?\\\]|\$\0+\$"
+        # What stands between brackets holds none, so that each is looked at once.
+        r"\\\((?:(?:(?!\\[()])[^\n\\^_=+])*+[\\^_=+](?:(?!\\[()])[^\n])*+|[ ]?[A-Za-z][ ]?)\\\)"
+        r"|^\\\[\s(?:(?!\\[\[\]])[\s\S])*+\\\]|\$\0+\$"
         r"|\\(?:begin|ref|eqref|cite\w*)\{[^{}\n\0]*\}|(?<![\w:\\])\\(?!end\{)[A-Za-z]{2,}\{[^{}\n\0]*\}"
         rf"|(?<![\w:\\/])\\(?-i:{'|'.join(_MACROS.split())})(?![\w\\/])",
         "there is no formula here",

@@ -112,11 +112,12 @@ def _check_dollars(
 def _diagnose(content: Excerpt, name: str, kind: Kind, match: re.Match[str]) -> Diagnostic | None:
     """The diagnostic of a match of a kind in the masked content; `None` if it is no mistake."""
     whole = content.text
-    if name in ("braces", "mark") and _is_escaped(whole[: match.start()]):
+    if name in ("braces", "mark") and _is_escaped(whole, match.start()):
         return None
     markup = whole[match.start() : match.end()].strip(" \t\n")
     at = whole.index(markup, match.start())
-    before, after = whole[:at], whole[at + len(markup) :]
+    end = at + len(markup)
+    before, after = whole[max(at - 1, 0) : at], whole[end : end + 3]
     span, help = content.span(at, at + len(markup)), kind.help
     match name:
         case "braces":
@@ -160,10 +161,10 @@ def _diagnose(content: Excerpt, name: str, kind: Kind, match: re.Match[str]) -> 
     return diagnose(kind.rule, span, message, help=help)
 
 
-def _is_escaped(before: str) -> bool:
-    """Whether a text ends with brackets of which a backslash says that they are mere brackets."""
-    opening = before.rfind("[") if before.endswith("]") else 0
-    return opening > 0 and before[opening - 1] == "\\"
+def _is_escaped(text: str, end: int) -> bool:
+    """Whether brackets end here of which a backslash says that they are mere brackets."""
+    opening = text.rfind("[", 0, end) if text.endswith("]", 0, end) else 0
+    return opening > 0 and text[opening - 1] == "\\"
 
 
 def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:

@@ -10,9 +10,12 @@ import json
 import re
 from collections.abc import Mapping
 
+from msgspec.structs import replace
+
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages.marks import block_quote, fence
 from coursebuild.core.registry import CORE_FENCES, fence_names
+from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.features.importer.cells import code_for_readers
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.prose import display_formula, rewrite_prose
@@ -29,6 +32,8 @@ _CALLOUTS = {
     **dict.fromkeys(("exercise", "question"), "try"),
     **dict.fromkeys(("answer", "success"), "solution"),
 }
+_MAX_DEPTH = 20
+"""Blocks that may be around another."""
 _TITLED_DIRECTIVES = ("admonition", "dropdown", "sidebar", "topic", "exercise", "example", "margin")
 """Directives whose argument is a title; that of others is their first line."""
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
@@ -62,6 +67,10 @@ def convert_segment(segment: Segment, context: LessonContext) -> str:
 
 
 def _convert_nested(text: str, context: LessonContext) -> str:
+    if context.depth == _MAX_DEPTH:
+        context.add_leftover(f"blocks that nest more than {_MAX_DEPTH} deep, shown as written")
+        return fence("text", text)
+    context = replace(context, depth=context.depth + 1)
     parts = read_markdown(text, place=context.place)
     return "\n\n".join(convert_segment(part, context).strip("\n") for part in parts)
 
@@ -69,8 +78,11 @@ def _convert_nested(text: str, context: LessonContext) -> str:
 def _callout_kind(kind: str, context: LessonContext) -> str:
     callout_kind = _CALLOUTS.get(kind.lower())
     if callout_kind is None:
-        context.callouts[kind.lower()] = kind.replace("-", " ").capitalize()
-    return callout_kind or kind.lower()
+        callout_kind = slug_of(kind).lstrip("0123456789-") or "note"
+        if callout_kind not in _CALLOUTS:
+            label = kind if kind.isprintable() else callout_kind
+            context.callouts[callout_kind] = label.replace("-", " ").capitalize()
+    return callout_kind
 
 
 def _write_callout(

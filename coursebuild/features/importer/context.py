@@ -39,6 +39,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """The folder of the new file, such as `content/lessons`."""
     place: str = ""
     """The place in the lesson that is converted, as `line 12` or `cell 3`."""
+    depth: int = 0
+    """How many blocks are around the place."""
     leftovers: list[Leftover] = field(default_factory=list)
     copies: dict[str, bytes] = field(default_factory=dict)
     """The files and pictures that the lesson uses, by their new paths."""

@@ -13,6 +13,8 @@ import re
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.values import title_of_file
 
+# A formula holds no beginning of another: so each character is looked at a few times, not once for
+# each beginning before it.
 _LINE = re.compile(
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"
     r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`))"
@@ -22,7 +24,7 @@ _LINE = re.compile(
     r"\((?P<address>[^()\s]+)(?P<title>[ \t]+\"[^\"\n]*\")?\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     r"|(?P<math>\$\$?[^$\n]+\$\$?)"
-    r"|(?P<paren>\\\((?P<inner>[^\n]+?)\\\))"
+    r"|(?P<paren>\\\((?P<inner>(?:(?!\\[()])[^\n])++)\\\))"
     r"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst)-(?P<label>[\w-]+)\]?)"
     r"|(?P<cite>\[-?@[\w:.-]+(?:[;,][^\[\]\n]*)?\])"
     r"|(?P<substitution>\{\{[^{}\n]*\}\})"
@@ -35,11 +37,14 @@ _DISPLAY = re.compile(
 )
 _ENVIRONMENT = re.compile(
     r"(?P<before>(?:\A|\n[ \t]*\n))[ \t]*"
-    r"(?P<tex>\\begin\{(?P<env>align|equation|gather|multline|alignat)(?P<star>\*?)\}.*?"
+    r"(?P<tex>\\begin\{(?P<env>align|equation|gather|multline|alignat)(?P<star>\*?)\}"
+    r"(?:(?!\\(?:begin|end)\{(?P=env)(?P=star)\}).)*+"
     r"\\end\{(?P=env)(?P=star)\})(?P<after>[ \t]*(?=\n|\Z))",
     re.DOTALL,
 )
-_BRACKETS = re.compile(r"^[ \t]*\\\[(?P<tex>.+?)\\\][ \t]*$", re.DOTALL | re.MULTILINE)
+_BRACKETS = re.compile(
+    r"^[ \t]*\\\[(?P<tex>(?:(?!\\[\[\]]).)++)\\\][ \t]*$", re.DOTALL | re.MULTILINE
+)
 _TARGET = re.compile(
     r"^\((?P<name>[\w:.-]+)\)=[ \t]*(?:\n+(?P<heading>#{1,6}[ \t].*))?$", re.MULTILINE
 )

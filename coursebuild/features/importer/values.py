@@ -10,6 +10,8 @@ from typing import Any, Literal
 import yaml
 from msgspec import Struct
 
+from coursebuild.core.values import DAMAGE
+
 
 class Leftover(Struct, frozen=True, order=True):
     """Something that has no counterpart, or that the author has to look at."""
@@ -113,7 +115,7 @@ def read_yaml(text: str) -> Any:
     """
     try:
         value = _Yaml(text).get_single_data()
-    except (yaml.YAMLError, ValueError, RecursionError):  # such as an invalid date
+    except (yaml.YAMLError, *DAMAGE):  # an invalid date, a tag of YAML's own with another text
         return None
     parts, count = [(value, 0)], 0
     while parts:

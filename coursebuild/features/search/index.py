@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -38,6 +39,7 @@ _BATCH = 16
 _PAGES_PER_SHARD = 8
 _MAX_SHARDS = 1024
 _DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
+_SLICE = re.compile(rb"(?:[^\n ]++ (?:[0-9a-f]{2})*+(?:\n(?!\Z)|\Z))*+")
 _LIVE = "search.live."
 """The prefix of interface texts that only the search script needs."""
 
@@ -143,7 +145,18 @@ def _sorted_slices(site: SiteContext, plan: IndexPlan, pages: Sequence[NotedPage
     def make() -> bytes:
         return b"\0".join(sort_terms(plan, (text_and_terms(site.note(p.path))[1] for p in pages)))
 
-    return site.get_or_create(key, make).split(b"\0")
+    return read_slices(plan, site.get_or_create(key, make)) or make().split(b"\0")
+
+
+def read_slices(plan: IndexPlan, data: bytes) -> list[bytes] | None:
+    """Return the slices that were kept; `None` where the data holds none of this plan."""
+    slices = data.split(b"\0")
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return None
+    is_whole = len(slices) == plan.terms + plan.words and all(map(_SLICE.fullmatch, slices))
+    return slices if is_whole else None
 
 
 def sort_terms(plan: IndexPlan, pages: Iterable[bytes]) -> list[bytes]:

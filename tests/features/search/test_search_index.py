@@ -17,8 +17,7 @@ from coursebuild.features.search import index
 from coursebuild.features.search.index import IndexPlan, search_files
 from coursebuild.features.search.words import is_fuzzy
 from support.rendered_course import Make
-
-DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
+from support.search_shards import read_shard
 
 
 @pytest.fixture(scope="module")
@@ -68,22 +67,8 @@ def lines(terms: dict[str, int]) -> bytes:
 
 
 def decode_shard(data: bytes) -> dict[str, list[tuple[int, int]]]:
-    """Read a shard as the browser does: the pages and weights of each term."""
-    text = json.loads(data.decode().partition(",")[2].partition(",")[2].rstrip()[:-1])
-    pages_by_term: dict[str, list[tuple[int, int]]] = {}
-    for line in text.split("\n") if text else ():
-        term, _, digits = line.partition(" ")
-        page = value = shift = 0
-        pages = []
-        for digit in digits:
-            value |= (DIGITS.index(digit) & 31) << shift
-            shift += 5
-            if not DIGITS.index(digit) & 32:
-                page += value >> 4
-                pages.append((page, value & 15))
-                value = shift = 0
-        pages_by_term[term] = pages
-    return pages_by_term
+    """Read the file of a shard."""
+    return read_shard(json.loads(data.decode().partition(",")[2].partition(",")[2].rstrip()[:-1]))
 
 
 def shards(files: dict[str, CachedFile]) -> dict[int, dict[str, list[tuple[int, int]]]]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -29,11 +29,12 @@ from coursebuild.features.language_server.commands.renaming import name_at, rena
 from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.preview.session import Session
 
-_TEXTS: dict[str, Callable[[Any], str | None]] = {
-    types.TEXT_DOCUMENT_DID_OPEN: lambda params: params.text_document.text,
-    types.TEXT_DOCUMENT_DID_CHANGE: lambda params: params.content_changes[-1].text,
-    types.TEXT_DOCUMENT_DID_CLOSE: lambda params: None,
+_TEXTS: dict[str, Callable[[Any], Sequence[str | None]]] = {
+    types.TEXT_DOCUMENT_DID_OPEN: lambda params: [params.text_document.text],
+    types.TEXT_DOCUMENT_DID_CHANGE: lambda params: [c.text for c in params.content_changes],
+    types.TEXT_DOCUMENT_DID_CLOSE: lambda params: [None],
 }
+"""The texts that a file has one after the other; `None`: it is closed."""
 _ANSWERS: dict[str, Callable[[OpenTexts, Source, Any], Any]] = {
     types.TEXT_DOCUMENT_HOVER: hover,
     types.TEXT_DOCUMENT_DEFINITION: definition,
@@ -67,8 +68,8 @@ class Server:
         """The loop of the thread that answers; `None` until the client is ready."""
         feature = self.client.feature
         feature(types.INITIALIZED)(lambda params: self._begin())
-        for method, get_text in _TEXTS.items():
-            feature(method)(partial(self._take_text, get_text))
+        for method, get_texts in _TEXTS.items():
+            feature(method)(partial(self._take_text, get_texts))
         feature(types.TEXT_DOCUMENT_DID_SAVE)(lambda params: session.run_code())
         for method, answer in _ANSWERS.items():
             feature(method, _OPTIONS.get(method))(partial(self._answer, answer))
@@ -90,16 +91,19 @@ class Server:
 
     # --- edits
 
-    def _take_text(self, get_text: Callable[[Any], str | None], params: Any) -> None:
+    def _take_text(self, get_texts: Callable[[Any], Sequence[str | None]], params: Any) -> None:
         """Note the new text of a file in the editor, or that the file is no longer open."""
-        text, session = get_text(params), self.session
+        texts, session = get_texts(params), self.session
         path = self.places.path(params.text_document.uri)
         if not path.startswith(("content/", "models/")) and path not in session.files_elsewhere():
             return
-        texts = {p: open_text for p, open_text in session.open_texts.items() if p != path}
+        if not texts:  # a change may be none
+            return
+        text = texts[-1]
+        open_texts = {p: open_text for p, open_text in session.open_texts.items() if p != path}
         if text is not None:  # without half characters, which no file can hold
-            texts[path] = text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
-        session.open_texts = texts
+            open_texts[path] = text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
+        session.open_texts = open_texts
         with self._edited:
             self._edited_paths.add(path)
             self._edited.notify()
