@@ -10,7 +10,16 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.engine import digests as module
-from coursebuild.core.engine.digests import ABSENT, FOLDER, SPECIAL, Clock, file_state
+from coursebuild.core.engine.digests import (
+    ABSENT,
+    FILE,
+    FOLDER,
+    SPECIAL,
+    Clock,
+    file_state,
+    folder_state,
+    modules_in,
+)
 from coursebuild.core.engine.memo import Memo
 
 
@@ -35,6 +44,28 @@ def test_states(tmp_path: Path, file: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     assert file_state(str(tmp_path / "pipe")) == SPECIAL
     assert file_state(str(tmp_path / ("x" * 5000))).startswith("unreadable: file name too long")
+
+
+def test_states_of_folders(tmp_path: Path, file: Path) -> None:
+    assert (folder_state(str(file)), folder_state(str(file / "x"))) == (FILE, FILE)
+    assert folder_state(str(tmp_path / "not there")) == ABSENT
+    states = {folder_state(str(tmp_path))}
+    file.write_bytes(b"two")
+    assert states == {folder_state(str(tmp_path))}, "only names count"
+    file.unlink()
+    states.add(folder_state(str(tmp_path)))
+    file.mkdir()
+    states.add(folder_state(str(tmp_path)))
+    assert len(states) == 3
+
+
+def test_modules_of_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "one.py").touch()
+    for name in ("two", "three"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "two/__init__.py").touch()
+    assert modules_in(str(tmp_path), ("two", "three", "one", "four")) == "two one"
+    assert modules_in(str(tmp_path / "four"), ("one",)) == ""
 
 
 def test_a_file_that_may_not_be_read(held_back: Path) -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from coursebuild.core.engine import up_to_date
 from coursebuild.core.engine.up_to_date import Watcher, unchanged
+from support.workflows import git
 
 COMMAND = ("build", "public")
 ALL_IS_WELL = "all is well\n"
@@ -155,6 +156,18 @@ def test_what_changes_during_the_work_is_not_kept(
 ) -> None:
     assert not keep(root, during=change)
     assert last_message(root) is None
+
+
+def test_what_depends_on_a_name_of_two_lines_is_not_kept(root: Path) -> None:
+    assert not Watcher(str(root), COMMAND).keep(ALL_IS_WELL, ["data/a\nb"], [])
+    assert Watcher(str(root), COMMAND).keep(ALL_IS_WELL, ["data/a b"], [])
+
+
+def test_a_store_that_is_warned_of_is_warned_of_again(root: Path) -> None:
+    assert keep(root)
+    git(root, "init", "--quiet")
+    git(root, "add", "--force", ".coursebuild")
+    assert not keep(root)
 
 
 def test_what_the_work_writes_may_be_new(root: Path) -> None:
