@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markupsafe import Markup
 
+from coursebuild.core.files.resources import template_texts
 from coursebuild.core.pages.fonts import BASE
+from coursebuild.core.pages.frame import FRAME_IDS
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.styles import class_name
@@ -65,3 +67,12 @@ def test_formula_style_and_forbidden_character_are_changed_and_noted() -> None:
 def test_any_text_is_recorded_and_markup_is_taken_as_text(html: str) -> None:
     """`Markup` would escape what is inserted."""
     assert type(record_of(html)[1]) is str
+
+
+def test_an_id_that_the_page_or_its_frame_has_already_is_noted() -> None:
+    facts, _ = record_of('<p id="a"><a id="b" name="b" href="#a">x</a><!-- id="b" --><i id="a">')
+    assert facts.repeated_ids == (("a", 0, 0),)
+    base = dict(template_texts())["base.html"]
+    assert frozenset(re.findall(r'\bid="([^"]*)"', base)) == FRAME_IDS
+    for name in FRAME_IDS:
+        assert record_of(f'<p id="{name}">')[0].repeated_ids == ((name, 0, 0),)
