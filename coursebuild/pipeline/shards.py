@@ -107,7 +107,7 @@ def read_timings(file: str) -> dict[str, float]:
         return msgspec.json.decode(Path(file).read_bytes(), type=_Timings).seconds
     except OSError as error:
         raise UsageError(f"--timings: {file} cannot be read: {reason(error)}") from None
-    except (msgspec.DecodeError, RecursionError):
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         message = f"--timings: {file} holds no times; `--write-timings` writes such a file"
         raise UsageError(message) from None
 

@@ -311,5 +311,5 @@ def _decode_texts(body: bytes) -> dict[str, str]:
     """Decode a JSON object of texts; empty if the body is something else."""
     try:
         return msgspec.json.decode(body, type=dict[str, str])
-    except msgspec.DecodeError:
+    except (msgspec.DecodeError, UnicodeDecodeError):
         return {}

@@ -70,7 +70,7 @@ class Attempts:
 
     def seconds(self, data: bytes) -> float:
         """The processor time that an input takes."""
-        held, peak = resident(), peak_memory()
+        before, peak = resident(), peak_memory()
         signal.setitimer(signal.ITIMER_PROF, MOST_SECONDS)
         start = time.process_time()
         try:
@@ -80,7 +80,7 @@ class Attempts:
         seconds = time.process_time() - start
         if seconds > MOST_SECONDS:
             raise SlownessError(f"{len(data)} bytes take {seconds:.1f} s")
-        memory = peak_memory() - held if peak_memory() > peak else 0.0
+        memory = peak_memory() - before if peak_memory() > peak else 0.0
         if seconds > self.worst[0] or memory > self.worst[1]:
             self.worst = [max(seconds, self.worst[0]), max(memory, self.worst[1])]
             (self.folder / WORST).write_text(json.dumps(self.worst))

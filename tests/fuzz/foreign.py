@@ -42,18 +42,18 @@ _TABLE = b"x,y\n0,1\n0.5,2e3\n"
 
 def figure(data: bytes) -> None:
     """It is refused, or recorded: in a form that stays the same, and has nothing that acts."""
-    name, other = "a.csv", _TABLE
+    name, sample = "a.csv", _TABLE
     if data.startswith(_PNG[:2]):
-        name, other = "a.png", _png(2, 2)
+        name, sample = "a.png", _png(2, 2)
     elif data.lstrip().startswith((b"<", b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")):
-        name, other = "a.svg", _DRAWING
+        name, sample = "a.svg", _DRAWING
     prepared = prepare_figure(name, data)
-    describe_difference(name, data, other)  # what is recorded may be a contributor's
+    describe_difference(name, data, sample)  # what is recorded may be a contributor's
     if isinstance(prepared, str):
         assert prepared
         return
     assert prepare_figure(name, prepared) == prepared
-    describe_difference(name, other, prepared)
+    describe_difference(name, sample, prepared)
     describe_difference(name, data, prepared)
     if name == "a.svg":
         for element in ET.fromstring(prepared).iter():
@@ -319,12 +319,12 @@ def conversations() -> Iterator[bytes]:
         changed = {**document, "version": 2}
         typed = '## A\n\n[x](lesson:\n\n```quiz\n{"q'
         change = message("didChange", textDocument=changed, contentChanges=[{"text": typed}])
-        asked = [
-            message(method, number, textDocument=document, position=where)
-            for number, (method, where) in enumerate(
-                (method, where)
+        requests = [
+            message(method, number, textDocument=document, position=position)
+            for number, (method, position) in enumerate(
+                (method, position)
                 for method in ("hover", "definition", "completion", "prepareRename")
-                for where in (place, far)
+                for position in (place, far)
             )
         ]
         whole = [
@@ -341,8 +341,8 @@ def conversations() -> Iterator[bytes]:
             )
         ]
         closing = message("didClose", textDocument=document)
-        yield b"\n".join((opening, *asked[:4]))
-        yield b"\n".join((opening, change, *asked[4:], closing))
+        yield b"\n".join((opening, *requests[:4]))
+        yield b"\n".join((opening, change, *requests[4:], closing))
         yield b"\n".join((*whole, opening, *whole))
         part = {"range": {"start": place, "end": far}, "text": "x"}
         yield b"\n".join(
@@ -351,7 +351,7 @@ def conversations() -> Iterator[bytes]:
                 message("didChange", textDocument=changed, contentChanges=[part]),
                 message("didChange", textDocument=changed, contentChanges=[]),
                 closing,
-                *asked[:2],
+                *requests[:2],
             )
         )
     yield b'{"jsonrpc":"2.0","id":1,"method":"initialize","params":{"capabilities":{"general":{' + (

@@ -111,15 +111,15 @@ def journal(data: bytes) -> None:
         file.parent.mkdir(parents=True, exist_ok=True)
         key, before = store_key(str(root)), _contents(top)
         file.write_bytes(payload if form == WHOLE else seal("changes", _packed(form, payload), key))
-        told: list[str] = []
+        messages: list[str] = []
         try:
-            undo_changes(root, told.append)
+            undo_changes(root, messages.append)
             assert not file.exists()
         except EffectError as error:
-            told.append(error.message)
+            messages.append(error.message)
         after = _contents(top)
         damaged = file.with_suffix(".damaged")
-        assert len(told) == 1 or (before == after and not told and not damaged.exists())
+        assert len(messages) == 1 or (before == after and not messages and not damaged.exists())
         for left in (file, damaged):
             left.unlink(missing_ok=True)
         for path in before.keys() | after.keys():
@@ -135,7 +135,7 @@ def _packed(form: bytes, payload: bytes) -> bytes:
         return payload
     try:
         changes = msgspec.json.decode(payload, type=list[dict[str, str | None]])
-    except msgspec.MsgspecError:
+    except DAMAGE:
         return payload
     values = (
         {
@@ -199,8 +199,8 @@ def manifest(data: bytes) -> None:
         publish(root, out, _site("one"))
         folder = Memo(root).folder / KIND
         (file,) = folder.iterdir()
-        ((_, kept), *_) = msgspec.json.decode(file.read_bytes()[32:]).items()
-        words = zip((b"DIGEST", b"SIZE", b"TIME", b"INODE"), kept[1:], strict=True)
+        ((_, entry_parts), *_) = msgspec.json.decode(file.read_bytes()[32:]).items()
+        words = zip((b"DIGEST", b"SIZE", b"TIME", b"INODE"), entry_parts[1:], strict=True)
         for word, value in words:
             payload = payload.replace(word, str(value).encode())
         if form == _MARKER:
@@ -246,15 +246,15 @@ def manifests() -> Iterator[bytes]:
 
 
 def slices(data: bytes) -> None:
-    """What was kept is refused or can be joined; what is sorted now has each term where it was.
+    """What was kept is refused or can be actual; what is sorted now has each term where it was.
 
     After the first byte: kept slices; or pages, between which is the byte 1, of terms with blanks.
     """
     form, payload = data[:1], data[1:]
     plan = IndexPlan(4, 2)
     if form != AS_JSON:
-        kept = read_slices(plan, payload)
-        for part in kept or ():
+        kept_slices = read_slices(plan, payload)
+        for part in kept_slices or ():
             read_shard(join_slices([part, part]))
         return
     texts = payload.decode("utf-8", "replace").split("\1")
@@ -266,14 +266,14 @@ def slices(data: bytes) -> None:
     ]
     for batch in batches:
         assert read_slices(plan, b"\0".join(batch)) == batch
-    found: dict[str, list[tuple[int, int]]] = {}
+    actual: dict[str, list[tuple[int, int]]] = {}
     for parts in [*zip(*batches, strict=True)][: plan.terms]:
-        found |= read_shard(join_slices(parts))
+        actual |= read_shard(join_slices(parts))
     expected: dict[str, list[tuple[int, int]]] = {}
     for number, page in enumerate(pages):
         for term, weight in page.items():
             expected.setdefault(term, []).append((number, weight))
-    assert found == expected
+    assert actual == expected
 
 
 def slice_groups() -> Iterator[bytes]:

@@ -23,7 +23,7 @@ SAMPLE = 12
 """Seeds of a target that are tried, besides its corpus."""
 
 
-def found(attempts: Attempts) -> list[str]:
+def signatures_of(attempts: Attempts) -> list[str]:
     return [json.loads(path.read_text())[0] for path in attempts.folder.glob("found-*.json")]
 
 
@@ -35,7 +35,7 @@ def test_kept_inputs_survive(name: str, tmp_path: Path) -> None:
     attempts.interval = 1
     for data in read_corpus(f"{name}-found"):
         attempts(data)
-    assert found(attempts) == []
+    assert signatures_of(attempts) == []
 
 
 def test_input_that_takes_long_or_much_or_fails_is_found(tmp_path: Path) -> None:
@@ -54,7 +54,7 @@ def test_input_that_takes_long_or_much_or_fails_is_found(tmp_path: Path) -> None
     attempts = Attempts(Target(lambda: iter([b""]), attempt, repeatable=False), tmp_path)
     for data in (b"", b"endless", b"large", b"wrong", b"wrong"):
         attempts(data)
-    signatures = sorted(signature.split()[0] for signature in found(attempts))
+    signatures = sorted(signature.split()[0] for signature in signatures_of(attempts))
     assert signatures == ["HungerError", "SlownessError", "ValueError"]
 
 

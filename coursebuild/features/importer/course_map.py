@@ -29,36 +29,38 @@ def read_texts(course: ImportedCourse, files: SourceFiles) -> ImportedCourse:
         UsageError: a file cannot be read.
     """
     levels = []
-    taken = set[str]()
+    used_ids = set[str]()
     for number, level in enumerate(course.levels, 1):
         own_id = level.id if re.fullmatch("[A-Za-z0-9]+", level.id) else str(number)
-        id = _free_id(own_id, (f"{own_id}x{n}" for n in itertools.count(2)), taken)
-        lessons, taken_lessons = [], set[str]()
+        id = _free_id(own_id, (f"{own_id}x{n}" for n in itertools.count(2)), used_ids)
+        lessons, used_lesson_ids = [], set[str]()
         for place, lesson in enumerate(level.lessons, 1):
             fits = re.fullmatch(rf"{re.escape(id)}(\.[A-Za-z0-9]+)+", lesson.old_id)
-            others = (f"{id}.{n}" for n in itertools.count(place))
-            lesson_id = _free_id(lesson.old_id if fits else next(others), others, taken_lessons)
+            other_ids = (f"{id}.{n}" for n in itertools.count(place))
+            lesson_id = _free_id(
+                lesson.old_id if fits else next(other_ids), other_ids, used_lesson_ids
+            )
             lessons.append(_read_text(lesson, lesson_id, files))
         title = level.title or f"Level {id}"
         levels.append(replace(level, id=id, title=title, lessons=tuple(lessons)))
-    taken = {*RESERVED_IDS}
-    pages = (_read_text(page, "", files, taken) for page in course.pages if page.file)
+    used_ids = {*RESERVED_IDS}
+    pages = (_read_text(page, "", files, used_ids) for page in course.pages if page.file)
     return replace(course, levels=tuple(levels), pages=tuple(pages))
 
 
-def _free_id(id: str, others: Iterator[str], taken: set[str]) -> str:
+def _free_id(id: str, other_ids: Iterator[str], used_ids: set[str]) -> str:
     """Return an id that nothing has yet, whatever the case of its letters; it is taken then."""
-    free = next(new for new in itertools.chain([id], others) if new.casefold() not in taken)
-    taken.add(free.casefold())
+    free = next(new for new in itertools.chain([id], other_ids) if new.casefold() not in used_ids)
+    used_ids.add(free.casefold())
     return free
 
 
 def _read_text(
-    text: ImportedText, id: str, files: SourceFiles, taken: set[str] | None = None
+    text: ImportedText, id: str, files: SourceFiles, used_ids: set[str] | None = None
 ) -> ImportedText:
     """Read the file of a lesson with this id, or of a page, whose id is made from its title.
 
-    `taken` are the ids that a page cannot have.
+    `used_ids` are the ids that a page cannot have.
     """
     title, slug = text.title, text.slug
     if not text.file:
@@ -70,8 +72,8 @@ def _read_text(
     if not re.search("[a-z]", slug):
         slug = slug_of(title)
     page = slug_of(text.old_id or title)
-    if taken is not None:
-        page = _free_id(page, (f"{page}-{n}" for n in itertools.count(2)), taken)
+    if used_ids is not None:
+        page = _free_id(page, (f"{page}-{n}" for n in itertools.count(2)), used_ids)
     path = f"content/lessons/{id}-{slug}.md" if id else f"content/pages/{page}.md"
     read = replace(text, segments=tuple(segments), pictures=pictures)
     return replace(read, id=id or page, slug=slug, title=title, path=path)

@@ -195,7 +195,8 @@ def join_slices(slices: Iterable[bytes]) -> str:
         for line in part.decode().split("\n") if part else ():
             term, _, pages = line.partition(" ")
             pages_by_term[term] += [first + page for page in bytes.fromhex(pages)]
-    return "\n".join([_shard_line(term, pages_by_term[term]) for term in sorted(pages_by_term)])
+    lines = [_shard_line(term, sorted(pages)) for term, pages in sorted(pages_by_term.items())]
+    return "\n".join(lines)
 
 
 def _shard_line(term: str, pages: list[int]) -> str:
