@@ -122,7 +122,7 @@ def main() -> int:
                 "kills": (
                     "Commands that write, killed at a call that changes a file",
                     killings.tries(arguments.kills),
-                    lambda: f"{killings.deaths} were killed, the others had ended before",
+                    lambda: f"{killings.deaths} were killed before they ended",
                 ),
                 "entries": ("Entries of the store", foreigners.entries(arguments.entries), str),
                 "stores": ("Stores of strangers", foreigners.stores(arguments.stores), str),

@@ -6,6 +6,7 @@ Entry points: `Mutants`, `drawing_tries`, `probe_tries`.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import os
 import random
@@ -219,11 +220,12 @@ def drawing_tries(grounds: Grounds, count: int, seed: int) -> Iterable[Try]:
     folder = grounds.folder("drawings")
     with sync_playwright() as playwright:
         browsers = Browsers(playwright)
-        with Drawings(browsers["plain"], folder.root) as drawings:
+        with contextlib.closing(browsers), Drawings(browsers["plain"], folder.root) as drawings:
             hostile = dict(HOSTILE)
             if not drawings.open(hostile["script"]) or not drawings.open(hostile["onclick"]):
                 raise SystemExit("the browser does not tell of what a drawing does")
-            for name, data in (*HOSTILE, *HARMLESS, *mutants(20 * count, seed)):
+            others = mutants(1000 * count, seed)
+            for name, data in itertools.chain(HOSTILE, HARMLESS, others):
                 files, violation = _judge(data)
                 if (name, data) in HARMLESS:
                     files = files[:1]  # these are there for their mutants
@@ -231,10 +233,9 @@ def drawing_tries(grounds: Grounds, count: int, seed: int) -> Iterable[Try]:
                     yield f"drawing {name}, judged", lambda violation=violation: violation
                 for file in files:
                     if count_opened == count:
-                        break
+                        return
                     count_opened += 1
                     yield f"drawing {name}", lambda file=file: "; ".join(drawings.open(file))
-        browsers.close()
 
 
 def _judge(data: bytes) -> tuple[list[bytes], str]:

@@ -161,7 +161,12 @@ def _convert_texts(
         files=files,
         camera_is_position=course.camera_is_position,
     )
-    out = {text.path: _encode(_convert_text(text, context)) for text in texts}
+    out = {}
+    for text in texts:
+        try:
+            out[text.path] = _encode(_convert_text(text, context))
+        except RecursionError:
+            raise UsageError(f"{text.file} is nested too deeply") from None
     return {**out, **context.copies}, context
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 
 from msgspec.structs import replace
 
+from coursebuild.core.files.errors import UsageError
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
@@ -66,7 +67,10 @@ def _read_text(
     if not text.file:
         title = title or id
         return replace(text, id=id, slug=slug_of(slug or title), title=title)
-    heading, segments, pictures = read_segments(files.read_text(text.file), text.file)
+    try:
+        heading, segments, pictures = read_segments(files.read_text(text.file), text.file)
+    except RecursionError:
+        raise UsageError(f"{text.file} is nested too deeply") from None
     title = " ".join((title or heading or title_of_file(text.file)).split())
     slug = slug_of(slug or title_of_file(text.file))
     if not re.search("[a-z]", slug):
