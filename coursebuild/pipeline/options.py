@@ -18,6 +18,7 @@ from coursebuild.core.files.changes import undo_changes
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.errors import UsageError as UsageError
 from coursebuild.core.files.read import find_root
+from coursebuild.core.files.trust import FOLDER, FOREIGN
 from coursebuild.core.model import Course, Lesson, Owner
 from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.memory import Memory
@@ -118,7 +119,10 @@ def open_store(root: Path, location: str | None, size: str | None, *, fresh: boo
             shared = shared_cache(location, key)
         except EffectError as error:
             raise UsageError(error.message, help=error.help) from None
-    return Memo(root, shared=shared, size=limit, fresh=fresh)
+    store = Memo(root, shared=shared, size=limit, fresh=fresh)
+    if store.set_aside not in ("", FOREIGN):
+        Progress().say(f"warning: {FOLDER} {store.set_aside}; it is set aside")
+    return store
 
 
 def _parse_size(option: str, text: str) -> int:

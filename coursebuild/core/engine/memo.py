@@ -33,7 +33,6 @@ import msgspec
 from coursebuild.core.files.errors import reason
 from coursebuild.core.files.trust import (
     FOLDER,
-    FOREIGN,
     TEMPORARY,
     find_store,
     make_store,
@@ -95,8 +94,6 @@ class Memo:
         self._bytes_written = 0
         if shared is not None:
             shared.tell = self._say
-        if self.set_aside and self.set_aside != FOREIGN:
-            self._say(f"{FOLDER} {self.set_aside}; it is set aside")
 
     def listen(self, tell: Callable[[str], None]) -> None:
         """Send messages about the store to `tell`, a line each, earlier ones included."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import shutil
 import subprocess
@@ -12,6 +14,7 @@ import pytest
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files import trust
+from coursebuild.pipeline.options import open_store
 from support.workflows import git
 
 KEY = "a" * 64
@@ -38,9 +41,10 @@ def fill(root: Path) -> Path:
 
 def look_up(root: Path) -> tuple[bytes | None, list[str]]:
     """What is found under the key, and what is said."""
-    store, lines = Memo(root), list[str]()
-    store.listen(lines.append)
-    return store.get("kind", KEY, bytes), lines
+    said = io.StringIO()
+    with contextlib.redirect_stderr(said):
+        store = open_store(root, None, None)
+    return store.get("kind", KEY, bytes), said.getvalue().splitlines()
 
 
 def become_another_user(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -128,7 +132,7 @@ def test_without_a_place_outside_of_the_course_nothing_is_kept(
     assert look_up(root) == (
         None,
         [
-            ".coursebuild needs a key of this user's, for which there is no place: "
+            "warning: .coursebuild needs a key of this user's, for which there is no place: "
             "set HOME, XDG_STATE_HOME or COURSEBUILD_STORE_KEY; it is set aside"
         ],
     )
@@ -229,7 +233,10 @@ def test_store_of_another_user_is_set_aside_with_a_warning(
     fill(root)
     user = os.geteuid() + 1
     monkeypatch.setattr(os, "geteuid", lambda: user)
-    assert look_up(root) == (None, [".coursebuild belongs to another user; it is set aside"])
+    assert look_up(root) == (
+        None,
+        ["warning: .coursebuild belongs to another user; it is set aside"],
+    )
 
 
 # --- Git
@@ -252,7 +259,7 @@ def test_store_that_git_tracks_is_set_aside_with_a_warning(
     assert look_up(root) == (b"kept", [])
     git(top, "add", "--force", str(entry))
     git(top, "update-index", "--index-version", str(version))
-    assert look_up(root) == (None, [".coursebuild is tracked by Git; it is set aside"])
+    assert look_up(root) == (None, ["warning: .coursebuild is tracked by Git; it is set aside"])
     assert look_up(root / ".course1") == (None, []), "another folder of the repository"
     git(top, "rm", "--quiet", "--cached", str(entry))
     assert look_up(root) == (b"kept", [])
@@ -268,7 +275,9 @@ def test_linked_work_tree_and_letters_of_another_case(tmp_path: Path, state: Pat
     git(top, "worktree", "add", "--quiet", str(tmp_path / "tree"))
     shutil.rmtree(tmp_path / "tree/.Coursebuild")
     fill(tmp_path / "tree")
-    assert look_up(tmp_path / "tree")[1] == [".coursebuild is tracked by Git; it is set aside"]
+    assert look_up(tmp_path / "tree")[1] == [
+        "warning: .coursebuild is tracked by Git; it is set aside"
+    ]
 
 
 def test_git_folder_that_no_git_has_made_ends_nothing(root: Path) -> None:
