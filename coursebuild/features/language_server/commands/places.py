@@ -30,8 +30,11 @@ class Places:
 
     def path(self, uri: str) -> str:
         """Return the path of a file relative to the course's folder; empty for files outside."""
-        file = Path((uri.startswith("file:") and uris.to_fs_path(uri)) or "/")
-        full = file.parent.resolve() / file.name
+        try:
+            file = Path((uri.startswith("file:") and uris.to_fs_path(uri)) or "/")
+            full = file.parent.resolve() / file.name
+        except (ValueError, RuntimeError):  # no name of a file, as with NUL; links in a circle
+            return ""
         if not full.is_relative_to(self.root):
             return ""
         path = full.relative_to(self.root).as_posix()
