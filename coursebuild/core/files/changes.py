@@ -115,7 +115,9 @@ def _undo(root: Path, tell: Callable[[str], None] | None) -> None:
     journaled = unseal(_NAME, data, store_key(str(root)))
     try:
         changes = msgspec.msgpack.decode(journaled or b"", type=tuple[FileChange, ...])
-    except DAMAGE:
+        for change in changes:
+            _check_path(root, change)
+    except (*DAMAGE, OutsideProjectError):
         journal.replace(journal.with_suffix(".damaged"))
         message = (
             "a command that was interrupted has left a damaged journal, so nothing was undone: "

@@ -149,7 +149,7 @@ def test_no_journal_lies_in_the_course(root: Path) -> None:
     assert (root.parent / "victim").read_bytes() == b"dear"
 
 
-@pytest.mark.parametrize("kind", ["empty", "cut", "garbage", "another key", "no changes"])
+@pytest.mark.parametrize("kind", ["empty", "cut", "garbage", "another key", "no changes", "path"])
 def test_damaged_journal_is_told_of_once_and_set_aside(root: Path, kind: str) -> None:
     journal = leave_journal(root, GOOD)
     whole = journal.read_bytes()
@@ -158,6 +158,11 @@ def test_damaged_journal_is_told_of_once_and_set_aside(root: Path, kind: str) ->
         "cut": whole[:-1],
         "garbage": whole[:40] + b"garbage",
         "another key": seal("changes", whole[32:], b"of somebody else"),
+        "path": seal(
+            "changes",
+            msgspec.msgpack.encode([*GOOD, FileChange("../b.md", None, b"b")]),
+            store_key(str(root)),
+        ),
         "no changes": seal("changes", msgspec.msgpack.encode(["?"]), store_key(str(root))),
     }
     journal.write_bytes(damaged[kind])
