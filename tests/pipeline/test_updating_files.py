@@ -36,6 +36,33 @@ def test_a_lesson_saved_or_removed_meanwhile_is_not_written(make: Make) -> None:
     assert not (folder.root / third).exists()
 
 
+def test_a_lesson_with_a_merge_conflict_is_neither_updated_nor_formatted(make: Make) -> None:
+    conflict = "<<<<<<< HEAD\nIt  is two.\n=======\nIt is  three.\n>>>>>>> three\n"
+    folder = make(STALE + "\n" + conflict)
+    before = folder.text(folder.lesson())
+    for command_name in ("check", "update", "fmt"):
+        result = folder.main(command_name)
+        assert result.status == 1, result.out
+        assert "output-drift" not in result.out
+        assert folder.text(folder.lesson()) == before
+    folder.write(folder.lesson(), STALE)
+    assert folder.main("update").status == 0
+
+
+def test_merge_conflicts_are_found_in_files_that_lessons_only_use(make: Make) -> None:
+    folder = make(GOOD)
+    conflict = "x = 1\n<<<<<<< HEAD\ny = 2\n=======\ny = 3\n>>>>>>> three\n"
+    files = ("lib/helper.py", "theme/look.css", "content/data.csv")
+    for path in files:
+        folder.write(path, conflict)
+    course_map = folder.text("content/course.toml")
+    course_map = course_map.replace("[course]\n", '[course]\npackages = ["lib"]\n', 1)
+    folder.write("content/course.toml", course_map + '\n[theme]\ncss = ["theme/look.css"]\n')
+    result = folder.main("check")
+    assert result.out.count("error[merge-conflict]") == 3, result.out
+    assert all(f"--> {path}:2:1" in result.out for path in files), result.out
+
+
 def test_update_keeps_permissions_and_leaves_a_read_only_lesson_alone(make: Make) -> None:
     """Even as root, who could write it."""
     folder = make(STALE, "## Two\n\n" + block("y.py", "print(2)", "OLD"))

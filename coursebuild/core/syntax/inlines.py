@@ -255,7 +255,9 @@ class _TokenReader:
             case "math":
                 node = self._read_math(token, span)
             case "code_inline":
-                self.state.diagnostics += check_inline_code(token.content, span)
+                self.state.diagnostics += check_inline_code(
+                    self.content, token.start, token.end, token.content
+                )
                 node = CodeSpan(span, token.content)
             case "number_binding" | "number_given":
                 node = self._read_number(token, span)

@@ -30,7 +30,8 @@ _WIDE = r"[\u3040-\u30ff\u3400-\u9fff\uac00-\ud7af]"
 """Letters of scripts that are written without blanks."""
 _SCHEME = r"(?:lesson|model|page|term):(?=\w)"
 _ADDRESS = (
-    rf"(?:{_SCHEME}|https?:|mailto:|#\w|[\w./-]{1, 80}\.(?:csv|html|jpe?g|md|pdf|png|py|svg|xml)\b)"
+    rf"(?:{_SCHEME}|https?:|mailto:|#\w"
+    r"|[\w./-]{1,80}\.(?:csv|html|jpe?g|md|pdf|png|py|svg|xml)\b)"
 )
 _MACROS = """
     alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta kappa lambda mu nu xi pi rho
@@ -154,14 +155,14 @@ BROKEN = {
     ),
     "braces": Kind(r"(?<=[\0\]])\{(?![ \t]*[.#:%{])(?:[^{}\n\0]*\}|\w*)", "", ""),
     "link": Kind(
-        r"(?<!\\)!?\[[^\[\]\n]{0,200}(?<!\\)\][ \t]+\(" + _ADDRESS + r"[^)\n]*\)"
-        r"|(?:(?<!\\)!?\[[^\[\]\n]{0,200})?(?<!\\)\]\([^\s)]*\)?"
+        r"(?<!\\)!?\[[^\[\]]{0,200}(?<!\\)\][ \t]+\(" + _ADDRESS + r"[^)\n]*\)"
+        r"|(?:(?<!\\)!?\[[^\[\]]{0,200})?(?<!\\)\]\([^\s)]*\)?"
         r"|\([^()\n]{1,200}\)\[" + _ADDRESS + r"[^\]\n]*\]"
         r"|(?<!\\)!\[[^\[\]\n\0]*\]"
         rf"|(?<![\w:/.])(?-i:{_SCHEME})[\w.#/-]*\w"
-        r"|(?<!\\)\[[^\[\]\n]{0,200}\(" + _ADDRESS + r"[^()\s]*\)(?![^\[\n]*\])"
-        r"|(?<!\\)\[[^\[\]\n]{0,200}\]?\(?\]?\S?" + _ADDRESS + r"[^()\s\]]*\)(?![^\[\n]*\])"
-        r"|(?<!\\)\[[^\[\]\n]{0,200}\]#\([^()\s]*\)|(?<=\0)\]|\[(?=\0)",
+        r"|(?<!\\)\[[^\[\]]{0,200}\(" + _ADDRESS + r"[^()\s]*\)(?![^\[\n]*\])"
+        r"|(?<!\\)\[[^\[\]]{0,200}\]?\(?\]?\S?" + _ADDRESS + r"[^()\s\]]*\)(?![^\[\n]*\])"
+        r"|(?<!\\)\[[^\[\]]{0,200}\]#\([^()\s]*\)|(?<=\0)\]|\[(?=\0)",
         "this is not a complete link",
         "a link is `[text](address)`, with no blank before the `(` and none in the address",
         "markup-unread",
@@ -169,7 +170,7 @@ BROKEN = {
     ),
     "heading": Kind(
         r"^[ \t]*#{2,6}(?=[^\s#])|^[ \t]*#{7,}(?=\s)"
-        r"|^(?-i:[^\sA-Z#\0]#{1,5} (?=[A-Z])|#{1,5}[^\w\s#\0] (?=[A-Z]))",
+        r"|^(?-i:[^\sA-Z#\0]#{1,5} (?=[A-Z])|#{1,5}[^\s#\0\d]#{0,4} (?=[A-Z]))",
         "no heading begins here",
         "a heading is `## Title`, with two to six `#` and a blank after them",
         "markup-unread",

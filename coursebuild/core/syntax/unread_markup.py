@@ -31,8 +31,8 @@ _DOLLAR = re.compile(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
 _TEX = re.compile(r"\\[A-Za-z]{2,}|[A-Za-z)}\]][_^](?:[0-9]|\{)")
 """A command, an index or an exponent."""
 _LONE_DOLLAR = re.compile(
-    r"(?<![\w$])\$(?!(?-i:[A-Z_]{3,})\b)(?:[A-Za-z\\(|{]|[-+][A-Za-z])"  # as before a formula
-    r"|(?:(?<![A-Za-z])(?<!\d )[a-z]{1,2}|[)}])\$(?![\w$])"  # as after one
+    r"(?<![\w$])\$(?!(?-i:[A-Z_]{3,})\b)(?:[A-Za-z\\(|{]|[-+][A-Za-z])"
+    r"|(?:(?<![A-Za-z])(?<!\d )(?:[a-z]{1,2}|(?-i:[A-Z](?!\$ ?\d)))|[)}])\$(?![\w$])"
     r"|(?<!\$)\$ [A-Za-z](?: ?[=<>+*/^_-] ?[\w.]+)* \$(?!\$)"
 )
 """Dollar signs that were surely meant for a formula, with a character of it."""
@@ -48,6 +48,8 @@ _KINDS = {**BROKEN, **FOREIGN}
 _ANY_KIND, _ANY_IN_HTML = _one_pattern(_KINDS), _one_pattern(IN_HTML)
 _CELL = re.compile(r"\{[=.]?(?:bash|julia|js|ojs|python|py|r|sql)\}\s|r [A-Za-z_.][\w.]*[($\[]")
 """How an expression begins that Quarto or R Markdown would compute."""
+
+_LETTER_BEFORE, _LETTER_AFTER = re.compile(r"(?:^|(?<=\s))\w\Z"), re.compile(r"\w")
 
 
 def check_unread_markup(
@@ -192,17 +194,26 @@ def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:
     return diagnose("markup-foreign", span, message, help=help)
 
 
-def check_inline_code(code: str, span: Span) -> Iterator[Diagnostic]:
-    """Report code in a line that another tool would compute, or that was to be a block."""
-    fence = re.match(r"``(\w+)[^`\n]*\n", span.text)
+def check_inline_code(content: Excerpt, start: int, end: int, code: str) -> Iterator[Diagnostic]:
+    """Report code in a line that another tool would compute, or whose backticks are misplaced."""
+    text, span = content.text, content.span(start, end)
+    fence = re.match(r"``(\w+)[^`\n]*\n", text[start:end])
     if fence is not None and is_known_kind(fence[1]):
         message = f"a block of kind `{fence[1]}` does not begin here: there are two backticks"
-        opening = Span(span.source, span.start, span.start + len(fence[0].rstrip()))
+        opening = content.span(start, start + len(fence[0].rstrip()))
         yield diagnose("markup-unread", opening, message, help=BROKEN["fence"].help)
     if _CELL.match(code):
         message = f"`{shorten(code)}` is shown, and not computed"
         help = "show the value, bound to what a script printed: `` `4.47`{out} ``"
         yield diagnose("markup-foreign", span, message, help=help)
+    # A letter and a backtick change places easily, as in "i`mpratio`" and "`body_mass `while".
+    letter = _LETTER_BEFORE.search(text, max(start - 2, 0), start)
+    if letter is None and text[start:end].endswith(" `"):
+        letter = _LETTER_AFTER.match(text, end)
+    if letter is not None:
+        message = f"`{letter[0]}` stands directly beside a backtick that begins or ends code"
+        help = "move the backtick, or write a blank between them"
+        yield diagnose("markup-unread", content.span(*letter.span()), message, help=help)
 
 
 def _mask(text: str) -> str:
