@@ -224,8 +224,8 @@ def drawing_tries(grounds: Grounds, count: int, seed: int) -> Iterable[Try]:
             hostile = dict(HOSTILE)
             if not drawings.open(hostile["script"]) or not drawings.open(hostile["onclick"]):
                 raise SystemExit("the browser does not tell of what a drawing does")
-            others = mutants(1000 * count, seed)
-            for name, data in itertools.chain(HOSTILE, HARMLESS, others):
+            mutated_files = mutants(1000 * count, seed)
+            for name, data in itertools.chain(HOSTILE, HARMLESS, mutated_files):
                 files, violation = _judge(data)
                 if (name, data) in HARMLESS:
                     files = files[:1]  # these are there for their mutants

@@ -21,7 +21,7 @@ def course(tmp_path: Path, stores: Path) -> Folder:
     page = fences(DOCS / "how-to/features.md")
     [code] = (fence.text for fence in page if "Exporter(" in fence.text)
     folder = Folder(tmp_path / "a course")
-    folder.fill([GOOD, "## Two\n"], stores)
+    folder.fill([GOOD, "## Two\n\nText.\n"], stores)
     folder.write("features/lessons.py", code)
     folder.replace(MAP, "[course]\n", '[course]\nfeatures = ["features/lessons.py"]\n')
     folder.replace(MAP, 'title = "Lesson two"', "title = 'Two, \"quoted\"'")

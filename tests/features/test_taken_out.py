@@ -25,7 +25,7 @@ DEPENDENT_FEATURES = {"bench": ("numerics",), "markdown": ("notebook",), "quiz":
 @pytest.mark.parametrize("feature", DEPENDENT_FEATURES)
 def test_a_course_is_built_without_a_feature(feature: str, tmp_path: Path, stores: Path) -> None:
     course, installed = Folder(tmp_path / "a course"), tmp_path / "installed"
-    course.fill([GOOD, "## Two\n"], stores)
+    course.fill([GOOD, "## Two\n\nText.\n"], stores)
     for name in ("coursebuild", "mjcourse", "templates"):
         shutil.copytree(ROOT / name, installed / name)
     (installed / "site").mkdir()

@@ -168,7 +168,7 @@ def test_a_mistake_that_an_edit_makes_elsewhere_is_found(course: Course) -> None
     course.edit("1.3", "#first", "#last")
     result = course.folder.main("build")
     assert result.status == 1
-    assert "public/lessons/1.1-l11.html" in result.out
+    assert "content/lessons/1.1-l11.md:" in result.out
     assert "`lessons/1.2-l12.html` has no anchor `#first`" in result.out
     course.edit("1.2", "## Last", "## First")
     course.edit("1.3", "#last", "#first")

@@ -67,7 +67,7 @@ def test_nothing_is_new_after_a_touch(make: Make, live: Callable[[Folder], Live]
 def test_the_last_good_page_stays_and_the_others_go_on(
     make: Make, live: Callable[[Folder], Live]
 ) -> None:
-    folder = make(GOOD, "## Two\n")
+    folder = make(GOOD, "## Two\n\nText.\n")
     running = live(folder)
     first, second = "lessons/1.1-one.html", "lessons/1.2-two.html"
     running.site()

@@ -25,7 +25,7 @@ def browser(browsers: Mapping[str, Browser]) -> Browser:
 def test_mistakes_are_shown_and_clear_by_themselves(
     make: Make, browser: Browser, tmp_path: Path
 ) -> None:
-    folder = make(GOOD, "## Two\n")
+    folder = make(GOOD, "## Two\n\nText.\n")
     editor, calls = tmp_path / "code", tmp_path / "told"
     editor.write_text(f'#!/bin/sh\necho "$@" > "{calls}"\n')
     editor.chmod(0o755)
@@ -70,7 +70,7 @@ def test_mistakes_are_shown_and_clear_by_themselves(
             elsewhere = second_page.page.get_by_role("region", name="Problems")
             expect(elsewhere.locator("strong")).to_have_text(kinds)
             expect(elsewhere.get_by_role("listitem").first).to_contain_text("1.2-two.md:1:5")
-            folder.write(folder.lesson(2), "## Two\n")
+            folder.write(folder.lesson(2), "## Two\n\nText.\n")
             expect(panel).to_contain_text("the formula does not parse")
             folder.write(folder.lesson(), GOOD.replace("## Hello", "## Mended"))
             expect(panel).to_have_count(0)

@@ -137,7 +137,7 @@ def test_lab_that_was_not_touched_goes_on(make: Make, browser: Browser) -> None:
 
 
 def test_page_that_goes_and_one_that_comes(make: Make, browser: Browser) -> None:
-    folder = make(GOOD, "## Two\n")
+    folder = make(GOOD, "## Two\n\nText.\n")
     map_ = folder.text("content/course.toml")
     with serve_preview(folder) as preview:
         preview.wait_for_line("checked: ")

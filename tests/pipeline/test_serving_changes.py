@@ -118,7 +118,7 @@ SAVES = (in_place, in_pieces, with_a_backup, by_renaming, gone_for_a_moment)
 
 
 def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make) -> None:
-    folder = make(GOOD, *("## One\n" for _ in range(5)))
+    folder = make(GOOD, *("## One\n\nText.\n" for _ in range(5)))
     pictures = [f"content/pics/{number}.svg" for number in range(300)]
     for path in pictures:
         folder.write(path, '<svg xmlns="http://www.w3.org/2000/svg"/>')
@@ -137,7 +137,7 @@ def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make)
         for path in pictures:
             (folder.root / path).unlink()
         for number in range(1, 7):
-            folder.write(folder.lesson(number), "## Two\n")
+            folder.write(folder.lesson(number), "## Two\n\nText.\n")
         events.wait_for_change()
         for page in ("1.1-one", "1.6-six"):
             assert b"Two" in preview.get(f"/lessons/{page}.html")[2]
@@ -147,7 +147,7 @@ def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make)
 
 
 def test_pages_elsewhere_are_followed_and_two_browsers_told_alike(make: Make) -> None:
-    folder = make(GOOD, "## Two\n")
+    folder = make(GOOD, "## Two\n\nText.\n")
     entry = '[[page]]\nid = "readme"\ntitle = "Page"\nfile = "README.md"\n'
     folder.write("content/course.toml", folder.text("content/course.toml") + entry)
     folder.write("README.md", "One.\n")

@@ -49,7 +49,7 @@ class UndrawnDocuments(Documents):
 def read_library(folder: Folder, documents: Documents) -> Library:
     """A course that was built, as the next build has it."""
     checked_course = read_and_verify(folder.options(), documents, static=True)
-    assert not isinstance(checked_course, Report) and checked_course.is_sound
+    assert not isinstance(checked_course, Report) and checked_course.report().ok
     assets = Assets(template_texts(), Bundle(), prepared_folder())
     results = checked_course.verification.results
     return Library(checked_course.course, results, assets, checked_course.reports)

@@ -13,7 +13,7 @@ pytestmark = pytest.mark.site
 
 FULL_LESSON = """## Everything
 
-Text with trailing spaces,  \n	a tab, a form feed\x0c, a no-break space\xa0 and U+2028\u2028.
+Text with trailing spaces,  \n	a tab, a no-break space\xa0 and U+2028\u2028.
 
 ```python file=examples/plain.py
 print("alpha", 1.5)

@@ -32,8 +32,10 @@ HOSTILE = [
     "<figure><img src='sketch.svg' alt=''><figcaption>cap</figcaption></figure>",
 ]  # fmt: skip
 
-REFUSED_TEXTS = [text for text in HOSTILE if text.startswith(("<b>bold\n", "</textarea"))]
-"""Those that a check rejects: elements that are not closed, or not open."""
+REFUSED_TEXTS = [
+    text for text in HOSTILE if text.startswith(("<b>bold\n", "</textarea")) or "\x0b" in text
+]
+"""Those that a check rejects: elements that are not closed, or not open; a control character."""
 
 _PIECES = (
     "a|&nbsp;|&lt;|&|<|>|<p>|</p>|<br>|<div class=x>|</div>|<ul><li>|<li>|</ul>|<table><tr><td>"

@@ -41,10 +41,10 @@ def fill(root: Path) -> Path:
 
 def look_up(root: Path) -> tuple[bytes | None, list[str]]:
     """What is found under the key, and what is said."""
-    said = io.StringIO()
-    with contextlib.redirect_stderr(said):
+    output = io.StringIO()
+    with contextlib.redirect_stderr(output):
         store = open_store(root, None, None)
-    return store.get("kind", KEY, bytes), said.getvalue().splitlines()
+    return store.get("kind", KEY, bytes), output.getvalue().splitlines()
 
 
 def become_another_user(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
