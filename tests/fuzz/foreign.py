@@ -125,8 +125,8 @@ def folder(data: bytes) -> None:
                         path.symlink_to(mark["link"].decode("utf-8", "surrogateescape"))
                     elif not path.is_symlink():
                         path.write_bytes(data[mark.end() : end])
-            except (OSError, ValueError):
-                continue  # no file has such a name
+            except (OSError, RuntimeError, ValueError):
+                continue  # no file has such a name, or links go round
         _import(course)
 
 

@@ -83,7 +83,7 @@ def test_the_last_good_page_stays_and_the_others_go_on(
         assert rule in running.error_rules()
         assert running.session.files.is_outdated(first)
         assert running.find(first) == before
-        folder.write(folder.lesson(2), f"## Two after {rule}\n")
+        folder.write(folder.lesson(2), f"## Two after {rule}\n\nText.\n")
         assert running.save(folder.lesson(2))
         assert f"Two after {rule}".encode() in (running.find(second) or b"")
         running.site()
