@@ -74,10 +74,12 @@ def resolve(target: Target, course: Course, document_path: str) -> Target:
 AnchorOwner: TypeAlias = Block | Inline | DisplayFormula | Equation | Source
 """What an anchor of a document leads to; a source for the title of a page."""
 
-_HTML_ID = re.compile(r"""<[^>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
+_HTML_ID = re.compile(r"""<[^<>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
 _NO_MARKUP = re.compile(
-    r"<!--.*?-->|(<(script|style|textarea|title)\b[^>]*>).*?</\2\s*>", re.IGNORECASE | re.DOTALL
+    r"<!--.*?(?:-->|\Z)|(<(script|style|textarea|title)\b[^<>]*>).*?(?:</\2\s*>|\Z)",
+    re.IGNORECASE | re.DOTALL,
 )
+"""Text in HTML in which no tag begins; what nothing closes goes on to the end."""
 
 
 def document_anchors(document: Document) -> Iterator[tuple[str, AnchorOwner, Span]]:
