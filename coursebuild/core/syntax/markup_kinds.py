@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
-class Kind(NamedTuple):
+class MarkupKind(NamedTuple):
     """A kind of unread markup."""
 
     pattern: str
@@ -42,24 +42,24 @@ _MACROS = """
 _ENTITIES = "amp deg gt hellip lt mdash middot nbsp ndash quot shy times"
 
 FOREIGN = {
-    "wiki": Kind(
+    "wiki": MarkupKind(
         r"(?<![\\\w])\[\[(?![\d\s.,;+*/-]+\])[^\[\]\n\0]+\]\]",
         "a link is not written in this way",
         "a link to a lesson is `[its title](lesson:1.2)`",
     ),
-    "template": Kind(
+    "template": MarkupKind(
         r"\{\{[-~<%#/!&]?\s*[A-Za-z_][^{}\n\0]*\}\}|\{%[^%\n\0]*%\}|<%[=-]?[^%\n\0]*%>"
         r"|\{(?:\+\+|--|~~|==|>>)[^{}\n\0]*\}",
         "lessons are not templates",
         "write the text itself, or put it into backticks if readers are to see it",
     ),
-    "callout": Kind(
+    "callout": MarkupKind(
         r"^ {0,3}(?:(?:!!!|\?\?\?\+?)(?:[ \t]+|(?-i:(?=[a-z])))[\w-]+|:{3,}[ \t]*\{?[.#]?[\w-]+\}?)"
         r"|\A\[![\w-]*\]?|(?<!\\)\[![\w-]+\]",
         "no callout begins here",
         "a callout is a quotation: `> [!note]`, and `> ` before each line of it",
     ),
-    "latex": Kind(
+    "latex": MarkupKind(
         # What stands between brackets holds none, so that each is looked at once.
         r"\\\((?:(?:(?!\\[()])[^\n\\^_=+])*+[\\^_=+](?:(?!\\[()])[^\n])*+|[ ]?[A-Za-z][ ]?)\\\)"
         r"|^\\\[\s(?:(?!\\[\[\]])[\s\S])*+\\\]|\$\0+\$"
@@ -68,69 +68,69 @@ FOREIGN = {
         "there is no formula here",
         "a formula is `$x$` or stands between two `$$`, and a link to one is `[](#eq:name)`",
     ),
-    "attributes": Kind(
+    "attributes": MarkupKind(
         r"\{:?[ \t]*[.#][A-Za-z][\w:.-]*[^{}\n\0]*\}?|\{:[^{}\n\0]+\}|\{#?eq:[^{}\n\0]*\}?"
         r"|(?<![{\w&\0])[#.][A-Za-z][\w:.-]*\}",
         "only headings have attributes, and formulas labels: `{#eq:name}`",
         "in a heading, `## Title {#id .class}` ends the line; write HTML where a text needs a "
         "class or a size",
     ),
-    "reference": Kind(
+    "reference": MarkupKind(
         r"(?<![\w\]\0\\])\[[^\[\]\n\0]+\]\[[^\[\]\n\0]*\](?!\()",
         "this link has no address",
         "write a line `[name]: address`, or the address itself: `[text](address)`",
     ),
-    "footnote": Kind(
+    "footnote": MarkupKind(
         r"\^\[[^\[\]\n\0]+\]",
         "no footnote begins here",
         "a footnote is `[^name]`, with a paragraph `[^name]: …`",
     ),
-    "citation": Kind(
+    "citation": MarkupKind(
         r"(?<!\\)\[(?:[^\[\]\n\0@]*[\s-])?@[\w:./-]+[^\[\]\n\0]*\]",
         "there is no list of sources",
         "link to the source, or put it into a footnote: `[^name]`",
     ),
-    "crossref": Kind(
+    "crossref": MarkupKind(
         r"(?<![\w.@])@(?:fig|tbl|eq|sec|lst|thm)[-:][\w-]+",
         "a cross-reference is not written in this way",
         "link to a heading or a formula by its id: `[text](#id)`, `[](#eq:name)`",
     ),
-    "highlight": Kind(
+    "highlight": MarkupKind(
         r"(?<![=\w])==[^\s=](?:[^=\n\0]*[^\s=])?==(?![=\w])",
         "emphasis is not written in this way",
         "emphasis is `*text*` or `**text**`",
     ),
-    "script": Kind(
+    "script": MarkupKind(
         r"(?<=[^\W_])(?:~[^\W_]{1,8}~(?!~)|\^[^\W_]{1,8}\^(?![\w^]))",
         "an index or an exponent is not written in this way",
         "write a formula, `$\\mathrm{H_2O}$`, or HTML: `<sub>2</sub>`, `<sup>2</sup>`",
     ),
-    "contents": Kind(
+    "contents": MarkupKind(
         r"^\[TOC\]$",
         "there is no such mark",
         "take it away: each page lists its headings by itself",
     ),
-    "tab": Kind(
+    "tab": MarkupKind(
         r"^ {0,3}===[!+]? \"[^\"\n\0]*\"",
         "no tab begins here",
         "tabs are a feature: `plugins/tabs` of coursebuild",
     ),
-    "role": Kind(
+    "role": MarkupKind(
         r"(?<![\w:]):[a-z][\w.+-]*(?::[\w.+-]+)*:(?=\0)|(?<![\w{])\{[a-z][\w:.+-]*\}(?=\0)",
         "roles of reStructuredText are not read",
         "write a link, a formula or code as Markdown has it",
     ),
-    "directive": Kind(
+    "directive": MarkupKind(
         r"^\.\. [\w:+-]+::",
         "directives of reStructuredText are not read",
         "a callout is a quotation, `> [!note]`; an image is `![what it shows](x.svg)`",
     ),
-    "magic": Kind(
+    "magic": MarkupKind(
         r"^(?:%%[a-z]\w*|%(?:config|conda|load_ext|matplotlib|pip|run|timeit|time)\b)",
         "commands of Jupyter are not read",
         "leave it out, or put it into backticks if readers are to see it",
     ),
-    "emoji": Kind(
+    "emoji": MarkupKind(
         r"(?<![\w:])(?-i::[a-z][a-z0-9]+(?:_[a-z0-9]+)*:)(?![\w:\0])",
         "names of emoji are not read",
         "type the emoji itself",
@@ -138,7 +138,7 @@ FOREIGN = {
 }
 """Markup of other tools."""
 BROKEN = {
-    "binding": Kind(
+    "binding": MarkupKind(
         rf"(?:`{_NUMBER}[^`{{}}\n\0]{{0,20}}|(?:{_NUMBER})?`?)"
         r"\{[ \t]*(?:out|given)\b[^{}\n\0]*\}?"
         r"|(?<=\0)[A-Za-z]{1,3}\{[A-Za-z]{1,6}\}|(?<=\0)[^\s\0]{0,2}(?:out|given)[)}\]]"
@@ -147,14 +147,14 @@ BROKEN = {
         "put the number into backticks: `` `4.47`{out} ``",
         "binding-attribute",
     ),
-    "mark": Kind(
+    "mark": MarkupKind(
         r"\{[ \t]*(?:term|symbol|further)\b[^{}\n\0]*\}",
         "braces stand directly after what they mark",
         'write `[word]{term}`, `$x${symbol="meaning"}`, `## Heading {.further}`',
         "markup-unread",
     ),
-    "braces": Kind(r"(?<=[\0\]])\{(?![ \t]*[.#:%{])(?:[^{}\n\0]*\}|\w*)", "", ""),
-    "link": Kind(
+    "braces": MarkupKind(r"(?<=[\0\]])\{(?![ \t]*[.#:%{])(?:[^{}\n\0]*\}|\w*)", "", ""),
+    "link": MarkupKind(
         r"(?<!\\)!?\[[^\[\]]{0,200}(?<!\\)\][ \t]+\(" + _ADDRESS + r"[^)\n]*\)"
         r"|(?:(?<!\\)!?\[[^\[\]]{0,200})?(?<!\\)\]\([^\s)]*\)?"
         r"|\([^()\n]{1,200}\)\[" + _ADDRESS + r"[^\]\n]*\]"
@@ -168,14 +168,14 @@ BROKEN = {
         "markup-unread",
         once=True,
     ),
-    "heading": Kind(
+    "heading": MarkupKind(
         r"^[ \t]*#{2,6}(?=[^\s#])|^[ \t]*#{7,}(?=\s)"
         r"|^(?-i:[^\sA-Z#\0]#{1,5} (?=[A-Z])|#{1,5}[^\s#\0\d]#{0,4} (?=[A-Z]))",
         "no heading begins here",
         "a heading is `## Title`, with two to six `#` and a blank after them",
         "markup-unread",
     ),
-    "table": Kind(
+    "table": MarkupKind(
         r"^[ \t]*\|?[ \t]*:?-{2,}:?(?:[ \t]*\|[ \t]*:?-{2,}:?)+[ \t]*\|?[ \t]*$"
         r"|^[ \t]*\|[ \t]*:?-{3,}:?[ \t]*\|[ \t]*$"
         r"|^[ \t]*\|[ \t][^|\n]*(?:[ \t]\|[ \t][^|\n]*)+\|[ \t]*$"
@@ -186,51 +186,51 @@ BROKEN = {
         "markup-unread",
         once=True,
     ),
-    "note": Kind(
+    "note": MarkupKind(
         r"(?<!\\)\[\^[^\[\]\n\0]*\]?",
         "no footnote begins here",
         "a footnote is `[^name]`, its name without blanks, with a paragraph `[^name]: …`",
         "markup-unread",
     ),
-    "conflict": Kind(
+    "conflict": MarkupKind(
         r"^={7}$",
         "a merge conflict may have left it behind",
         "delete it; a line between two parts is `---`",
         "markup-unread",
     ),
-    "task": Kind(
+    "task": MarkupKind(
         r"^[-*+]\[[ xX]?\](?=[ \t])|\A\[(?: [xX] ?|[xX] |)\](?=[ \t]*\w)",
         "no task begins here",
         "a task is `- [ ] text` or `- [x] text`",
         "markup-unread",
     ),
-    "fence": Kind(
+    "fence": MarkupKind(
         r"^(?:'{3}|´{3}|‘{3}|’{3})[ \t]*\w*(?=[\w \t=./\"-]*$)",
         "no block begins here",
         "a block of code begins and ends with three backticks on a line of their own",
         "markup-unread",
         once=True,
     ),
-    "html": Kind(
+    "html": MarkupKind(
         r"<!--|</[A-Za-z][\w-]*>?|<[A-Za-z][\w-]*\s+[\w-]+\s*=[^<>\n]*>?",
         "no tag or comment was read here",
         'close it: `<tag attribute="value">`, `</tag>`, `<!-- comment -->`',
         "markup-unread",
     ),
-    "entity": Kind(
+    "entity": MarkupKind(
         rf"&(?:{'|'.join(_ENTITIES.split())})(?![\w;])",
         "an entity ends with a semicolon",
         "write the character itself, or add the `;`",
         "markup-unread",
     ),
-    "code": Kind(
+    "code": MarkupKind(
         r"(?<!\w)`+|`+(?!\w)",
         "no code begins or ends here",
         "put a backtick at both ends, in the same paragraph; write `` \\` `` for the character",
         "markup-unread",
         once=True,
     ),
-    "emphasis": Kind(
+    "emphasis": MarkupKind(
         rf"{_BEFORE}(?:\*\*\*?|__|~~)(?=[^\W_]|[\"'“„(\[$\\\0])"
         rf"|(?:(?<=[^\W\d_])|(?<=[\"'”\].!?…\0]))(?:\*\*|__|~~)(?!\*){_AFTER}"
         rf"|(?<={_WIDE})\*\*|\*\*(?={_WIDE})"
@@ -241,7 +241,7 @@ BROKEN = {
         "markup-unread",
         once=True,
     ),
-    "character": Kind(
+    "character": MarkupKind(
         "[\ufffd\x01-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]",
         "",
         "delete it, or write the character that was meant",
@@ -252,7 +252,7 @@ BROKEN = {
 """Markup of ours that is not whole."""
 IN_HTML = {
     **{name: BROKEN[name] for name in ("html", "entity", "character")},
-    "markdown": Kind(
+    "markdown": MarkupKind(
         r"(?<![\w*])\*\*[^\s*][^\n*]*\*\*(?!\w)|`[^`\n]+`|!?\[[^\[\]\n]*\]\([^\s()]+\)"
         r"|^[ \t]*#{2,6}[ \t]+\S|^[ \t]*(?:`{3}|~{3})\w*|\{(?:out|given|term)\b[^{}\n]*\}",
         "inside HTML, Markdown is read only after an empty line",

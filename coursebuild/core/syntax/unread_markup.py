@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from coursebuild.core.syntax.fence import is_known_kind
-from coursebuild.core.syntax.markup_kinds import BROKEN, FOREIGN, IN_HTML, Kind
+from coursebuild.core.syntax.markup_kinds import BROKEN, FOREIGN, IN_HTML, MarkupKind
 from coursebuild.core.syntax.wording import shorten
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Span
@@ -38,7 +38,7 @@ _LONE_DOLLAR = re.compile(
 """Dollar signs that were surely meant for a formula, with a character of it."""
 
 
-def _one_pattern(kinds: dict[str, Kind]) -> re.Pattern[str]:
+def _one_pattern(kinds: dict[str, MarkupKind]) -> re.Pattern[str]:
     """A pattern for all kinds, with a group for each."""
     parts = (f"(?P<{name}>{kind.pattern})" for name, kind in kinds.items())
     return re.compile("|".join(parts), re.MULTILINE | re.IGNORECASE)
@@ -111,7 +111,9 @@ def _check_dollars(
     yield diagnose("math-unread", content.span(at, at + 1), message, help=help)
 
 
-def _diagnose(content: Excerpt, name: str, kind: Kind, match: re.Match[str]) -> Diagnostic | None:
+def _diagnose(
+    content: Excerpt, name: str, kind: MarkupKind, match: re.Match[str]
+) -> Diagnostic | None:
     """The diagnostic of a match of a kind in the masked content; `None` if it is no mistake."""
     whole = content.text
     if name in ("braces", "mark") and _is_escaped(whole, match.start()):
