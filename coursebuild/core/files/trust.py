@@ -51,7 +51,8 @@ def unseal(name: str, sealed: bytes, key: bytes) -> bytes | None:
 def state_folder(root: str) -> str | None:
     """The user's own folder for what no course should hold; it may not be there yet.
 
-    `None` where the user has none, or none outside of the course in `root`.
+    `None` where the user has none, none outside of the course in `root`, or one that others can
+    write: what lies there is run, as the environments are.
     """
     base = os.environ.get("XDG_STATE_HOME", "")
     if not os.path.isabs(base):
@@ -59,7 +60,14 @@ def state_folder(root: str) -> str | None:
         base = os.path.join(os.path.expanduser("~"), home)
     folder = os.path.realpath(os.path.join(base, "coursebuild"))
     inside = f"{os.path.realpath(root)}{os.sep}"
-    return folder if os.path.isabs(base) and not f"{folder}{os.sep}".startswith(inside) else None
+    if not os.path.isabs(base) or f"{folder}{os.sep}".startswith(inside):
+        return None
+    try:
+        status = os.stat(folder)
+    except OSError:  # there is none yet
+        return folder
+    others_may_write = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return None if status.st_uid != os.geteuid() or others_may_write else folder
 
 
 def store_key(root: str) -> bytes:

@@ -123,10 +123,17 @@ def test_processes_that_begin_at_once_have_one_key(root: Path, state: Path) -> N
     assert len(keys) == 1
 
 
-@pytest.mark.parametrize("place", ["course", "course/deep", "/dev/null"])
-def test_without_a_place_outside_of_the_course_nothing_is_kept(
+@pytest.mark.parametrize("place", ["course", "course/deep", "/dev/null", "public", "of another"])
+def test_without_a_place_of_ones_own_outside_of_the_course_nothing_is_kept(
     root: Path, monkeypatch: pytest.MonkeyPatch, place: str
 ) -> None:
+    for name, mode in (("public", 0o777), ("of another", 0o700)):
+        folder = root.parent / name / "coursebuild"
+        folder.mkdir(parents=True)
+        folder.chmod(mode)
+    if place == "of another":
+        user = os.geteuid() + 1
+        monkeypatch.setattr(os, "geteuid", lambda: user)
     monkeypatch.setenv("XDG_STATE_HOME", str(root.parent / place))
     Memo(root).put("kind", KEY, b"kept")
     assert look_up(root) == (
