@@ -14,7 +14,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.compile import compile_lab
-from coursebuild.features.lab.inputs import SECONDS, lab_trials
+from coursebuild.features.lab.inputs import lab_trials
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.trial import Engines, LabTrials
 from coursebuild.pipeline.options import Options
@@ -53,7 +53,7 @@ def try_labs(
     models: Mapping[str, CompileResult] | None = None,
     diagnostics: Sequence[Diagnostic] = (),
     documents: frozenset[str] | None = None,
-    seconds: float = SECONDS,
+    seconds: float | None = None,
 ) -> TrialOutcome:
     """Run the trials of a course's labs, or of those in some documents, without static forms."""
     memory = Memory(options.root, options.store)

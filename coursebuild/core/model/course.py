@@ -175,6 +175,10 @@ class Limits(Struct, frozen=True, forbid_unknown_fields=True):
             description="seconds of processor time for compiling all models; one may take half",
         ),
     ] = 8.0
+    lab: Annotated[
+        float,
+        Meta(gt=0, le=100_000, description="seconds of processor time for trying one lab"),
+    ] = 8.0
 
 
 class Course(Struct, frozen=True):

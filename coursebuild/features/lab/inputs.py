@@ -11,6 +11,7 @@ from typing import Any
 
 from coursebuild.core.features import Trial
 from coursebuild.core.model import Course, find_blocks
+from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.source import key_of
@@ -19,8 +20,6 @@ from coursebuild.features.lab.engines.files import engine_digest, lab_digest
 from coursebuild.features.lab.gallery import gallery_labs
 from coursebuild.features.lab.model import BUILT_IN_KINDS, Lab
 
-SECONDS = 60.0
-"""Limit of a trial, in seconds of processor time."""
 _DISPLAY_FIELDS = ("id", "title", "model", "height", "toggles")
 """Data of a lab on which no trial depends."""
 
@@ -55,7 +54,7 @@ def inputs_of(lab: Lab, module: LabModule) -> Inputs:
         ("how a lab is repeated natively", lab_digest("engines/native_worker.py")[:12]),
         ("the browser's engine and its trial", engine_digest()[:12]),
     )
-    return Inputs(f"lab {module.name}", text, (), SECONDS, (), conditions)
+    return Inputs(f"lab {module.name}", text, (), LIMITS.lab, (), conditions)
 
 
 def trial_data(module: LabModule) -> dict[str, Any]:

@@ -40,7 +40,7 @@ from coursebuild.features.lab.engines.files import lab_digest
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
 from coursebuild.features.lab.export.trial import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.files import LabOutput
-from coursebuild.features.lab.inputs import SECONDS, inputs_of, trial_data
+from coursebuild.features.lab.inputs import inputs_of, trial_data
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, Lab
 from coursebuild.features.lab.names import name_diagnostics, references
 from coursebuild.features.lab.reply import MainRun, TrialReply, read_reply, reply_bytes
@@ -54,6 +54,8 @@ from coursebuild.features.lab.verdict import (
 _PARITY_SECONDS = 1.0
 """Simulated time over which the size of a difference counts, unless a lab says how much is allowed.
 """
+_PART_OF_MODEL = 20
+"""Engine, model and states together take up to 16 times the memory of a large compiled model."""
 _TRANSIENT = ("timeout", "engine")
 """Kinds of failure that may not happen again: a trial that ends in one is not stored."""
 
@@ -84,10 +86,11 @@ class LabTrials:
     """Trials of labs whose models compile; a lab that has diagnostics already is left out."""
 
     def __init__(
-        self, context: TrialContext, engines: Engines | None = None, seconds: float = SECONDS
+        self, context: TrialContext, engines: Engines | None = None, seconds: float | None = None
     ) -> None:
-        """`seconds`: the processor time that a trial may take."""
-        self._context, self._seconds = context, seconds
+        """`seconds`: the processor time that a trial may take; by default, what the map says."""
+        self._context = context
+        self._seconds = seconds or context.course.limits.lab
         self._engines = engines or Engines(context.root, context.course.limits)
 
     def run(self, trials: Sequence[Trial]) -> TrialOutcome:
@@ -198,6 +201,8 @@ class _LabTrial(Struct, frozen=True):
         inputs = inputs_of(lab, module)
         try:
             mjb = _save_model(self.context, self.engines.native, self.model)
+            if diagnostic := self._check_size(mjb):
+                return self._fail(module, [diagnostic])
             key = fingerprint((inputs.text, inputs.conditions, mjb))
             evaluate = functools.partial(self._evaluate_reply, module, key)
             cached_evaluation = store.get("labs", key, evaluate, shared=True)
@@ -240,6 +245,19 @@ class _LabTrial(Struct, frozen=True):
         """Make the result of a lab that could not be tried."""
         line = TrialLine(module.name, self.lab.fields.title, self.trial.owner, "failed")
         return TrialResult(self.lab.span, line, LabOutput(module.code, module.config)), diagnostics
+
+    def _check_size(self, mjb: bytes) -> Diagnostic | None:
+        """Report a compiled model for which a trial, and a reader's page, need too much memory."""
+        memory = self.context.course.limits.memory
+        size, largest = len(mjb) >> 20, memory // _PART_OF_MODEL
+        if size <= largest:
+            return None
+        message = f"the compiled model has {size} MiB, {largest} MiB at most can be tried"
+        help = (
+            "give it smaller meshes, textures and height fields, or set `memory` in `[limits]` of "
+            f"the map: {_PART_OF_MODEL} times the size of the model"
+        )
+        return diagnose("lab-timeout", self.lab.place(("model",)), message, help=help)
 
     def _evaluate_reply(self, module: LabModule, key: str, data: bytes) -> _Evaluation:
         """Evaluate a stored reply.
