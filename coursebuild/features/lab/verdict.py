@@ -48,7 +48,11 @@ _EXPLANATIONS = {
         "reach it in the preview (`coursebuild serve`), and take what `Copy log` gives",
     ),
     "timeout": ("lab-timeout", "{name} {message}", "look for a loop or a list without an end"),
-    "length": ("lab-timeout", "trying {name} takes too long", "run less of it: {seconds}, or set `lab` in `[limits]` of the map"),
+    "length": (
+        "lab-timeout",
+        "trying {name} takes too long",
+        "run less of it: {seconds}, or set `lab` in `[limits]` of the map",
+    ),
     "engine": ("lab-engine", "the browser's engine says: {message}", ""),
     "shared": (
         "lab-shared",
