@@ -102,7 +102,7 @@ def add_strict(parser: argparse.ArgumentParser) -> None:
 
 def _parse_jobs(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 1024:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of jobs: a whole number from 1")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of jobs: a whole number from 1")
     return int(text)
 
 

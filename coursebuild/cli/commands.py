@@ -24,6 +24,14 @@ if TYPE_CHECKING:
 
     from coursebuild.core.features import Command
 
+_OF_OTHER_TOOLS = {
+    "clean": "nothing needs it: `build` removes old pages, and `.coursebuild/` may be deleted",
+    "list": "`check` names every script and lab",
+    "render": "did you mean `build`?",
+    "test": "did you mean `check`?",
+    "watch": "did you mean `serve`?",
+}
+"""What to do instead of commands that other tools have."""
 _OVERVIEW = """\
 usage: coursebuild [-C DIR] COMMAND ...
 
@@ -59,13 +67,17 @@ def run_command(directory: str | None, words: Sequence[str]) -> int:
             pass
     name, *rest = words
     if name.startswith("-"):
-        message = f"`{name}` is no command: options stand behind one, and `-C` takes a folder"
+        message = f"`{name}` is not a command; options come after it, and `-C` takes a folder"
         raise UsageError(message)
     command = known_commands(installed=False).get(name) or known_commands().get(name)
     if command is None:
         from coursebuild.core.text.diagnostics import did_you_mean
 
-        help = did_you_mean(name, known_commands()) or "`coursebuild help` lists them"
+        help = (
+            _OF_OTHER_TOOLS.get(name)
+            or did_you_mean(name, known_commands())
+            or "`coursebuild help` lists them"
+        )
         raise UsageError(f"there is no command `{name}`", help=help)
     arguments = parser_of(command).parse_args(
         rest, argparse.Namespace(root=directory, words=tuple(words))

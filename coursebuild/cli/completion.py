@@ -52,7 +52,7 @@ complete -c coursebuild -a '(coursebuild completion fish -- \\
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("shell", choices=_SCRIPTS, metavar="SHELL", help=", ".join(_SCRIPTS))
-    parser.add_argument("line", nargs="*", metavar="WORD", help="of a line that is to be completed")
+    parser.add_argument("line", nargs="*", metavar="WORD", help="of the line to complete")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -58,11 +58,11 @@ def run(arguments: argparse.Namespace) -> NoReturn:
 
 def _parse_port(text: str) -> int:
     if not text.isdecimal() or int(text) > 65535:
-        raise argparse.ArgumentTypeError(f"{text!r} is no port: a whole number from 0 to 65535")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port: a whole number from 0 to 65535")
     return int(text)
 
 
 def _parse_origin(text: str) -> str:
     if not re.fullmatch(r"[a-z][a-z0-9+.-]*:(//[\w.*\[\]:-]+)?", text):
-        raise argparse.ArgumentTypeError(f"{text!r} is no origin, such as https://example.org")
+        raise argparse.ArgumentTypeError(f"{text!r} is not an origin, such as https://example.org")
     return text

@@ -253,7 +253,7 @@ def installed_features() -> tuple[Feature, ...]:
         feature = point.load()
         if not isinstance(feature, Feature):
             raise RuntimeError(
-                f"the entry point {point.value} is no feature: write `{point.module}:FEATURE`"
+                f"the entry point {point.value} is not a feature: write `{point.module}:FEATURE`"
             )
         if reason := find_clash(feature, available):
             raise RuntimeError(f"the entry point {point.value} cannot be used: {reason}")

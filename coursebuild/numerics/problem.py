@@ -106,7 +106,7 @@ def whole_number(length: float, part: float, length_name: str, part_name: str) -
         ValueError: not a whole number of times, so that an end would not be reached.
     """
     if not is_multiple(length, part):
-        message = f"{length_name} ({length:g} s) is no multiple of {part_name} ({part:g} s)"
+        message = f"{length_name} ({length:g} s) is not a multiple of {part_name} ({part:g} s)"
         raise ValueError(message)
     return round(length / part)
 

@@ -119,8 +119,8 @@ def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diag
         yield diagnose(
             "script-unproven",
             script.span.first_line(),
-            f"`{line.path}` was not run ({reason}), so that nothing proves {unproven}",
-            help=f'{cure}, or let it pass: `unproven = ["{line.path}"]` in `[verify]` of the map',
+            f"`{line.path}` was not run ({reason}), so nothing proves {unproven}",
+            help=f'{cure}, or allow it: `unproven = ["{line.path}"]` in `[verify]` of the map',
         )
 
 

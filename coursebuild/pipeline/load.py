@@ -200,10 +200,10 @@ class _Loader:
             if len(source.text) <= limit:
                 short.append(source)
                 continue
-            message = f"{source.path} has {len(source.text):_} characters, and may have {limit:_}"
+            message = f"{source.path} has {len(source.text):_} characters; the limit is {limit:_}"
             help = "make more courses of it"
             if source.path != MAP:
-                shorter = "make more lessons of it" if source.path.endswith(".md") else "shorten it"
+                shorter = "split it" if source.path.endswith(".md") else "shorten it"
                 help = f"{shorter}, or set `text` in `[limits]` of the map"
             self.diagnostics.append(
                 diagnose("text-long", source.span(limit, limit + 1), message, help=help)
@@ -310,7 +310,7 @@ class _Loader:
         for lesson in course.lessons:
             if lesson.status == "planned":
                 if lesson.path in paths:
-                    message = f"lesson {lesson.id} is planned, and there is a file {lesson.path}"
+                    message = f"lesson {lesson.id} is planned, but there is a file {lesson.path}"
                     help = 'say `status = "draft"` or `"complete"`, or move the file away'
                     self._report("lesson-planned-file", lesson.span, message, help)
             elif lesson.path not in paths and lesson.path not in self.unreadable:
@@ -319,6 +319,8 @@ class _Loader:
                 if closest is not None:
                     help = f"is it `{closest}`, which the map does not name?"
                     del unlisted[closest]
+                elif other := next(self.root.glob(f"{lesson.path.removesuffix('.md')}.*"), None):
+                    help = f"is it `{other.name}`? the file of a lesson ends with `.md`"
                 message = f"there is no file {lesson.path}"
                 self._report("lesson-missing", lesson.span, message, help)
         for source in unlisted.values():

@@ -130,7 +130,7 @@ def _parse_size(option: str, text: str) -> int:
     match = re.fullmatch(r"([0-9]{1,15})([KMGT]?)", text, re.IGNORECASE)
     if match is None:
         raise UsageError(
-            f"{option}: {text!r} is no size: a whole number, perhaps with K, M, G or T"
+            f"{option}: {text!r} is not a size: a whole number, perhaps with K, M, G or T"
         )
     return int(match[1]) << (10 * " KMGT".index(match[2].upper() or " "))
 

@@ -76,7 +76,7 @@ def check_recorded_runs(scripts: Iterable[Extraction], options: Options) -> Iter
             continue
         recorded_run, path = _read(extraction, options), extraction.path
         if recorded_run is None:
-            message = f"`{path}` is recorded once, and no run of it is kept in {_path(path)}"
+            message = f"`{path}` is recorded once, but no run of it is kept in {_path(path)}"
         else:
             changes = input_changes(recorded_run.record.inputs, _inputs(extraction))
             changes += state_changes(recorded_run.record.dependencies, states)

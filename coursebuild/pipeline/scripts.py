@@ -87,7 +87,7 @@ def _diagnose_blocked(
     )
     if blocked_file.diverged:
         help = (
-            "the block was changed as well: bring what is to stay of the file into it by hand, "
+            "the block was changed as well: copy into it by hand what should stay of the file, "
             "then delete the file"
         )
     notes = (

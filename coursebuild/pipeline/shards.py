@@ -86,10 +86,12 @@ def read_shard(text: str | None, timings: Sequence[str]) -> Shard | None:
         return None
     match = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
     if match is None:
-        raise UsageError(f"--shard: {text!r} is no part of the work; write 2/8 for the second of 8")
+        raise UsageError(
+            f"--shard: {text!r} is not a part of the work; write 2/8 for the second of 8"
+        )
     index, count = int(match[1]), int(match[2])
     if not 1 <= index <= count <= _LARGEST_COUNT:
-        raise UsageError(f"--shard: there is no part {index} of {count}")
+        raise UsageError(f"--shard: part {index} of {count} does not exist")
     seconds: dict[str, float] = {}
     for file in timings:
         for name, value in read_timings(file).items():

@@ -135,7 +135,7 @@ def _check_templates(theme: Theme) -> Iterator[Diagnostic]:
             if origin is None:
                 message = f"it is not said which `{name}` of coursebuild this was copied from"
             help = (
-                f"`coursebuild new template {name} --print` gives it, and a first line to take over"
+                f"`coursebuild new template {name} --print` prints it; take over its first line too"
             )
             yield diagnose("template-outdated", source.span(0, len(first)), message, help=help)
 

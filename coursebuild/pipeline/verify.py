@@ -182,7 +182,7 @@ def _diagnose_nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Dia
     """Diagnose that there is nothing to publish, or that nothing was verified."""
     place = course.map.span(0, 0)
     if all(lesson.status == "planned" for lesson in course.lessons):
-        message = "no lesson of the course is written"
+        message = "the course has no written lesson"
         help = "write a file in content/lessons, and give its entry in the map a `status`"
         yield diagnose("no-lessons", place, message, help=help)
     allowed_paths = {entry.path for entry in course.unproven}
@@ -191,7 +191,7 @@ def _diagnose_nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Dia
     ]
     if skipped_runs and not any(run.did_run for run in runs):
         missing = sorted({name for run in skipped_runs for name in run.missing})
-        message = "no script can run here, so that nothing was verified"
+        message = "no script can run here, so nothing was verified"
         yield diagnose("no-scripts", place, message, help=f"install {', '.join(missing)}")
 
 

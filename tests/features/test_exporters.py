@@ -100,10 +100,10 @@ def test_export_is_refused_where_it_would_be_in_the_way(course: Folder) -> None:
     course.write("public/.coursebuild-site", "{}")
     for name, out, reason in (
         ("lessons", "models/q.csv", "lies in models/ of the project, where no export goes"),
-        ("lessons", "notes.txt", "notes.txt is there, and is no such export"),
-        ("epub", "notes.txt", "notes.txt is there, and is no such export"),
-        ("page", "notes.txt", "notes.txt is there, and is no such export"),
-        ("scorm", "mine.zip", "mine.zip is there, and is no such export"),
+        ("lessons", "notes.txt", "notes.txt exists and is not such an export"),
+        ("epub", "notes.txt", "notes.txt exists and is not such an export"),
+        ("page", "notes.txt", "notes.txt exists and is not such an export"),
+        ("scorm", "mine.zip", "mine.zip exists and is not such an export"),
         ("lessons", ".", "is a folder"),
         ("lessons", "public/q.csv", "lies in a published site, which the next build replaces"),
     ):

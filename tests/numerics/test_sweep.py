@@ -113,7 +113,7 @@ def test_a_block_without_friction_slides_as_far_as_it_goes() -> None:
         ('{ "geom.solref[7]" = [1] }', "`geom.solref[7]` cannot be 1"),
         ('{ "geom:ball.size[0]" = [-1] }', "`geom:ball.size[0]` cannot be -1"),
         ('{ "geom:wall.mass" = "±1 %" }', "`geom:wall.mass` is not given in the MJCF"),
-        ('{ "option.timestep" = [0.003] }', "the sampling interval (0.02 s) is no multiple of"),
+        ('{ "option.timestep" = [0.003] }', "the sampling interval (0.02 s) is not a multiple of"),
     ],
 )
 def test_what_is_no_parameter_is_told(vary: str, message: str) -> None:

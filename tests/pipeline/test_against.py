@@ -247,7 +247,7 @@ def test_wrong_combinations_of_arguments_give_2(make: Make) -> None:
         (("--format", "sarif"), "--against cannot be combined with --format sarif"),
         (("--shard", "1/2"), "--against cannot be combined with --shard"),
         (("--write-timings", "x"), "--against cannot be combined with --write-timings"),
-        (("--against", "three"), "--against: 'three' is no version of MuJoCo, such as 3.13.0"),
+        (("--against", "three"), "--against: 'three' is not a version of MuJoCo, such as 3.13.0"),
         (("9.9",), "no lesson or page is called `9.9`; known: `1.1`"),
     ):
         result = check_against(course, *arguments)

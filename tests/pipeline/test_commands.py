@@ -76,7 +76,7 @@ WRONG_USAGE = [
     ("help stabiliti", "coursebuild: there is no command `stabiliti`; did you mean `stability`?\n"),
     (
         "-q check",
-        "coursebuild: `-q` is no command: options stand behind one, and `-C` takes a folder\n",
+        "coursebuild: `-q` is not a command; options come after it, and `-C` takes a folder\n",
     ),
     ("check --frob=1", "no option `--frob`; `coursebuild check --help` lists them\n"),
     ("check --quite", "coursebuild: there is no option `--quite`; did you mean `--quiet`?\n"),
@@ -85,7 +85,7 @@ WRONG_USAGE = [
     ("check --format yaml", "invalid choice: 'yaml'"),
     ("build extra", "unrecognized arguments: extra"),
     ("extract --jobs 2", "there is no option `--jobs`"),
-    ("check --jobs 0", "'0' is no number of jobs: a whole number from 1"),
+    ("check --jobs 0", "'0' is not a number of jobs: a whole number from 1"),
     ("check --jobs -1", "'-1' is no number of jobs"),
     ("check --jobs 2.5", "'2.5' is no number of jobs"),
     ("check --jobs ²", "'²' is no number of jobs"),
@@ -105,7 +105,7 @@ WRONG_USAGE = [
     ("check --sensitivity --against 3.13.0", "--sensitivity"),
     (
         "check --shard two",
-        "coursebuild: --shard: 'two' is no part of the work; write 2/8 for the second of 8\n",
+        "coursebuild: --shard: 'two' is not a part of the work; write 2/8 for the second of 8\n",
     ),
     (
         "check --timings x",
@@ -301,6 +301,6 @@ def test_a_course_without_a_written_lesson_is_a_mistake(make: Make) -> None:
     for command in ("build", "check"):
         result = folder.main(command)
         assert result.status == 1
-        assert "error[no-lessons]: no lesson of the course is written" in result.out
+        assert "error[no-lessons]: the course has no written lesson" in result.out
         assert "no-scripts" not in result.out
     assert not (folder.root / "public").exists()

@@ -29,7 +29,7 @@ def test_figure_is_recorded_compared_and_shown(make: Make) -> None:
     folder = make(lesson(9))
     first = folder.main("check")
     assert first.status == 1
-    assert "figure-drift]: nothing is recorded yet of what `examples/line.py` draws" in first.out
+    assert "figure-drift]: no figure of `examples/line.py` is recorded yet" in first.out
     update = folder.main("update")
     assert update.status == 0, update.out
     assert "drew content/lessons/line.svg" in update.out

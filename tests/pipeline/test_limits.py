@@ -17,7 +17,7 @@ def test_a_line_of_megabytes_is_told_and_not_read(make: Make) -> None:
     folder = make(GOOD, "a *b* " * 1_700_000)
     result = folder.main("check")
     assert result.status == 1
-    assert "1.2-two.md has 10_200_000 characters, and may have 250_000" in result.out
+    assert "1.2-two.md has 10_200_000 characters; the limit is 250_000" in result.out
     assert f"{folder.lesson(2)}:1:250001" in result.out and len(result.out) < 2_000
     assert "1 error" in result.out
     folder.write(folder.lesson(2), GOOD.replace("hello.py", "again.py") + "words " * 50_000)
@@ -33,7 +33,7 @@ def test_a_map_or_model_that_is_too_long_is_told_and_not_read(make: Make) -> Non
     folder.write("models/a.toml", "# nothing\n" * 30_000)
     result = folder.main("check")
     assert result.status == 1
-    assert "models/b.xml has 270_019 characters, and may have 250_000" in result.out
+    assert "models/b.xml has 270_019 characters; the limit is 250_000" in result.out
     assert "models/b.xml:27778:" in result.out and "help: shorten it, or set `text`" in result.out
     assert "models/a.toml has 300_000 characters" in result.out
     assert "2 errors" in result.out

@@ -62,7 +62,7 @@ def test_nothing_runs_without_a_sandbox(
     result = folder.main("check", "--sandbox")
     assert (result.status, result.out) == (1, "")
     assert result.err == (
-        "coursebuild: `--sandbox` needs Bubblewrap, and there is no program `bwrap`\n"
+        "coursebuild: `--sandbox` needs Bubblewrap, but there is no program `bwrap`\n"
         "  help: install it, as by `apt-get install bubblewrap`\n"
     )
     assert not (folder.root / "examples").exists()

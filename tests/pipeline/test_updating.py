@@ -152,7 +152,7 @@ def test_update_writes_the_parts_of_files_that_a_lesson_shows(make: Make) -> Non
     )
     result = folder.main("check")
     assert (result.status, result.out.count("error[")) == (1, 1)
-    assert "this is not what `src/ball.py` holds" in result.out
+    assert "this differs from what `src/ball.py` holds" in result.out
     assert folder.main("update").status == 0
     part = "   @property\n   def fall(self):\n\n       return 1\n"
     assert fence.format(part) in folder.text(folder.lesson())

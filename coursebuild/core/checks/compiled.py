@@ -185,7 +185,7 @@ def _check_text(
                 "mjcf-compiles",
                 span,
                 f"this block must fail with `{block.error}`, and it compiles",
-                help="mend the block, or drop `error=`",
+                help="fix the block, or remove `error=`",
             )
         elif _collapse_spaces(block.error) not in _collapse_spaces(result.error):
             yield diagnose(

@@ -84,7 +84,7 @@ def _check_empty_lesson(course: Course, document: Document) -> Iterator[Diagnost
             continue
         help = 'say `status = "planned"` in the map and remove the file'
         if lesson.status == "complete":
-            message = f"lesson {lesson.id} is complete, and there is nothing to read in it"
+            message = f"lesson {lesson.id} is complete, but there is nothing to read in it"
             help = f'write it, say `status = "draft"` in the map, or {help}'
             yield diagnose("lesson-empty", source.span(0, 0), message, help=help)
         elif not document.blocks:
@@ -102,14 +102,14 @@ def _check_unproven(course: Course) -> Iterator[Diagnostic]:
             message = f"the script `{entry.path}` is named twice"
             notes = [Note("the first one is here", first[entry.path])]
             help = "remove it here"
-            yield diagnose("unproven-script", entry.span, message, help=help, notes=notes)
+            yield diagnose("unproven-name", entry.span, message, help=help, notes=notes)
         elif script is None:
             message = f"no lesson or page has a script `{entry.path}`"
             help = did_you_mean(entry.path, scripts) or "remove it"
-            yield diagnose("unproven-script", entry.span, message, help=help)
+            yield diagnose("unproven-name", entry.span, message, help=help)
         elif not (script.norun or script.requires):
             message = f"`{entry.path}` always runs: it says neither `norun` nor `requires`"
-            yield diagnose("unproven-script", entry.span, message, help="remove it")
+            yield diagnose("unproven-name", entry.span, message, help="remove it")
 
 
 def _check_title(course: Course, document: Document) -> Iterator[Diagnostic]:

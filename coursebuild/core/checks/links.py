@@ -133,7 +133,7 @@ def _check_html_rules(html: HtmlBlock | RawInline, course: Course) -> Iterator[D
         message, help = "the course allows no raw HTML", "write it in Markdown"
         yield diagnose("html-forbidden", html.span, message, help=help)
     elif course.html == "safe":
-        help = 'if you trust all who write the course, its map may say `html = "trusted"`'
+        help = 'if you trust everyone who writes the course, set `html = "trusted"` in its map'
         for part in html.forbidden:
             yield diagnose("html-forbidden", part.span, part.message, help=help)
 
@@ -220,9 +220,7 @@ def _look_up(
     link: Link, target: _NamedTarget, targets: LinkTargets
 ) -> tuple[str, str, Collection[str], str]:
     """The rule of a link, the name of its target, all names of this kind, and the message."""
-    lacks = (
-        f"is {'mentioned' if link.mention else 'linked to'}, and the course map does not have it"
-    )
+    lacks = "is not in the course map"
     match target:
         case LessonTarget(id=id):
             return "link-lesson", id, targets.lessons, f"lesson {id} {lacks}"
@@ -291,7 +289,7 @@ def _check_url(
 ) -> Iterator[Diagnostic]:
     parts = urlsplit_or_none(url)
     if parts is None:
-        yield diagnose("link-file", span, f"`{url}` is no address that can be read")
+        yield diagnose("link-file", span, f"`{url}` is not a readable address")
         return
     if parts.scheme or parts.netloc:
         return

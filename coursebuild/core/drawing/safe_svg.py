@@ -174,9 +174,9 @@ class _Reader:
             data.decode("utf-8-sig")
             self._parser.Parse(data, True)
         except UnicodeDecodeError:
-            raise _RefusedError("is no SVG in UTF-8") from None
+            raise _RefusedError("is not an SVG file in UTF-8") from None
         except (expat.ExpatError, ValueError, LookupError) as error:
-            raise _RefusedError(f"is no SVG: {error}") from None
+            raise _RefusedError(f"is not an SVG file: {error}") from None
         return self._builder.close()
 
     def _add_style(self, css: str) -> None:
@@ -185,11 +185,11 @@ class _Reader:
             self._refuse(f"styles of more than {MAX_STYLE >> 20} MiB")
 
     def _refuse(self, part: str) -> None:
-        raise _RefusedError(f"holds {part} in line {self._parser.CurrentLineNumber}")
+        raise _RefusedError(f"contains {part} on line {self._parser.CurrentLineNumber}")
 
     def _declaration(self, version: str, encoding: str | None, standalone: int) -> None:
         if encoding is not None and encoding.lower() not in _ENCODINGS:
-            raise _RefusedError(f"is no SVG in UTF-8, but in `{encoding}`")
+            raise _RefusedError(f"is not in UTF-8, but in `{encoding}`")
 
     def _doctype(self, name: str, system: str | None, public: str | None, internal: bool) -> None:
         """Allow that of SVG alone, which says nothing: browsers do not read it."""
@@ -209,7 +209,7 @@ class _Reader:
         self._depth += 1
         self._count += 1
         if self._count == 1 and tag != f"{SVG}svg":
-            raise _RefusedError("is no SVG: its root is another element")
+            raise _RefusedError("is not an SVG file: its root is another element")
         if self._depth > MAX_DEPTH:
             self._refuse(f"more than {MAX_DEPTH} elements inside each other")
         if self._count > MAX_ELEMENTS:

@@ -50,7 +50,7 @@ def check_target(root: Path, out: Path, mark: str, *, archive: bool) -> None:
     is_export = _holds_file if archive else _begins_with
     if os.path.lexists(place) and not is_export(place, mark):
         raise PublishRefusedError(
-            f"{out} is there, and is no such export", help="move it away, or name another file"
+            f"{out} exists and is not such an export", help="move it away, or name another file"
         )
 
 

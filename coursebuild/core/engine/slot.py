@@ -137,7 +137,7 @@ def new_site(old: Manifest, files: Iterable[SiteFile], file_list: FileList | Non
     for file in files:
         path = file.path
         if _NO_PATH.search(path) or path == MARKER:
-            raise ValueError(f"{path!r} is no path that a site may have")
+            raise ValueError(f"{path!r} is not a path that a site may have")
         if path in by_path or (file_list is not None and path == file_list.path):
             raise ValueError(f"the site has two files {path}")
         by_path[path] = file

@@ -165,7 +165,7 @@ def _check_path(root: Path, change: FileChange) -> Path:
     parts = file.relative_to(os.path.realpath(root)).parts
     is_hidden = any(part.startswith(".") for part in parts)
     if not _CLOSED.isdisjoint(parts) or (is_hidden and change.old is not None):
-        raise OutsideProjectError(f"{change.path} is no file that a command may change")
+        raise OutsideProjectError(f"{change.path} is not a file that a command may change")
     return file
 
 

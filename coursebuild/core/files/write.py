@@ -81,7 +81,7 @@ def resolve_inside(root: Path, path: str) -> Path:
     try:
         target = Path(os.path.realpath(root / path))
     except ValueError:  # NUL
-        raise OutsideProjectError(f"{path!r} is no path") from None
+        raise OutsideProjectError(f"{path!r} is not a path") from None
     if not target.is_relative_to(os.path.realpath(root)):
         raise OutsideProjectError(f"{path} leads out of the project")
     return target

@@ -77,7 +77,7 @@ def find_template_error(text: str) -> tuple[int, str] | None:
     try:
         _environment(DictLoader({})).from_string(text)
     except TemplateSyntaxError as error:
-        return error.lineno, error.message or "it is no template"
+        return error.lineno, error.message or "it is not a template"
     return None
 
 

@@ -61,7 +61,7 @@ def check_other_version(text: str) -> str:
         UsageError: it is no version, or the one installed here.
     """
     if not _VERSION.fullmatch(text):
-        raise UsageError(f"--against: {text!r} is no version of MuJoCo, such as 3.13.0")
+        raise UsageError(f"--against: {text!r} is not a version of MuJoCo, such as 3.13.0")
     if _without_zeros(text) == _without_zeros(engine_version()):
         raise UsageError(f"--against: MuJoCo {engine_version()} is the version installed here")
     return text

@@ -23,6 +23,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
+from xml.parsers import expat
 
 import msgspec
 
@@ -147,6 +148,8 @@ class _Compiler(JsonChild):
             facts |= {"includes": existing_files(self.root, path, text)}
             return CompileResult("", facts=msgspec.convert(facts, ModelFacts))
         message = self._without_paths(error.strip())
+        if _PARSER.search(message):
+            return CompileResult(message, _line_of_xml_error(text) or error_line(message, text))
         if _NO_MEMORY.search(message):
             return CompileResult(f"{OWN_FAULT}takes more than {self.memory} MiB of memory for it")
         return CompileResult(message, error_line(message, text))
@@ -181,6 +184,15 @@ def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:
     # MuJoCo joins an absolute path to another one; nothing is there, on any machine.
     nowhere = f"{root}/".lstrip("/")
     return tuple(sorted(file for file in files if file != path and nowhere not in file[1:]))
+
+
+def _line_of_xml_error(text: str) -> int | None:
+    """Where a text stops to be XML: MuJoCo names where the element begins that goes on there."""
+    try:
+        expat.ParserCreate().Parse(text.encode("utf-8", "surrogatepass"), True)
+    except expat.ExpatError as error:
+        return min(error.lineno, len(text.splitlines()))
+    return None
 
 
 def existing_files(root: Path, path: str, text: str) -> tuple[str, ...]:

@@ -100,7 +100,7 @@ def examine_sandbox(root: Path) -> tuple[Sandbox | None, tuple[SandboxPart, ...]
     parts = [SandboxPart("Bubblewrap"), SandboxPart("a filter of system calls")]
     program, machine = shutil.which("bwrap"), platform.machine()
     if program is None:
-        problem = "needs Bubblewrap, and there is no program `bwrap`"
+        problem = "needs Bubblewrap, but there is no program `bwrap`"
         help = "install it, as by `apt-get install bubblewrap`"
         return None, (SandboxPart("Bubblewrap", problem, help),)
     system_calls = compile_filter(machine)

@@ -210,7 +210,7 @@ def _check(
             "binding-volatile",
             binding.text_span,
             f"`{binding.text}` is bound to an output that differs from run to run",
-            help="take `{out}` away, or let `volatile` leave this number in the comparison",
+            help="remove `{out}`, or narrow `volatile` so that this number is compared",
         )
     return mismatch(binding, path, lines, before)
 
@@ -236,13 +236,13 @@ def _orphan_diagnostic(
 ) -> Diagnostic:
     """A binding that has no output: none above it, no such script, or one that is not run."""
     if path is None:
-        target = ", and no recorded output stands above it"
+        target = ", but there is no recorded output above it"
         help = "write it below the output, or name the script: `{out=examples/…}`"
     elif path in outputs.scripts:
         target = f" to `{path}`, which has no recorded output and is not run"
         help = "record its output below it"
     else:
-        target = f" to `{path}`, which is no script of the course"
+        target = f" to `{path}`, which is not a script of the course"
         help = did_you_mean(path, outputs.scripts)
     message = f"`{binding.text}` is bound{target}"
     return diagnose("binding-orphan", binding.text_span, message, help=help)

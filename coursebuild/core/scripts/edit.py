@@ -114,7 +114,7 @@ def _new_lines(
     return refusal(
         body.span().first_line(),
         "no text was found that matches what the script prints",
-        "bring it up to date by hand: a `...` or a filter stands in the way",
+        "bring it up to date by hand: a `...` or a filter is in the way",
     )
 
 

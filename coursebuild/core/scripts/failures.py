@@ -154,7 +154,7 @@ def _failure_wording(extraction: Extraction, run: ScriptRun) -> tuple[str, str, 
             help = "make it do less, or set `timeout=SECONDS` on its fence to a higher limit"
             return "script-timeout", message, help
         case Outcome.OUTPUT_LIMIT:
-            help = "print less: a recorded output is to be read"
+            help = "print less: people read a recorded output"
             return "script-output-limit", f"{path} printed more than 1 MiB", help
         case Outcome.ENCODING:
             help = "print text; `sys.stdout.buffer` takes bytes as they are"
@@ -168,7 +168,7 @@ def silence_diagnostic(recording: Recording, path: str) -> Diagnostic:
     return diagnose(
         "script-silent",
         recording.caption_span,
-        f"an output is recorded here and `{path}` printed nothing",
+        f"an output is recorded here, but `{path}` printed nothing",
         help="print what is recorded, or take the recorded output away",
     )
 
@@ -215,12 +215,11 @@ def _stderr_notes(outcome: Outcome, text: str) -> list[Note]:
 _MAX_INCIDENTS = 4
 """The most further incidents that notes name."""
 _DIVERGES = (
-    "try a smaller timestep or another integrator; if it is to diverge, say so by `diverges` on "
-    "its fence"
+    "try a smaller timestep or another integrator; if that is intended, put `diverges` on its fence"
 )
 _DEEP = (
     "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts (`solref`), or look at "
-    "where they start; if they are to, say so by `deep` on its fence"
+    "where they start; if that is intended, put `deep` on its fence"
 )
 
 _EFFECTS = {
@@ -232,7 +231,7 @@ _EFFECTS = {
     EffectKind.CONNECTION: (
         "script-connects",
         "uses the network",
-        "keep what it asks for in the course, where it stays the same",
+        "keep the data in the course, where it does not change",
     ),
 }
 """The rule, the end of the message, and the help."""

@@ -41,7 +41,7 @@ MAX_PIXELS = 25_000_000
 """Pixels that a PNG may have."""
 MAX_TABLE = 4 << 20
 """Bytes that data may have."""
-SVG_HELP = "an SVG may hold what draws a still picture, and refer to its own parts alone"
+SVG_HELP = "an SVG may contain only what draws a still picture, and refer only to its own parts"
 
 _NUMBER = re.compile(r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?")
 _HREFS = ("href", f"{XLINK}href")
@@ -92,7 +92,7 @@ def _compare_figure(
         return
     update = f"`coursebuild update {owner}`"
     if recorded is None:
-        message = f"nothing is recorded yet of what `{run.path}` draws"
+        message = f"no figure of `{run.path}` is recorded yet"
         yield diagnose("figure-drift", figure.span, message, help=f"run {update}")
         return
     wording = describe_difference(figure.name, recorded, figure_file)
@@ -221,7 +221,7 @@ def _png_size(data: bytes) -> tuple[int, int] | str:
             image.load()
             return image.size
     except (OSError, ValueError, SyntaxError, struct.error):
-        return "is no PNG"
+        return "is not a PNG file"
 
 
 def _png_drawing(data: bytes) -> bytes:

@@ -7,6 +7,7 @@ Entry points: `script_findings` (scripts that failed, and all of the next), `out
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 from coursebuild.core.model import Course, Document, Owner
@@ -166,7 +167,7 @@ def drift_diagnostic(
         return diagnose(
             "output-drift",
             recording.caption_span,
-            f"nothing is recorded yet of what `{recording.script}` prints",
+            f"no output of `{recording.script}` is recorded yet",
             help=f"run {update}",
         )
     first, *rest = sorted(verdict.changes, key=lambda change: change.span.start)
@@ -181,9 +182,19 @@ def drift_diagnostic(
         first.span,
         f"recorded output differs from this run ({classes(verdict.changes)})",
         label=_label(first),
-        help=f"if the change is intended, run {update}",
+        help=_explain_slip(verdict.changes, first) or f"if the change is intended, run {update}",
         notes=notes,
     )
+
+
+def _explain_slip(changes: Sequence[Change], first: Change) -> str:
+    """How to mend a recorded output that was pasted or typed as no script prints it, if it was."""
+    if any("\x1b" in change.recorded and "\x1b" not in change.printed for change in changes):
+        return "what is recorded has the colour codes of a terminal: remove them"
+    fraction = re.match(r",(\d+)", first.span.source.text[first.span.end : first.span.end + 40])
+    if fraction and f"{first.recorded}.{fraction[1]}" == first.printed:
+        return f"Python prints a decimal point: write `{first.printed}`"
+    return ""
 
 
 def classes(changes: Sequence[Change]) -> str:

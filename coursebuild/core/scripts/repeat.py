@@ -66,8 +66,8 @@ def _unrepeatable(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> 
     return diagnose(
         "script-unrepeatable",
         extraction.script.span.first_line(),
-        f"`{extraction.path}` behaves differently than before, with nothing changed "
-        "that is known to count",
+        f"`{extraction.path}` behaves differently than before, though nothing that "
+        "it is known to depend on has changed",
         help="make it do the same each time (a fixed seed, no clock, files that it opens itself), "
         "or put `volatile` on its output",
         notes=notes,

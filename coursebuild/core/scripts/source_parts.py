@@ -50,11 +50,11 @@ def check_source_parts(course: Course, read: ReadText) -> Iterator[Diagnostic]:
             yield diagnose(
                 "source-part",
                 span,
-                f"this is not what `{source.path}` holds",
+                f"this differs from what `{source.path}` holds",
                 label=f"it has `{file_lines[first].strip()}` here"
                 if first < len(file_lines)
                 else "",
-                help="run `coursebuild update`, which writes what it holds",
+                help="run `coursebuild update`, which copies it here",
                 edits=[whole_lines(source.body_span, source.prefix, file_lines)],
             )
 

@@ -26,7 +26,7 @@ _PAIR = re.compile(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
 _ID = re.compile(r"\{#(eq:[\w-]+)(?=[\s}])")
 _SPACES = re.compile(r"\s+")
 
-_TERM_HELP = 'write `{term}`, or `{term="headword"}` where the glossary is to say it otherwise'
+_TERM_HELP = 'write `{term}`, or `{term="headword"}` if the glossary should name it differently'
 _SYMBOL_HELP = 'write `{symbol="what it stands for" unit="m/s"}`, of which the unit may be left out'
 _LABEL_HELP = "write `{#eq:name}`, of letters, digits, `-` and `_`"
 _MARK_HELP = 'write `{#eq:name check}`, or `{#eq:name given="its source"}`'
@@ -55,7 +55,7 @@ def _read_pairs(
         key, span = pair[1], braces.span(*pair.span(1))
         if key not in keys:
             suggestion = did_you_mean(key, keys) if len(keys) > 1 else ""
-            return diagnose(rule, span, f"`{key}` is no key here", help=suggestion or help)
+            return diagnose(rule, span, f"`{key}` is not a known key here", help=suggestion or help)
         if key in values:
             return diagnose(rule, span, f"`{key}` is given twice", help=help)
         group = pair.lastindex or 1
@@ -108,7 +108,7 @@ def read_label(braces: Excerpt, report: Report) -> Label | None:
     if match is None:
         message = "the label of this formula is never closed"
         if is_closed:
-            message = f"`{braces.text}` is no label of a formula"
+            message = f"`{braces.text}` is not a label of a formula"
         report(diagnose("equation-label", braces.span(), message, help=_LABEL_HELP))
         return None
     end = match.end()

@@ -181,12 +181,12 @@ def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diag
 
 
 def _check_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
-    """Check that each lesson stands in the level that its id begins with."""
+    """Check that each lesson is in the level that its id begins with."""
     for level in root.objects("level"):
         name = _read_id(level.get("id"))
         for node, fields in decoding.find_structs(LessonTable, level.objects("lesson")):
             if name and not fields.id.startswith(f"{name}."):
-                message = f"the lesson `{fields.id}` stands in the level `{shorten(name)}`"
+                message = f"the lesson `{fields.id}` is in the level `{shorten(name)}`"
                 help = f"an id in this level begins with `{shorten(name)}.`"
                 yield diagnose("field-value", node.place("id"), message, help=help)
 

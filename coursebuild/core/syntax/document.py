@@ -70,7 +70,7 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
         return Parsed(document, (conflict,))
     state.diagnostics += (*_check_placement(document), *_check_ids(document))
     if (at := source.text.find("\0")) >= 0:
-        message, help = "a NUL character stands here", "delete it; readers would see `\ufffd`"
+        message, help = "the text contains a NUL character", "delete it; readers would see `\ufffd`"
         state.report(diagnose("control-character", source.span(at, at + 1), message, help=help))
     return Parsed(document, sort_diagnostics(state.diagnostics))
 
@@ -102,7 +102,7 @@ def _check_placement(document: Document) -> tuple[Diagnostic, ...]:
     for block in document_blocks(document):
         is_elsewhere = id(block) in elsewhere
         if is_elsewhere or not isinstance(block, Paragraph):
-            message = "a term is not defined here"
+            message = "a term cannot be defined here"
             help = "define it in a paragraph of the text, whose sentence the glossary can show"
             inlines = walk_inlines(block_inlines(block))
             terms = (term.span for term in inlines if isinstance(term, Term))

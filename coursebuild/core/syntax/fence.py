@@ -131,7 +131,7 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     words = split_words(fence.info).value
     yield from (diagnostic for word in words if (diagnostic := check_foreign_key(kind.text, word)))
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
-        message = f"a block of kind `{kind.text}` is shown and never run, and this one has a `file`"
+        message = f"a block of kind `{kind.text}` is shown but never run, and this one has a `file`"
         help = "a script is a block of kind `python`"
         yield diagnose("script-kind", kind.span(), message, help=help)
     elif name in _FOREIGN or name.startswith("{"):

@@ -144,6 +144,6 @@ def check_heading(
     if previous is not None and level > previous + 1:
         message = f"a heading of level {level} follows one of level {previous}"
         if lesson and previous == 1:
-            message = f"a heading of level {level} stands before any of level 2"
+            message = f"a heading of level {level} comes before any of level 2"
         diagnostics.append(diagnose("heading-skip", span, message))
     return diagnostics

@@ -155,7 +155,7 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
         end = match.end()
         if spaced_word := _SPACED_OPTION.match(text, at):
             equals, end = spaced_word.start(spaced_word.lastindex or 0), spaced_word.end()
-            message = "no space may stand beside the `=` of a key"
+            message = "there is a space beside the `=` of a key"
             diagnostics.append(diagnose("fence-info", info.span(equals, equals + 1), message))
         elif end < len(text) and not text[end].isspace():
             diagnostic, end = _diagnose_malformed(info, at, end)

@@ -72,7 +72,7 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
             return None
         help = "link to an address with `https:`, to a file, or by "
         help += "`lesson:`, `page:`, `model:`, `term:`"
-        return diagnose("link-scheme", span, f"`{scheme}:` must not stand in a page", help=help)
+        return diagnose("link-scheme", span, f"`{scheme}:` is not allowed in a page", help=help)
     likely = nearest(scheme, _COURSE_SCHEMES, cutoff=0.75)
     if likely is None:
         return None

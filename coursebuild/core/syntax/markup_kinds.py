@@ -51,7 +51,7 @@ FOREIGN = {
         r"\{\{[-~<%#/!&]?\s*[A-Za-z_][^{}\n\0]*\}\}|\{%[^%\n\0]*%\}|<%[=-]?[^%\n\0]*%>"
         r"|\{(?:\+\+|--|~~|==|>>)[^{}\n\0]*\}",
         "lessons are not templates",
-        "write the text itself, or put it into backticks if readers are to see it",
+        "write the text itself, or put it into backticks if readers should see it",
     ),
     "callout": MarkupKind(
         r"^ {0,3}(?:(?:!!!|\?\?\?\+?)(?:[ \t]+|(?-i:(?=[a-z])))[\w-]+|:{3,}[ \t]*\{?[.#]?[\w-]+\}?)"
@@ -128,7 +128,7 @@ FOREIGN = {
     "magic": MarkupKind(
         r"^(?:%%[a-z]\w*|%(?:config|conda|load_ext|matplotlib|pip|run|timeit|time)\b)",
         "commands of Jupyter are not read",
-        "leave it out, or put it into backticks if readers are to see it",
+        "leave it out, or put it into backticks if readers should see it",
     ),
     "emoji": MarkupKind(
         r"(?<![\w:])(?-i::[a-z][a-z0-9]+(?:_[a-z0-9]+)*:)(?![\w:\0])",

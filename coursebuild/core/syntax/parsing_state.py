@@ -83,8 +83,8 @@ class FootnoteList(Struct):
         """Add a footnote, or report that its label is in use."""
         first = self.by_label.setdefault(note.label.casefold(), note)
         if first is not note:
-            message = f"footnote `[^{note.label}]` is written twice"
-            notes = [Note("first written here", first.label_span)]
+            message = f"footnote `[^{note.label}]` is defined twice"
+            notes = [Note("first defined here", first.label_span)]
             self.report(diagnose("footnote-repeated", note.label_span, message, notes=notes))
 
     def refer(self, label: str, span: Span) -> FootnoteRef | None:
@@ -92,7 +92,7 @@ class FootnoteList(Struct):
         note = self.by_label.get(label.casefold())
         if note is None:
             labels = [f"[^{note.label}]" for note in islice(self.by_label.values(), 100)]
-            message = f"footnote `[^{label}]` is not written anywhere"
+            message = f"footnote `[^{label}]` is not defined anywhere"
             help = did_you_mean(f"[^{label}]", labels)
             help = help or f"write it as a paragraph that begins with `[^{label}]:`"
             self.report(diagnose("footnote-undefined", span, message, help=help))

@@ -69,7 +69,7 @@ def check_near_caption(inlines: tuple[Inline, ...], span: Span, kind: str) -> li
     is_near = kind == "text" and _NEAR_CAPTION.fullmatch(text)
     if kind not in _OUTPUT_KINDS or not (is_near or _OUTPUT_SENTENCE.fullmatch(text)):
         return []
-    message = "this looks like the caption of a recorded output, and nothing is compared"
+    message = "this looks like the caption of a recorded output, but nothing is compared"
     help = "a caption begins with the word `Output` and ends with a colon: `Output:`"
     return [diagnose("recording-caption", span, message, help=help)]
 
@@ -145,7 +145,7 @@ def diagnose_wrong_body(span: Span, subject: str) -> Diagnostic:
 def _find_script(caption_span: Span, state: ParsingState) -> str | None:
     """The path of the script above a recording; reports if there is none."""
     if state.script is None and not state.has_invalid_script:
-        message = "no script stands above this recorded output"
+        message = "there is no script above this recorded output"
         help = "it records what the nearest ```` ```python file=examples/….py ```` above it prints"
         state.report(diagnose("recording-orphan", caption_span, message, help=help))
     return state.script
@@ -175,7 +175,7 @@ def check_stray_keys(fence: Fence, state: ParsingState) -> None:
     words = keys.value.words
     if words:
         span = words[0].span.to(words[-1].span)
-        message = "this block is no recorded output, so it is not compared with anything"
+        message = "this block is not a recorded output, so it is not compared with anything"
         help = "put a paragraph that begins with `Output` and ends with a colon directly above it"
         state.report(diagnose("recording-keys", span, message, help=help))
 

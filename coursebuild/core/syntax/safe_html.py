@@ -96,13 +96,13 @@ def _check_html(html: str) -> Iterator[tuple[int, int, str]]:
 def _check_tag(html: str, tag: re.Match[str]) -> Iterator[tuple[int, int, str]]:
     element = tag[1].lower()
     if element not in _ELEMENTS:
-        yield *tag.span(), f"`<{tag[1]}>` must not stand in a page"
+        yield *tag.span(), f"`<{tag[1]}>` is not allowed in a page"
         return
     for attribute in _ATTRIBUTES.finditer(html, *tag.span(2)):
         value = unescape((attribute[2] or "").strip("\"'"))
         subject = _find_forbidden_part(element, attribute[1].lower(), value)
         if subject:
-            yield attribute.start(1), attribute.end(), f"{subject} must not stand in a page"
+            yield attribute.start(1), attribute.end(), f"{subject} is not allowed in a page"
 
 
 def _find_forbidden_part(element: str, name: str, value: str) -> str:

@@ -169,7 +169,7 @@ def _check_times(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]
         return
     for name, length in (("duration", duration), ("hold", table.hold)):
         if length is not None and not is_multiple(length, sample):
-            message = f"`{name}` ({length:g} s) is no multiple of `sample` ({sample:g} s)"
+            message = f"`{name}` ({length:g} s) is not a multiple of `sample` ({sample:g} s)"
             help = "the state is looked at in even steps, and a command changes at such a look"
             yield diagnose("field-value", node.place(name), message, help=help)
     if duration is not None and duration / sample > MOST_SAMPLES * (1 + _TOLERANCE):

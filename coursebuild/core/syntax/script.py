@@ -151,7 +151,7 @@ def _read_figures(word: Word | None, diagnostics: list[Diagnostic]) -> Iterator[
         if _FIGURE.fullmatch(name.text):
             yield FigureName(name.text, name.span())
         else:
-            message = f"`{name.text}` is no name of a figure"
+            message = f"`{name.text}` is not a name for a figure"
             help = "it is a file name that ends in `.svg` or `.png`, as in `figure=flip.svg`, or "
             help += "in `.csv` for the data of the figure with this name"
             diagnostics.append(diagnose("fence-key-value", name.span(), message, help=help))
@@ -258,7 +258,7 @@ def _find_windows(code: Excerpt) -> Iterator[Diagnostic]:
         if _SHOWS.fullmatch(f"{names.get(first, first)}{dot}{rest}"):
             row = code.lines()[call.lineno - 1]
             at = max(row.text.find(name), 0)
-            message = f"`{name}` opens a window, and the page has no figure"
+            message = f"`{name}` opens a window, so the page has no figure"
             help = (
                 'save it, `plt.savefig("x.svg")`, say `figure=x.svg` on the fence, and write '
                 "`Figure: what it shows` below"

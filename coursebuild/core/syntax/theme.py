@@ -96,9 +96,7 @@ def check_contrast(node: ObjectNode, theme: Theme) -> Iterator[Diagnostic]:
             scheme = "light" if grounds is GROUNDS_LIGHT else "dark"
             message = f"on {scheme} pages `{colour}` has a contrast of {ratio:.2f} : 1"
             nearest = legible(colour, grounds)
-            help = (
-                f"text needs {REQUIRED_CONTRAST} : 1; the nearest colour that has it is `{nearest}`"
-            )
+            help = f"text needs {REQUIRED_CONTRAST} : 1; `{nearest}` is the nearest that reaches it"
             yield diagnose("theme-contrast", node.place(name), message, help=help)
 
 

@@ -55,7 +55,9 @@ def _describe_mistake(text: str, message: str) -> _Mistake:
     char, words = text[at : at + 1], _PLACE.sub("", message)
     if odd := "a lone carriage return" if char == "\r" else odd_character(char):
         help = "remove it" if at == 0 else "replace it by a plain space, or remove it"
-        return at, at + 1, f"{odd} cannot stand here in TOML", help
+        if at == 0 and char == "\ufeff":
+            help = "save the file as UTF-8 without a byte order mark"
+        return at, at + 1, f"{odd} is not allowed here in TOML", help
     opening = _innermost_opening(text, at)
     bracket = text[opening] if opening is not None else ""
     if opening is not None and bracket in "\"'":
@@ -111,7 +113,7 @@ def _wrong_value(text: str, start: int) -> _Mistake:
     value = scalar[0].rstrip() if scalar else ""
     if not value:
         return start, start, "a value is missing", 'an empty text is written `""`'
-    message = f"`{shorten(value)}` is not a value of TOML"
+    message = f"`{shorten(value)}` is not a valid TOML value"
     return start, start + len(value), message, _value_help(value)
 
 
@@ -126,7 +128,7 @@ def _value_help(text: str) -> str:
         return "a number has no leading zeros, and digits on both sides of its point"
     if '"' in text or "'" in text:
         return ""
-    return f'text stands between quotes: `"{shorten(text)}"`'
+    return f'text needs quotes: `"{shorten(text)}"`'
 
 
 def _wrong_end_of_value(text: str, at: int, closer: str) -> _Mistake:

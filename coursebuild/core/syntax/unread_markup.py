@@ -104,8 +104,9 @@ def _check_dollars(
     else:
         return
     help = (
-        "in `$x$` no blank stands inside the dollar signs, no digit follows the last one, and no "
-        "line of a formula begins as a list item does (`+ `, `- `); write `\\$` for a dollar sign"
+        "write `$x$` without blanks inside the dollar signs and without a digit after the last "
+        "one; no line of a formula begins as a list item does (`+ `, `- `); write `\\$` for a "
+        "dollar sign"
     )
     message = "this dollar sign would be shown as written: no formula begins or ends here"
     yield diagnose("math-unread", content.span(at, at + 1), message, help=help)
@@ -129,7 +130,7 @@ def _diagnose(
         case "binding" if before.endswith("`") and markup.startswith("{"):
             return _diagnose_braces(markup, span, "`")
         case "binding" if markup == "}":
-            help = "delete it, or write `\\}` for a brace that readers are to see"
+            help = "delete it, or write `\\}` for a brace that readers should see"
         case "binding":
             number, _, braces = markup.replace("`", "").rpartition("{")
             if re.match("[-+\u2212\\d]", number) and braces.endswith("}"):
@@ -151,9 +152,9 @@ def _diagnose(
         case "character" if span.text == "\0":
             return None  # it is reported wherever it stands
         case "character":
-            message = f"the control character U+{ord(markup):04X} stands in the text"
+            message = f"the text contains the control character U+{ord(markup):04X}"
             if markup == "\ufffd":
-                message = "a character was lost here: U+FFFD stands in its place"
+                message = "a character was lost here: U+FFFD has taken its place"
             return diagnose(kind.rule, span, message, help=help)
         case "code":
             subject = "this backtick" if len(markup) == 1 else "these backticks"
@@ -174,7 +175,7 @@ def _is_escaped(text: str, end: int) -> bool:
 def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:
     """The diagnostic of braces directly after something that ends with the character `before`."""
     key = re.sub(r"[^\w].*", "", markup[1:].strip(), flags=re.DOTALL)
-    escaping = "; write `\\{` for braces that readers are to see"
+    escaping = "; write `\\{` for braces that readers should see"
     if before == "`":
         message = f"`{shorten(markup)}` does not say where the number is from"
         likely = nearest(key.lower(), ("out", "given"))

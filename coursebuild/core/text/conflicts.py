@@ -56,5 +56,5 @@ def find_conflict(source: Source) -> Diagnostic | None:
         notes.append(Note(f"conflicts further down in this file: {more_count}"))
     help = "keep one of the versions, or join them, and delete the marks"
     if is_markdown:
-        help += "; a conflict that readers are to see stands in a block of kind `diff`"
+        help += "; to show a conflict to readers, put it into a block of kind `diff`"
     return diagnose("merge-conflict", conflict[0], message, help=help, notes=notes)

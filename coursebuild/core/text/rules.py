@@ -52,14 +52,14 @@ _SUMMARIES = {
     "script-python": "The interpreter that the map names for scripts cannot run them.",
     "silence-rule": "An entry of `[[silence]]` names an unknown rule or an error, or gives no "
     "reason.",
-    "unproven-script": "An entry of `unproven` in the course map names no script, or one that "
+    "unproven-name": "An entry of `unproven` in the course map names no script, or one that "
     "always runs.",
     "no-lessons": "The course has no lesson to publish.",
-    "no-scripts": "No script can run here, so that nothing is verified.",
+    "no-scripts": "No script can run here, so nothing is verified.",
     # the theme
     "theme-file": "A file that the theme names is not there, or is not what it must be.",
     "theme-contrast": "The accent is too near to the colour of the page for text to be read in it.",
-    "template-unknown": "A file stands in the place of a template that there is not.",
+    "template-unknown": "The course has a template that coursebuild has not.",
     "template-broken": "A template of the course cannot be read, or fails.",
     "template-outdated": "The tool has changed the template that one of the course was copied "
     "from.",
@@ -80,7 +80,7 @@ _SUMMARIES = {
     "heading-attributes": "The attributes after a heading cannot be read.",
     "anchor-repeated": "Two things on a page have the same id.",
     "fence-unclosed": "A code fence is never closed, or not before another one begins.",
-    "fence-indented": "A fence is indented, so that its block is shown as text.",
+    "fence-indented": "A fence is indented, so its block is shown as text.",
     "fence-info": "The info string of a fence cannot be read.",
     "fence-key-unknown": "A fence has a key that its kind does not know.",
     "fence-key-repeated": "A fence has the same key twice.",
@@ -91,11 +91,10 @@ _SUMMARIES = {
     "feature-missing": "A fence needs a feature that is not installed.",
     "math-syntax": "A formula does not parse.",
     "math-unclosed": "Display math is never closed.",
-    "math-unread": "A dollar sign that was meant for a formula stands in a text.",
+    "math-unread": "A text has a dollar sign that was meant for a formula.",
     "markup-unread": "Markdown, or an attribute in braces, is not whole, so that readers would see "
     "it as it is written.",
-    "markup-foreign": "Markup of another tool stands in a text, which would show it as it is "
-    "written.",
+    "markup-foreign": "A text has markup of another tool, which would show it as it is written.",
     "control-character": "A text has a character that no reader can see.",
     "merge-conflict": "A file of the course holds both versions of a merge, with the marks between "
     "them.",
@@ -110,11 +109,11 @@ _SUMMARIES = {
     "symbol-repeated": "A text says twice what a symbol stands for.",
     "table-cells": "A row of a table has more cells than its header; what is in them would not be "
     "shown.",
-    "footnote-undefined": "A footnote is referred to and never written.",
-    "footnote-unused": "A footnote is written and never referred to.",
-    "footnote-repeated": "A footnote is written twice.",
+    "footnote-undefined": "A footnote is referred to but never defined.",
+    "footnote-unused": "A footnote is defined but never referred to.",
+    "footnote-repeated": "A footnote is defined twice.",
     "figure-unshown": "A script draws a figure that no paragraph below it shows.",
-    "figure-window": "A script shows a figure in a window, so that its page has none.",
+    "figure-window": "A script shows a figure in a window, so its page has none.",
     "figure-missing": "A script does not draw the figure that it names.",
     "figure-unreadable": "What a script drew cannot be shown.",
     "figure-drift": "A recorded figure differs from what its script draws now.",
@@ -150,9 +149,9 @@ _SUMMARIES = {
     "binding-attribute": "The attribute of a bound number cannot be read.",
     # scripts and recorded outputs
     "script-path": "The path of a script is not one that a script may have.",
-    "script-kind": "A block with a `file` is not of kind `python`, so that nothing runs it.",
+    "script-kind": "A block with a `file` is not of kind `python`, so nothing runs it.",
     "source-part": "A block does not show what the file that it names holds.",
-    "script-unproven": "A script was not run, so that nothing proves what the course shows of it.",
+    "script-unproven": "A script was not run, so nothing proves what the course shows of it.",
     "script-repeated": "Two blocks are extracted to the same path.",
     "python-syntax": "A Python block does not parse.",
     "recording-caption": "A `text` block looks like a recorded output, and is compared with "
@@ -171,15 +170,15 @@ _SUMMARIES = {
     "script-encoding": "A script printed bytes that are not UTF-8.",
     "script-unrepeatable": "A script behaves differently than before, although nothing known to "
     "matter has changed.",
-    "script-silent": "An output is recorded and the script printed nothing.",
+    "script-silent": "An output is recorded, but the script printed nothing.",
     "script-diverged": "A simulation of a script diverged, and the script does not say that it "
     "should.",
-    "script-stable": "A script says `diverges`, and none of its simulations did.",
+    "script-stable": "A script says `diverges`, but none of its simulations did.",
     "script-penetration": "Bodies of a script's simulation lie deep in each other, which MuJoCo "
     "does not warn of.",
     "script-writes": "A script writes outside its temporary folder.",
     "script-connects": "A script uses the network.",
-    "script-shallow": "A script says `deep`, and no bodies lay deep in each other.",
+    "script-shallow": "A script says `deep`, but no bodies lay deep in each other.",
     "recorded-run": "The course has no run of a script that is recorded once, or an outdated one.",
     "output-drift": "A recorded output differs from what the script prints.",
     "output-noise": "A recorded output has digits that change when initial states are moved by "
@@ -197,7 +196,7 @@ _SUMMARIES = {
     "shows it.",
     "bench-model": "A shown report names a model that is not in models/.",
     "bench-scenario": "A shown report names a scenario or a sweep that its model does not have.",
-    "bench-text": "Text stands in a fence that shows a report.",
+    "bench-text": "A fence that shows a report has text in it.",
     "bench-unrecorded": "A report is shown of a model for which nothing was recorded.",
     "mjcf-error": "An MJCF block does not compile.",
     "mjcf-compiles": "An MJCF block compiles although it must not.",
@@ -213,11 +212,11 @@ _SUMMARIES = {
     "lab-warning": "MuJoCo raised a warning while a lab was tried.",
     "lab-diverged": "The simulation of a lab diverges.",
     "lab-penetration": "Bodies of a lab lie deep in each other, which MuJoCo does not warn of.",
-    "lab-shallow": "A lab says `deep`, and no bodies lay deep in each other.",
+    "lab-shallow": "A lab says `deep`, but no bodies lay deep in each other.",
     "lab-expect": "A claim of a lab does not hold.",
     "lab-goal": "A lab's goal is reached by doing nothing, or not by its log.",
     "lab-parity": "A lab runs differently in the browser's engine and natively.",
-    "lab-far": "What moves is small in the picture of a lab.",
+    "lab-far": "Motion is small in the picture of a lab.",
     "lab-reset": "A reset does not lead a lab back to where it started.",
     "lab-shared": "A lab changes what all labs of a page share: objects of JavaScript or of the "
     "engine.",

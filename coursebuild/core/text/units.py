@@ -36,9 +36,17 @@ COMMON = tuple(
 )
 """Units that are valid without asking Pint; others are proposed from among these."""
 _NAMES = {
-    **{"meter": "m", "metre": "m", "second": "s", "gram": "g", "kilogram": "kg", "newton": "N"},
+    **{"meter": "m", "metre": "m", "second": "s", "sec": "s", "gram": "g", "kilogram": "kg"},
     **{"joule": "J", "watt": "W", "pascal": "Pa", "radian": "rad", "degree": "°", "hertz": "Hz"},
-    **{"minute": "min", "hour": "h", "kelvin": "K", "volt": "V", "ampere": "A", "percent": "%"},
+    **{
+        "newton": "N",
+        "minute": "min",
+        "hour": "h",
+        "kelvin": "K",
+        "volt": "V",
+        "ampere": "A",
+        "percent": "%",
+    },
 }
 _PRODUCT_UNITS = ("kg", "N", "J", "W", "A", "V", "K", "m", "s")
 """Units that are often written without the space between them."""
@@ -138,7 +146,7 @@ def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
         if word in COMMON or (word != "rads" and _registry().parse_unit_name(word)):
             continue  # Pint takes `rads` for a dose of radiation
         likely = _suggest_unit(word)
-        help = "leave it out, and say in words what is counted"
+        help = "leave it out, and name in words what is counted"
         help = f"did you mean `{likely}`?" if likely else help
         message = f"there is no unit `{word}`"
         yield diagnose("unit-unknown", unit.span(*match.span()), message, help=help)
@@ -153,5 +161,5 @@ def _suggest_unit(word: str) -> str:
         second = word.removeprefix(first)
         if second != word and second in _PRODUCT_UNITS:
             return f"{first} {second}"
-    likely = nearest(word, (*COMMON, *_NAMES), cutoff=0.7) or ""
+    likely = nearest(word, (*COMMON, *_NAMES), cutoff=0.6) or ""
     return _NAMES.get(likely, likely)

@@ -127,7 +127,7 @@ def _find_mistake(left: Expression, right: Expression, relation: str) -> Formula
     if _agrees(numeral, value, relation):
         return None
     digits = max(numeral.digits + 2, 4)
-    message = f"{_format_number(value / numeral.unit_size, digits)} comes out, and not this"
+    message = f"{_format_number(value / numeral.unit_size, digits)} is the result, not this"
     is_rounded = numeral.is_whole and relation == "=" and _agrees(numeral, value, "≈")
     help = "write `\\approx` where a whole number is rounded" if is_rounded else ""
     return FormulaComparison("wrong", side.start, side.end, message, help)

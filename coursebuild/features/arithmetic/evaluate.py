@@ -92,7 +92,7 @@ class _Evaluator:
         except ZeroDivisionError:
             raise expression.not_understood("it divides by zero") from None
         except (ValueError, TypeError):
-            raise expression.not_understood("it is no real number") from None
+            raise expression.not_understood("it is not a real number") from None
 
     def _evaluate(self, expression: Expression) -> PhysicalQuantity:
         match expression.kind:
@@ -147,7 +147,7 @@ class _Evaluator:
             return PhysicalQuantity(self.arithmetic.library.pi / 180)
         unit = find_unit(expression.text)
         if unit is None:
-            raise expression.not_understood(f"`{expression.text}` is no unit that is known")
+            raise expression.not_understood(f"`{expression.text}` is not a known unit")
         return PhysicalQuantity(self.arithmetic.number(str(unit.size)), unit.dimension)
 
     def _evaluate_sum(self, expression: Expression) -> PhysicalQuantity:
@@ -167,7 +167,7 @@ class _Evaluator:
     def _evaluate_power(self, expression: Expression) -> PhysicalQuantity:
         base, exponent = map(self.evaluate, expression.parts)
         if exponent.dimension:
-            reason = f"an exponent is {describe_dimension(exponent.dimension)}, and no number"
+            reason = f"an exponent is {describe_dimension(exponent.dimension)}, not a number"
             raise WrongDimensions(reason, expression.parts[1].start, expression.parts[1].end)
         dimension: Dimension = ()
         if base.dimension:
@@ -178,7 +178,7 @@ class _Evaluator:
     def _evaluate_calculus(self, expression: Expression) -> PhysicalQuantity:
         body, variable, *ends = expression.parts
         if self.arithmetic.calculus is None or (expression.kind == "integral" and not ends):
-            raise expression.not_understood("it is no number")
+            raise expression.not_understood("it is not a number")
         point = self._evaluate_symbol(variable)
         dimension: list[Dimension] = []
 

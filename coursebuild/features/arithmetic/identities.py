@@ -33,14 +33,14 @@ def check_identity(tex: str, symbols: Mapping[str, Dimension]) -> Iterator[Formu
     """Yield the comparisons of a formula's sides that fail or are not understood."""
     statements = read_statements(tex)
     if not any(statement.relations for statement in statements):
-        yield FormulaComparison("unread", 0, len(tex), "it is no equation")
+        yield FormulaComparison("unread", 0, len(tex), "it is not an equation")
     for statement in statements:
         for (left, right), relation in zip(
             pairwise(statement.sides), statement.relations, strict=True
         ):
             try:
                 if relation != "=":
-                    raise NotUnderstood("it is no equation", left.start, right.end)
+                    raise NotUnderstood("it is not an equation", left.start, right.end)
                 yield from _compare(left.get_expression(), right.get_expression(), symbols)
             except NotUnderstood as error:
                 yield FormulaComparison(error.kind, error.start, error.end, error.reason)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import count
 
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.model import Course, Lesson
@@ -37,6 +38,13 @@ def with_lesson(course: Course, id: str, slug: str, title: str) -> str:
     rows = (f"{name} = {toml_string(value)}" for name, value in fields.items())
     lines = ["[[level.lesson]]", *rows]
     return _require_valid(course, _insert(course, id, lines), id)
+
+
+def next_id(course: Course) -> str:
+    """The first free id in the last level of a course."""
+    level = course.levels[-1].id if course.levels else "1"
+    ids = {lesson.id for lesson in course.lessons}
+    return next(id for number in count(1) if (id := f"{level}.{number}") not in ids)
 
 
 def with_lesson_renamed(course: Course, old: Lesson, new: str, edits: Sequence[Edit]) -> str:
@@ -103,7 +111,7 @@ def with_feature(course: Course, path: str) -> str:
 def _check_free(course: Course, id: str) -> None:
     levels = [level.id for level in course.levels]
     if _level_id(id) not in levels:
-        help = did_you_mean("", levels)
+        help = f"add it as a [[level]]; {did_you_mean('', levels)}".rstrip("; ")
         raise UsageError(f"the map has no level for `{id}`", help=help)
     for lesson in course.lessons:
         if lesson.id.casefold() == id.casefold():

@@ -52,7 +52,7 @@ def _check(bench: Bench, course: Course) -> Iterator[Diagnostic]:
     if scenarios:
         yield from _check_scenario(bench, scenarios)
     if BENCH.path(bench.model) not in course.files:
-        message = f"nothing was recorded of the model `{bench.model}`, so the page says so"
+        message = f"nothing was recorded of the model `{bench.model}`, and the page says so"
         help = f"measure it with `{BENCH.command(bench.model)}`"
         yield diagnose("bench-unrecorded", bench.model_span, message, help=help)
 

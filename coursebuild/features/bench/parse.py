@@ -31,7 +31,7 @@ def parse_bench(fence: Fence, _: TextParser) -> Parsed[Bench | None]:
     shows = _DEFAULT if show is None else _parse_parts(show, diagnostics)
     body = trim(fence.body, " \t\n")
     if body.text:
-        message = "a bench shows what was recorded, and has no text of its own"
+        message = "a `bench` block shows a recorded report and takes no text"
         help = "write the text before or after it"
         diagnostics.append(diagnose("bench-text", body.span().first_line(), message, help=help))
     if keys.name is None or diagnostics:

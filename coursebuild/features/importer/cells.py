@@ -61,7 +61,7 @@ def runnable_code(cell: Segment, context: LessonContext) -> str:
     options = {quarto or myst: value.strip() for quarto, myst, value in _OPTION.findall(cell.text)}
     text = _OPTION.sub("", cell.text)
     if "raises-exception" in cell.head + options.get("tags", ""):
-        context.add_leftover("a cell that is to fail is shown and not run")
+        context.add_leftover("a cell that is meant to fail is shown, not run")
         return ""
     if options.get("eval") == "false":
         return ""

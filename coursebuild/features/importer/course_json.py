@@ -88,7 +88,7 @@ class _Reader:
     def fields(self, value: Any, names: tuple[str, ...]) -> dict[str, Any]:
         """Return the fields of an object, by their names here; of these, `names` are expected."""
         if not isinstance(value, dict):
-            raise UsageError("course.json: a level or a lesson is no object")
+            raise UsageError("course.json: a level or a lesson is not an object")
         self.unknown.update(key for key in value if _field_name(key) not in names)
         return {_field_name(key): item for key, item in value.items()}
 

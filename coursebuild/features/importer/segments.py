@@ -134,12 +134,12 @@ def _read_notebook(text: str, name: str) -> tuple[list[Segment], dict[str, bytes
     """Return its cells as segments, and the pictures that are attached to them, by name.
 
     Raises:
-        UsageError: it is no notebook of format 4.
+        UsageError: it is not a notebook of format 4.
     """
     try:
         return _read_cells(json.loads(text)["cells"])
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        raise UsageError(f"{name} is no notebook of format 4") from None
+        raise UsageError(f"{name} is not a notebook of format 4") from None
 
 
 def _read_cells(cells: list[dict[str, Any]]) -> tuple[list[Segment], dict[str, bytes]]:

@@ -96,7 +96,7 @@ def _check_order(parts: Mapping[str, _Part]) -> Iterator[Diagnostic]:
     expected = [label for label in LABELS if label in parts]
     swaps = [(label, first) for label, first in zip(parts, expected, strict=True) if label != first]
     for label, first in swaps[:1]:
-        message = f"`{label}:` stands before `{first}:`"
+        message = f"`{label}:` comes before `{first}:`"
         help = "the order is `INPUT:`, `PROCESS:`, `OUTPUT:`"
         yield diagnose("io-order", parts[label].span, message, help=help)
 

@@ -28,7 +28,10 @@ def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagno
     models = {model.name for model in course.models}
     for lab in (lab for document in documents for lab in find_blocks(document, Lab)):
         if lab.kind not in kinds:
-            message, help = f"no kind of lab is called `{lab.kind}`", did_you_mean(lab.kind, kinds)
+            message, help = (
+                f"`{lab.kind}` is not a known kind of lab",
+                did_you_mean(lab.kind, kinds),
+            )
             yield diagnose("lab-kind", lab.kind_span, message, help=help)
         for name in lab.models():
             if name not in models:

@@ -69,14 +69,14 @@ def parse_expression(code: str) -> Node:
     """Parse a piece of code that is one expression.
 
     Raises:
-        UntranslatableError: the code cannot be parsed, or is no single expression.
+        UntranslatableError: the code cannot be parsed, or is not a single expression.
     """
     body = parse_statements(f"({code}\n)")
     if len(body) == 1 and body[0].type == "expression_statement":
         (whole,) = children(body[0])
         if whole.type == "parenthesized_expression":
             return _without_parentheses(whole)
-    raise UntranslatableError("code that is no single expression")
+    raise UntranslatableError("code that is not a single expression")
 
 
 def children(node: Node) -> list[Node]:

@@ -166,7 +166,7 @@ def _check_button(label: StringNode, controls: Controls) -> Iterator[Diagnostic]
     if label.value in buttons:
         return
     if label.value in controls:
-        message = f"`{label.value}` is no button"
+        message = f"`{label.value}` is not a button"
         help = f'give the value that it is set to: `{{"{label.value}": …}}`'
     else:
         message = f"the lab has no button `{label.value}`"

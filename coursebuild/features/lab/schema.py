@@ -179,9 +179,9 @@ class Expect(Struct, frozen=True, forbid_unknown_fields=True):
 
     t: Annotated[NotNegative, Meta(description="simulated time in seconds")]
     expr: Annotated[Text | None, Meta(description="an expression that gives a number")] = None
-    diverges: Annotated[
-        bool, Meta(description="the simulation is to diverge, no later than at `t`")
-    ] = False
+    diverges: Annotated[bool, Meta(description="the simulation diverges, no later than at `t`")] = (
+        False
+    )
     after: Annotated[
         Step | Annotated[tuple[Step, ...], Meta(min_length=1)] | None,
         Meta(
@@ -235,7 +235,9 @@ class Verify(Struct, frozen=True, forbid_unknown_fields=True):
     rtol: Annotated[
         NotNegative | None, Meta(description="relative difference allowed to the native engine")
     ] = None
-    deep: Annotated[bool, Meta(description="bodies are to lie deep in each other")] = False
+    deep: Annotated[
+        bool, Meta(description="whether bodies are meant to lie deep in each other")
+    ] = False
 
 
 class CommonLab(Struct, frozen=True):

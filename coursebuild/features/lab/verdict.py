@@ -20,20 +20,20 @@ from coursebuild.features.lab.schema import Button
 
 _EXPLANATIONS = {
     "throws": ("lab-throws", "{name} throws{time}: {message}", ""),
-    "nan": ("lab-value", "{name} {message}{time}", "where there is to be no value, give `null`"),
+    "nan": ("lab-value", "{name} {message}{time}", "return `null` where there is no value"),
     "type": ("lab-value", "{name} {message}", ""),
     "warning": ("lab-warning", "MuJoCo warns{time}: {message}", ""),
     "diverged": (
         "lab-diverged",
         "the simulation diverges{time}: {message}",
-        "try a smaller timestep, another integrator, or a narrower range; if it is to diverge, "
+        "try a smaller timestep, another integrator, or a narrower range; if that is intended, "
         "claim so: {diverges}",
     ),
     "deep": (
         "lab-penetration",
         "bodies lie deep in each other{time}: {message}",
         "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts (`solref`), or a "
-        "narrower range; if they are to lie so, say so: {deep}",
+        "narrower range; if that is intended, say so: {deep}",
     ),
     "expect": ("lab-expect", "the claim does not hold: {message}", ""),
     "stopAt": ("lab-expect", "{message}", ""),
@@ -92,7 +92,7 @@ def code_diagnostic(lab: Lab, piece: LabCode, message: str) -> Diagnostic:
     return diagnose("lab-code", lab.place(piece.entry), message, help=help)
 
 
-_PYTHON = re.compile(r"\b(and|or|not)\b| if .* else ")
+_PYTHON = re.compile(r"\b(and|or|not|import|def|print)\b| if .* else |:\s*$", re.MULTILINE)
 _OF_MATH = re.compile(
     r"ReferenceError: (abs|sqrt|exp|log|a?(?:sin|cos|tan)|atan2|floor|ceil|round|min|max|pow|pi)\b"
 )
@@ -164,7 +164,7 @@ def _check_depth(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 def _check_depth_claim(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report a lab that says `deep` without need."""
     if lab.verify.deep and not any(failure.kind == "deep" for failure in trial.failures):
-        message = "the lab says `deep`, and no bodies lay deep in each other"
+        message = "the lab says `deep`, but no bodies lay deep in each other"
         span = lab.place(("verify", "deep"))
         yield diagnose("lab-shallow", span, message, help="take `deep` away")
 
@@ -176,7 +176,7 @@ def _check_framing(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
         return
     if fill < _SMALL and fill < most / 2:
         message = (
-            f"what moves fills {100 * fill:.2g} % of the picture, and could fill {100 * most:.2g} %"
+            f"motion fills {100 * fill:.2g} % of the picture and could fill {100 * most:.2g} %"
         )
         help = "without `distance` and `target` the camera fits the motion"
         yield diagnose("lab-far", lab.place(("camera",)), message, help=help)
@@ -232,7 +232,7 @@ def _check_reset(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     if difference is None:
         return
     entry = difference["entry"]
-    message = f"a reset does not lead back to the start: `{difference['what']}` differs"
+    message = f"a reset does not return to the start: `{difference['what']}` differs"
     match entry:
         case ("controls", int(i), *_) if not getattr(lab.fields.controls[i], "init", False):
             help = f'{_entry_name(lab, entry)} is not applied again; give it `"init": true`'

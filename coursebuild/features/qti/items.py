@@ -66,7 +66,7 @@ def quiz_items(page: PageContext, quiz: Quiz, course: Course) -> QuizItems:
         writer = _Writer(page, quiz, number, course)
         item = writer.item(question)
         for loss in writer.flow.losses:
-            message = f"this question is not whole in the QTI package: {loss}"
+            message = f"the QTI package cannot hold all of this question: {loss}"
             losses.append(diagnose("package-reduced", question.span, message))
         items += [item] if item is not None else []
     name = identifier("quiz.", quiz.id, most=_NAME)

@@ -138,7 +138,9 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
             yield from _check_choices(node, fields)
         case Numeric() as fields:
             if fields.answer == 0 and fields.tol is None:
-                message = "`tol` is missing: of an answer that is 0 it cannot be a share"
+                message = (
+                    "`tol` is missing: the usual tolerance is a share of the answer, which is 0"
+                )
                 yield diagnose("field-missing", node.place("answer"), message)
             if isinstance(unit := node.get("unit"), StringNode):
                 yield from check_unit(unit.excerpt)

@@ -69,7 +69,7 @@ def _check_declaration(
 ) -> Iterator[Diagnostic]:
     """Report a declaration of no symbol, or of one declared before."""
     if symbol is None:
-        message = f"`${formula.tex.text}$` is not a single symbol, and is said to mean something"
+        message = f"`${formula.tex.text}$` is declared as a symbol, but is not a single one"
         help = "declare one letter with its accents and indices"
         yield diagnose("symbol-formula", formula.tex.span(), message, help=help)
         return

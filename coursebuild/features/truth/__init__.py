@@ -46,7 +46,7 @@ def _check_share(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnost
     claims = sum_claims(claims for _, claims in course_claims(course, runs))
     if claims.proven < course.truth * claims.all:
         required = f"{100 * course.truth:g} %"
-        message = f"{claims.share} of the numbers are proven, and {required} are asked for"
+        message = f"{claims.share} of the numbers are proven; the course requires {required}"
         help = f"`coursebuild check --truth` lists the other {len(claims.open)}"
         yield diagnose("truth-share", course.truth_span, message, help=help)
 

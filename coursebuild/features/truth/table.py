@@ -49,7 +49,7 @@ def parse_truth(fence: Fence, texts: TextParser) -> Parsed[TruthTable]:
     if fence.body.text.strip():
         help = "leave it empty: the table is made from the course"
         place = fence.body.span()
-        diagnostics.append(diagnose("truth-text", place, "nothing reads this", help=help))
+        diagnostics.append(diagnose("truth-text", place, "this text is not used", help=help))
     return Parsed(TruthTable(fence.span), tuple(diagnostics))
 
 

@@ -220,7 +220,7 @@ def _impact_problem() -> Problem:
             for steps in (5, 10, 20, 40, 80)
         ),
         smooth=False,
-        note="an impact begins within a step: no order is to be expected",
+        note="an impact begins within a step: no order can be expected",
     )
 
 

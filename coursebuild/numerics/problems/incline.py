@@ -158,7 +158,7 @@ def _sliding_problem(cone: Cone, is_diagonal: bool) -> Problem:
         text,
         Reference("closed", "Coulomb's law, a = g (sin α − μ cos α)", slide),
         tuple(checks),
-        "the error is the model's: soft contacts, and the cone; no order is to be expected",
+        "the error is the model's: soft contacts, and the cone; no order can be expected",
     )
 
 

@@ -147,7 +147,7 @@ def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -
         raise ModelTextError(f"there is no file {path}")
     main = parse_markup(path, data)
     if main.root.tag != "mujoco":
-        raise ModelTextError(f"its root is <{main.root.tag}>: it is no model of its own")
+        raise ModelTextError(f"its root is <{main.root.tag}>: it is not a whole model")
     _splice_includes(main, posixpath.dirname(path), read, 0)
     return ModelText(main, compile, check=check)
 

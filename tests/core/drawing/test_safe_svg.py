@@ -21,24 +21,24 @@ UNHARMED = frozenset(("image of SVG as PNG", "100,000 namespaces", "CSS of 300,0
 """Files that may be shown: nothing comes of what they try."""
 
 WORDINGS = {
-    "<script/>": "holds `<script>` in line 2",
-    '\n<x:script x:a=""/>': "holds `<script>` of the namespace `urn:x` in line 3",
-    '<g x:href=""/>': "holds `href` of the namespace `urn:x` of `<g>` in line 2",
-    '<g onload="f()"/>': "holds `onload` of `<g>` in line 2",
-    '<a href="java&#10;script:f()"/>': "holds the link `java script:f()` of `<a>` in line 2",
-    '<g style="fill: red; src: x; behaviour: x"/>': "holds the property `behaviour` of `<g>` in "
+    "<script/>": "contains `<script>` on line 2",
+    '\n<x:script x:a=""/>': "contains `<script>` of the namespace `urn:x` on line 3",
+    '<g x:href=""/>': "contains `href` of the namespace `urn:x` of `<g>` on line 2",
+    '<g onload="f()"/>': "contains `onload` of `<g>` on line 2",
+    '<a href="java&#10;script:f()"/>': "contains the link `java script:f()` of `<a>` on line 2",
+    '<g style="fill: red; src: x; behaviour: x"/>': "contains the property `behaviour` of `<g>` in "
     "line 2",
-    '<g style="fill: u\\72l(//x)"/>': "holds a `url()` that leads elsewhere of `<g>` in line 2",
-    '<g mask="im\\61ge-set(x)"/>': "holds `image-set()` of `<g>` in line 2",
-    '<g fill="a:b"/>': "holds `fill:a:` of `<g>` in line 2",
-    '<g style="}"/>': "holds an unpaired `}` of `<g>` in line 2",
-    '<g style="fill: `x`"/>': "holds ``x`` of `<g>` in line 2",
-    "<style>@import 'x'</style>": "holds `@import` of a style sheet in line 2",
-    "<style>a{b{}}</style>": "holds the property `b` of a style sheet in line 2",
-    "<?x?>": "holds `<?x?>` in line 2",
-    "<g>" * 100: "holds more than 100 elements inside each other in line 2",
+    '<g style="fill: u\\72l(//x)"/>': "contains a `url()` that leads elsewhere of `<g>` on line 2",
+    '<g mask="im\\61ge-set(x)"/>': "contains `image-set()` of `<g>` on line 2",
+    '<g fill="a:b"/>': "contains `fill:a:` of `<g>` on line 2",
+    '<g style="}"/>': "contains an unpaired `}` of `<g>` on line 2",
+    '<g style="fill: `x`"/>': "contains ``x`` of `<g>` on line 2",
+    "<style>@import 'x'</style>": "contains `@import` of a style sheet on line 2",
+    "<style>a{b{}}</style>": "contains the property `b` of a style sheet on line 2",
+    "<?x?>": "contains `<?x?>` on line 2",
+    "<g>" * 100: "contains more than 100 elements inside each other on line 2",
     '<g id="a"><use href="#a"/></g>': "repeats more than 100 elements inside each other",
-    "&x;": "is no SVG: undefined entity: line 2, column 0",
+    "&x;": "is not an SVG file: undefined entity: line 2, column 0",
 }
 
 
@@ -48,11 +48,11 @@ def test_each_reason_has_its_words() -> None:
 
 
 WHOLE = {
-    b"": "is no SVG: no element found: line 1, column 0",
-    b"<p/>": "is no SVG: its root is another element",
-    b"\xff\xfe<\0": "is no SVG in UTF-8",
-    b"<?xml version='1.0' encoding='utf-7'?><svg/>": "is no SVG in UTF-8, but in `utf-7`",
-    b"<!DOCTYPE svg [<!ENTITY a 'a'>]>": "holds a document type of its own in line 1",
+    b"": "is not an SVG file: no element found: line 1, column 0",
+    b"<p/>": "is not an SVG file: its root is another element",
+    b"\xff\xfe<\0": "is not an SVG file in UTF-8",
+    b"<?xml version='1.0' encoding='utf-7'?><svg/>": "is not in UTF-8, but in `utf-7`",
+    b"<!DOCTYPE svg [<!ENTITY a 'a'>]>": "contains a document type of its own on line 1",
     b"x" * (5 << 20): "is larger than 4 MiB",
 }
 
@@ -66,7 +66,7 @@ def test_hostile_files_are_refused_in_words() -> None:
     assert {name for name, reading in readings.items() if not isinstance(reading, str)} == UNHARMED
     wordings = [reading for reading in readings.values() if isinstance(reading, str)]
     assert [
-        wording for wording in wordings if not re.match("holds|is|draws|repeats", wording)
+        wording for wording in wordings if not re.match("contains|is|draws|repeats", wording)
     ] == []
     assert max(map(len, wordings)) < 200
 

@@ -115,7 +115,7 @@ def test_paths_that_no_site_has_or_that_are_in_each_others_way(root: Path) -> No
     publish(root, root / "public", site("one"))
     bad = ("", "/a", "../a", "a/../b", "a//b", "./a", "a/", "a\\b", "a\nb", "a\0b", MARKER)
     for path in bad:
-        with pytest.raises(ValueError, match="is no path that a site may have"):
+        with pytest.raises(ValueError, match="is not a path that a site may have"):
             publish(root, root / "public", [OutputFile("a.html", b""), OutputFile(path, b"")])
     for paths in (("a", "a"), ("a", "a/b"), ("a/b", "a")):
         with pytest.raises((ValueError, EffectError)):

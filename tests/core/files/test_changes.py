@@ -74,10 +74,10 @@ def test_all_are_changed(root: Path) -> None:
         (FileChange("../d.md", None, b"x"), "../d.md leads out of the project"),
         (FileChange("../d.md", b"x", None), "../d.md leads out of the project"),
         (FileChange("/etc/d.md", b"x", None), "/etc/d.md leads out of the project"),
-        (FileChange(".git/x", None, b"x"), ".git/x is no file that a command may change"),
-        (FileChange("x/.git/x", None, b"x"), "x/.git/x is no file that a command may change"),
-        (FileChange(".venv/x", None, b"x"), ".venv/x is no file that a command may change"),
-        (FileChange(".hidden", b"x", b"y"), ".hidden is no file that a command may change"),
+        (FileChange(".git/x", None, b"x"), ".git/x is not a file that a command may change"),
+        (FileChange("x/.git/x", None, b"x"), "x/.git/x is not a file that a command may change"),
+        (FileChange(".venv/x", None, b"x"), ".venv/x is not a file that a command may change"),
+        (FileChange(".hidden", b"x", b"y"), ".hidden is not a file that a command may change"),
     ],
 )
 def test_where_one_cannot_be_changed_none_is(root: Path, bad: FileChange, message: str) -> None:

@@ -15,7 +15,7 @@ from coursebuild.core.run.versions import engine_version
 def test_texts_that_are_no_version(text: str) -> None:
     with pytest.raises(UsageError) as error:
         check_other_version(text)
-    assert str(error.value) == f"--against: {text!r} is no version of MuJoCo, such as 3.13.0"
+    assert str(error.value) == f"--against: {text!r} is not a version of MuJoCo, such as 3.13.0"
 
 
 def test_the_installed_version_is_refused_however_it_is_written() -> None:

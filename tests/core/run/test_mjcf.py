@@ -169,7 +169,7 @@ MISTAKES = (
     ),
     (
         "<mujoco>\n<worldbody>\n</mujoco>",
-        "2: not well-formed XML (mismatched element <worldbody>)",
+        "3: not well-formed XML (mismatched element <worldbody>)",
     ),
     ("", "None: empty file this text"),
     ("hello", "1: not well-formed XML (text)"),

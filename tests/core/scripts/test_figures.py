@@ -69,7 +69,7 @@ def test_png_differs_by_pixels() -> None:
     assert wording == "pixels differ in columns 3 to 8, rows 4 to 9"
     wording = describe_difference("x.png", base, png((10, 10)))
     assert wording == "it has 10×10 pixels where 20×10 are recorded"
-    assert describe_difference("x.png", b"no", base) == "the recorded file is no PNG"
+    assert describe_difference("x.png", b"no", base) == "the recorded file is not a PNG file"
 
 
 DIFFERENT_TABLES = {
@@ -121,9 +121,9 @@ def test_reasons_why_a_figure_cannot_be_shown() -> None:
         )
     ]
     assert wordings == [
-        "holds `<script>` in line 1",
-        "is no PNG",
-        "is no PNG",
+        "contains `<script>` on line 1",
+        "is not a PNG file",
+        "is not a PNG file",
         "has more than 25 million pixels",
         "is larger than 4 MiB",
     ]

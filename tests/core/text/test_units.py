@@ -41,7 +41,7 @@ def test_wrong_units_are_reported_with_the_likely_one() -> None:
     }
     for word, unit in likely.items():
         assert [m.partition(": ")[2] for m in messages(word)] == [f"did you mean `{unit}`?"], word
-    assert messages("strides") == ["strides: leave it out, and say in words what is counted"]
+    assert messages("strides") == ["strides: leave it out, and name in words what is counted"]
     assert [unit for unit in INVALID_UNITS if not messages(unit)] == []
 
 

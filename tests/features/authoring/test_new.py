@@ -86,10 +86,10 @@ REFUSED_COMMANDS = [
     ("lesson 1.3 T --slug A/b", f"{MAP} cannot have a lesson 1.3: "),
     ("lesson 1.3 \udcff", "the title is not UTF-8"),
     ("lesson 1.7 there", "there is a file content/lessons/1.7-there.md already"),
-    ("model ../x", "`../x` is no name of a model: use letters, digits, `_` and `-`"),
+    ("model ../x", "`../x` is not a name for a model: use letters, digits, `_` and `-`"),
     ("model there", "there is a file models/there.xml already"),
     ("feature quiz", "there is a feature or a fence `quiz` already"),
-    ("feature Big-1", "`Big-1` is no name of a feature: use lower-case letters"),
+    ("feature Big-1", "`Big-1` is not a name for a feature: use lower-case letters"),
     ("template lessn.html", "there is no template `lessn.html`; did you mean `lesson.html`?"),
     ("template ../base.html", "there is no template `../base.html`; did you mean `base.html`?"),
 ]

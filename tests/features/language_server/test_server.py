@@ -113,7 +113,7 @@ def test_mistakes_are_reported_while_typing_and_nothing_is_saved(editor: Editor)
     assert mistake.range == types.Range(place, types.Position(5, 16))
     assert mistake.severity == types.DiagnosticSeverity.Error
     assert mistake.message.startswith(
-        "lesson 9.9 is mentioned, and the course map does not have it"
+        "lesson 9.9 is not in the course map"
     )
     assert mistake.code_description and mistake.code_description.href.endswith(
         "rules.md#link-lesson"

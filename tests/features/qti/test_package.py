@@ -204,7 +204,7 @@ def test_package_of_hard_cases_is_whole_and_its_losses_are_reported(make_course:
         "it is left out: its script was not run, so nobody knows the key",
         *WARNINGS_BY_TEXT.values(),
     )
-    message = "this question is not whole in the QTI package: "
+    message = "the QTI package cannot hold all of this question: "
     assert [loss for loss in losses if f"{message}{loss}" not in command.out] == []
     assert len(items(files, "quiz.unknown")) == 1
     assert len(items(files, "quiz.hostile")) == len(hostile) > 15

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import keyword
 import re
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from coursebuild.core.registry import CORE_FENCES, features, fence_names
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.features.authoring.commands import apply_changes
-from coursebuild.features.authoring.course_map import with_feature, with_lesson
+from coursebuild.features.authoring.course_map import next_id, with_feature, with_lesson
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.theme import template_copies
 
@@ -51,7 +52,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(metavar="KIND", required=True, prog=parser.prog)
     lesson = kinds.add_parser("lesson", help="a draft, and its entry in the course map")
     lesson.add_argument("id", metavar="ID", help="its level's id, a dot, its own part, as in 1.4")
-    lesson.add_argument("title", metavar="TITLE", help="as readers see it")
+    lesson.add_argument("title", metavar="TITLE", nargs="?", help="as readers see it")
     lesson.add_argument("--slug", help="for its file and address (default: made of the title)")
     lesson.set_defaults(add=_new_lesson)
     model = kinds.add_parser("model", help="a file of models/ with a ball above a floor")
@@ -79,6 +80,9 @@ def run(arguments: argparse.Namespace) -> int:
 def _new_lesson(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     course = load_course(root, code="none")
     id, title = arguments.id, arguments.title
+    if title is None:
+        help = f"the id comes first: `coursebuild new lesson {next_id(course)} {shlex.quote(id)}`"
+        raise UsageError("a lesson needs an id and a title", help=help)
     if any("\ud800" <= char <= "\udfff" for char in title):
         raise UsageError("the title is not UTF-8")
     slug = arguments.slug or slug_of(title)
@@ -92,7 +96,7 @@ def _new_lesson(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
 def _new_model(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     name = arguments.name
     if not _NAME.fullmatch(name):
-        raise UsageError(f"`{name}` is no name of a model: use letters, digits, `_` and `-`")
+        raise UsageError(f"`{name}` is not a name for a model: use letters, digits, `_` and `-`")
     return [FileChange(f"models/{name}.xml", None, _MODEL.format(name).encode())]
 
 
@@ -106,7 +110,7 @@ def _new_template(root: Path, arguments: argparse.Namespace) -> list[FileChange]
 def _new_feature(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     course, name = load_course(root, code="none"), arguments.name
     if not re.fullmatch("[a-z][a-z0-9]*", name) or keyword.iskeyword(name):
-        raise UsageError(f"`{name}` is no name of a feature: use lower-case letters")
+        raise UsageError(f"`{name}` is not a name for a feature: use lower-case letters")
     if name in {*CORE_FENCES, *fence_names(), *(feature.name for feature in features())}:
         raise UsageError(f"there is a feature or a fence `{name}` already")
     path = f"features/{name}.py"

@@ -16,7 +16,7 @@ from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.model import Course, Lesson
 from coursebuild.core.scripts.edit import apply_edits
-from coursebuild.core.text.diagnostics import Edit
+from coursebuild.core.text.diagnostics import Edit, did_you_mean
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.course_map import with_lesson_renamed
@@ -49,7 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
     course, new = load_course(root), arguments.new
     lesson = documents_by_name(course).get(arguments.old)
     if not isinstance(lesson, Lesson):
-        raise UsageError(f"no lesson is called `{arguments.old}`")
+        help = did_you_mean(arguments.old, [lesson.id for lesson in course.lessons])
+        raise UsageError(f"no lesson is called `{arguments.old}`", help=help)
     edits = rename_references(course, lesson, new)
     changes = _list_changes(root, course, lesson, new, edits)
     doubtful = doubtful_places(course, lesson, new, edits, _read_code(root))
