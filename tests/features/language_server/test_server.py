@@ -112,9 +112,7 @@ def test_mistakes_are_reported_while_typing_and_nothing_is_saved(editor: Editor)
     place = types.Position(5, 13)  # in UTF-16, of which the two characters before take two each
     assert mistake.range == types.Range(place, types.Position(5, 16))
     assert mistake.severity == types.DiagnosticSeverity.Error
-    assert mistake.message.startswith(
-        "lesson 9.9 is not in the course map"
-    )
+    assert mistake.message.startswith("lesson 9.9 is not in the course map")
     assert mistake.code_description and mistake.code_description.href.endswith(
         "rules.md#link-lesson"
     )
