@@ -26,7 +26,7 @@ WORDINGS = {
     '<g x:href=""/>': "contains `href` of the namespace `urn:x` of `<g>` on line 2",
     '<g onload="f()"/>': "contains `onload` of `<g>` on line 2",
     '<a href="java&#10;script:f()"/>': "contains the link `java script:f()` of `<a>` on line 2",
-    '<g style="fill: red; src: x; behaviour: x"/>': "contains the property `behaviour` of `<g>` in "
+    '<g style="fill: red; src: x; behaviour: x"/>': "contains the property `behaviour` of `<g>` on "
     "line 2",
     '<g style="fill: u\\72l(//x)"/>': "contains a `url()` that leads elsewhere of `<g>` on line 2",
     '<g mask="im\\61ge-set(x)"/>': "contains `image-set()` of `<g>` on line 2",
