@@ -46,7 +46,7 @@ NEW = (
     .replace("| 2 | 0.25 |", "| 2 | 0.20 |")
     .replace("takes 3.5 s", "takes 3.5 s, or 4.5 s")
     .replace(block("gone.py", "print('gone')", "gone"), block("added.py", "print(1)", "1"))
-    .replace(LAB % ("Throw", "1"), LAB % ("Spin", "0") + LAB % ("Throw", "2"))
+    .replace(LAB % ("Throw", "1"), LAB % ("Spin <b>@all</b>", "0") + LAB % ("Throw", "2"))
 )
 HERE = Path(__file__).parent
 

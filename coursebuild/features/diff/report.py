@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from html import escape
 from itertools import zip_longest
 from typing import TypeVar
 
@@ -15,7 +16,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Course, Recording, find_blocks
 from coursebuild.core.model.figures import recorded_figures
-from coursebuild.core.pages.marks import fence, table
+from coursebuild.core.pages.marks import code_span, escape_text, fence, table
 from coursebuild.core.registry import feature_trials
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import text_diff
@@ -68,23 +69,27 @@ def report(base: str, old: CourseState, new: CourseState) -> str:
         {owner.id: document.source.text for owner, document in state.course.owned_documents}
         for state in (old, new)
     )
-    texts = ", ".join(f"{id} {change}" for id, change in _changes(before, now)) or "no change"
+    texts = (
+        ", ".join(f"{escape_text(id)} {change}" for id, change in _changes(before, now))
+        or "no change"
+    )
     figures = _changes(_figures(old), _figures(new), _describe_figure_change)
     labs = _changes(_labs(old.course), _labs(new.course), _describe_lab_change)
     parts = (
-        f"## What this change does\n\nCompared with {base}. Lessons and pages: {texts}.\n",
+        f"## What this change does\n\nCompared with {base}. "
+        f"Lessons and pages: {texts}.\n",
         _outputs_section(_scripts(old.course), _scripts(new.course)),
         section(
             "Figures",
             "What scripts draw, as it is recorded.",
             ("figure", "change"),
-            [(f"`{path}`", change) for path, change in figures],
+            [(code_span(path), change) for path, change in figures],
         ),
         section(
             "Labs",
             "What readers run. Whether each does what it promises is what `check` says.",
             ("in", "lab", "change"),
-            [(*lab, change) for lab, change in labs],
+            [(*map(escape_text, lab), change) for lab, change in labs],
         ),
         _truth_section(old.course, new.course),
     )
@@ -133,14 +138,17 @@ def _scripts(course: Course) -> dict[str, ScriptState]:
 
 def _outputs_section(before: Mapping[str, ScriptState], now: Mapping[str, ScriptState]) -> str:
     changes = dict(_changes(before, now, _describe_script_change))
-    rows = [(f"`{path}`", (now.get(path) or before[path]).owner, changes[path]) for path in changes]
+    rows = [
+        (code_span(path), escape_text((now.get(path) or before[path]).owner), changes[path])
+        for path in changes
+    ]
     meaning = "What scripts print, as it is recorded. Whether they print it is what `check` says."
     parts = [section("Outputs", meaning, ("script", "in", "change"), rows)]
     for path in [path for path in changes if path in before and path in now][:_ROWS]:
         pairs = zip_longest(before[path].outputs, now[path].outputs)
         lines = "\n".join(filter(None, (text_diff(_text(old), _text(new)) for old, new in pairs)))
         if lines:
-            summary = f"<summary><code>{path}</code></summary>"
+            summary = f"<summary><code>{escape(path)}</code></summary>"
             parts.append(f"<details>{summary}\n\n{fence('diff', lines)}\n\n</details>\n")
     return "\n".join(parts)
 
@@ -212,11 +220,12 @@ def _describe_lab_change(before: LabState, now: LabState) -> str:
         values = [json.dumps(lab.data.get(name), ensure_ascii=False) for lab in (before, now)]
         if values[0] != values[1]:
             is_short = max(map(len, values)) <= _SHORT
-            parts.append(f"`{name}`" + (" `{}` → `{}`".format(*values) if is_short else ""))
+            shown = f" {' → '.join(map(code_span, values))}" if is_short else ""
+            parts.append(code_span(name) + shown)
     if before.text != now.text and not parts:
         parts.append("its text")
     models = _changes(before.models, now.models)
-    return ", ".join((*parts, *(f"model `{name}` {change}" for name, change in models)))
+    return ", ".join((*parts, *(f"model {code_span(name)} {change}" for name, change in models)))
 
 
 # --- truth
@@ -236,7 +245,10 @@ def _truth_section(old: Course, new: Course) -> str:
         " gives as known. Whether they hold is what `check` says.",
         ("in", "numbers", "printed", "computed", "given", "unproven", "proven"),
         [
-            (id, *(a if a == b else f"{a} → {b}" for a, b in zip(old_row, new_row, strict=True)))
+            (
+                escape_text(id),
+                *(a if a == b else f"{a} → {b}" for a, b in zip(old_row, new_row, strict=True)),
+            )
             for id, (old_row, new_row) in counts.items()
             if old_row != new_row
         ],
