@@ -76,8 +76,7 @@ def report(base: str, old: CourseState, new: CourseState) -> str:
     figures = _changes(_figures(old), _figures(new), _describe_figure_change)
     labs = _changes(_labs(old.course), _labs(new.course), _describe_lab_change)
     parts = (
-        f"## What this change does\n\nCompared with {base}. "
-        f"Lessons and pages: {texts}.\n",
+        f"## What this change does\n\nCompared with {base}. Lessons and pages: {texts}.\n",
         _outputs_section(_scripts(old.course), _scripts(new.course)),
         section(
             "Figures",
