@@ -15,7 +15,7 @@ from coursebuild.core.model import Block, CodeBlock, FeatureBlock, Mjcf, Script
 from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import Fence, check_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.syntax.recording import check_stray_keys
+from coursebuild.core.syntax.recording import check_stray_keys, record_fence
 from coursebuild.core.syntax.script import parse_python
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Note, diagnose
@@ -27,12 +27,14 @@ _HEAD_RULES = frozenset(
 
 
 def read_block(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
-    """The block of a fence; those with recorded outputs are read in `recording`."""
+    """The block of a fence; recorded outputs are read in `recording`."""
     if not fence.is_closed or fence.inner is not None:
         return _read_unclosed(fence, state)
     match fence.kind:
         case "python":
             return _read_script(fence, state)
+        case "output":
+            return _read_output(fence, state)
         case "text":
             check_stray_keys(fence, state)
             return fence.code()
@@ -73,6 +75,13 @@ def _read_script(fence: Fence, state: ParsingState) -> Block:
     elif not fence.nested and any(d.rule in _HEAD_RULES for d in parsed_block.diagnostics):
         state.script, state.has_invalid_script = None, True
     return parsed_block.value
+
+
+def _read_output(fence: Fence, state: ParsingState) -> Block:
+    if fence.nested:
+        message = "a text of a quiz or lab cannot hold a recorded output"
+        state.report(diagnose("fence-info", fence.head, message))
+    return (None if fence.nested else record_fence((), fence.head, fence, state)) or fence.code()
 
 
 def _read_feature_block(
