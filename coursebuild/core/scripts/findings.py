@@ -112,9 +112,9 @@ def output_findings(
 
 
 _ALIKE = 0.5
-"""The share of its telling lines or rows by which a block resembles an output. Of the 650 texts and
-tables of the course itself none comes near it (the most is a line of eleven); a copied output of
-which some lines were cut, and others changed, stays above it."""
+"""The share of its telling lines or rows by which a block resembles an output. The 353 texts and
+tables of the course and of this tool's documentation, each compared with each of 107 outputs, share
+a third at most; a copied output of which some lines were cut, and others changed, shares more."""
 _TELLING = re.compile(r"[^\W\d_]{2}|\d[.,]?\d[.,]?\d")
 """A word or a number of three digits: a line without either is like too many others."""
 

@@ -142,7 +142,8 @@ def record_fence(
             subject = f"a block of kind `{fence.kind}`" if fence.kind else "a block without a kind"
             state.report(diagnose_wrong_body(fence.head, subject))
         return None
-    keys = fence.keys(values=_VALUES, flags=(*_FLAGS, ILLUSTRATION))
+    flags = (*_FLAGS, ILLUSTRATION) if ILLUSTRATION in fence.info.text else _FLAGS
+    keys = fence.keys(values=_VALUES, flags=flags)
     diagnostics = list(keys.diagnostics)
     mark = keys.value.get(ILLUSTRATION)
     if mark is not None:
