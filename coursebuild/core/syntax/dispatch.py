@@ -33,8 +33,12 @@ def read_block(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
     match fence.kind:
         case "python":
             return _read_script(fence, state)
+        case "output" if fence.nested:
+            message = "a text of a quiz or lab cannot hold a recorded output"
+            state.report(diagnose("fence-info", fence.head, message))
+            return fence.code()
         case "output":
-            return _read_output(fence, state)
+            return record_fence((), fence.head, fence, state) or fence.code()
         case "text":
             check_stray_keys(fence, state)
             return fence.code()
@@ -75,13 +79,6 @@ def _read_script(fence: Fence, state: ParsingState) -> Block:
     elif not fence.nested and any(d.rule in _HEAD_RULES for d in parsed_block.diagnostics):
         state.script, state.has_invalid_script = None, True
     return parsed_block.value
-
-
-def _read_output(fence: Fence, state: ParsingState) -> Block:
-    if fence.nested:
-        message = "a text of a quiz or lab cannot hold a recorded output"
-        state.report(diagnose("fence-info", fence.head, message))
-    return (None if fence.nested else record_fence((), fence.head, fence, state)) or fence.code()
 
 
 def _read_feature_block(
