@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Course, Declarations, Document
+from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode, encode
@@ -121,10 +122,13 @@ class Documents(Parser):
         return diagnostics
 
     def read_documents(
-        self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]
+        self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str], words: Words
     ) -> list[Parsed[Document]]:
         """Return documents without their prose, and what is wrong in them."""
-        texts = [SourceText.of(source, callouts, lesson=lesson) for source, lesson in sources]
+        texts = [
+            SourceText.of(source, callouts, lesson=lesson, words=words)
+            for source, lesson in sources
+        ]
         summaries = {text.key: self._find_summary(text) for text in texts}
         missing = [text for text in texts if summaries[text.key] is None]
         if len(missing) >= _MIN_PARALLEL:

@@ -23,6 +23,7 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.course_features import features_digest, load_course_features
 from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.read import read_course, read_sources
+from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import (
     Course,
     Declarations,
@@ -35,7 +36,8 @@ from coursebuild.core.model import (
     local_file,
 )
 from coursebuild.core.model.theme import TEMPLATES, Theme
-from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.model.vocabulary import CALLOUTS, ENGLISH, Words
+from coursebuild.core.pages.assets import words_for
 from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.versions import engine_version
@@ -64,7 +66,7 @@ class Parser:
     """Parses texts and checks courses; keeps nothing."""
 
     def read_documents(
-        self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str]
+        self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str], words: Words
     ) -> list[Parsed[Document]]:
         """Return the documents that texts hold, and what is wrong in them.
 
@@ -72,7 +74,10 @@ class Parser:
         """
         from coursebuild.core.syntax.document import parse_document
 
-        return [parse_document(source, callouts, lesson=lesson) for source, lesson in sources]
+        return [
+            parse_document(source, callouts, lesson=lesson, words=words)
+            for source, lesson in sources
+        ]
 
     def read_map(self, source: Source) -> Parsed[Course | None]:
         """Return the course that a map describes, and what is wrong in it."""
@@ -156,8 +161,9 @@ class _Loader:
         if course is None:
             if self.files.map is not None:
                 lessons = [(source, True) for source in self.files.lessons]
-                self._parse_documents(lessons, frozenset(CALLOUTS))
+                self._parse_documents(lessons, frozenset(CALLOUTS), ENGLISH)
             return None
+        course = replace(course, words=words_for(template_texts(), course.language))
         self._compare_lessons(course)
         course = self._attach_documents(course, self._find_pages(course))
         course = replace(
@@ -356,7 +362,7 @@ class _Loader:
         planned = {lesson.path for lesson in course.lessons if lesson.status == "planned"}
         sources = [(s, True) for s in self.files.lessons if s.path not in planned]
         sources += [(source, False) for source in pages]
-        documents = self._parse_documents(sources, course.callout_names)
+        documents = self._parse_documents(sources, course.callout_names, course.words)
 
         def attach(lesson: Lesson) -> Lesson:
             return replace(lesson, document=documents.get((lesson.path, True)))
@@ -372,11 +378,11 @@ class _Loader:
         )
 
     def _parse_documents(
-        self, sources: list[tuple[Source, bool]], callouts: frozenset[str]
+        self, sources: list[tuple[Source, bool]], callouts: frozenset[str], words: Words
     ) -> dict[tuple[str, bool], Document]:
         """Parse texts; return the documents by path, and by whether they are lessons."""
         documents = {}
-        parsed_documents = self.parser.read_documents(sources, callouts)
+        parsed_documents = self.parser.read_documents(sources, callouts, words)
         for (source, lesson), parsed_document in zip(sources, parsed_documents, strict=True):
             self.diagnostics += parsed_document.diagnostics
             documents[source.path, lesson] = parsed_document.value

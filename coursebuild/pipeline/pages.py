@@ -232,7 +232,10 @@ def text_of(entry: PageEntry, library: Library) -> SourceText | None:
         return None
     lesson = library.lessons.get(entry.id)
     is_lesson = lesson is not None and lesson.document is document
-    return SourceText.of(document.source, library.course.callout_names, lesson=is_lesson)
+    course = library.course
+    return SourceText.of(
+        document.source, course.callout_names, lesson=is_lesson, words=course.words
+    )
 
 
 def page_request(entry: PageEntry, library: Library) -> PageRequest:

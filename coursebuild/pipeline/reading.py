@@ -29,6 +29,7 @@ from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Document, document_scripts
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.summary import without_prose
+from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.folding import find_imports
@@ -39,7 +40,7 @@ from coursebuild.core.pages.renderer import Renderer, known_mathml
 from coursebuild.core.pages.templates import Texts
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import summarize
-from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.fingerprints import document_fingerprint, notes_fingerprint
@@ -64,14 +65,23 @@ class SourceText(Struct, frozen=True):
     source: Source
     callouts: frozenset[str]
     lesson: bool
+    words: Words
     key: str
     """A hash of all that its summary depends on."""
 
     @classmethod
-    def of(cls, source: Source, callouts: frozenset[str], *, lesson: bool) -> SourceText:
+    def of(
+        cls, source: Source, callouts: frozenset[str], *, lesson: bool, words: Words
+    ) -> SourceText:
         """A text with its key."""
-        key = step_key("summary", lesson, callouts, source.path, source.digest)
-        return cls(source, callouts, lesson, key)
+        key = step_key("summary", lesson, callouts, encode(words), source.path, source.digest)
+        return cls(source, callouts, lesson, words, key)
+
+    def parse(self) -> Parsed[Document]:
+        """Return the document that the text holds, and what is wrong in it."""
+        from coursebuild.core.syntax.document import parse_document
+
+        return parse_document(self.source, self.callouts, lesson=self.lesson, words=self.words)
 
 
 class DocumentSummary(Struct, frozen=True):
@@ -181,10 +191,9 @@ def prepare_to_read(sample: SourceText) -> None:
     for name in _HEAVY:
         importlib.import_module(name)
     from coursebuild.core.pages.highlight import highlight_lines
-    from coursebuild.core.syntax.document import parse_document
 
     # Several modules prepare things at their first use.
-    document = parse_document(sample.source, sample.callouts, lesson=sample.lesson).value
+    document = sample.parse().value
     highlight_lines("python", "x")
     if document_formulas(document):
         from coursebuild.core.run.v8 import start
@@ -278,9 +287,7 @@ class PageReader:
             whole = decode(zlib.decompress(whole), _TypesetDocument, text.source)
         if isinstance(whole, _TypesetDocument) and key == text.key:
             return whole
-        from coursebuild.core.syntax.document import parse_document
-
-        parsed_text = parse_document(text.source, text.callouts, lesson=text.lesson)
+        parsed_text = text.parse()
         formulas = document_formulas(parsed_text.value)
         return _TypesetDocument(
             parsed_text.value, parsed_text.diagnostics, self._typeset(text.source.path, formulas)

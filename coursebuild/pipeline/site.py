@@ -212,7 +212,9 @@ def _find_in_texts(course: Course, page: str, url: str) -> Span | None:
         if url not in unescape(summary.source.text):
             continue
         lesson = isinstance(owner, Lesson)
-        document = parse_document(summary.source, course.callout_names, lesson=lesson).value
+        document = parse_document(
+            summary.source, course.callout_names, lesson=lesson, words=course.words
+        ).value
         for node in (*document_blocks(document), *document_inlines(document)):
             if isinstance(node, HtmlBlock | RawInline) and (at := find_address(node.html, url)):
                 # In a quiz it is a part of JSON, in a quote of lines with marks.

@@ -236,8 +236,9 @@ class Session:
                 return None
             (source,) = sources
             if source != owner.document.source or self._diagnostics_by_file.get(path):
-                callouts, lesson = self.library.course.callout_names, isinstance(owner, Lesson)
-                (parsed_document,) = self._documents.read_documents([(source, lesson)], callouts)
+                (parsed_document,) = self._documents.read_documents(
+                    [(source, isinstance(owner, Lesson))], course.callout_names, course.words
+                )
                 diagnostics = (*read.diagnostics, *parsed_document.diagnostics)
                 changed_owners.append((replace(owner, document=parsed_document.value), diagnostics))
         return changed_owners

@@ -42,6 +42,15 @@ OLD
 > lines
 > ```
 
+1. In a list
+
+   ```python file=examples/listed.py
+   print("listed")
+   ```
+
+   ~~~output digits
+   ~~~
+
 ```python file=examples/clock.py
 import time
 print(time.perf_counter_ns())
@@ -59,6 +68,7 @@ UPDATED_LESSON = FULL_LESSON.replace(
     "```text\nOLD\n```\n\n> [!note]",
     "```text\nalpha 1.5\n\nbeta    -0.25\n```\n\n> [!note]",
 ).replace("> ```text\n> OLD\n> lines\n", "> ```text\n> quoted\n>\n>     indented\n")
+UPDATED_LESSON = UPDATED_LESSON.replace("~~~output digits\n", "~~~output digits\n   listed\n")
 
 
 def test_update_changes_outputs_and_no_other_byte(make: Make) -> None:

@@ -233,12 +233,15 @@ class Filter(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Recording(Struct, frozen=True):
-    """`Output:` and the text fence or table below it."""
+    """An `output` fence, or `Output:` and the text fence or table below it."""
 
     span: Span
     """From the caption to the end of the body."""
     caption: tuple[Inline, ...]
+    """Empty for a fence without one, and if it is the word alone: a page shows that of its
+    language."""
     caption_span: Span
+    """That of the fence's first line if there is no caption."""
     body: Excerpt | Table
     """The text between the fences, or the table."""
     body_span: Span
@@ -404,6 +407,8 @@ class Document(Struct, frozen=True, dict=True):
     footnotes: tuple[Footnote, ...]
     title_anchor: str = ""
     """The anchor of the title that a page opens with; empty where a heading has the same."""
+    unclaimed: tuple[CodeBlock | Table, ...] = ()
+    """Texts and tables below a script that may show its output, and that are not marked as such."""
     equations: tuple[Equation, ...] = ()
     """Set in a summary only, which lacks the formulas themselves."""
     summaries: Mapping[str, Struct] | None = None

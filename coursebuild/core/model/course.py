@@ -15,6 +15,7 @@ from coursebuild.core.model import fields
 from coursebuild.core.model.blocks import Comparison, Document, Filter, Recording
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.core.model.theme import Theme
+from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.text.source import Source, Span, key_of
 
 _COMMENT = re.compile("<!--(.*?)-->", re.DOTALL)
@@ -230,6 +231,7 @@ class Course(Struct, frozen=True):
     """The raw HTML that lessons and pages may have."""
     limits: Limits = Limits()
     theme: Theme = Theme()
+    words: Words = Words()
 
     @property
     def key(self) -> str:

@@ -57,7 +57,7 @@ def without_prose(document: Document) -> Document:
             blocks += _summarize_block(block)
     if is_blank(blocks) and not is_blank(document_blocks(document)):
         blocks.append(ThematicBreak(document.blocks[0].span))
-    return Document(document.source, tuple(blocks), (), document.title_anchor)
+    return Document(document.source, tuple(blocks), (), document.title_anchor, document.unclaimed)
 
 
 def _summarize_block(block: Block) -> Iterator[Block]:

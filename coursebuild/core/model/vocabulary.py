@@ -1,10 +1,12 @@
-"""The vocabulary of every course: the kinds of callouts, and closed forms to measure against.
+"""The vocabulary of every course: callouts, captions, closed forms to measure against.
 
-Entry points: `CALLOUTS` and `CLOSED_FORMS`. A course can add kinds of callouts, or relabel these,
-under `[callouts]` in course.toml.
+Entry points: `CALLOUTS`, `Words`, `ENGLISH` and `CLOSED_FORMS`. A course can add kinds of
+callouts, or relabel these, under `[callouts]` in course.toml.
 """
 
 from __future__ import annotations
+
+from msgspec import Struct
 
 CALLOUTS: tuple[str, ...] = (
     "established",
@@ -23,6 +25,26 @@ CALLOUTS: tuple[str, ...] = (
     "caution",
 )
 """Their labels and promises are interface texts, `callout.NAME` and `promise.NAME`."""
+
+
+class Words(Struct, frozen=True):
+    """The words by which a text is read: `Output:` above an output, mentions as in "Lesson 4.3".
+
+    Of a course in another language they are the interface texts `words.…`, then the English ones.
+    """
+
+    output: tuple[str, ...] = ("Output",)
+    unlike: tuple[str, ...] = ("Outfit", "Outlet", "Outset")
+    """Words that differ from these by a letter or two, and that nobody misspelt."""
+    lesson: tuple[str, ...] = ("Lesson",)
+    lessons: tuple[str, ...] = ("Lessons",)
+    level: tuple[str, ...] = ("Level",)
+    levels: tuple[str, ...] = ("Levels",)
+    conjunctions: tuple[str, ...] = ("and", "or", "to")
+    """Between the numbers of lessons or levels."""
+
+
+ENGLISH = Words()
 
 CLOSED_FORMS: tuple[str, ...] = (
     "tumbling-box",

@@ -1,6 +1,7 @@
 """The tool's own files: templates, interface texts, and the bundled files for browsers.
 
-Entry points: `Assets`, a value made by who reads the disk; `strings_for`; `hashed_name`.
+Entry points: `Assets`, a value made by who reads the disk; `strings_for`, `words_for`;
+`hashed_name`.
 
 1. `templates` holds every file of `templates/` as text, `dist` every file of the bundle as bytes,
    by path relative to their folder.
@@ -14,10 +15,12 @@ import functools
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
+from unicodedata import normalize
 
 from msgspec import Struct
 
 from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.model.vocabulary import ENGLISH, Words
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import DEFAULT_LANGUAGE, Strings, parse_strings
 from coursebuild.core.pages.templates import Texts, templates_of
@@ -90,6 +93,19 @@ def strings_for(templates: tuple[tuple[str, str], ...], language: str) -> String
     return _strings_for(
         templates, tuple(text for texts in feature_texts for text in texts), language
     )
+
+
+def words_for(templates: tuple[tuple[str, str], ...], language: str) -> Words:
+    """The words by which texts of a language are read: its own, and the English ones.
+
+    Letters with marks may be typed as one character or as two.
+    """
+    strings, words = strings_for(templates, language), {}
+    for field in Words.__struct_fields__:
+        names = strings(f"words.{field}").split("|")
+        forms = (normalize(form, name) for name in names for form in ("NFC", "NFD"))
+        words[field] = tuple(dict.fromkeys((*forms, *getattr(ENGLISH, field))))
+    return Words(**words)
 
 
 @functools.lru_cache(maxsize=8)

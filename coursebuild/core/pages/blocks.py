@@ -168,7 +168,7 @@ class OutputView(Struct, frozen=True):
 def _output(page: PageContext, block: Recording) -> OutputView:
     numbers = output_numbers(page.document)
     return OutputView(
-        caption=page.inlines(block.caption),
+        caption=page.inlines(block.caption) or Markup(escape(page.words("code.caption"))),
         path=block.script or "",
         anchor=output_anchor(block.script, numbers[block.span.start]) if block.script else "",
         text=None if isinstance(block.body, Table) else visible(block.body.text).rstrip("\n"),

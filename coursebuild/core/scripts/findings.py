@@ -10,9 +10,12 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-from coursebuild.core.model import Course, Document, Owner
+from msgspec.structs import replace
+
+from coursebuild.core.model import CodeBlock, Course, Document, Owner, Table, document_scripts
 from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
+from coursebuild.core.scripts.align import count_alike
 from coursebuild.core.scripts.bindings import (
     BindingEvidence,
     DependentBinding,
@@ -31,10 +34,12 @@ from coursebuild.core.scripts.failures import (
     failure_diagnostic,
     silence_diagnostic,
 )
+from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
 from coursebuild.core.scripts.numbers import Number, scan
 from coursebuild.core.scripts.repeat import instability_diagnostic
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.scripts.tables import TableMatcher, table_rows
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note, diagnose
 from coursebuild.core.text.source import Excerpt
 
 _MAX_NOTES = 3
@@ -103,6 +108,73 @@ def output_findings(
                 unstable_output = _find_instability(verdict, run, repeated_runs or {})
                 yield unstable_output or drift_diagnostic(verdict, owner.id, dependents)
         yield from check_bindings(document, outputs, evidence)
+        yield from _find_unmarked(course, document, outputs.runs)
+
+
+_ALIKE = 0.5
+"""The share of its telling lines or rows by which a block resembles an output. The 353 texts and
+tables of the course and of this tool's documentation, each compared with each of 107 outputs, share
+a third at most; a copied output of which some lines were cut, and others changed, shares more."""
+_TELLING = re.compile(r"[^\W\d_]{2}|\d[.,]?\d[.,]?\d")
+"""A word or a number of three digits: a line without either is like too many others."""
+
+
+def _find_unmarked(
+    course: Course, document: Document, runs: Mapping[str, ScriptRun]
+) -> Iterator[Diagnostic]:
+    """Report the texts and tables of a document that resemble what a script above them printed."""
+    for block in document.unclaimed:
+        scripts = [s for s in document_scripts(document) if s.span.start < block.span.start]
+        for script in reversed(scripts):
+            run = runs.get(script.path)
+            if run is None or run.outcome is not Outcome.OK or not run.stdout.strip():
+                continue
+            if _share_alike(block, run.stdout, course) >= _ALIKE:
+                yield _unmarked_diagnostic(block, script.path, course.words.output[0])
+                break
+
+
+def _share_alike(block: CodeBlock | Table, stdout: str, course: Course) -> float:
+    """The share of the telling lines or rows of a block that a script printed, but for numbers.
+
+    A row of numbers alone would stand in most lines, so its numbers must have been printed.
+    """
+    comparison = replace(course.comparison, course_filters=course.filters)
+    printed = Side.of(stdout, comparison.filters)
+    if isinstance(block, Table):
+        rows = table_rows(block, comparison.filters)
+        texts = [" ".join(cell.mapped.text for cell in row) for row in rows]
+        matches = TableMatcher(rows, printed, comparison).match()
+        telling = [pair for pair in zip(matches, texts, strict=True) if _TELLING.search(pair[1])]
+        count = sum(
+            match.line >= 0 and (not match.pairs or any(map(str.isalpha, text)))
+            for match, text in telling
+        )
+        return count / max(len(telling), 1)
+    whole = Side.of(block.code.text, comparison.filters)
+    if whole.lines == printed.lines and len(block.code.text.strip()) > 3:
+        return 1.0
+    lines = list(filter(_TELLING.search, whole.lines))
+    matcher = LineMatcher(comparison)
+    return count_alike(Side.of("\n".join(lines)), printed, matcher) / max(len(lines), 1)
+
+
+def _unmarked_diagnostic(block: CodeBlock | Table, path: str, word: str) -> Diagnostic:
+    message = f"this resembles what `{path}` printed, and nothing compares the two"
+    if isinstance(block, Table):
+        help = f"write a paragraph `{word}:` above it; or bind its numbers, or mark them as given"
+        return diagnose("output-unmarked", block.span.first_line(), message, help=help)
+    help = "an output is of kind `output`; if it is none, write `text illustration`"
+    head = _FENCE_HEAD.match(block.span.text)
+    edits = []
+    if head is not None:
+        start = block.span.start
+        edits.append(Edit(block.span.source.span(start, start + head.end()), f"{head[1]}output"))
+    place = block.span.first_line()
+    return diagnose("output-unmarked", place, message, help=help, edits=edits)
+
+
+_FENCE_HEAD = re.compile(r"(`{3,}|~{3,})[ \t]*[^\s`]*")
 
 
 def _find_instability(

@@ -15,7 +15,7 @@ from coursebuild.core.model import Block, CodeBlock, FeatureBlock, Mjcf, Script
 from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import Fence, check_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.syntax.recording import check_stray_keys
+from coursebuild.core.syntax.recording import check_stray_keys, record_fence
 from coursebuild.core.syntax.script import parse_python
 from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Note, diagnose
@@ -27,12 +27,18 @@ _HEAD_RULES = frozenset(
 
 
 def read_block(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
-    """The block of a fence; those with recorded outputs are read in `recording`."""
+    """The block of a fence; recorded outputs are read in `recording`."""
     if not fence.is_closed or fence.inner is not None:
         return _read_unclosed(fence, state)
     match fence.kind:
         case "python":
             return _read_script(fence, state)
+        case "output" if fence.nested:
+            message = "a text of a quiz or lab cannot hold a recorded output"
+            state.report(diagnose("fence-info", fence.head, message))
+            return fence.code()
+        case "output":
+            return record_fence((), fence.head, fence, state) or fence.code()
         case "text":
             check_stray_keys(fence, state)
             return fence.code()

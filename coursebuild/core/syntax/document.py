@@ -13,15 +13,21 @@ Entry point: `parse_document`. It never raises, whatever the text:
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+
+from msgspec.structs import replace
 
 from coursebuild.core.model import (
     AnchorOwner,
+    CodeBlock,
     Document,
     FeatureBlock,
     Heading,
+    NumberBinding,
     Paragraph,
+    Recording,
     Script,
+    Table,
     Term,
     block_formulas,
     block_inlines,
@@ -32,8 +38,10 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.model.equations import DisplayFormula, feature_block_ids
+from coursebuild.core.model.vocabulary import ENGLISH, Words
 from coursebuild.core.syntax.headings import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
+from coursebuild.core.syntax.recording import ILLUSTRATION
 from coursebuild.core.syntax.spans import read_markdown
 from coursebuild.core.syntax.tree import TextReader
 from coursebuild.core.text.conflicts import find_conflict
@@ -48,14 +56,17 @@ _YAML = re.compile(
 _TOML = re.compile(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
 
 
-def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) -> Parsed[Document]:
+def parse_document(
+    source: Source, callouts: frozenset[str], *, lesson: bool, words: Words = ENGLISH
+) -> Parsed[Document]:
     """Parse a lesson or a page.
 
-    `callouts` are the known kinds. A lesson, unlike a page, has no heading of level 1. The title
-    with which a page may begin is not in the document. Mistakes become diagnostics, in the order of
-    their places; the document holds all that could be read.
+    `callouts` are the known kinds, `words` those of the course's language. A lesson, unlike a
+    page, has no heading of level 1. The title with which a page may begin is not in the document.
+    Mistakes become diagnostics, in the order of their places; the document holds all that could be
+    read.
     """
-    state = ParsingState(callouts, lesson)
+    state = ParsingState(callouts, lesson, words)
     base = _remove_front_matter(read_markdown(source), state)
     title = None if lesson else title_line(source)
     if title is not None:
@@ -65,6 +76,7 @@ def parse_document(source: Source, callouts: frozenset[str], *, lesson: bool) ->
     anchor = "" if title is None else slug(title.text)
     is_free = not state.anchors.has(anchor)
     document = Document(source, blocks, state.notes.finish(), anchor if is_free else "")
+    document = replace(document, unclaimed=tuple(_unclaimed_blocks(document, state.diagnostics)))
     conflict = find_conflict(source)
     if conflict is not None:  # the rest follows from it
         return Parsed(document, (conflict,))
@@ -84,6 +96,37 @@ def _remove_front_matter(text: Excerpt, state: ParsingState) -> Excerpt:
     help = "its title and everything else about it are in content/course.toml; begin with the text"
     state.report(diagnose("front-matter", text.span(0, 3), message, help=help))
     return text.slice(match.end())
+
+
+_TEXTS = frozenset(("", *"console log none plain plaintext raw stdout text txt".split()))
+"""Kinds of code blocks that may show an output."""
+
+
+def _unclaimed_blocks(
+    document: Document, diagnostics: Iterable[Diagnostic]
+) -> Iterator[CodeBlock | Table]:
+    """The texts and tables below a script of which nothing says what they are.
+
+    A table is claimed if one of its numbers is bound or given. Quizzes show what is wrong as well;
+    of a block with a mistake in its first line that is to be mended first.
+    """
+    in_features = feature_block_ids(document)
+    mistakes = {d.span.line for d in diagnostics if d.is_error}
+    has_script, recorded = False, None
+    for block in document_blocks(document):
+        if isinstance(block, Script):
+            has_script = True
+        elif isinstance(block, Recording):
+            recorded = block.body
+        elif not has_script or id(block) in in_features or block.span.line in mistakes:
+            pass
+        elif isinstance(block, CodeBlock):
+            if block.language in _TEXTS and ILLUSTRATION not in block.info.split():
+                yield block
+        elif isinstance(block, Table) and block is not recorded:
+            inlines = walk_inlines(block_inlines(block))
+            if not any(isinstance(inline, NumberBinding) for inline in inlines):
+                yield block
 
 
 _MARKS = ("]{", "{#eq:")

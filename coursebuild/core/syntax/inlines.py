@@ -111,7 +111,7 @@ class _TokenReader:
         self.stack = [_Frame(None)]
         self.pieces: list[TextPiece] = []
         self.texts: list[tuple[int, str]] = []
-        self.open_links = 0 if mentions and may_mention(content.text) else 1
+        self.open_links = 0 if mentions and may_mention(content.text, state.words) else 1
         """How many links and terms are open; one more if mentions are not wanted."""
         self.open_literals = 0
         """How many elements of HTML are open in which every character stands for itself."""
@@ -152,7 +152,7 @@ class _TokenReader:
         self.pieces = []
         nodes = self.stack[-1].nodes
         if not self.open_links and not self.open_literals:
-            nodes += link_mentions(pieces, self.content)
+            nodes += link_mentions(pieces, self.content, self.state.words)
         else:
             nodes += text_inlines(pieces, self.content)
 

@@ -1,7 +1,8 @@
 """Targets of links, schemes that a page must not have, and mentions.
 
 Entry points: `classify`, `check_scheme`, `check_raw_scheme`; `may_mention`, `text_inlines` and
-`link_mentions`, which make links of "Lesson 2.2" and "Level 18" in prose.
+`link_mentions`, which make links of "Lesson 2.2" and "Level 18" in prose, in the words of the
+course's language.
 
 Text and soft line ends that follow each other make one run, as a mention may be broken over two
 lines. A mention becomes a `Link` whose `target_span` is the number; the text around it becomes
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import groupby
 from typing import NamedTuple
 from urllib.parse import unquote
@@ -30,6 +32,7 @@ from coursebuild.core.model import (
     Text,
     UrlTarget,
 )
+from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.syntax.headings import term_id
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Span
@@ -93,12 +96,7 @@ def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
 
 _LESSON = r"[0-9]+(?:\.[0-9]+)+(?!\w)"
 _LEVEL = r"[0-9]+(?:\.[0-9]+)*(?!\w)"
-_CONJUNCTION = r"(?:,?\s+(?:and|or|to)\s+|,\s+|\s?[–-]\s?)"
-_MENTIONS = re.compile(
-    r"(?<![\w\\])(?:"
-    rf"(Lesson)(?:\s+{_LESSON}|s\s+{_LESSON}(?:{_CONJUNCTION}{_LESSON})*)"
-    rf"|Level(?:\s+{_LEVEL}|s\s+{_LEVEL}(?:{_CONJUNCTION}{_LEVEL})*))"
-)
+
 _NUMBER = re.compile(r"[0-9.]*[0-9]")
 
 
@@ -112,9 +110,28 @@ class TextPiece(NamedTuple):
     """Whether each character stands for itself; not so for entities and escapes."""
 
 
-def may_mention(text: str) -> bool:
+def may_mention(text: str, words: Words) -> bool:
     """Whether a text is worth searching for mentions."""
-    return "Lesson" in text or "Level" in text
+    return any(word in text for names in _mention_names(words) for word in names)
+
+
+def _mention_names(words: Words) -> tuple[tuple[str, ...], ...]:
+    return words.lesson, words.lessons, words.level, words.levels
+
+
+@lru_cache(maxsize=8)
+def _mentions(words: Words) -> re.Pattern[str]:
+    """The pattern of mentions; its group is there if they are of lessons."""
+    lesson, lessons, level, levels, conjunctions = (
+        "|".join(map(re.escape, names)) for names in (*_mention_names(words), words.conjunctions)
+    )
+    # Arabic writes "and" and the number without a space.
+    joint = rf"(?:[,،]?\s+(?:{conjunctions})\s*|[,،]\s+|\s?[–-]\s?)"
+    return re.compile(
+        r"(?<![\w\\])(?:"
+        rf"((?:{lesson})\s+{_LESSON}|(?:{lessons})\s+{_LESSON}(?:{joint}{_LESSON})*)"
+        rf"|(?:{level})\s+{_LEVEL}|(?:{levels})\s+{_LEVEL}(?:{joint}{_LEVEL})*)"
+    )
 
 
 def text_inlines(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
@@ -130,13 +147,13 @@ def text_inlines(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
     return inlines
 
 
-def link_mentions(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
+def link_mentions(run: Sequence[TextPiece], content: Excerpt, words: Words) -> list[Inline]:
     """The run as texts, soft line ends, and links where it mentions lessons and levels."""
     chars = _characters(run)
     text = "".join([char.text for char in chars])
     inlines: list[Inline] = []
     position = 0
-    for mentions in _MENTIONS.finditer(text):
+    for mentions in _mentions(words).finditer(text):
         for number in _NUMBER.finditer(text, *mentions.span()):
             is_first = position <= mentions.start()  # its link includes the word
             start, end = mentions.start() if is_first else number.start(), number.end()

@@ -13,6 +13,7 @@ from typing import TypeVar
 from msgspec import Struct, field
 
 from coursebuild.core.model import Block, Footnote, FootnoteRef
+from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.syntax.headings import Anchors
 from coursebuild.core.syntax.markdown import References
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
@@ -24,9 +25,10 @@ T = TypeVar("T")
 class ParsingState:
     """The state of the parser of one document."""
 
-    def __init__(self, callouts: frozenset[str], lesson: bool) -> None:
+    def __init__(self, callouts: frozenset[str], lesson: bool, words: Words) -> None:
         self.callouts = callouts
         self.lesson = lesson
+        self.words = words
         self.references: References = {}
         """The link definitions of the document, which its inner texts may use."""
         self.diagnostics: list[Diagnostic] = []

@@ -1,7 +1,8 @@
-"""What scripts print and draw: `Output…:` above a `text` fence or a table, and `Figure:`.
+"""What scripts print and draw: `output` fences, `Output…:` above a fence or table, figures.
 
 Entry points: `is_caption`; `record_fence` and `record_table`, which read a caption and its body;
-`read_figure`; and diagnostics of captions and bodies without each other.
+`read_figure`; and diagnostics of captions and bodies without each other. The word of a caption is
+that of the course's language, or the English one.
 """
 
 from __future__ import annotations
@@ -9,9 +10,20 @@ from __future__ import annotations
 import posixpath
 import re
 from decimal import Decimal
+from functools import lru_cache
 
-from coursebuild.core.model import Comparison, Image, Inline, Mode, Recording, Table, plain_text
+from coursebuild.core.model import (
+    Comparison,
+    Image,
+    Inline,
+    Mode,
+    Recording,
+    Table,
+    Text,
+    plain_text,
+)
 from coursebuild.core.model.blocks import volatile_pattern
+from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.syntax.fence import Fence, is_known_kind
 from coursebuild.core.syntax.info import FenceKeys, Word
 from coursebuild.core.syntax.parsing_state import ParsingState
@@ -19,9 +31,9 @@ from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, misspe
 from coursebuild.core.text.patterns import matches_empty_text, pattern_mistake
 from coursebuild.core.text.source import Excerpt, Span
 
-OUTPUT, FIGURE = "Output", "Figure:"
-_CAPTION = re.compile(r"\s*Output\b.*:\s*", re.DOTALL)
-_FIRST_WORD = re.compile(r"([^\s:*`]{3,12})(?![^\s:])[ \t]*(:?)")
+FIGURE, OUTPUT_KIND = "Figure:", "output"
+_BODY_KINDS = ("text", OUTPUT_KIND)
+_FIRST_WORD = re.compile(r"([^\s:*`]{3,12})(?![^\s:])[^\S\n]*(:?)")
 _NEAR_CAPTION = re.compile(
     r"\s*(?:(?:the|expected|recorded|sample|printed|its)\s+){0,2}outputs?\b.{0,40}\s*",
     re.IGNORECASE | re.DOTALL,
@@ -32,75 +44,118 @@ _OUTPUT_SENTENCE = re.compile(
     re.IGNORECASE | re.DOTALL,
 )
 """A sentence before an output, as in "On this machine it prints (abridged):"."""
-_OUTPUT_KINDS = ("text", "", "console", "output", "plain", "plaintext", "txt")
-"""Kinds of blocks that may show an output."""
+_OUTPUT_KINDS = ("text", "", "console", "plain", "plaintext", "txt")
+"""Kinds of blocks that may show an output without being one."""
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _VALUES = ("rtol", "atol", "volatile")
 _FLAGS = ("exact", "digits", "ellipsis", "volatile")
 _MODES = {"rtol": "rtol", "atol": "rtol", **{key: key for key in _FLAGS}}
+ILLUSTRATION = "illustration"
+"""The flag of a `text` fence that resembles an output and is none."""
 
 
-def is_caption(inlines: tuple[Inline, ...]) -> bool:
-    """Whether a paragraph begins with the word "Output" and ends with a colon."""
-    return _CAPTION.fullmatch(plain_text(inlines)) is not None
+def is_caption(inlines: tuple[Inline, ...], words: Words) -> bool:
+    """Whether a paragraph begins with a word for "output" and ends with a colon."""
+    return _caption(words.output).fullmatch(plain_text(inlines)) is not None
 
 
-def find_misspelt_caption(content: Excerpt, word: str) -> Diagnostic | None:
-    """The diagnostic of a paragraph that begins with a misspelt `word` and ends with a colon.
+def _is_bare(caption: tuple[Inline, ...], words: Words) -> bool:
+    """Whether a caption is the word alone."""
+    match = _caption(words.output).fullmatch(plain_text(caption))
+    return match is not None and not match[1].strip()
 
-    One that consists of the word may lack the colon.
+
+@lru_cache(maxsize=8)
+def _caption(names: tuple[str, ...]) -> re.Pattern[str]:
+    return re.compile(rf"\s*(?:{'|'.join(map(re.escape, names))})\b(.*):\s*", re.DOTALL)
+
+
+def find_misspelt_caption(
+    content: Excerpt, names: tuple[str, ...], unlike: tuple[str, ...] = ()
+) -> Diagnostic | None:
+    """The diagnostic of a paragraph that begins with a misspelt name and ends with a colon.
+
+    One that consists of the name may lack the colon. Words in `unlike` are not misspelt.
     """
     match = _FIRST_WORD.match(content.text)
     is_alone = match is not None and match.end() == len(content.text)
     if match is None or not (is_alone or match[2] or content.text.endswith(":")):
         return None
-    if match[1] == word and (match[2] or not is_alone):
-        return None
-    if match[1] != word and misspelt(match[1], [word]) is None:
+    is_name = match[1] in names
+    word = match[1] if is_name else misspelt(match[1], names)
+    if word is None or match[1] in unlike or (is_name and (match[2] or not is_alone)):
         return None
     message = f"`{content.text[: match.end()].rstrip()}` is not a caption"
     place = content.span(0, len(match[0].rstrip()))
     return diagnose("recording-misspelt", place, message, help=f"did you mean `{word}:`?")
 
 
-def check_near_caption(inlines: tuple[Inline, ...], span: Span, kind: str) -> list[Diagnostic]:
-    """Warn if a paragraph looks like the caption of the block below it, whose kind is `kind`."""
+def check_near_caption(
+    inlines: tuple[Inline, ...], span: Span, info: str, words: Words
+) -> list[Diagnostic]:
+    """Warn if a paragraph looks like the caption of the fence below it, whose info is given."""
+    kind, *keys = info.split() or [""]
     text = plain_text(inlines)
-    is_near = kind == "text" and _NEAR_CAPTION.fullmatch(text)
-    if kind not in _OUTPUT_KINDS or not (is_near or _OUTPUT_SENTENCE.fullmatch(text)):
+    is_near = kind == "text" and (
+        _NEAR_CAPTION.fullmatch(text)
+        or re.fullmatch(
+            rf"(?:\w+\s+){{0,2}}(?:{'|'.join(words.output)})\b.{{0,40}}:\s*", text, re.I
+        )
+    )
+    if (
+        ILLUSTRATION in keys
+        or kind not in _OUTPUT_KINDS
+        or not (is_near or _OUTPUT_SENTENCE.fullmatch(text))
+    ):
         return []
     message = "this looks like the caption of a recorded output, but nothing is compared"
-    help = "a caption begins with the word `Output` and ends with a colon: `Output:`"
-    return [diagnose("recording-caption", span, message, help=help)]
+    return [diagnose("recording-caption", span, message, help=_help_to_mark(words))]
 
 
-def diagnose_missing_caption(fence: Span) -> Diagnostic:
+def _help_to_mark(words: Words) -> str:
+    return (
+        "begin the fence with ```` ```output ````, or write a paragraph "
+        f"`{words.output[0]}:` above it; mark any other text as `text {ILLUSTRATION}`"
+    )
+
+
+def diagnose_missing_caption(fence: Span, words: Words) -> Diagnostic:
     """The warning for a `text` block directly below a script."""
-    message = "this looks like the output of the script above it, and nothing is compared"
-    help = "write a paragraph `Output:` between the two"
+    message = "this looks like the output of the script above it, but nothing is compared"
+    help = _help_to_mark(words)
     return diagnose("recording-caption", fence.first_line(), message, help=help)
 
 
 def record_fence(
     caption: tuple[Inline, ...], caption_span: Span, fence: Fence, state: ParsingState
 ) -> Recording | None:
-    """The recording with a caption and this fence as its body; `None` if the fence is none."""
+    """The recording with this fence as its body; `None` if the fence is none.
+
+    An `output` fence needs no caption; then the place of the caption is that of its first line.
+    """
     if not fence.is_closed or fence.inner is not None:
         return None
-    if fence.kind != "text":
+    if fence.kind not in _BODY_KINDS:
         if is_known_kind(fence.kind):
-            state.diagnostics += check_missing_body(caption, caption_span)
+            state.diagnostics += check_missing_body(caption, caption_span, state.words)
         else:
             subject = f"a block of kind `{fence.kind}`" if fence.kind else "a block without a kind"
             state.report(diagnose_wrong_body(fence.head, subject))
         return None
-    keys = fence.keys(values=_VALUES, flags=_FLAGS)
+    flags = (*_FLAGS, ILLUSTRATION) if ILLUSTRATION in fence.info.text else _FLAGS
+    keys = fence.keys(values=_VALUES, flags=flags)
     diagnostics = list(keys.diagnostics)
-    comparison = _read_comparison(keys.value, diagnostics)
+    mark = keys.value.get(ILLUSTRATION)
+    if mark is not None:
+        message = "a recorded output is not an illustration"
+        help = f"leave `{ILLUSTRATION}` out, or write `text {ILLUSTRATION}` without a caption"
+        diagnostics.append(diagnose("recording-keys", mark.span, message, help=help))
+    own_words = tuple(word for word in keys.value.words if word is not mark)
+    comparison = _read_comparison(FenceKeys(None, own_words), diagnostics)
     state.diagnostics += diagnostics
     return Recording(
         caption_span.to(fence.span),
-        caption,
+        _own_caption(caption, state.words),
         caption_span,
         fence.body,
         fence.body_span,
@@ -120,23 +175,30 @@ def record_table(
         message = "the recorded table has no rows, so that nothing is compared"
         help = "write what the script prints into the rows below the header"
         state.report(diagnose("recording-body", table.span.first_line(), message, help=help))
+    caption = _own_caption(caption, state.words)
     return Recording(span, caption, caption_span, table, table.span, "", None, script)
 
 
-def check_missing_body(caption: tuple[Inline, ...], span: Span) -> list[Diagnostic]:
+def _own_caption(caption: tuple[Inline, ...], words: Words) -> tuple[Inline, ...]:
+    """The caption to be shown; none for the word alone, instead of which a page has its own."""
+    is_plain = all(isinstance(inline, Text) for inline in caption)
+    return () if is_plain and _is_bare(caption, words) else caption
+
+
+def check_missing_body(caption: tuple[Inline, ...], span: Span, words: Words) -> list[Diagnostic]:
     """Report a caption without a body, if it can be nothing but a caption."""
-    if plain_text(caption).strip() != "Output:":
+    if not _is_bare(caption, words):
         return []
     message = "no recorded output follows this line"
-    help = "put a fence that begins with ```` ```text ````, or a table, directly below it"
+    help = "put a fence that begins with ```` ```output ````, or a table, directly below it"
     return [diagnose("recording-body", span, message, help=help)]
 
 
 def diagnose_wrong_body(span: Span, subject: str) -> Diagnostic:
     """The diagnostic of a caption above something that is no body, called `subject`."""
-    message = f"the recorded output is {subject}, not of kind `text`"
+    message = f"the recorded output is {subject}, not of kind `output` or `text`"
     help = (
-        "write the output in a fence that begins with ```` ```text ````, "
+        "write the output in a fence that begins with ```` ```output ````, "
         "or end the paragraph without a colon"
     )
     return diagnose("recording-body", span, message, help=help)
@@ -170,13 +232,13 @@ def _read_comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparis
 
 def check_stray_keys(fence: Fence, state: ParsingState) -> None:
     """Report keys on a `text` fence that records no output."""
-    keys = fence.keys(values=_VALUES, flags=_FLAGS)
+    keys = fence.keys(values=_VALUES, flags=(*_FLAGS, ILLUSTRATION))
     state.diagnostics += keys.diagnostics
-    words = keys.value.words
+    words = [word for word in keys.value.words if word.key != ILLUSTRATION]
     if words:
         span = words[0].span.to(words[-1].span)
         message = "this block is not a recorded output, so it is not compared with anything"
-        help = "put a paragraph that begins with `Output` and ends with a colon directly above it"
+        help = "an output is of kind `output`"
         state.report(diagnose("recording-keys", span, message, help=help))
 
 

@@ -7,7 +7,8 @@ for quizzes and labs.
    (`_scan_tokens`), which must be known before the first reference.
 2. It walks the flat tokens once, with a method for each kind of block; containers read the blocks
    inside them by recursion.
-3. A paragraph looks ahead: `Output:` and the block below it are one `Recording`.
+3. A paragraph looks ahead: `Output:` and the block below it are one `Recording`, as is an `output`
+   fence without it.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from coursebuild.core.syntax.markdown import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
-    OUTPUT,
+    OUTPUT_KIND,
     check_missing_body,
     check_near_caption,
     diagnose_missing_caption,
@@ -128,8 +129,8 @@ class TextReader:
             recording = self._read_recording(children, span)
             if recording is not None:
                 return recording
-        elif not self.nested and (kind := self._peek_fence_kind()) is not None:
-            self.state.diagnostics += check_near_caption(children, span, kind)
+        elif not self.nested and (info := self._peek_info()) is not None:
+            self.state.diagnostics += check_near_caption(children, span, info, self.state.words)
         if not self.nested and self._is_figure(content):
             children, shows_image = read_figure(children, span, self.state.figures)
             return model.Paragraph(span, children, token.hidden, shows_image)
@@ -137,14 +138,15 @@ class TextReader:
 
     def _is_caption(self, content: Excerpt, inlines: tuple[model.Inline, ...]) -> bool:
         """Whether a paragraph is the caption of an output; a misspelt one is, with a diagnostic."""
-        if OUTPUT in content.text[:16] and is_caption(inlines):
+        words = self.state.words
+        if any(name in content.text[:24] for name in words.output) and is_caption(inlines, words):
             return True
         token = self._peek()
         if token is None or (token.type, token.info.split()[:1]) not in _BODIES:
             return False
         if self.state.script is None and not self.state.has_invalid_script:
             return False
-        mistake = find_misspelt_caption(content, OUTPUT)
+        mistake = find_misspelt_caption(content, words.output, words.unlike)
         if mistake is not None:
             self.state.report(mistake)
         return mistake is not None
@@ -153,7 +155,7 @@ class TextReader:
         """Whether a paragraph shows a figure; a misspelt one does, with a diagnostic."""
         if content.text.startswith(FIGURE) or not self.state.figures:
             return content.text.startswith(FIGURE)
-        mistake = find_misspelt_caption(content, FIGURE[:-1])
+        mistake = find_misspelt_caption(content, (FIGURE[:-1],))
         if mistake is not None:
             self.state.report(mistake)
         return mistake is not None
@@ -161,12 +163,10 @@ class TextReader:
     def _peek(self) -> PositionedToken | None:
         return self.tokens[self.index] if self.index < len(self.tokens) else None
 
-    def _peek_fence_kind(self) -> str | None:
-        """The kind of the next block, if it is a fence."""
+    def _peek_info(self) -> str | None:
+        """The info string of the next block, if it is a fence."""
         token = self._peek()
-        if token is None or token.type != "fence":
-            return None
-        return (token.info.split() or [""])[0]
+        return token.info if token is not None and token.type == "fence" else None
 
     def _read_heading(self, token: PositionedToken) -> model.Heading:
         self.index += 2
@@ -201,14 +201,11 @@ class TextReader:
     def _read_fence(self, token: PositionedToken) -> model.Block:
         fence = read_fence(token, self.base, nested=self.nested)
         block = read_block(fence, self.state, self.texts)
-        if (
-            isinstance(block, model.Script)
-            and not block.norun
-            and self._peek_fence_kind() == "text"
-        ):
-            next_token = self.tokens[self.index]
-            if next_token.info.split() == ["text"]:  # with keys, these are reported instead
-                self.state.report(diagnose_missing_caption(self._span(next_token)))
+        if isinstance(block, model.Script) and not block.norun:
+            info = self._peek_info() or ""
+            if info.split() == ["text"]:  # with keys, these are reported instead
+                place = self._span(self.tokens[self.index])
+                self.state.report(diagnose_missing_caption(place, self.state.words))
         return block
 
     def _read_code(self, token: PositionedToken) -> model.CodeBlock:
@@ -355,12 +352,13 @@ class TextReader:
                 place = self._span(token).first_line()
                 self.state.report(diagnose_wrong_body(place, "an indented block"))
             case _:
-                self.state.diagnostics += check_missing_body(caption, span)
+                self.state.diagnostics += check_missing_body(caption, span, self.state.words)
         return None
 
 
 _BODIES: tuple[tuple[str, list[str]], ...] = (
     ("fence", ["text"]),
+    ("fence", [OUTPUT_KIND]),
     ("fence", []),
     ("table_open", []),
 )

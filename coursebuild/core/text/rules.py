@@ -158,7 +158,7 @@ _SUMMARIES = {
     "nothing.",
     "recording-misspelt": "The caption of a recorded output or a figure looks misspelt.",
     "recording-orphan": "A recorded output has no script above it.",
-    "recording-body": "`Output:` is followed by something that is not a `text` fence or a table "
+    "recording-body": "`Output:` is followed by something that is not an output fence or a table "
     "with rows.",
     "recording-keys": "Keys of comparison contradict each other, or stand on a block that records "
     "nothing.",
@@ -181,6 +181,8 @@ _SUMMARIES = {
     "script-shallow": "A script says `deep`, but no bodies lay deep in each other.",
     "recorded-run": "The course has no run of a script that is recorded once, or an outdated one.",
     "output-drift": "A recorded output differs from what the script prints.",
+    "output-unmarked": "A text or table resembles what a script above it printed, and nothing "
+    "compares the two.",
     "output-noise": "A recorded output has digits that change when initial states are moved by "
     "1e-12.",
     "output-unstable": "Two runs of a script print different lines, so that there is nothing to "

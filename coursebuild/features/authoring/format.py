@@ -13,11 +13,13 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 from msgspec.structs import replace
 
 from coursebuild.core import model
+from coursebuild.core.model.vocabulary import ENGLISH, Words
 from coursebuild.core.registry import fence_names
 from coursebuild.core.scripts.edit import apply_edits, whole_lines
 from coursebuild.core.syntax.document import parse_document
@@ -41,20 +43,21 @@ WIDTH = 120
 
 
 def format_document(
-    source: Source, callouts: frozenset[str], *, lesson: bool, width: int
+    source: Source, callouts: frozenset[str], *, lesson: bool, width: int, words: Words = ENGLISH
 ) -> Parsed[str]:
     """Format a document; one with mistakes stays as it is, and they are returned.
 
     `width` is that of paragraphs; 0 leaves their lines as they are.
     """
-    before = parse_document(source, callouts, lesson=lesson)
+    read = partial(parse_document, callouts=callouts, lesson=lesson, words=words)
+    before = read(source)
     if errors := _errors(before):
         return Parsed(source.text, errors)
     meaning = _meaning(before.value)
 
     def is_harmless(edits: Sequence[Edit]) -> bool:
         text = apply_edits(source.text, edits)
-        after = parse_document(Source(source.path, text), callouts, lesson=lesson)
+        after = read(Source(source.path, text))
         return not _errors(after) and _meaning(after.value) == meaning
 
     proposals = _Layout(source, width).edits(before.value)

@@ -167,7 +167,9 @@ def _convert_fence(segment: Segment, context: LessonContext) -> str:
     kind = head.partition(" ")[0]
     if kind == "lab" and context.camera_is_position:
         text = _CAMERA.sub(_reverse_camera, text)
-    if kind not in (*CORE_FENCES, *fence_names()):
+    if kind == "output":  # of a block that is not run here
+        head = "text"
+    elif kind not in (*CORE_FENCES, *fence_names()):
         head = head.strip("{}. ").partition(" ")[0].rstrip(",}")
         if head != "json" and _is_json(text):
             context.add_leftover(f"a block `{head}`, which is shown as JSON")

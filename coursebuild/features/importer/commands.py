@@ -143,7 +143,7 @@ def _try_scripts(options: Options, notebook_outputs: Mapping[str, str]) -> tuple
                         remarks.append(f"{notebook}: {_describe_changes(verdict.changes)}")
             if not script_recordings and script_run.stdout.strip() and not script.prefix:
                 end = script.span.end
-                text = "Output:\n\n" + fence("text", script_run.stdout.rstrip("\n"))
+                text = fence("output", script_run.stdout.rstrip("\n"))
                 changes.append(Edit(Span(script.span.source, end, end), f"\n\n{text}"))
     file_changes = (
         FileChange(source.path, source.text.encode(), apply_edits(source.text, changes).encode())

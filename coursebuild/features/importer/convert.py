@@ -193,7 +193,7 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
             parts[shown_end:] = [fence(f"python file={script_path}", script)]
             output = join_outputs((text.segments[cell], code) for cell, code in codes.items())
             if output.strip():
-                parts.append("Output:\n\n" + fence("text", output))
+                parts.append(fence("output", output))
                 context.notebook_outputs[script_path] = text.file
             continue
         is_cell = segment.kind == "cell"

@@ -131,7 +131,11 @@ class DocumentWriter(BlockWriter):
             body = self.blocks((block.body,))
         else:
             body = fence("text", block.body.text)
-        return f"{self.inlines(block.caption)}\n\n{body}\n\n{self.receipt(block)}"
+        return f"{self.caption(block)}\n\n{body}\n\n{self.receipt(block)}"
+
+    def caption(self, block: model.Recording) -> str:
+        """Write the caption of an output."""
+        return self.inlines(block.caption) or escape_marks(self.words("code.caption"))
 
     def receipt(self, block: model.Recording) -> str:
         """Write the receipt of an output: how it was verified."""

@@ -148,7 +148,7 @@ def _script_cells(writer: DocumentWriter, section: str, block: Script) -> Iterat
     for recording in recordings:
         if is_run and output is None and not isinstance(recording.body, Table):
             output = f"{recording.body.text.rstrip()}\n"
-            remarks.append(f"{writer.inlines(recording.caption)} {writer.receipt(recording)}")
+            remarks.append(f"{writer.caption(recording)} {writer.receipt(recording)}")
         else:
             remarks.append(writer.recording(recording))
     if block.norun:

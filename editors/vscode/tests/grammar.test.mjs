@@ -78,6 +78,13 @@ test('models and cards are read as what they are', () => {
   has(text, 'fragment', 'entity.other.attribute-name.coursebuild');
 });
 
+test('an output is one by its kind or by its caption, in each language of the interface', () => {
+  const fence = '```output digits\n1.5\n```\n';
+  has(fence, 'output', 'entity.name.type.fence.coursebuild');
+  has(fence, 'digits', 'entity.other.attribute-name.coursebuild');
+  for (const word of ['Ausgabe', 'Salida', 'Sortie', 'المخرجات']) has(`${word} :\n\n`, word, 'keyword.other.caption.coursebuild');
+});
+
 test('code that shows such marks is code', () => {
   const text = '`[a]{term}` and `` `1`{out} ``\n\n````markdown\n```lab\n> [!note] N\n````\n';
   assert.ok(pieces(text).every(([, scopes]) => !scopes.includes('coursebuild')));

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from unicodedata import normalize
 
 import pytest
 
-from coursebuild.core.pages.assets import Assets, strings_for
+from coursebuild.core.model import Link, Recording, find_blocks, find_inlines
+from coursebuild.core.model.vocabulary import ENGLISH
+from coursebuild.core.pages.assets import Assets, strings_for, words_for
 from coursebuild.core.pages.strings import parse_strings
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.source import Source
 
 ROOT = Path(__file__).parents[3]
 
@@ -35,6 +40,30 @@ def test_a_regional_language_takes_the_general_one_first(assets: Assets) -> None
     assert words("code.copy") == "Copy"
 
 
+def test_captions_and_mentions_follow_the_language(assets: Assets) -> None:
+    """However letters with marks are typed; English ones hold too."""
+    assert words_for(assets.templates, "en") == words_for(assets.templates, "pt") == ENGLISH
+    for language, caption, mention, unlike in (
+        ("ar", "المخرجات:", "الدروس 1.1 و1.2", "المدخلات:"),
+        ("de", "Ausgabe:", "Lektionen 1.1 und 1.2", "Aufgabe:"),
+        ("de-CH", "Ausgabe :", "Lektion 1.1 und Stufe 1.2", "Angabe:"),
+        ("es", "Salida:", "las lecciones 1.1 y 1.2", "Subida:"),
+        ("fr", "Sortie\u202f:", "la leçon 1.1 et Niveau 1.2", "Partie\u00a0:"),
+        ("fr", "Output:", "Lessons 1.1, 1.2", "Outset:"),
+    ):
+        words = words_for(assets.templates, language)
+        for form in ("NFC", "NFD"):
+            head = "```python file=examples/a.py\nprint(1)\n```\n\n"
+            text = f"{head}{caption}\n\n```text\n1\n```\n\n{mention}\n\n{unlike}\n\n| a |\n| - |\n"
+            source = Source("x.md", normalize(form, text))
+            parsed_text = parse_document(source, frozenset(), lesson=True, words=words)
+            assert parsed_text.diagnostics == (), language
+            (recording,) = find_blocks(parsed_text.value, Recording)
+            assert recording.caption == (), "it is shown in the language of the page"
+            links = find_inlines(parsed_text.value, Link)
+            assert [getattr(link.target, "id", "") for link in links] == ["1.1", "1.2"], mention
+
+
 def test_every_text_that_is_asked_for_exists_and_every_one_is_used(assets: Assets) -> None:
     """Keys that are made at run time are listed here by prefix."""
     run_time_prefixes = (
@@ -45,6 +74,7 @@ def test_every_text_that_is_asked_for_exists_and_every_one_is_used(assets: Asset
         "code.docstring",
         "code.imports",
         "theme.",
+        "words.",
     )
     run_time_prefixes += ("lab.live.", "measured.reference_", "numerics.case_")
     text = "".join(text for path, text in assets.templates if path.endswith(".html"))

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.scripts.compare import verify
+from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.findings import script_findings
 from support.sample_lessons import course, describe, document, make_run
@@ -40,6 +41,22 @@ def test_tracebacks_lead_into_scripts_that_did_not_run() -> None:
         script_findings(lessons, scripts, [make_run("E 1.5")], verify(lessons, [make_run("E 1.5")]))
         == ()
     )
+
+
+def test_a_text_that_resembles_an_output_is_mended_by_its_edit() -> None:
+    for block in (
+        "```\nE 1.52 of 3\n```",
+        "~~~~ txt\nE 1.52 of 3\n~~~~",
+        "> ```text\n> E 1.52 of 3\n> ```",
+    ):
+        lessons = course(document("```python file=examples/a.py\n1\n```\n\nSee this.\n\n" + block))
+        runs = [make_run("E 1.25 of 3")]
+        scripts = extract(lessons).value
+        (diagnostic,) = script_findings(lessons, scripts, runs, verify(lessons, runs))
+        assert diagnostic.rule == "output-unmarked"
+        lessons = course(document(apply_edits(lessons.documents[0].source.text, diagnostic.edits)))
+        (diagnostic,) = script_findings(lessons, scripts, runs, verify(lessons, runs))
+        assert describe(diagnostic).startswith("output-drift")
 
 
 def test_every_recording_gets_a_verdict() -> None:

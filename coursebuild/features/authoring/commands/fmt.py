@@ -64,5 +64,8 @@ def _format_documents(
     callouts = course.callout_names
     for owner, document in course.owned_documents:
         if documents is None or owner.path in documents:
-            source, lesson = document.source, isinstance(owner, Lesson)
-            yield source, format_document(source, callouts, lesson=lesson, width=course.width)
+            source, lesson, width = document.source, isinstance(owner, Lesson), course.width
+            yield (
+                source,
+                format_document(source, callouts, lesson=lesson, width=width, words=course.words),
+            )

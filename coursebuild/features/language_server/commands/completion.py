@@ -29,7 +29,7 @@ from coursebuild.features.language_server.commands.texts import OpenTexts
 
 _NAME = r"[A-Za-z_]\w*"
 _SUBJECTS = (
-    ("lesson", Kind.Reference, r"(?:\blesson:|\bLessons? )(?P<word>[\w.]*)$"),
+    ("lesson", Kind.Reference, r"\b(?:lesson:|(?:LESSON)\s)(?P<word>[\w.]*)$"),
     ("page", Kind.Reference, r"\bpage:(?P<word>[\w-]*)$"),
     ("model", Kind.File, r"\bmodel:(?P<word>[\w/-]*)$"),
     ("model", Kind.File, r"""(?:model_path\(|"model"\s*:\s*)["'](?P<word>[\w/-]*)$"""),
@@ -45,7 +45,7 @@ _SUBJECTS = (
     ("member", Kind.Field, rf"(?<![\w.])(?P<path>{_NAME}(?:\.{_NAME})*)\.(?P<word>\w*)$"),
 )
 """What can be proposed, its icon, and a pattern of the text before the cursor, whose group
-`word` is the part of the name that is there already.
+`word` is the part of the name that is there already. `LESSON` stands for the words of mentions.
 """
 
 
@@ -56,8 +56,10 @@ def completions(
     offset = texts.places.offset(source, params.position)
     cursor = source.span(offset, offset)
     line = source.text[source.line_starts[cursor.line - 1] : offset]
+    words = texts.library.course.words
+    mentions = "|".join((*words.lessons, *words.lesson))
     for subject, kind, pattern in _SUBJECTS:
-        prefix = re.search(pattern, line)
+        prefix = re.search(pattern.replace("LESSON", mentions), line)
         names = {} if prefix is None else _find_names(texts, cursor, subject, prefix)
         if prefix is not None and names:
             span = source.span(offset - len(prefix["word"]), offset)

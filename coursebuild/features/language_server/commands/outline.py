@@ -71,10 +71,12 @@ def format_text(
     texts: OpenTexts, source: Source, params: types.DocumentFormattingParams
 ) -> list[types.TextEdit]:
     """Return the edits that `coursebuild fmt` would make."""
-    owner, width = texts.owner(source), texts.library.course.width
+    owner, course = texts.owner(source), texts.library.course
     if owner is None:
         return []
-    callouts, lesson = texts.library.course.callout_names, isinstance(owner, Lesson)
-    new = format_document(source, callouts, lesson=lesson, width=width).value
+    lesson, width, words = isinstance(owner, Lesson), course.width, course.words
+    new = format_document(
+        source, course.callout_names, lesson=lesson, width=width, words=words
+    ).value
     edit = types.TextEdit(texts.places.range(source.span()), new)
     return [] if new == source.text else [edit]

@@ -11,6 +11,7 @@ from msgspec import Struct
 
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.model import Document, Lesson, Owner
+from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.pages.library import Library
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
@@ -34,8 +35,10 @@ class OpenTexts(Struct, frozen=True):
     def document(self, source: Source) -> Document | None:
         """Return the document of a lesson or page; `None` for other texts, and those too long."""
         owner = self.owner(source)
-        callouts = self.library.course.callout_names
-        return None if owner is None else _parse(source, callouts, isinstance(owner, Lesson))
+        if owner is None:
+            return None
+        course = self.library.course
+        return _parse(source, course.callout_names, isinstance(owner, Lesson), course.words)
 
     def owner(self, source: Source) -> Owner | None:
         """Return the lesson or page of a text, unless the text is too long to be read."""
@@ -45,6 +48,6 @@ class OpenTexts(Struct, frozen=True):
 
 
 @lru_cache(maxsize=16)
-def _parse(source: Source, callouts: frozenset[str], lesson: bool) -> Document:
+def _parse(source: Source, callouts: frozenset[str], lesson: bool, words: Words) -> Document:
     """Cached, since an editor sends many requests about the same text."""
-    return parse_document(source, callouts, lesson=lesson).value
+    return parse_document(source, callouts, lesson=lesson, words=words).value
