@@ -170,7 +170,8 @@ class _Loader:
             theme=self._load_theme(course.theme),
         )
         environment = course_environment(self.root, course)
-        if course.python is None or environment.value is not None:
+        # The map's interpreter is a program of the course, which a mere look must not start.
+        if course.python is None or (environment.value is not None and self.code == "run"):
             references = read_references(course, self.store, environment.value)
             course = replace(course, references=references)
         self.diagnostics += self.parser.check(course)

@@ -70,25 +70,28 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
 
 
 def against(course: Course, python: str) -> Iterator[Diagnostic]:
-    """Report names of MuJoCo that the one of another interpreter has lost, or discourages."""
+    """Report names of MuJoCo that the one of another interpreter has lost, or deprecated."""
     here = resolver_of(course)
-    modules = () if here.engine is None else here.engine.modules
-    there = Resolver(course, list_names(python, modules))
-    for noted in filter(None, map(names_of, course.documents)):
-        for claim, _, span in noted.claims:
-            known = here.resolve(claim, noted.names)
-            if not isinstance(known, Meaning) or not known.engine:
-                continue
-            answer = there.resolve(claim, noted.names)
-            if isinstance(answer, Meaning) and answer.engine:
-                was, now = ("deprecated" in meaning.doc.lower() for meaning in (known, answer))
-                if now and not was:
-                    message = f"`{claim.name}` is deprecated: {answer.doc}"
-                    yield diagnose("name-unknown", span, message)
-                continue
-            message = f"MuJoCo {there.engine.version} has no `{claim.name}`" if there.engine else ""
-            if isinstance(answer, Unknown):
-                message = answer.message
+    uses = [
+        (claim, span, noted.names, known)
+        for noted in filter(None, map(names_of, course.documents))
+        for claim, _, span in noted.claims
+        if isinstance(known := here.resolve(claim, noted.names), Meaning) and known.engine
+    ]
+    if not uses or here.engine is None:
+        return
+    other = list_names(python, here.engine.modules)
+    there = Resolver(course, other)
+    for claim, span, names, known in uses:
+        answer = there.resolve(claim, names)
+        if isinstance(answer, Meaning) and answer.engine:
+            if "deprecated" in answer.doc.lower() and "deprecated" not in known.doc.lower():
+                message = f"MuJoCo {other.version} discourages `{claim.name}`: {answer.doc}"
+                yield diagnose("name-unknown", span, message)
+        elif isinstance(answer, Unknown):
+            yield diagnose("name-unknown", span, answer.message)
+        else:
+            message = f"MuJoCo {other.version} has no `{claim.name}`"
             yield diagnose("name-unknown", span, message)
 
 

@@ -121,9 +121,13 @@ class Resolver:
     @functools.cached_property
     def has_engine(self) -> bool:
         """Whether the course is about MuJoCo, so that `model` and `data` are its structures."""
-        imports = (names.imports.values() for names in course_names(self.course))
-        return bool(self.course.models or self.course.engine) or any(
-            module.split(".")[0] == "mujoco" for modules in imports for module in modules
+        if self.course.models or self.course.engine:
+            return True
+        documents = course_names(self.course)
+        modules = {module for names in documents for module in names.imports.values()}
+        claims = (claim for names in documents for claim in names.claims if claim.kind == "word")
+        return any(module.split(".")[0] == "mujoco" for module in modules) or any(
+            ENGINE_WORD.fullmatch(claim.name) for claim in claims
         )
 
     def resolve(self, claim: Claim, names: CodeNames) -> Answer:
@@ -210,7 +214,7 @@ class Resolver:
         if not class_name or self.engine is None or root in names.imports:
             return ""
         used = names.members.get(root, frozenset())
-        return class_name if used <= self.engine.classes[class_name].keys() else ""
+        return class_name if used <= self.engine.classes.get(class_name, {}).keys() else ""
 
     def _member(self, class_name: str, parts: list[str]) -> Answer:
         """What a path means that begins at an object of a class of MuJoCo."""
