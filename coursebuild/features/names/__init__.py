@@ -52,11 +52,11 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
     free = {id(page.document) for page in course.pages if not page.names}
     resolver = resolver_of(course)
     for document in documents:
-        noted = names_of(document)
-        if noted is None or id(document) in free:
+        note = names_of(document)
+        if note is None or id(document) in free:
             continue
-        for claim, code, span in noted.claims:
-            answer = resolver.resolve(claim, noted.names)
+        for claim, code, span in note.claims:
+            answer = resolver.resolve(claim, note.names)
             if not isinstance(answer, Unknown):
                 continue
             text = code.text.strip("` ")
@@ -69,41 +69,41 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
             yield diagnose("name-unknown", place, answer.message, help=answer.help or _HELP)
 
 
-def against(course: Course, python: str) -> Iterator[Diagnostic]:
+def lost_names(course: Course, python: str) -> Iterator[Diagnostic]:
     """Report names of MuJoCo that the one of another interpreter has lost, or deprecated."""
-    here = resolver_of(course)
+    resolver = resolver_of(course)
     uses = [
-        (claim, span, noted.names, known)
-        for noted in filter(None, map(names_of, course.documents))
-        for claim, _, span in noted.claims
-        if isinstance(known := here.resolve(claim, noted.names), Meaning) and known.engine
+        (claim, span, note.names, meaning)
+        for note in filter(None, map(names_of, course.documents))
+        for claim, _, span in note.claims
+        if isinstance(meaning := resolver.resolve(claim, note.names), Meaning) and meaning.engine
     ]
-    if not uses or here.engine is None:
+    if not uses or resolver.engine is None:
         return
-    other = list_names(python, here.engine.modules)
-    there = Resolver(course, other)
-    for claim, span, names, known in uses:
-        answer = there.resolve(claim, names)
+    engine = list_names(python, resolver.engine.modules)
+    other_resolver = Resolver(course, engine)
+    for claim, span, names, meaning in uses:
+        answer = other_resolver.resolve(claim, names)
         if isinstance(answer, Meaning) and answer.engine:
-            if "deprecated" in answer.doc.lower() and "deprecated" not in known.doc.lower():
-                message = f"MuJoCo {other.version} discourages `{claim.name}`: {answer.doc}"
+            if "deprecated" in answer.doc.lower() and "deprecated" not in meaning.doc.lower():
+                message = f"MuJoCo {engine.version} discourages `{claim.name}`: {answer.doc}"
                 yield diagnose("name-unknown", span, message)
         elif isinstance(answer, Unknown):
             yield diagnose("name-unknown", span, answer.message)
         else:
-            message = f"MuJoCo {other.version} has no `{claim.name}`"
+            message = f"MuJoCo {engine.version} has no `{claim.name}`"
             yield diagnose("name-unknown", span, message)
 
 
 def code_links(library: Library, place: urls.Place, document: Document) -> dict[int, str]:
     """Return the addresses of what inline code names."""
-    noted, links = names_of(document), dict[int, str]()
-    if noted is None:
+    note, links = names_of(document), dict[int, str]()
+    if note is None:
         return links
     resolver = resolver_of(library.course)
     pages = {page.path: page for page in library.course.pages}
-    for claim, code, _ in noted.claims:
-        answer = resolver.resolve(claim, noted.names) if claim.linked else None
+    for claim, code, _ in note.claims:
+        answer = resolver.resolve(claim, note.names) if claim.linked else None
         href = answer.href if isinstance(answer, Meaning) else ""
         page = pages.get(href)
         if href.startswith("#examples/"):
@@ -120,7 +120,7 @@ FEATURE = Feature(
     summary=lambda document, mathml: Parsed(document_names(document)),
     reference=reference,
     code_links=code_links,
-    against=against,
+    against=lost_names,
     check=check,
     rules=(
         Rule("name-unknown", "error", "Inline code has the shape of a name, and nothing has it."),

@@ -29,7 +29,7 @@ Kind: TypeAlias = Literal[
 
 _SHAPE = re.compile(
     r"[A-Za-z0-9]_[A-Za-z0-9]|\w\.[A-Za-z]|\w\(|\b[Mm]j[A-Z]|=[\"]|\A<[/A-Za-z]|--\w|/|\[\w"
-    r"|\Acoursebuild "
+    r"|->\w|\Acoursebuild "
 )
 """What every claim has somewhere, so that most code is passed over quickly."""
 ENGINE_WORD = re.compile(r"(?:mj[A-Z]|mj[a-z]{0,2}_|mjt[A-Z]|Mj[A-Z])\w+")
@@ -112,15 +112,15 @@ def document_names(document: model.Document) -> DocumentNames | None:
             words.update(_CODE_WORD.findall(block.span.text))
         if isinstance(block, model.Script):
             _read_script(block, names)
-        linked: set[int] = set()
+        link_parts: set[int] = set()
         for inline in model.walk_inlines(model.block_inlines(block)):
             if isinstance(inline, model.Link):
-                linked |= {id(child) for child in model.walk_inlines(inline.children)}
+                link_parts |= {id(child) for child in model.walk_inlines(inline.children)}
             elif isinstance(inline, model.CodeSpan) and not inline.literal:
                 for claim, place in claims_of(inline):
                     claims.append(
                         replace(
-                            claim, linked=may_link and claim.linked and id(inline) not in linked
+                            claim, linked=may_link and claim.linked and id(inline) not in link_parts
                         )
                     )
                     codes.append(inline.span)
@@ -140,13 +140,13 @@ def _read_script(script: model.Script, names: CodeNames) -> None:
         return
     members: dict[str, set[str]] = {}
     for node in ast.walk(tree):
-        defined: str | None = None
+        definition: str | None = None
         match node:
             case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
-                defined = node.name
-            case ast.Name(id=defined, ctx=ast.Store()):
+                definition = node.name
+            case ast.Name(id=definition, ctx=ast.Store()):
                 pass
-            case ast.arg(arg=defined):
+            case ast.arg(arg=definition):
                 pass
             case ast.Import():
                 for alias in node.names:
@@ -163,11 +163,11 @@ def _read_script(script: model.Script, names: CodeNames) -> None:
                     names.variables[name] = classes.pop()
             case _:
                 pass
-        if defined is not None:
+        if definition is not None:
             line = getattr(node, "lineno", 1)
-            names.definitions.setdefault(defined, (script.path, line))
-    for name, used in members.items():
-        names.members[name] = names.members.get(name, frozenset()) | used
+            names.definitions.setdefault(definition, (script.path, line))
+    for name, attributes in members.items():
+        names.members[name] = names.members.get(name, frozenset()) | attributes
 
 
 def claims_of(code: model.CodeSpan) -> Iterator[tuple[Claim, Span]]:
@@ -218,7 +218,7 @@ def _find_python(text: str) -> Iterator[tuple[Kind, str, str]]:
             yield "word", word, word
         return
     parts: set[int] = set()
-    stored = {
+    targets = {
         n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
     }
     for node in ast.walk(tree):
@@ -231,7 +231,7 @@ def _find_python(text: str) -> Iterator[tuple[Kind, str, str]]:
             elif path is not None and not path.startswith("_"):
                 name = path.removesuffix("()")
                 yield ("word" if _is_telling(name) else "call"), name, name
-        elif isinstance(node, ast.Name) and node.id not in stored and _is_telling(node.id):
+        elif isinstance(node, ast.Name) and node.id not in targets and _is_telling(node.id):
             yield "word", node.id, node.id
 
 

@@ -48,7 +48,7 @@ def _engine(mujoco: ModuleType) -> dict[str, Any]:
         from mujoco.introspect.structs import STRUCTS
     except ImportError:  # an old MuJoCo describes itself in docstrings alone
         ENUMS = FUNCTIONS = STRUCTS = {}
-    functions = {name: _described(function) for name, function in FUNCTIONS.items()}
+    functions = {name: _describe(function) for name, function in FUNCTIONS.items()}
     enums = {name: list(enum.values) for name, enum in ENUMS.items()}
     constants: dict[str, str] = {}
     classes: dict[str, Any] = {}
@@ -59,8 +59,11 @@ def _engine(mujoco: ModuleType) -> dict[str, Any]:
                 classes[name.lstrip("_")] = dict(_members(value, fields))
             elif callable(value) and name.startswith("mj") and name not in enums:
                 doc = (value.__doc__ or "").strip().split("\n\n")
-                known = functions.get(name, {"doc": " ".join(doc[1:2])})
-                functions[name] = {**known, "text": doc[0].split("\n")[0] or known.get("text", "")}
+                description = functions.get(name, {"doc": " ".join(doc[1:2])})
+                functions[name] = {
+                    **description,
+                    "text": doc[0].split("\n")[0] or description.get("text", ""),
+                }
             elif name.startswith("mj") and isinstance(value, int | float | str):
                 constants[name] = repr(value)
     structs = {n: _fields(s) for n, s in STRUCTS.items() if f"Mj{n[2:]}" not in classes}
@@ -73,14 +76,14 @@ def _engine(mujoco: ModuleType) -> dict[str, Any]:
     }
 
 
-def _described(declaration: Any) -> dict[str, Any]:
+def _describe(declaration: Any) -> dict[str, Any]:
     extent = getattr(declaration, "array_extent", None) or ()
     return {"text": str(declaration), "doc": declaration.doc, "extent": [*map(str, extent)]}
 
 
 def _fields(struct: Any) -> dict[str, Any]:
     fields = () if struct is None else struct.fields
-    return {field.name: _described(field) for field in fields if hasattr(field, "name")}
+    return {field.name: _describe(field) for field in fields if hasattr(field, "name")}
 
 
 def _members(cls: type, fields: dict[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -93,8 +96,8 @@ def _members(cls: type, fields: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         types = _TYPE.findall(text)
         doc = " ".join(" ".join(text.split("\n\n")[1:2]).split())
         first = text.split("\n")[0] if callable(value) else ""
-        known = fields.get(name, {"text": first, "doc": doc})
-        yield name, {**known, "type": types[-1] if types else ""}
+        description = fields.get(name, {"text": first, "doc": doc})
+        yield name, {**description, "type": types[-1] if types else ""}
 
 
 def _elements(mujoco: Any) -> dict[str, dict[str, list[str]]]:
@@ -122,12 +125,12 @@ def _elements(mujoco: Any) -> dict[str, dict[str, list[str]]]:
 
 def _module(name: str) -> Iterator[str]:
     """The names of a module; `*` where there may be more."""
-    loaded = sys.modules.get(name)
-    if loaded is not None and name.split(".")[0] in ("mujoco", "numpy") and loaded.__file__:
-        yield from dir(loaded)
-        yield from _submodules(Path(loaded.__file__))
+    module = sys.modules.get(name)
+    if module is not None and name.split(".")[0] in ("mujoco", "numpy") and module.__file__:
+        yield from dir(module)
+        yield from _submodules(Path(module.__file__))
         return
-    if name in sys.builtin_module_names or (loaded and name in sys.stdlib_module_names):
+    if name in sys.builtin_module_names or (module and name in sys.stdlib_module_names):
         yield from dir(sys.modules.get(name) or __import__(name))
         return
     path = name.replace(".", "/")

@@ -8,24 +8,20 @@ from __future__ import annotations
 
 import builtins
 import functools
-import importlib.util
 import re
-from collections.abc import Iterable, Iterator
-from pathlib import Path
+from collections.abc import Iterable
 from typing import TypeAlias
 
-import msgspec.inspect as inspect
 from msgspec import Struct
 
 from coursebuild.core.model import Course, Document, document_scripts
 from coursebuild.core.model.addresses import line_anchor
-from coursebuild.core.registry import CORE_COMMANDS, features
 from coursebuild.core.syntax.course_schema import CourseFile
-from coursebuild.core.syntax.schemas import schema_roots
 from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest
 from coursebuild.core.text.rules import HELP
 from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, DocumentNames
 from coursebuild.features.names.engine import EngineName, EngineNames, EngineTable
+from coursebuild.features.names.own_names import known_keys, options_by_command, tables_of
 
 _MANUAL = "https://mujoco.readthedocs.io/en/{}/{}"
 _ROOTS = {"model": "MjModel", "data": "MjData", "opt": "MjOption", "spec": "MjSpec"}
@@ -79,9 +75,9 @@ def resolver_of(course: Course) -> Resolver:
     return _resolvers[0]
 
 
-def _propose(name: str, known: Iterable[str]) -> str:
+def _propose(name: str, names: Iterable[str]) -> str:
     """Propose the nearest name, if one is near; only those of about its length are compared."""
-    similar = (other for other in known if abs(len(other) - len(name)) <= 2)
+    similar = (candidate for candidate in names if abs(len(candidate) - len(name)) <= 2)
     likely = nearest(name, similar, cutoff=0.8)
     return f"did you mean `{likely}`?" if likely else ""
 
@@ -158,22 +154,24 @@ class Resolver:
             return Meaning(f"#{line_anchor(*names.definitions[name])}", name)
         if name in names.imports or hasattr(builtins, name):
             return Meaning()
-        found = None if engine is None else find_engine_name(engine, name)
-        if found is not None:
-            return found
+        meaning = None if engine is None else find_engine_name(engine, name)
+        if meaning is not None:
+            return meaning
         if engine is not None and name in engine.words:
             return Meaning()
         if engine is not None and ENGINE_WORD.fullmatch(name):
             version = engine.version
-            known = {*engine.functions, *engine.constants, *engine.enums, *engine.enum_of}
-            known |= {*engine.classes}
-            return Unknown(f"MuJoCo {version} has no `{name}`", did_you_mean(name, known), name)
-        if name in self.words or name in _keys():
+            engine_words = {*engine.functions, *engine.constants, *engine.enums, *engine.enum_of}
+            engine_words |= {*engine.classes}
+            return Unknown(
+                f"MuJoCo {version} has no `{name}`", did_you_mean(name, engine_words), name
+            )
+        if name in self.words or name in known_keys():
             return Meaning()
         is_vague = claim.kind == "call" or name.isupper()  # prose, or an environment variable
         if is_vague and (len(name) < 4 or misspelt(name, names.definitions) is None):
             return None
-        candidates = {*self.words, *_keys(), *(() if engine is None else engine.words)}
+        candidates = {*self.words, *known_keys(), *(() if engine is None else engine.words)}
         message = f"nothing that the course knows is called `{name}`"
         return Unknown(message, _propose(name, candidates), name)
 
@@ -213,30 +211,30 @@ class Resolver:
         class_name = _ROOTS.get(root, "") if self.has_engine else ""
         if not class_name or self.engine is None or root in names.imports:
             return ""
-        used = names.members.get(root, frozenset())
-        return class_name if used <= self.engine.classes.get(class_name, {}).keys() else ""
+        attributes = names.members.get(root, frozenset())
+        return class_name if attributes <= self.engine.classes.get(class_name, {}).keys() else ""
 
     def _member(self, class_name: str, parts: list[str]) -> Answer:
         """What a path means that begins at an object of a class of MuJoCo."""
         assert self.engine is not None
-        found: EngineName | None = None
+        member: EngineName | None = None
         first_class = class_name
         for part in parts:
             members = self.engine.classes.get(class_name)
             name = re.sub(r"[()\[\]]+", "", part)
             if not members:
                 break
-            found = members.get(name)
-            if found is None:
+            member = members.get(name)
+            if member is None:
                 message = f"`{class_name}` of MuJoCo {self.engine.version} has no `{name}`"
                 return Unknown(message, did_you_mean(name, members), name)
-            class_name = found.type
+            class_name = member.type
             if class_name.endswith("List"):
                 class_name = _ITEMS.get(class_name, "") if "[]" in part else ""
-        if found is None:
+        if member is None:
             return None
         href = _class_href(self.engine, first_class)
-        return Meaning(href, found.text, found.doc, found.extent, engine=True)
+        return Meaning(href, member.text, member.doc, member.extent, engine=True)
 
     def _module_member(self, module: str, parts: list[str], names: CodeNames) -> Answer:
         engine = self.engine
@@ -246,20 +244,22 @@ class Resolver:
             if module == "mujoco":
                 if name in engine.classes:
                     rest = parts[number + 1 :]
-                    found = Meaning(_class_href(engine, name), name, engine=True)
-                    return self._member(name, rest) if rest else found
+                    meaning = Meaning(_class_href(engine, name), name, engine=True)
+                    return self._member(name, rest) if rest else meaning
                 if name in engine.enums and parts[number + 1 :]:
                     return self._path(".".join(parts[number:]), names)
-                found_name = find_engine_name(engine, name)
-                if found_name is not None:
-                    return found_name
-            known = engine.modules.get(module)
-            if known is None or (name not in known and "*" in known):
+                meaning = find_engine_name(engine, name)
+                if meaning is not None:
+                    return meaning
+            module_names = engine.modules.get(module)
+            if module_names is None or (name not in module_names and "*" in module_names):
                 return None
-            if name not in known:
+            if name not in module_names:
                 version = f" {engine.version}" if module == "mujoco" else ""
                 label = f"MuJoCo{version}" if module == "mujoco" else f"the module `{module}`"
-                words = known | engine.functions.keys() if module == "mujoco" else known
+                words = (
+                    module_names | engine.functions.keys() if module == "mujoco" else module_names
+                )
                 return Unknown(f"{label} has no `{name}`", did_you_mean(name, words), name)
             module = f"{module}.{name}"
         return Meaning()
@@ -282,17 +282,17 @@ class Resolver:
         if engine is None or not self.has_engine or (element and element not in engine.elements):
             return None
         if element:
-            known = {name for places in engine.elements[element].values() for name in places}
-            if name in known:
+            attributes = {name for places in engine.elements[element].values() for name in places}
+            if name in attributes:
                 return Meaning(element_href(engine, element, name), name, engine=True)
             if element in _HTML:
                 return None
             message = f"`<{element}>` of MuJoCo {engine.version} has no attribute `{name}`"
-            return Unknown(message, did_you_mean(name, known), name)
+            return Unknown(message, did_you_mean(name, attributes), name)
         if name in engine.attributes:
             return Meaning(engine=True, text=name)
         likely = nearest(name, engine.attributes, cutoff=0.75)
-        if name in self.words or likely is None or name in _keys():
+        if name in self.words or likely is None or name in known_keys():
             return None
         message = f"no element of MuJoCo {engine.version} has an attribute `{name}`"
         return Unknown(message, f"did you mean `{likely}`?", name)
@@ -306,10 +306,10 @@ class Resolver:
         return Unknown(f"coursebuild has no command `{name}`", help, name)
 
     def _option(self, command: str, name: str) -> Answer:
-        known = options_by_command()
-        options = known.get(command)
+        commands = options_by_command()
+        options = commands.get(command)
         if options is None:
-            options = frozenset(option for options in known.values() for option in options)
+            options = frozenset(option for options in commands.values() for option in options)
         if name in options:
             return Meaning(self._manual("commands"))
         if not command and nearest(name, options, cutoff=0.85) is None:
@@ -319,7 +319,7 @@ class Resolver:
 
     def _table(self, table: str, key: str) -> Answer:
         name = table.lstrip("[")
-        tables = _tables(CourseFile)
+        tables = tables_of(CourseFile)
         if name not in tables:
             likely = misspelt(name, tables) if len(name) > 3 else None
             if likely is None:
@@ -370,7 +370,7 @@ def names_of(document: Document) -> DocumentNames | None:
 
 def course_names(course: Course) -> tuple[CodeNames, ...]:
     """Return the names of each document of a course."""
-    return tuple(noted.names for noted in map(names_of, course.documents) if noted is not None)
+    return tuple(note.names for note in map(names_of, course.documents) if note is not None)
 
 
 def find_engine_name(engine: EngineNames, name: str) -> Meaning | None:
@@ -421,60 +421,3 @@ def element_href(engine: EngineNames, name: str, attribute: str = "") -> str:
 @functools.lru_cache(maxsize=256)
 def _words_of(text: str) -> frozenset[str]:
     return frozenset(re.findall(r"[A-Za-z]\w*", text))
-
-
-@functools.cache
-def options_by_command() -> dict[str, frozenset[str]]:
-    """The commands of coursebuild and the options in their code, which is read and not run."""
-    modules = {name: f"coursebuild.cli.{name}" for name in CORE_COMMANDS}
-    modules |= {c.name: c.module for feature in features() for c in feature.commands}
-    common = {"--help", "--version", *_options(["coursebuild.cli.arguments"])}
-    options = {name: frozenset((*common, *_options([m]))) for name, m in modules.items()}
-    return {**options, "help": frozenset(common)}
-
-
-def _options(modules: Iterable[str]) -> Iterator[str]:
-    for module in modules:
-        spec = importlib.util.find_spec(module)
-        if spec is None or spec.origin is None:
-            continue
-        file = Path(spec.origin)
-        shared = file.parent.glob("*.py") if file.parent.name == "commands" else ()
-        for path in (file, *shared):
-            yield from re.findall(r'"(--[a-z][a-z-]*)"', path.read_text("utf-8"))
-
-
-@functools.cache
-def _tables(root: type[Struct]) -> dict[str, frozenset[str]]:
-    """The tables of a file, each with its keys; none where any may stand."""
-    tables: dict[str, frozenset[str]] = {}
-
-    def add(name: str, declared: inspect.Type) -> None:
-        match declared:
-            case inspect.StructType():
-                if name in tables:
-                    return  # it holds itself
-                tables[name] = frozenset(field.encode_name for field in declared.fields)
-                for field in declared.fields:
-                    add(f"{name}.{field.encode_name}".lstrip("."), field.type)
-            case inspect.UnionType():
-                for inner in declared.types:
-                    add(name, inner)
-            case inspect.VarTupleType():
-                add(name, declared.item_type)
-            case inspect.Metadata():
-                add(name, declared.type)
-            case inspect.DictType():
-                tables[name] = frozenset()
-            case _:
-                pass
-
-    add("", inspect.type_info(root))
-    return tables
-
-
-@functools.cache
-def _keys() -> frozenset[str]:
-    """The keys of everything that coursebuild reads: the course map, labs, quizzes."""
-    tables = (_tables(root) for root, _ in schema_roots().values())
-    return frozenset(key for table in tables for keys in table.values() for key in keys)

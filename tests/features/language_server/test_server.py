@@ -106,9 +106,7 @@ def unchanged(editor: Editor) -> Iterator[None]:
 
 
 def test_mistakes_are_reported_while_typing_and_nothing_is_saved(editor: Editor) -> None:
-    editor.write(
-        SECOND_LESSON, LINKS.replace("\n", "\r\n") + "🙂 𝄞 Lesson 9.9 is not there.\r\n"
-    )
+    editor.write(SECOND_LESSON, LINKS.replace("\n", "\r\n") + "🙂 𝄞 Lesson 9.9 is not there.\r\n")
     (mistake,) = editor.until(SECOND_LESSON, "link-lesson")
     place = types.Position(5, 13)  # in UTF-16, of which the two characters before take two each
     assert mistake.range == types.Range(place, types.Position(5, 16))

@@ -27,7 +27,8 @@ from coursebuild.features.language_server.commands.fields import (
 )
 from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
-from coursebuild.features.names.resolve import options_by_command, resolver_of
+from coursebuild.features.names.own_names import options_by_command
+from coursebuild.features.names.resolve import resolver_of
 
 _NAME = r"[A-Za-z_]\w*"
 _SUBJECTS = (
@@ -135,8 +136,8 @@ def _find_engine_names(
 ) -> Mapping[str, str]:
     """Return names that inline code can begin with, or elements and attributes of MJCF."""
     engine, document = resolver_of(texts.library.course).engine, texts.document(source)
-    noted = None if document is None else document_names(document)
-    names = {} if noted is None else dict.fromkeys(noted.names.definitions, "")
+    note = None if document is None else document_names(document)
+    names = {} if note is None else dict.fromkeys(note.names.definitions, "")
     if engine is None:
         return names if subject == "name" else {}
     if subject == "element":

@@ -294,15 +294,15 @@ class _Lookup:
 
     def look_up_name(self, code: model.CodeSpan, offset: int) -> Referent | None:
         """Look up what the name in inline code at an offset means, or else its first name."""
-        noted = document_names(self.document)
+        note = document_names(self.document)
         resolver, library = resolver_of(self.library.course), self.library
-        claims = [] if noted is None else [c for c in noted.claims if c[1].start == code.span.start]
+        claims = [] if note is None else [c for c in note.claims if c[1].start == code.span.start]
         for claim, _, span in sorted(claims, key=lambda claim: not _touches(claim[2], offset)):
-            assert noted is not None
-            meaning = resolver.resolve(claim, noted.names)
+            assert note is not None
+            meaning = resolver.resolve(claim, note.names)
             if not isinstance(meaning, Meaning) or not meaning.text:
                 continue
-            path, line = noted.names.definitions.get(claim.name, ("", 0))
+            path, line = note.names.definitions.get(claim.name, ("", 0))
             text, place = fence("python", meaning.text), None
             if path in library.scripts:
                 script = library.scripts[path][0].code
