@@ -244,8 +244,8 @@ class Resolver:
             if module == "mujoco":
                 if name in engine.classes:
                     rest = parts[number + 1 :]
-                    meaning = Meaning(_class_href(engine, name), name, engine=True)
-                    return self._member(name, rest) if rest else meaning
+                    href = _class_href(engine, name)
+                    return self._member(name, rest) if rest else Meaning(href, name, engine=True)
                 if name in engine.enums and parts[number + 1 :]:
                     return self._path(".".join(parts[number:]), names)
                 meaning = find_engine_name(engine, name)
@@ -255,12 +255,9 @@ class Resolver:
             if module_names is None or (name not in module_names and "*" in module_names):
                 return None
             if name not in module_names:
-                version = f" {engine.version}" if module == "mujoco" else ""
-                label = f"MuJoCo{version}" if module == "mujoco" else f"the module `{module}`"
-                words = (
-                    module_names | engine.functions.keys() if module == "mujoco" else module_names
-                )
-                return Unknown(f"{label} has no `{name}`", did_you_mean(name, words), name)
+                is_engine = module == "mujoco"
+                label = f"MuJoCo {engine.version}" if is_engine else f"the module `{module}`"
+                return Unknown(f"{label} has no `{name}`", did_you_mean(name, module_names), name)
             module = f"{module}.{name}"
         return Meaning()
 

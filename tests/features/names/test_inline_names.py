@@ -29,17 +29,19 @@ print(json.dumps({"fall_time": 1}))""",
     '{"fall_time": 1}',
 )
 KNOWN = """
-`mujoco.mj_step(model, data, nstep=…)`, `mj_step`, `mjtJoint`, `mujoco.mjtJoint.mjJNT_HINGE`, `MjSpec.from_file`,
-`data.body("x").xpos[2]`, `data.contact[0].solref`, `data->qpos`, `mjModel.nq`, `model.opt.timestep`, `jnt_range`,
-`flg_local=1`, `spec.worldbody.add_body().pos`, `mjData`, `efc_pos`, `while data.time < 1`, `model.body_pos[i] += 1`,
-`<joint damping="2"/>`, `<visual><global>`, `</body>`, `solref="-1 -2"`, `<frame pos="0 0 1">`, `<div class="x">`,
-`measure(2)`, `ball_speed`, `fall_time`, `np.linalg.norm(x)`, `json.dumps`, `time.sleep(1)`, `len(x)`, `isinstance(x, int)`,
-`coursebuild check --strict`, `--quick`, `[verify] rtol`, `[[silence]]`, `[de]`, `examples/spin.py`, `models/NAME.toml`,
-`free_name`{code}, `listed_one`
+`mujoco.mj_step(model, data, nstep=…)`, `mj_step`, `mjtJoint`, `mujoco.mjtJoint.mjJNT_HINGE`,
+`MjSpec.from_file`, `data.body("x").xpos[2]`, `data.contact[0].solref`, `data->qpos`,
+`mjModel.nq`, `model.opt.timestep`, `jnt_range`, `flg_local=1`, `spec.worldbody.add_body().pos`,
+`mjData`, `efc_pos`, `while data.time < 1`, `model.body_pos[i] += 1`, `<joint damping="2"/>`,
+`<visual><global>`, `</body>`, `solref="-1 -2"`, `<frame pos="0 0 1">`, `<div class="x">`,
+`measure(2)`, `ball_speed`, `fall_time`, `np.linalg.norm(x)`, `json.dumps`, `time.sleep(1)`,
+`len(x)`, `isinstance(x, int)`, `coursebuild check --strict`, `--quick`, `[verify] rtol`,
+`[[silence]]`, `[de]`, `examples/spin.py`, `models/NAME.toml`, `free_name`{code}, `listed_one`
 """
 NO_CLAIMS = """
-`damping`, `page.blocks`, `reader.add("x_y")`, `pip install --user x`, `x = 1`, `a.b.c`, `COURSE_KEY`, `draw(x)`, `i.e.`,
-`1e-3`, `m/s`, `kg m^2`, `_toc.yml`, `plot.svg`, `3.14.0`, `*`, `"a_b"`, `f(`, `<x@y.org>`, `--delay-updates`, `a -> b`
+`damping`, `page.blocks`, `reader.add("x_y")`, `pip install --user x`, `x = 1`, `a.b.c`,
+`COURSE_KEY`, `draw(x)`, `i.e.`, `1e-3`, `m/s`, `kg m^2`, `_toc.yml`, `plot.svg`, `3.14.0`, `*`,
+`"a_b"`, `f(`, `<x@y.org>`, `--delay-updates`, `a -> b`
 """
 WRONG = """
 - `mj_stp`, `mjJNT_HNGE`, `mujoco.MjDta`, `mjtJoint.mjJNT_FRE`, `MjSpec.from_fle`, `data->qpoz`
@@ -58,8 +60,8 @@ WRONG = """
 > - `mj_frward`
 
 ```quiz
-{"id": "q", "questions": [{"id": "a", "kind": "mcq", "q": "`mj_frward`?", "options": ["`mj_frward`", "b"],
- "answer": 1, "explain": "`mj_frward`", "hints": ["`mj_frward`"]}]}
+{"id": "q", "questions": [{"id": "a", "kind": "mcq", "q": "`mj_frward`?",
+ "options": ["`mj_frward`", "b"], "answer": 1, "explain": "`mj_frward`", "hints": ["`mj_frward`"]}]}
 ```
 """
 
@@ -97,10 +99,11 @@ def test_variables_of_a_script_are_what_it_makes_them(make_course: MakeCourse) -
 
 
 def test_pages_link_names_to_what_explains_them(make_course: MakeCourse) -> None:
-    text = "## Of `mj_step`\n\n`mj_step` and [`mj_forward`](#of-mj_step), `data.qpos`, `<joint/>`, `damping`;"
-    text += (
-        " `<joint damping='1'/>`, `<flag energy=\"enable\"/>`, `ball_speed`, `examples/spin.py`."
-    )
+    text = """## Of `mj_step`
+
+`mj_step` and [`mj_forward`](#of-mj_step), `data.qpos`, `<joint/>`, `damping`, `free_name`{code},
+`<flag energy="enable"/>`, `ball_speed`, `examples/spin.py`.
+"""
     course = make_course(f"{text}\n\n{SCRIPT}")
     assert course.main("build").status == 0
     page = course.text("public/lessons/1.1-one.html")
