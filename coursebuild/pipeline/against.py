@@ -42,6 +42,7 @@ from coursebuild.core.scripts.failures import failure_diagnostic
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
+from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import extract_scripts, run
 from coursebuild.pipeline.verify import compile_models
 from coursebuild.report.against import ComparisonReport, ModelLine, ScriptComparison
@@ -66,7 +67,7 @@ def compare_with_version(
     version = check_other_version(version)
     options.store.listen(options.progress.say)
     with project_lock(options.root, options.progress.say):
-        with Documents(options) as parser:
+        with Documents(replace(options, progress=Progress(quiet=True))) as parser:
             parsed_course = load(options.root, parser)
         course = parsed_course.value
         if course is not None and course.python is not None:
