@@ -36,6 +36,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.rules import Rule
 
 if TYPE_CHECKING:  # types of the layers above, which functions of features take
+    from coursebuild.core.engine.memo import Memo
     from coursebuild.core.pages.added_files import ExportContext, SiteContext
     from coursebuild.core.pages.assets import Assets
     from coursebuild.core.pages.context import PageContext
@@ -45,6 +46,7 @@ if TYPE_CHECKING:  # types of the layers above, which functions of features take
     from coursebuild.core.pages.urls import Place
     from coursebuild.core.run.dependencies import Inputs
     from coursebuild.core.run.memory import Memory
+    from coursebuild.core.run.script_environment import Interpreter
     from coursebuild.core.syntax.fence import Fence
     from coursebuild.core.syntax.texts import TextParser
 else:  # names that `help` can show, without importing the layers above
@@ -53,7 +55,9 @@ else:  # names that `help` can show, without importing the layers above
         "ExportContext",
         "Fence",
         "Inputs",
+        "Interpreter",
         "Library",
+        "Memo",
         "Memory",
         "PageContext",
         "PageInputs",
@@ -338,6 +342,14 @@ class Feature(Struct, frozen=True, kw_only=True):
     model_part: ModelPart | None = None
     rules: tuple[Rule, ...] = ()
     """Rules of its own, in addition to the catalogue (`coursebuild.core.text.rules`)."""
+    reference: Callable[[Course, Memo, Interpreter | None], Struct | None] | None = None
+    """What it reads of the environment of the scripts, kept in `course.references`; the interpreter
+    is `None` where the one of this tool runs them."""
+    code_links: Callable[[Library, Place, Document], Mapping[int, str]] | None = None
+    """Addresses of what inline code names, by the offset of the code, for a document's page."""
+    against: Callable[[Course, str], Iterable[Diagnostic]] | None = None
+    """What the course would lose with the MuJoCo of another interpreter, of which the path is
+    given, for `check --against`."""
     check: Callable[[Course, Collection[Document]], Iterable[Diagnostic]] | None = None
     """The diagnostics about some documents of the course that parsing did not find."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None

@@ -40,7 +40,11 @@ from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Span
 
 if TYPE_CHECKING:
+    from coursebuild.core.engine.memo import Memo
     from coursebuild.core.pages.assets import Assets
+    from coursebuild.core.pages.library import Library
+    from coursebuild.core.pages.urls import Place
+    from coursebuild.core.run.script_environment import Interpreter
     from coursebuild.core.syntax.fence import Fence
     from coursebuild.core.syntax.texts import TextParser
 
@@ -214,6 +218,30 @@ def summarize(document: Document, mathml: Mathml) -> Parsed[dict[str, Struct]]:
         name: summary.value for name, summary in summaries.items() if summary.value is not None
     }
     return Parsed(values, tuple(d for summary in summaries.values() for d in summary.diagnostics))
+
+
+def read_references(
+    course: Course, store: Memo, interpreter: Interpreter | None
+) -> dict[str, Struct]:
+    """What features read of the environment of the scripts, by feature."""
+    readers = {f.name: f.reference for f in features() if f.reference is not None}
+    references = {name: read(course, store, interpreter) for name, read in readers.items()}
+    return {name: value for name, value in references.items() if value is not None}
+
+
+def losses_against(course: Course, python: str) -> tuple[Diagnostic, ...]:
+    """What a course would lose with the MuJoCo of another interpreter."""
+    finders = (feature.against for feature in features() if feature.against is not None)
+    return tuple(diagnostic for find in finders for diagnostic in find(course, python))
+
+
+def code_links(library: Library, place: Place, document: Document) -> dict[int, str]:
+    """The addresses of what inline code in a document names, by the offset of the code."""
+    finders = (feature.code_links for feature in features() if feature.code_links is not None)
+    links: dict[int, str] = {}
+    for find in finders:
+        links |= find(library, place, document)
+    return links
 
 
 def check_runs(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic, ...]:

@@ -7,7 +7,7 @@ Entry point: `compare_with_version(options, names, version)`.
    `core.run.environments`). Their results are remembered, too.
 3. Those that do something else run once more there, and in a fresh environment with the version of
    here, to find the cause (see `core.scripts.against`).
-4. The models and MJCF blocks are compiled there.
+4. The models and MJCF blocks are compiled there, and the names in inline code looked up.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptRun
+from coursebuild.core.registry import losses_against
 from coursebuild.core.run.environments import (
     check_other_version,
     latest_version,
@@ -38,8 +39,10 @@ from coursebuild.core.scripts.against import (
 )
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import failure_diagnostic
+from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
+from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import extract_scripts, run
 from coursebuild.pipeline.verify import compile_models
 from coursebuild.report.against import ComparisonReport, ModelLine, ScriptComparison
@@ -64,7 +67,8 @@ def compare_with_version(
     version = check_other_version(version)
     options.store.listen(options.progress.say)
     with project_lock(options.root, options.progress.say):
-        parsed_course = load(options.root)
+        with Documents(replace(options, progress=Progress(quiet=True))) as parser:
+            parsed_course = load(options.root, parser)
         course = parsed_course.value
         if course is not None and course.python is not None:
             raise UsageError(
@@ -138,6 +142,7 @@ class _Comparison(Struct):
             python_version(),
             (*lines, *blocked),
             self._compare_models(interpreter),
+            losses_against(self.course, interpreter.python),
         )
 
     def _run_control(self, scripts: Sequence[Extraction]) -> tuple[dict[str, RunStanding], str]:

@@ -38,6 +38,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.theme import TEMPLATES, Theme
 from coursebuild.core.model.vocabulary import CALLOUTS, ENGLISH, Words
 from coursebuild.core.pages.assets import words_for
+from coursebuild.core.registry import read_references
 from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.versions import engine_version
@@ -149,6 +150,7 @@ class _Loader:
         self.has_unknown_code = False
         self.parser = parser
         self.files = read.value
+        self.store = Memo(root)
         self.unreadable = list(read.value.unreadable)
         """Files that cannot be read, or that are too long."""
         self.diagnostics = list(read.diagnostics)
@@ -173,8 +175,12 @@ class _Loader:
             declarations=declarations,
             theme=self._load_theme(course.theme),
         )
-        self.diagnostics += self.parser.check(course)
         environment = course_environment(self.root, course)
+        # The map's interpreter is a program of the course, which a mere look must not start.
+        if course.python is None or (environment.value is not None and self.code == "run"):
+            references = read_references(course, self.store, environment.value)
+            course = replace(course, references=references)
+        self.diagnostics += self.parser.check(course)
         self.diagnostics += environment.diagnostics
         if course.python is None or environment.value is not None:
             self.diagnostics += _check_engine(course, environment.value)
@@ -277,7 +283,7 @@ class _Loader:
         if self.code == "none":
             return
         if course.features:
-            store, key = Memo(self.root), features_digest(self.root, course)
+            store, key = self.store, features_digest(self.root, course)
             is_known = store.peek(_CODE, key, bytes) is not None
             if self.code == "known" and not is_known:
                 self.has_unknown_code = True

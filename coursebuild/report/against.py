@@ -77,6 +77,8 @@ class ComparisonReport(Struct, frozen=True):
     python: str
     scripts: tuple[ScriptComparison, ...]
     models: tuple[ModelLine, ...]
+    names: tuple[Diagnostic, ...] = ()
+    """Names in the text that the other version has lost or deprecated."""
 
 
 def comparison_json(report: ComparisonReport) -> str:
@@ -86,7 +88,12 @@ def comparison_json(report: ComparisonReport) -> str:
         {
             **plain(report, version="against"),
             "scripts": [_script_value(script) for script in report.scripts],
-            "summary": {**_count(report.scripts), "models_lost": lost},
+            "names": [plain(name) for name in report.names],
+            "summary": {
+                **_count(report.scripts),
+                "models_lost": lost,
+                "names_lost": len(report.names),
+            },
         }
     )
 
@@ -118,6 +125,10 @@ def comparison_text(report: ComparisonReport, style: Style, *, quiet: bool = Fal
         f"{style.paint('fails     ', RED)} {visible(m.path)}:{m.line}"
         f"  no longer compiles: {visible(m.error)}"
         for m in lost
+    ]
+    lines += [
+        f"{style.paint('lost      ', RED)} {location(name.span)}  {visible(name.message)}"
+        for name in report.names
     ]
     if lines:
         parts.append("".join(f"{line}\n" for line in lines))

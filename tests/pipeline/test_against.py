@@ -38,6 +38,12 @@ class MjModel:
 
 class FatalError(Exception):
     pass
+
+def mj_forward(m, d):
+    \"\"\"mj_forward(m, d) -> None\n\nThis is deprecated, take another.\"\"\"
+
+def mj_printSchema(html, pad):
+    return "mujoco (!)       model"
 """
 
 
@@ -184,6 +190,28 @@ same       examples/plain.py
     assert again.err.count(": ok after") == 1
     # Its results do not count as those of the environment here.
     assert course.main("check").out.count("cached") == 4
+
+
+def test_names_that_the_other_version_lacks_are_listed(
+    make: Make, wheels: Path, installed: Path
+) -> None:
+    text = "## A\n\nIt calls `mj_forward(model, data)`, and `mj_step`; `data.qpos` is `<geom>`.\n"
+    course = borrow(make(text, "## B\n"), installed)
+    result = check_against(course)
+    assert (
+        result.out
+        == f"""\
+lost       content/lessons/1.1-one.md:3:11  MuJoCo {NEW_VERSION} discourages `mj_forward`: \
+This is deprecated, take another.
+lost       content/lessons/1.1-one.md:3:42  MuJoCo {NEW_VERSION} has no `mj_step`
+lost       content/lessons/1.1-one.md:3:53  MuJoCo {NEW_VERSION} has no `data.qpos`
+lost       content/lessons/1.1-one.md:3:69  MJCF of MuJoCo {NEW_VERSION} has no element `<geom>`
+
+{SUM} 0 scripts: nothing to compare
+"""
+    )
+    report = json.loads(check_against(course, "--format", "json", "-q").out)
+    assert [(name["line"], name["column"]) for name in report["names"]][:2] == [(3, 11), (3, 42)]
 
 
 def test_another_cause_than_mujoco_is_not_blamed_on_it(

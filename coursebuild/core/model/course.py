@@ -6,6 +6,7 @@ Entry point: `Course`.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
@@ -96,6 +97,8 @@ class Page(Struct, frozen=True):
     document: Document | None
     menu: bool = True
     """Whether it is in the menu of every page."""
+    names: bool = True
+    """Whether names in its inline code have to be known."""
 
     @property
     def is_home(self) -> bool:
@@ -222,6 +225,11 @@ class Course(Struct, frozen=True):
     """Whether warnings count as errors."""
     unproven: tuple[NamedPath, ...] = ()
     """The scripts that need not have been run where warnings count as errors."""
+    names: tuple[str, ...] = ()
+    """Inline code that names nothing which is known; `*` and `?` stand for anything."""
+    references: Mapping[str, Struct] = {}
+    """What features read of the environment of the scripts (`Feature.reference`), by their names.
+    """
     id: str = ""
     """A name for the course that stays when its title changes; see `key`."""
     pace: Pace | None = None

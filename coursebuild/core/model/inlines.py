@@ -46,6 +46,8 @@ class CodeSpan(Struct, frozen=True):
 
     span: Span
     text: str
+    literal: bool = False
+    """Whether `{code}` after it says that it names nothing."""
 
 
 class NumberBinding(Struct, frozen=True):

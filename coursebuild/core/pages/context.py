@@ -19,6 +19,7 @@ from msgspec import Struct
 from coursebuild.core.model import (
     Block,
     Callout,
+    CodeSpan,
     Document,
     Equation,
     FeatureBlock,
@@ -108,6 +109,10 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
             number = next(numbers, "")
             return f"({number})" if number else ""
         return self.inputs.equations.get(target, "")
+
+    def code_href(self, code: CodeSpan) -> str:
+        """The address of what inline code names."""
+        return self.inputs.code_links.get(code.span.start, "")
 
     def code(self, language: str, text: str) -> Markup:
         """A code block that is only shown, not run."""

@@ -15,7 +15,7 @@ from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import DocumentInputs, ShownRun, ShownVerdict
-from coursebuild.core.registry import kind_of_block
+from coursebuild.core.registry import code_links, kind_of_block
 
 
 def document_inputs(
@@ -52,6 +52,7 @@ def document_inputs(
         verdicts={start: ShownVerdict(v.status, v.comparison) for start, v in verdicts if v},
         trials={start: value for start, value in trials if value is not None},
         blocks={b.span.start: make(library, place, b) for b, make in values if make is not None},
+        code_links=code_links(library, place, document),
         keyframes={n: library.facts[n].keyframes for n in models if n in library.facts},
         address=urls.absolute(library.course.base_url, place.path),
     )

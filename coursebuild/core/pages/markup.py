@@ -101,6 +101,10 @@ class HtmlWriter:
         """A formula on a line of its own, at an offset in the document."""
         return Markup(rf'<span class="math">\[{escape(tex)}\]</span>')
 
+    def code_href(self, code: model.CodeSpan) -> str:
+        """The address of what inline code names; mostly empty."""
+        return ""
+
     def code(self, language: str, text: str) -> Markup:
         """A block of code that is only shown, not run."""
         return Markup(f"<pre><code>{escape(text)}</code></pre>\n")
@@ -279,7 +283,8 @@ class HtmlWriter:
             case model.SoftBreak():
                 return "\n"
             case model.CodeSpan():
-                return f"<code>{escape(inline.text)}</code>"
+                code, href = f"<code>{escape(inline.text)}</code>", self.code_href(inline)
+                return f'<a class="name" href="{escape(href)}">{code}</a>' if href else code
             case model.Math():
                 if inline.display:
                     return self.display(inline.tex.text, inline.span.start)

@@ -60,6 +60,8 @@ class DocumentInputs(Struct, frozen=True):
     """The values that features publish of trials."""
     blocks: Mapping[int, Struct] = field(default_factory=dict)
     """The values that features show with their blocks (`FenceKind.values`)."""
+    code_links: Mapping[int, str] = field(default_factory=dict)
+    """Addresses of what inline code names."""
     keyframes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the keyframes of models, by the model's name."""
     address: str = ""

@@ -121,6 +121,10 @@ class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
         tuple[Text, ...],
         Meta(description="paths of scripts that `strict` lets pass where they are not run"),
     ] = ()
+    names: Annotated[
+        tuple[Text, ...],
+        Meta(description="inline code that names nothing; `*` and `?` stand for anything"),
+    ] = ()
 
 
 class FormatTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -163,6 +167,7 @@ class PageTable(Struct, frozen=True, forbid_unknown_fields=True):
     title: Annotated[Text, Meta(description="plain text")]
     file: Annotated[Text, Meta(description="its Markdown file, anywhere in the project")]
     menu: Annotated[bool, Meta(description="whether it is in the menu of every page")] = True
+    names: Annotated[bool, Meta(description="whether names in its code have to be known")] = True
 
 
 class SecurityTable(Struct, frozen=True, forbid_unknown_fields=True):

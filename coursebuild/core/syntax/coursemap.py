@@ -99,7 +99,7 @@ def _build_course(
         silences=fields.silence,
         levels=levels,
         pages=tuple(
-            Page(node.span, page.id, page.title, page.file, None, page.menu)
+            Page(node.span, page.id, page.title, page.file, None, page.menu, page.names)
             for node, page in zip(root.objects("page"), fields.page, strict=True)
         ),
         models=(),
@@ -114,6 +114,7 @@ def _build_course(
         python=NamedPath(verify.python, gate.place("python")) if verify.python else None,
         strict=verify.strict,
         unproven=_named_paths(gate, "unproven", verify.unproven),
+        names=verify.names,
     )
 
 

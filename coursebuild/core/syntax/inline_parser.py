@@ -69,14 +69,15 @@ def _emphasis(state: StateInline, silent: bool) -> bool:
 
 
 _BINDING = re.compile(
-    r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}|\{(given)(?:="([^{}"]+)")?\}"""
+    r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}|\{(given)(?:="([^{}"]+)")?\}|\{code\}"""
 )
 
 
 def _code_span(state: StateInline, silent: bool) -> bool:
     """A code span; with `{out}` after it a `number_binding`, the script's path in its `info`.
 
-    With `{given}` it is a `number_given`, and its `info` the source.
+    With `{given}` it is a `number_given`, and its `info` the source; with `{code}` it stays code,
+    and its `info` is `code`.
     """
     start = state.pos
     if not backtick(state, silent):
@@ -88,6 +89,9 @@ def _code_span(state: StateInline, silent: bool) -> bool:
     state.pos = match.end()
     if not silent:
         token = state.tokens[-1]
+        if match[0] == "{code}":
+            token.info = "code"
+            return True
         token.type = "number_given" if match[3] else "number_binding"
         token.info = match[1] or match[2] or match[4] or ""
         token.map = [start + len(token.markup), end - len(token.markup)]

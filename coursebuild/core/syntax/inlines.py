@@ -258,7 +258,7 @@ class _TokenReader:
                 self.state.diagnostics += check_inline_code(
                     self.content, token.start, token.end, token.content
                 )
-                node = CodeSpan(span, token.content)
+                node = CodeSpan(span, token.content, token.info == "code")
             case "number_binding" | "number_given":
                 node = self._read_number(token, span)
             case "html_inline":

@@ -178,7 +178,7 @@ def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:
     escaping = "; write `\\{` for braces that readers should see"
     if before == "`":
         message = f"`{shorten(markup)}` does not say where the number is from"
-        likely = nearest(key.lower(), ("out", "given"))
+        likely = nearest(key.lower(), ("out", "given", "code"))
         help = 'write `{out}`, `{out=examples/x.py}`, `{given}` or `{given="its source"}`'
         help = help + escaping if likely in (None, key) else f"did you mean `{likely}`?"
         return diagnose("binding-attribute", span, message, help=help)

@@ -33,7 +33,7 @@ import mujoco
 from mjcourse import model_path
 
 model = mujoco.MjModel.from_xml_path(str(model_path("ball")))
-data = mujoco.MjData(model)
+data = fall_data = mujoco.MjData(model)
 mujoco.mj_step(model, data)
 print(f"after {model.opt.timestep} s at {data.qpos[2]:.3f} m")
 ```
@@ -44,7 +44,7 @@ Output:
 after 0.002 s at 1.000 m
 ```
 
-So it is at `1.000`{out} m.
+So it is at `1.000`{out} m, says `fall_data`.
 
 > [!warning] Careful
 > It falls.
@@ -59,6 +59,7 @@ LINKS = """## Links
 
 See [the ball](model:ball), [what turns](term:moment-of-inertia), [falling](lesson:1.1#fall),
 [energy](lesson:1.1#eq:energy), [the script](examples/fall.py), Lesson 1.1 and [here](#links).
+It calls `mj_step(model, data)`, reads `body_mass` and keeps `data`; `<joint damping="2"/>` is MJCF.
 """
 BALL = """<!-- A ball in the air. -->
 <mujoco>
@@ -105,9 +106,7 @@ def unchanged(editor: Editor) -> Iterator[None]:
 
 
 def test_mistakes_are_reported_while_typing_and_nothing_is_saved(editor: Editor) -> None:
-    editor.write(
-        SECOND_LESSON, LINKS.replace("\n", "\r\n") + "\r\n🙂 𝄞 Lesson 9.9 is not there.\r\n"
-    )
+    editor.write(SECOND_LESSON, LINKS.replace("\n", "\r\n") + "🙂 𝄞 Lesson 9.9 is not there.\r\n")
     (mistake,) = editor.until(SECOND_LESSON, "link-lesson")
     place = types.Position(5, 13)  # in UTF-16, of which the two characters before take two each
     assert mistake.range == types.Range(place, types.Position(5, 16))
@@ -246,6 +245,9 @@ HOVERS = [
     (SECOND_LESSON, "lesson:1.1#fa|ll", "**Lesson 1.1: "),
     (SECOND_LESSON, "lesson:1.1#eq:en|ergy", "```tex\nE = m g h\n```"),
     (SECOND_LESSON, "examples/fa|ll.py", "`examples/fall.py`, a script of 1.1"),
+    (SECOND_LESSON, "mj_st|ep(model", "mj_step(m: mujoco._structs.MjModel"),
+    (SECOND_LESSON, "`body_m|ass`", "shape `(nbody,)`"),
+    (SECOND_LESSON, "<joint dam|ping", "damping"),
     (MAP, "stat|us =", ""),
 ]
 
@@ -262,6 +264,7 @@ def test_hovers(editor: Editor) -> None:
 DEFINITIONS = [
     (FIRST_LESSON, "I \\om|ega^2", f"{FIRST_LESSON}:3"),
     (FIRST_LESSON, "`1.0|00`{out}", f"{FIRST_LESSON}:21"),
+    (FIRST_LESSON, "`fall_d|ata`", f"{FIRST_LESSON}:13"),
     (SECOND_LESSON, "model:ba|ll", "models/ball.xml:1"),
     (SECOND_LESSON, "term:mom|ent", f"{FIRST_LESSON}:3"),
     (SECOND_LESSON, "lesson:1.1#fa|ll", f"{FIRST_LESSON}:1"),
@@ -290,6 +293,10 @@ def test_definitions(editor: Editor) -> None:
         (SECOND_LESSON, "[x](term:|", "moment-of-inertia", "moment-of-inertia"),
         (SECOND_LESSON, "[x](lesson:1.1#|", "eq:energy", "eq:energy"),
         (SECOND_LESSON, "`1`{out=|", "examples/fall.py", "examples/fall.py"),
+        (SECOND_LESSON, "It calls `mj_for|", "mj_forward", "mj_forward"),
+        (SECOND_LESSON, "In `<free|", "freejoint", "freejoint"),
+        (SECOND_LESSON, 'In `<joint axis="1 0 0" dam|', "damping", "damping"),
+        (SECOND_LESSON, "Run `coursebuild ch|", "check", "check"),
         (SECOND_LESSON, "> [!w|", "warning", "warning"),
         (SECOND_LESSON, "```|", "quiz", "quiz"),
         (SECOND_LESSON, "```python\nmodel.opt.|\n```", "timestep", "timestep"),
@@ -308,7 +315,7 @@ def test_completions(editor: Editor, path: str, typed: str, label: str, new: str
     assert isinstance(item.text_edit, types.TextEdit)
     (text,) = editor.apply_edits({editor.places.uri(path): [item.text_edit]}).values()
     before, after = typed.split("|", 1)
-    stem = re.split(r'[\s:#=.!`("\[{]', before)[-1]
+    stem = re.split(r'[\s:#=.!`(<"\[{]', before)[-1]
     start = before.removesuffix('"' + stem) if new.startswith('"') else before.removesuffix(stem)
     assert text.endswith(start + new + after.removeprefix('"'))
 

@@ -26,6 +26,9 @@ from coursebuild.features.language_server.commands.fields import (
     possible_values,
 )
 from coursebuild.features.language_server.commands.texts import OpenTexts
+from coursebuild.features.names.claims import document_names
+from coursebuild.features.names.own_names import options_by_command
+from coursebuild.features.names.resolve import resolver_of
 
 _NAME = r"[A-Za-z_]\w*"
 _SUBJECTS = (
@@ -42,6 +45,10 @@ _SUBJECTS = (
         Kind.Reference,
         r"\]\((?:(?P<kind>lesson|page):(?P<id>[\w.-]+))?#(?P<word>[\w.:-]*)$",
     ),
+    ("command", Kind.Keyword, r"`coursebuild (?P<word>\w*)$"),
+    ("element", Kind.Class, r"`</?(?P<word>\w*)$"),
+    ("attribute", Kind.Property, r"`<(?P<tag>\w+)(?: [^`<>]*)? (?P<word>\w*)$"),
+    ("name", Kind.Function, r"(?<!`)`(?P<word>\w+)$"),
     ("member", Kind.Field, rf"(?<![\w.])(?P<path>{_NAME}(?:\.{_NAME})*)\.(?P<word>\w*)$"),
 )
 """What can be proposed, its icon, and a pattern of the text before the cursor, whose group
@@ -114,10 +121,40 @@ def _find_names(
             return dict.fromkeys((*CORE_FENCES, *fence_names()), "") if is_outside else {}
         case "anchor":
             return _find_anchors(texts, cursor.source, prefix)
+        case "command" | "element" | "attribute" | "name" if fence_at(cursor.source, cursor.start):
+            return {}
+        case "command":
+            return dict.fromkeys(options_by_command(), "")
+        case "element" | "attribute" | "name":
+            return _find_engine_names(texts, cursor.source, subject, prefix)
         case _:
             _, code = fence_at(cursor.source, cursor.start) or ("", cursor)
             declarations = members(tuple(prefix["path"].split(".")), code.text)
             return {name: declaration.doc for name, declaration in declarations.items()}
+
+
+def _find_engine_names(
+    texts: OpenTexts, source: Source, subject: str, prefix: re.Match[str]
+) -> Mapping[str, str]:
+    """Return names that inline code can begin with, or elements and attributes of MJCF."""
+    engine, document = resolver_of(texts.library.course).engine, texts.document(source)
+    note = None if document is None else document_names(document)
+    names = {} if note is None else dict.fromkeys(note.names.definitions, "")
+    if engine is None:
+        return names if subject == "name" else {}
+    if subject == "element":
+        return dict.fromkeys(engine.elements, "")
+    if subject == "attribute":
+        places = engine.elements.get(prefix["tag"], {}).values()
+        return {attribute: "" for attributes in places for attribute in attributes}
+    functions = {name: function.text for name, function in engine.functions.items()}
+    words = sorted(name for name in engine.words if name.lower().startswith("mj"))
+    fields = {
+        name: member.text
+        for kind in ("MjModel", "MjData")
+        for name, member in engine.classes[kind].items()
+    }
+    return {**dict.fromkeys(words, ""), **fields, **functions, **names}
 
 
 def _find_anchors(texts: OpenTexts, source: Source, prefix: re.Match[str]) -> Mapping[str, str]:

@@ -1,6 +1,6 @@
 """Fields of `data` and `model`, and functions of the engine, as MuJoCo's package describes them.
 
-Entry points: `members`, the names that can follow a dot; `describe_name`.
+Entry points: `members`, the names that can follow a dot; `describe_name`; `describe_shape`.
 """
 
 from __future__ import annotations
@@ -64,10 +64,11 @@ def describe_name(
         return None
     text = f"{fence('c', str(declaration))}\n{escape_text(declaration.doc)}"
     extent = getattr(declaration, "array_extent", None)
-    return span, f"{text}\n\n{_describe_shape(extent, facts)}" if extent else text
+    return span, f"{text}\n\n{describe_shape(extent, facts)}" if extent else text
 
 
-def _describe_shape(extent: Iterable[str | int], facts: ModelFacts | None) -> str:
+def describe_shape(extent: Iterable[str | int], facts: ModelFacts | None) -> str:
+    """Say the shape of an array, with numbers for the sizes that are known."""
     sizes: dict[str | int, int] = {}
     if facts is not None:
         sizes = {"nq": facts.nq, "nv": facts.nv, "nu": facts.nu, "nbody": facts.bodies + 1}

@@ -31,9 +31,11 @@ from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.glossary.sentences import definition_of
-from coursebuild.features.language_server.commands.engine import describe_name
+from coursebuild.features.language_server.commands.engine import describe_name, describe_shape
 from coursebuild.features.language_server.commands.fields import field_place
 from coursebuild.features.language_server.commands.texts import OpenTexts
+from coursebuild.features.names.claims import document_names
+from coursebuild.features.names.resolve import Meaning, resolver_of
 from coursebuild.features.symbols.mathml import only_symbol, symbols
 from coursebuild.pipeline.reading import kept_formulas
 
@@ -129,7 +131,9 @@ class _Lookup:
                 kind = self.library.callout(node.kind)
                 label, promise = escape_text(kind.label), escape_text(kind.promise)
                 return Referent(node.kind_span, f"**{label}**\n\n{promise}")
-            case model.Script() | model.PlainCode() | model.FeatureBlock() | model.CodeSpan():
+            case model.CodeSpan():
+                return self.look_up_code(node, offset) or self.look_up_name(node, offset)
+            case model.Script() | model.PlainCode() | model.FeatureBlock():
                 return self.look_up_code(node, offset)
             case _:
                 return None
@@ -287,6 +291,28 @@ class _Lookup:
             model_names = node.models()
         description = describe_name(node.span, offset, self.facts(sorted(model_names)))
         return description and Referent(*description)
+
+    def look_up_name(self, code: model.CodeSpan, offset: int) -> Referent | None:
+        """Look up what the name in inline code at an offset means, or else its first name."""
+        note = document_names(self.document)
+        resolver, library = resolver_of(self.library.course), self.library
+        claims = [] if note is None else [c for c in note.claims if c[1].start == code.span.start]
+        for claim, _, span in sorted(claims, key=lambda claim: not _touches(claim[2], offset)):
+            assert note is not None
+            meaning = resolver.resolve(claim, note.names)
+            if not isinstance(meaning, Meaning) or not meaning.text:
+                continue
+            path, line = note.names.definitions.get(claim.name, ("", 0))
+            text, place = fence("python", meaning.text), None
+            if path in library.scripts:
+                script = library.scripts[path][0].code
+                lines = script.text.splitlines(keepends=True)
+                start = sum(map(len, lines[: line - 1]))
+                place = script.span(start, start + len(lines[line - 1].rstrip()))
+                text = fence("python", place.text)
+            shape = describe_shape(meaning.extent, None) if meaning.extent else ""
+            return Referent(span, _paragraphs(text, escape_text(meaning.doc), shape), place)
+        return None
 
 
 def _is_at(tex: str, span: Span, offset: int) -> bool:

@@ -1,0 +1,128 @@
+"""Names in inline code are claims: each one means something, or is a mistake.
+
+1. `claims` finds them in a document, and what its code defines.
+2. `engine` lists the names of MuJoCo, of MJCF and of imported modules, by a child (`introspect`).
+3. `resolve` says what a name means; its page links to that, an editor shows it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator
+from fnmatch import fnmatchcase
+
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.features import Feature
+from coursebuild.core.model import Course, Document
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.library import Library
+from coursebuild.core.run.script_environment import Interpreter
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
+from coursebuild.core.text.rules import Rule
+from coursebuild.features.names.claims import document_names
+from coursebuild.features.names.engine import EngineTable, engine_names, list_names
+from coursebuild.features.names.resolve import (
+    Meaning,
+    Resolver,
+    Unknown,
+    course_names,
+    names_of,
+    resolver_of,
+)
+
+_HELP = "say `{code}` after it if it is no name, or list it under `names` in `[verify]`"
+
+
+def reference(course: Course, store: Memo, interpreter: Interpreter | None) -> EngineTable | None:
+    """Return the names of the installed MuJoCo, if the course names anything."""
+    documents = course_names(course)
+    paths = {"mujoco.x", "numpy.x"}
+    for names in documents:
+        paths |= {f"{module}.x" for module in names.imports.values()}
+        for claim in names.claims:
+            root, dot, rest = re.sub(r"[()\[\]]+", "", claim.name).partition(".")
+            module = names.imports.get(root, "numpy" if root == "np" else "")
+            paths |= {f"{module}.{rest}"} if dot and module else set()
+    modules = {path[: dot.start()] for path in paths for dot in re.finditer(r"\.", path)}
+    return engine_names(store, interpreter, modules) if any(n.claims for n in documents) else None
+
+
+def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:
+    """Report names that mean nothing."""
+    free = {id(page.document) for page in course.pages if not page.names}
+    resolver = resolver_of(course)
+    for document in documents:
+        note = names_of(document)
+        if note is None or id(document) in free:
+            continue
+        for claim, code, span in note.claims:
+            answer = resolver.resolve(claim, note.names)
+            if not isinstance(answer, Unknown):
+                continue
+            text = code.text.strip("` ")
+            if any(
+                fnmatchcase(word, name) for word in (text, answer.part) for name in course.names
+            ):
+                continue
+            at = code.source.text.find(answer.part, span.start, code.end)
+            place = code.source.span(at, at + len(answer.part)) if at >= 0 else span
+            yield diagnose("name-unknown", place, answer.message, help=answer.help or _HELP)
+
+
+def lost_names(course: Course, python: str) -> Iterator[Diagnostic]:
+    """Report names of MuJoCo that the one of another interpreter has lost, or deprecated."""
+    resolver = resolver_of(course)
+    uses = [
+        (claim, span, note.names, meaning)
+        for note in filter(None, map(names_of, course.documents))
+        for claim, _, span in note.claims
+        if isinstance(meaning := resolver.resolve(claim, note.names), Meaning) and meaning.engine
+    ]
+    if not uses or resolver.engine is None:
+        return
+    engine = list_names(python, resolver.engine.modules)
+    other_resolver = Resolver(course, engine)
+    for claim, span, names, meaning in uses:
+        answer = other_resolver.resolve(claim, names)
+        if isinstance(answer, Meaning) and answer.engine:
+            if "deprecated" in answer.doc.lower() and "deprecated" not in meaning.doc.lower():
+                message = f"MuJoCo {engine.version} discourages `{claim.name}`: {answer.doc}"
+                yield diagnose("name-unknown", span, message)
+        elif isinstance(answer, Unknown):
+            yield diagnose("name-unknown", span, answer.message)
+        else:
+            message = f"MuJoCo {engine.version} has no `{claim.name}`"
+            yield diagnose("name-unknown", span, message)
+
+
+def code_links(library: Library, place: urls.Place, document: Document) -> dict[int, str]:
+    """Return the addresses of what inline code names."""
+    note, links = names_of(document), dict[int, str]()
+    if note is None:
+        return links
+    resolver = resolver_of(library.course)
+    pages = {page.path: page for page in library.course.pages}
+    for claim, code, _ in note.claims:
+        answer = resolver.resolve(claim, note.names) if claim.linked else None
+        href = answer.href if isinstance(answer, Meaning) else ""
+        page = pages.get(href)
+        if href.startswith("#examples/"):
+            href = place.href(href[1:]) if href[1:] in library.scripts else ""
+        elif page is not None:
+            href = "" if page.document is document else place.href(urls.page_path(page))
+        if href:
+            links[code.start] = href
+    return links
+
+
+FEATURE = Feature(
+    name="names",
+    summary=lambda document, mathml: Parsed(document_names(document)),
+    reference=reference,
+    code_links=code_links,
+    against=lost_names,
+    check=check,
+    rules=(
+        Rule("name-unknown", "error", "Inline code has the shape of a name, and nothing has it."),
+    ),
+)

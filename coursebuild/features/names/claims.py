@@ -1,0 +1,260 @@
+"""Finds names in a document: what its inline code says that there is, and what its code defines.
+
+Entry points: `document_names`, what `resolve` must know of a document; `claims_of`, the claims of
+one piece of inline code; `Claim` and `CodeNames`.
+
+Inline code is a claim only where it has the shape of a name: a call, a dotted name, a word with an
+underscore or one that begins as MuJoCo's do, elements and attributes of MJCF, a command or an
+option of coursebuild, a table of the course map, a file of the course.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import re
+from collections.abc import Iterator
+from typing import Literal, TypeAlias
+
+import msgspec
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.core import model
+from coursebuild.core.text.source import Span
+
+Kind: TypeAlias = Literal[
+    "word", "call", "path", "element", "attribute", "command", "option", "table", "file"
+]
+
+_SHAPE = re.compile(
+    r"[A-Za-z0-9]_[A-Za-z0-9]|\w\.[A-Za-z]|\w\(|\b[Mm]j[A-Z]|=[\"]|\A<[/A-Za-z]|--\w|/|\[\w"
+    r"|->\w|\Acoursebuild "
+)
+"""What every claim has somewhere, so that most code is passed over quickly."""
+ENGINE_WORD = re.compile(r"(?:mj[A-Z]|mj[a-z]{0,2}_|mjt[A-Z]|Mj[A-Z])\w+")
+"""A name that only MuJoCo has."""
+_ATTRIBUTES = re.compile(r'\s*([A-Za-z_][\w:-]*)\s*=\s*"[^"]*"')
+_TAG = re.compile(rf"<(/?)([A-Za-z]\w*)((?:{_ATTRIBUTES.pattern[:-7]}\"[^\"]*\")*)\s*/?>")
+_TABLE = re.compile(r"(\[\[?)([a-z][\w.]*)\]\]?(?: (\w+)(?: =.*)?)?")
+_FILE = re.compile(r"(?:content|examples|models)/(?!.*[A-Z]{3})[\w./-]*\w\.[a-z]+")
+_CODE_WORD = re.compile(
+    r"\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
+)
+"""A word of code that inline code could mean."""
+_CODE = (
+    model.Script | model.PlainCode | model.CodeBlock | model.Mjcf | model.FeatureBlock
+) | model.Recording
+_STRUCTURES = {"MjData", "MjModel", "MjSpec"}
+
+
+class Claim(Struct, frozen=True, array_like=True):
+    """A name in inline code."""
+
+    kind: Kind
+    name: str
+    """Parts of a path are joined by dots; `()` and `[]` after one say that it is called or
+    indexed. An attribute has the elements before it, as in `joint damping`."""
+    linked: bool
+    """Whether the whole code can link to what this name means."""
+
+
+class CodeNames(Struct, frozen=True):
+    """The names of a document, but for their places."""
+
+    claims: tuple[Claim, ...]
+    words: frozenset[str]
+    """Words of its blocks of code, which the text may use."""
+    definitions: dict[str, tuple[str, int]]
+    """The names that its scripts define, each with the script's path and the line."""
+    imports: dict[str, str]
+    """The modules and the parts of modules that they import, by the names that they have there."""
+    variables: dict[str, str]
+    """Variables that hold a structure of MuJoCo, each with its class."""
+    members: dict[str, frozenset[str]]
+    """The attributes that scripts use of each of their variables."""
+
+
+class DocumentNames(Struct, frozen=True, dict=True):
+    """The names of a document as they are kept, since all documents are asked for words."""
+
+    data: bytes
+    codes: tuple[Span, ...]
+    """Of each claim the place of its inline code."""
+    places: tuple[Span, ...]
+    """Of each claim its own."""
+
+    @functools.cached_property
+    def names(self) -> CodeNames:
+        """What the bytes hold."""
+        return msgspec.json.decode(self.data, type=CodeNames)
+
+    @property
+    def claims(self) -> Iterator[tuple[Claim, Span, Span]]:
+        """Each claim with the place of its code and its own."""
+        return zip(self.names.claims, self.codes, self.places, strict=True)
+
+
+def document_names(document: model.Document) -> DocumentNames | None:
+    """Return the names of a document; `None` if it has neither claims nor code."""
+    claims: list[Claim] = []
+    codes: list[Span] = []
+    places: list[Span] = []
+    words: set[str] = set()
+    names = CodeNames((), frozenset(), {}, {}, {}, {})
+    inner: set[int] = set()
+    for block in model.document_blocks(document):
+        if isinstance(block, model.FeatureBlock):
+            inner |= {id(part) for part in model.walk_blocks(block.child_blocks())}
+        # A heading, an option of a quiz and a title may stand in a link or a button.
+        may_link = isinstance(block, model.Paragraph | model.Table) and id(block) not in inner
+        if isinstance(block, _CODE):
+            words.update(_CODE_WORD.findall(block.span.text))
+        if isinstance(block, model.Script):
+            _read_script(block, names)
+        link_parts: set[int] = set()
+        for inline in model.walk_inlines(model.block_inlines(block)):
+            if isinstance(inline, model.Link):
+                link_parts |= {id(child) for child in model.walk_inlines(inline.children)}
+            elif isinstance(inline, model.CodeSpan) and not inline.literal:
+                for claim, place in claims_of(inline):
+                    claims.append(
+                        replace(
+                            claim, linked=may_link and claim.linked and id(inline) not in link_parts
+                        )
+                    )
+                    codes.append(inline.span)
+                    places.append(place)
+    if not (claims or words):
+        return None
+    names = replace(names, claims=tuple(claims), words=frozenset(words))
+    data = msgspec.json.encode(names, order="deterministic")
+    return DocumentNames(data, tuple(codes), tuple(places))
+
+
+def _read_script(script: model.Script, names: CodeNames) -> None:
+    """Add what a script defines and imports."""
+    try:
+        tree = ast.parse(script.code.text)
+    except (SyntaxError, ValueError, RecursionError):
+        return
+    members: dict[str, set[str]] = {}
+    for node in ast.walk(tree):
+        definition: str | None = None
+        match node:
+            case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
+                definition = node.name
+            case ast.Name(id=definition, ctx=ast.Store()):
+                pass
+            case ast.arg(arg=definition):
+                pass
+            case ast.Import():
+                for alias in node.names:
+                    name = alias.asname or alias.name.partition(".")[0]
+                    names.imports[name] = alias.name if alias.asname else name
+            case ast.ImportFrom(module=str(module), level=0):
+                for alias in node.names:
+                    names.imports[alias.asname or alias.name] = f"{module}.{alias.name}"
+            case ast.Attribute(value=ast.Name(id=name), attr=attribute):
+                members.setdefault(name, set()).add(attribute)
+            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call(func=function)):
+                classes = _STRUCTURES.intersection(ast.unparse(function).split("."))
+                if classes:
+                    names.variables[name] = classes.pop()
+            case _:
+                pass
+        if definition is not None:
+            line = getattr(node, "lineno", 1)
+            names.definitions.setdefault(definition, (script.path, line))
+    for name, attributes in members.items():
+        names.members[name] = names.members.get(name, frozenset()) | attributes
+
+
+def claims_of(code: model.CodeSpan) -> Iterator[tuple[Claim, Span]]:
+    """Yield the claims of a piece of inline code, each with its place."""
+    text = code.text.strip()
+    if not _SHAPE.search(text) and ENGINE_WORD.fullmatch(text) is None:
+        return
+    for number, (kind, name, part) in enumerate(_find(text)):
+        start = code.span.start + code.span.text.find(part)
+        has_part = start >= code.span.start
+        span = code.span.source.span(start, start + len(part)) if has_part else code.span
+        yield Claim(kind, name, not number), span
+
+
+def _find(text: str) -> Iterator[tuple[Kind, str, str]]:
+    """Yield the kind of each claim, its name, and the part of the text that is reported."""
+    words = text.split()
+    if words[0] == "coursebuild" or text.startswith("--"):
+        is_command = words[0] == "coursebuild" and len(words) > 1
+        command = words[1] if is_command and re.fullmatch("[a-z]+", words[1]) else ""
+        if command:
+            yield "command", command, command
+        for word in words:
+            option = re.match(r"--[a-z][a-z-]*", word)
+            if option is not None:
+                yield "option", f"{command} {option[0]}", option[0]
+    elif table := _TABLE.fullmatch(text):
+        yield "table", f"{table[1]}{table[2]} {table[3] or ''}", table[3] or table[2]
+    elif text.startswith("<"):
+        for tag in _TAG.finditer(text):
+            yield "element", tag[2], tag[2]
+            for attribute in _ATTRIBUTES.findall(tag[3]):
+                yield "attribute", f"{tag[2]} {attribute}", attribute
+    elif re.fullmatch(rf"(?:{_ATTRIBUTES.pattern})+", text):
+        for attribute in _ATTRIBUTES.findall(text):
+            yield "attribute", f" {attribute}", attribute
+    elif _FILE.fullmatch(text):
+        yield "file", text, text
+    elif not re.search(r"\.(?:py|xml|toml|md|json|js|svg|csv|txt|ya?ml|html|rst|css)\b", text):
+        yield from _find_python(text)
+
+
+def _find_python(text: str) -> Iterator[tuple[Kind, str, str]]:
+    try:
+        tree = ast.parse(text.replace("…", "_").replace("->", "."))
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        for word in ENGINE_WORD.findall(text):
+            yield "word", word, word
+        return
+    parts: set[int] = set()
+    targets = {
+        n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+    }
+    for node in ast.walk(tree):
+        if id(node) in parts:
+            continue
+        if isinstance(node, ast.Attribute | ast.Call):
+            path = _path(node, parts)
+            if path is not None and "." in path:
+                yield "path", path, re.split(r"[.(\[]", path)[0]
+            elif path is not None and not path.startswith("_"):
+                name = path.removesuffix("()")
+                yield ("word" if _is_telling(name) else "call"), name, name
+        elif isinstance(node, ast.Name) and node.id not in targets and _is_telling(node.id):
+            yield "word", node.id, node.id
+
+
+def _is_telling(name: str) -> bool:
+    """Whether a word has the shape of a name by itself."""
+    return bool(re.search(r"[A-Za-z0-9]_[A-Za-z0-9]", name) or ENGINE_WORD.fullmatch(name))
+
+
+def _path(node: ast.expr, parts: set[int]) -> str | None:
+    """The dotted name that an expression is, down to its root; its nodes are added to `parts`."""
+    names: list[str] = []
+    suffix = ""
+    while True:
+        parts.add(id(node))
+        match node:
+            case ast.Attribute():
+                names.append(node.attr + suffix)
+                node, suffix = node.value, ""
+            case ast.Call():
+                node, suffix = node.func, "()" + suffix
+            case ast.Subscript():
+                node, suffix = node.value, "[]" + suffix
+            case ast.Name():
+                return ".".join(reversed([*names, node.id + suffix]))
+            case _:
+                return None

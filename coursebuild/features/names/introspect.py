@@ -1,0 +1,161 @@
+"""The child process that lists the names of MuJoCo, of MJCF and of the modules that scripts import.
+
+Entry point: run as a file by `engine`, in the environment of the scripts. It says `ready`; then
+each line is a list of modules, and the answer is an `engine.EngineNames`.
+
+Only MuJoCo and what it imports itself are imported. Other modules are read, and not run: the names
+that their file defines or imports; `*` stands for those that only running it would tell.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import json
+import os
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+_TYPE = re.compile(r"->\s*(?:\w+(?:\.|::))*_?(\w+)")
+_SCHEMA_LINE = re.compile(r"( *)(?:\((\w+)\))?(\w+) \(.\) +(.*)|( {20,})(\S.*)")
+
+
+def main() -> None:
+    """Serve until the input closes."""
+    replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what an import prints is no answer
+    import mujoco
+
+    print("ready", file=replies, flush=True)
+    for line in sys.stdin:
+        names = {
+            **_engine(mujoco),
+            "elements": _elements(mujoco),
+            "modules": {name: sorted(set(_module(name))) for name in json.loads(line)},
+        }
+        print(json.dumps(names), file=replies, flush=True)
+
+
+def _engine(mujoco: ModuleType) -> dict[str, Any]:
+    """The functions, constants and enumerations of MuJoCo, and its classes with their fields."""
+    try:
+        from mujoco.introspect.enums import ENUMS
+        from mujoco.introspect.functions import FUNCTIONS
+        from mujoco.introspect.structs import STRUCTS
+    except ImportError:  # an old MuJoCo describes itself in docstrings alone
+        ENUMS = FUNCTIONS = STRUCTS = {}
+    functions = {name: _describe(function) for name, function in FUNCTIONS.items()}
+    enums = {name: list(enum.values) for name, enum in ENUMS.items()}
+    constants: dict[str, str] = {}
+    classes: dict[str, Any] = {}
+    for module in (sys.modules.get("mujoco._structs", mujoco), mujoco):
+        for name, value in vars(module).items():
+            if inspect.isclass(value) and name not in enums:
+                fields = _fields(STRUCTS.get(f"mj{name[2:]}"))
+                classes[name.lstrip("_")] = dict(_members(value, fields))
+            elif callable(value) and name.startswith("mj") and name not in enums:
+                doc = (value.__doc__ or "").strip().split("\n\n")
+                description = functions.get(name, {"doc": " ".join(doc[1:2])})
+                functions[name] = {
+                    **description,
+                    "text": doc[0].split("\n")[0] or description.get("text", ""),
+                }
+            elif name.startswith("mj") and isinstance(value, int | float | str):
+                constants[name] = repr(value)
+    structs = {n: _fields(s) for n, s in STRUCTS.items() if f"Mj{n[2:]}" not in classes}
+    return {
+        "version": mujoco.__version__,
+        "functions": functions,
+        "enums": enums,
+        "constants": constants,
+        "classes": classes | structs,
+    }
+
+
+def _describe(declaration: Any) -> dict[str, Any]:
+    extent = getattr(declaration, "array_extent", None) or ()
+    return {"text": str(declaration), "doc": declaration.doc, "extent": [*map(str, extent)]}
+
+
+def _fields(struct: Any) -> dict[str, Any]:
+    fields = () if struct is None else struct.fields
+    return {field.name: _describe(field) for field in fields if hasattr(field, "name")}
+
+
+def _members(cls: type, fields: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    """The members of a class; their types are said by what pybind11 writes into docstrings."""
+    for name in dir(cls):
+        if name.startswith("_"):
+            continue
+        value = inspect.getattr_static(cls, name)
+        text = (getattr(getattr(value, "fget", value), "__doc__", None) or "").strip()
+        types = _TYPE.findall(text)
+        doc = " ".join(" ".join(text.split("\n\n")[1:2]).split())
+        first = text.split("\n")[0] if callable(value) else ""
+        description = fields.get(name, {"text": first, "doc": doc})
+        yield name, {**description, "type": types[-1] if types else ""}
+
+
+def _elements(mujoco: Any) -> dict[str, dict[str, list[str]]]:
+    """The elements of MJCF: of each the elements that it stands in, with its attributes there."""
+    elements: dict[str, dict[str, list[str]]] = {"include": {"mujoco": ["file", "prefix"]}}
+    elements["mujocoinclude"] = {"": []}
+    elements["worldbody"] = {"mujoco": ["name"]}
+    elements["frame"] = {"body": "axisangle childclass euler name pos quat xyaxes zaxis".split()}
+    elements["replicate"] = {"body": "count euler offset sep".split()}  # not in what is printed
+    parents: dict[int, str] = {}
+    attributes: list[str] = []
+    for match in map(_SCHEMA_LINE.match, mujoco.mj_printSchema(False, False).splitlines()):
+        if match is None:
+            continue
+        if match[6]:
+            attributes += match[6].split()
+            continue
+        depth, name = len(match[1]), match[3]
+        parent = next((parents[d] for d in sorted(parents, reverse=True) if d < depth), "")
+        parents = {d: p for d, p in parents.items() if d < depth} | {depth: name}
+        attributes = elements.setdefault(name, {}).setdefault(parent, [])
+        attributes += match[4].split()
+    return elements
+
+
+def _module(name: str) -> Iterator[str]:
+    """The names of a module; `*` where there may be more."""
+    module = sys.modules.get(name)
+    if module is not None and name.split(".")[0] in ("mujoco", "numpy") and module.__file__:
+        yield from dir(module)
+        yield from _submodules(Path(module.__file__))
+        return
+    if name in sys.builtin_module_names or (module and name in sys.stdlib_module_names):
+        yield from dir(sys.modules.get(name) or __import__(name))
+        return
+    path = name.replace(".", "/")
+    files = (Path(folder, path + end) for folder in sys.path for end in ("/__init__.py", ".py"))
+    file = next((file for file in files if file.is_file()), None)
+    if file is None:
+        yield "*"
+        return
+    yield from _submodules(file)
+    for node in ast.walk(ast.parse(file.read_bytes())):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            yield "*" if node.name == "__getattr__" else node.name
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            for alias in node.names:
+                yield alias.asname or alias.name.split(".")[0]  # `*` is itself
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("globals", "setattr"):
+            yield "*"
+
+
+def _submodules(file: Path) -> Iterator[str]:
+    if file.name.startswith("__init__."):
+        yield from (path.name.partition(".")[0] for path in file.parent.iterdir())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,420 @@
+"""Resolves the names in inline code: what each one means, or why there is nothing of that name.
+
+Entry points: `resolver_of`, a course; `Meaning` and `Unknown`, its answers. `None` means that
+nobody can say: the name belongs to something that is read nowhere, such as another program.
+"""
+
+from __future__ import annotations
+
+import builtins
+import functools
+import re
+from collections.abc import Iterable
+from typing import TypeAlias
+
+from msgspec import Struct
+
+from coursebuild.core.model import Course, Document, document_scripts
+from coursebuild.core.model.addresses import line_anchor
+from coursebuild.core.syntax.course_schema import CourseFile
+from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest
+from coursebuild.core.text.rules import HELP
+from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, DocumentNames
+from coursebuild.features.names.engine import EngineName, EngineNames, EngineTable
+from coursebuild.features.names.own_names import known_keys, options_by_command, tables_of
+
+_MANUAL = "https://mujoco.readthedocs.io/en/{}/{}"
+_ROOTS = {"model": "MjModel", "data": "MjData", "opt": "MjOption", "spec": "MjSpec"}
+"""The classes of variables by their usual names."""
+_HTML = frozenset(
+    """
+    a abbr article aside audio b blockquote body br button canvas caption cite code col
+    details dfn div dl dt dd em figcaption figure footer form h1 h2 h3 h4 h5 h6 head header hr
+    html i iframe img input kbd label legend li link main map math meta nav object ol optgroup
+    option output p path picture pre q rect s samp script section select small source span
+    strong style sub summary sup svg table tbody td template textarea tfoot th thead time
+    title tr track u ul use var video wbr
+    """.split()
+)
+
+
+class Meaning(Struct, frozen=True):
+    """What a name means."""
+
+    href: str = ""
+    """Its address: of another site, or that of a line (`#stem.L12`)."""
+    text: str = ""
+    """A declaration or signature, for an editor."""
+    doc: str = ""
+    extent: tuple[str, ...] = ()
+    """The shape of an array."""
+    engine: bool = False
+    """Whether it is a name of MuJoCo or MJCF, which another version may have lost."""
+
+
+class Unknown(Struct, frozen=True):
+    """Why there is nothing of a name."""
+
+    message: str
+    help: str = ""
+    part: str = ""
+    """The part of the name that is wrong."""
+
+
+Answer: TypeAlias = Meaning | Unknown | None
+
+
+_resolvers: list[Resolver] = []
+"""The one that was asked last."""
+
+
+def resolver_of(course: Course) -> Resolver:
+    """Return the resolver of a course, which pages and checks share."""
+    if not _resolvers or _resolvers[0].course is not course:
+        _resolvers[:] = [Resolver(course)]
+    return _resolvers[0]
+
+
+def _propose(name: str, names: Iterable[str]) -> str:
+    """Propose the nearest name, if one is near; only those of about its length are compared."""
+    similar = (candidate for candidate in names if abs(len(candidate) - len(name)) <= 2)
+    likely = nearest(name, similar, cutoff=0.8)
+    return f"did you mean `{likely}`?" if likely else ""
+
+
+class Resolver:
+    """Resolves the names of a course."""
+
+    def __init__(self, course: Course, engine: EngineNames | None = None) -> None:
+        self.course = course
+        table = course.references.get("names")
+        self.engine = engine
+        if engine is None and isinstance(table, EngineTable):
+            self.engine = table.names
+
+    @functools.cached_property
+    def words(self) -> frozenset[str]:
+        """The words of all code of the course."""
+        words: set[str] = {model.name for model in self.course.models}
+        for model in self.course.models:
+            words |= _words_of(model.source.text)
+        for names in course_names(self.course):
+            words |= names.words
+            words |= names.definitions.keys()
+        for package in self.course.packages:
+            words.add(package.path)
+        return frozenset(words)
+
+    @functools.cached_property
+    def imports(self) -> dict[str, str]:
+        """What scripts import, by the names that they agree on; a text may use these anywhere."""
+        imports: dict[str, str] = {"mujoco": "mujoco", "np": "numpy"}
+        for names in course_names(self.course):
+            for name, module in names.imports.items():
+                imports[name] = module if imports.get(name, module) == module else ""
+        return imports
+
+    @functools.cached_property
+    def has_engine(self) -> bool:
+        """Whether the course is about MuJoCo, so that `model` and `data` are its structures."""
+        if self.course.models or self.course.engine:
+            return True
+        documents = course_names(self.course)
+        modules = {module for names in documents for module in names.imports.values()}
+        claims = (claim for names in documents for claim in names.claims if claim.kind == "word")
+        return any(module.split(".")[0] == "mujoco" for module in modules) or any(
+            ENGINE_WORD.fullmatch(claim.name) for claim in claims
+        )
+
+    def resolve(self, claim: Claim, names: CodeNames) -> Answer:
+        """What a name in a document means."""
+        match claim.kind:
+            case "word" | "call":
+                return self._word(claim, names)
+            case "path":
+                return self._path(claim.name, names)
+            case "element":
+                return self._element(claim.name)
+            case "attribute":
+                return self._attribute(*claim.name.split(" "))
+            case "command":
+                return self._command(claim.name)
+            case "option":
+                return self._option(*claim.name.split(" "))
+            case "table":
+                return self._table(*claim.name.split(" "))
+            case "file":
+                return self._file(claim.name)
+
+    # --- Python
+
+    def _word(self, claim: Claim, names: CodeNames) -> Answer:
+        name, engine = claim.name, self.engine
+        if name in names.definitions:
+            return Meaning(f"#{line_anchor(*names.definitions[name])}", name)
+        if name in names.imports or hasattr(builtins, name):
+            return Meaning()
+        meaning = None if engine is None else find_engine_name(engine, name)
+        if meaning is not None:
+            return meaning
+        if engine is not None and name in engine.words:
+            return Meaning()
+        if engine is not None and ENGINE_WORD.fullmatch(name):
+            version = engine.version
+            engine_words = {*engine.functions, *engine.constants, *engine.enums, *engine.enum_of}
+            engine_words |= {*engine.classes}
+            return Unknown(
+                f"MuJoCo {version} has no `{name}`", did_you_mean(name, engine_words), name
+            )
+        if name in self.words or name in known_keys():
+            return Meaning()
+        is_vague = claim.kind == "call" or name.isupper()  # prose, or an environment variable
+        if is_vague and (len(name) < 4 or misspelt(name, names.definitions) is None):
+            return None
+        candidates = {*self.words, *known_keys(), *(() if engine is None else engine.words)}
+        message = f"nothing that the course knows is called `{name}`"
+        return Unknown(message, _propose(name, candidates), name)
+
+    def _path(self, path: str, names: CodeNames) -> Answer:
+        parts = [re.sub(r"[()\[\]]+", "", part) for part in path.split(".")]
+        root, engine = parts[0], self.engine
+        if engine is None:
+            return None
+        class_name = self._class_of(root, names)
+        if class_name:
+            return self._member(class_name, path.split(".")[1:])
+        module = names.imports.get(root) or self.imports.get(root, "")
+        if module:
+            return self._module_member(module, path.split(".")[1:], names)
+        class_name = f"M{root[1:]}" if root.startswith("mj") else root
+        if class_name in engine.classes:
+            return self._member(class_name, path.split(".")[1:])
+        if root in engine.enums:
+            if parts[1] in engine.enums[root]:
+                return find_engine_name(engine, parts[1])
+            help = did_you_mean(parts[1], engine.enums[root])
+            return Unknown(f"`{root}` has no member `{parts[1]}`", help, parts[1])
+        if root in names.definitions or root in names.words:
+            return None
+        likely = misspelt(root, ("model", "data", "mujoco")) if self.has_engine else None
+        if likely is not None and isinstance(
+            self._path(path.replace(root, likely, 1), names), Meaning
+        ):
+            message = f"nothing that the course knows is called `{root}`"
+            return Unknown(message, f"did you mean `{likely}`?", root)
+        return None
+
+    def _class_of(self, root: str, names: CodeNames) -> str:
+        """The class of MuJoCo of which a variable is; empty if it is of none."""
+        if root in names.variables:
+            return names.variables[root]
+        class_name = _ROOTS.get(root, "") if self.has_engine else ""
+        if not class_name or self.engine is None or root in names.imports:
+            return ""
+        attributes = names.members.get(root, frozenset())
+        return class_name if attributes <= self.engine.classes.get(class_name, {}).keys() else ""
+
+    def _member(self, class_name: str, parts: list[str]) -> Answer:
+        """What a path means that begins at an object of a class of MuJoCo."""
+        assert self.engine is not None
+        member: EngineName | None = None
+        first_class = class_name
+        for part in parts:
+            members = self.engine.classes.get(class_name)
+            name = re.sub(r"[()\[\]]+", "", part)
+            if not members:
+                break
+            member = members.get(name)
+            if member is None:
+                message = f"`{class_name}` of MuJoCo {self.engine.version} has no `{name}`"
+                return Unknown(message, did_you_mean(name, members), name)
+            class_name = member.type
+            if class_name.endswith("List"):
+                class_name = _ITEMS.get(class_name, "") if "[]" in part else ""
+        if member is None:
+            return None
+        href = _class_href(self.engine, first_class)
+        return Meaning(href, member.text, member.doc, member.extent, engine=True)
+
+    def _module_member(self, module: str, parts: list[str], names: CodeNames) -> Answer:
+        engine = self.engine
+        assert engine is not None
+        for number, part in enumerate(parts):
+            name = re.sub(r"[()\[\]]+", "", part)
+            if module == "mujoco":
+                if name in engine.classes:
+                    rest = parts[number + 1 :]
+                    href = _class_href(engine, name)
+                    return self._member(name, rest) if rest else Meaning(href, name, engine=True)
+                if name in engine.enums and parts[number + 1 :]:
+                    return self._path(".".join(parts[number:]), names)
+                meaning = find_engine_name(engine, name)
+                if meaning is not None:
+                    return meaning
+            module_names = engine.modules.get(module)
+            if module_names is None or (name not in module_names and "*" in module_names):
+                return None
+            if name not in module_names:
+                is_engine = module == "mujoco"
+                label = f"MuJoCo {engine.version}" if is_engine else f"the module `{module}`"
+                return Unknown(f"{label} has no `{name}`", did_you_mean(name, module_names), name)
+            module = f"{module}.{name}"
+        return Meaning()
+
+    # --- MJCF
+
+    def _element(self, name: str) -> Answer:
+        engine = self.engine
+        if engine is None or not self.has_engine:
+            return None
+        if name in engine.elements:
+            return Meaning(element_href(engine, name), f"<{name}>", engine=True)
+        if name in _HTML or name in self.words:
+            return None
+        message = f"MJCF of MuJoCo {engine.version} has no element `<{name}>`"
+        return Unknown(message, did_you_mean(name, engine.elements), name)
+
+    def _attribute(self, element: str, name: str) -> Answer:
+        engine = self.engine
+        if engine is None or not self.has_engine or (element and element not in engine.elements):
+            return None
+        if element:
+            attributes = {name for places in engine.elements[element].values() for name in places}
+            if name in attributes:
+                return Meaning(element_href(engine, element, name), name, engine=True)
+            if element in _HTML:
+                return None
+            message = f"`<{element}>` of MuJoCo {engine.version} has no attribute `{name}`"
+            return Unknown(message, did_you_mean(name, attributes), name)
+        if name in engine.attributes:
+            return Meaning(engine=True, text=name)
+        likely = nearest(name, engine.attributes, cutoff=0.75)
+        if name in self.words or likely is None or name in known_keys():
+            return None
+        message = f"no element of MuJoCo {engine.version} has an attribute `{name}`"
+        return Unknown(message, f"did you mean `{likely}`?", name)
+
+    # --- coursebuild and the course
+
+    def _command(self, name: str) -> Answer:
+        if name in options_by_command():
+            return Meaning(self._manual("commands"))
+        help = did_you_mean(name, options_by_command())
+        return Unknown(f"coursebuild has no command `{name}`", help, name)
+
+    def _option(self, command: str, name: str) -> Answer:
+        commands = options_by_command()
+        options = commands.get(command)
+        if options is None:
+            options = frozenset(option for options in commands.values() for option in options)
+        if name in options:
+            return Meaning(self._manual("commands"))
+        if not command and nearest(name, options, cutoff=0.85) is None:
+            return None  # of another program
+        subject = f"`coursebuild {command}`" if command else "coursebuild"
+        return Unknown(f"{subject} has no option `{name}`", did_you_mean(name, options), name)
+
+    def _table(self, table: str, key: str) -> Answer:
+        name = table.lstrip("[")
+        tables = tables_of(CourseFile)
+        if name not in tables:
+            likely = misspelt(name, tables) if len(name) > 3 else None
+            if likely is None:
+                return None
+            return Unknown(
+                f"the course map has no table `{name}`", f"did you mean `{likely}`?", name
+            )
+        if key and tables[name] and key not in tables[name]:
+            help = did_you_mean(key, tables[name])
+            return Unknown(f"the table `{name}` of the course map has no key `{key}`", help, key)
+        return Meaning(self._manual("course-map"))
+
+    def _manual(self, page: str) -> str:
+        path = f"docs/reference/{page}.md"
+        if any(p.path == path for p in self.course.pages):
+            return path
+        return HELP.replace("rules.md#{}", f"{page}.md")
+
+    def _file(self, path: str) -> Answer:
+        if path in self.files:
+            return Meaning(f"#{path}" if path.startswith("examples/") else "")
+        help = _propose(path, self.files) or "write it, or say `{code}` after the name"
+        return Unknown(f"the course has no file `{path}`", help, path)
+
+    @functools.cached_property
+    def files(self) -> frozenset[str]:
+        """The files that the course has."""
+        course = self.course
+        scripts = (s.path for document in course.documents for s in document_scripts(document))
+        lessons = (lesson.path for lesson in course.lessons)
+        sources = (source.path for source in course.sources)
+        return frozenset((*course.files, *scripts, *sources, *lessons))
+
+
+_ITEMS = {
+    "MjContactList": "MjContact",
+    "MjSolverStatList": "MjSolverStat",
+    "MjTimerStatList": "MjTimerStat",
+    "MjWarningStatList": "MjWarningStat",
+}
+
+
+def names_of(document: Document) -> DocumentNames | None:
+    """Return the names of a document that the course has read."""
+    names = (document.summaries or {}).get("names")
+    return names if isinstance(names, DocumentNames) else None
+
+
+def course_names(course: Course) -> tuple[CodeNames, ...]:
+    """Return the names of each document of a course."""
+    return tuple(note.names for note in map(names_of, course.documents) if note is not None)
+
+
+def find_engine_name(engine: EngineNames, name: str) -> Meaning | None:
+    """What a single name of MuJoCo means, as C or Python has it."""
+    api = "APIreference/"
+    if name in engine.functions:
+        function = engine.functions[name]
+        page = f"{api}APIfunctions.html#{name.lower().replace('_', '-')}"
+        href = _MANUAL.format(engine.version, page) if name.startswith("mj") else ""
+        return Meaning(href, function.text, function.doc, engine=True)
+    enum = name if name in engine.enums else engine.enum_of.get(name)
+    if enum is not None:
+        href = _MANUAL.format(engine.version, f"{api}APItypes.html#{enum.lower()}")
+        return Meaning(href, name, f"of `{enum}`" if enum != name else "", engine=True)
+    if name in engine.constants:
+        href = _MANUAL.format(engine.version, f"{api}APIglobals.html")
+        return Meaning(href, f"{name} = {engine.constants[name]}", engine=True)
+    for class_name in (name, f"Mj{name[2:]}"):
+        if class_name in engine.classes and name[:2].lower() == "mj":
+            return Meaning(_class_href(engine, class_name), name, engine=True)
+    classes = [c for c in engine.classes_of.get(name, ()) if c in ("MjModel", "MjData", "MjOption")]
+    if classes and "_" in name:
+        member = engine.classes[classes[0]][name]
+        href = _class_href(engine, classes[0])
+        return Meaning(href, member.text, member.doc, member.extent, engine=True)
+    if name in ("mjtNum", "mjtByte", "mjtSize", "mjtBool"):
+        return Meaning(_MANUAL.format(engine.version, f"{api}APItypes.html#{name.lower()}"), name)
+    return None
+
+
+def _class_href(engine: EngineNames, name: str) -> str:
+    page = "python.html" if name.endswith("Views") else f"APIreference/APItypes.html#{name.lower()}"
+    return _MANUAL.format(engine.version, page)
+
+
+def element_href(engine: EngineNames, name: str, attribute: str = "") -> str:
+    """The address of an element of MJCF in MuJoCo's manual, or of an attribute."""
+    places = {p: a for p, a in engine.elements[name].items() if not attribute or attribute in a}
+    places = {p: a for p, a in places.items() if p != "default"} or places
+    parent = next(iter(places), "")
+    if name in ("frame", "replicate", "worldbody") or parent in ("", "mujoco"):
+        parent = ""
+    target = "body" if name == "worldbody" else name
+    anchor = "-".join(filter(None, (parent, target, attribute)))
+    return _MANUAL.format(engine.version, f"XMLreference.html#{anchor}")
+
+
+@functools.lru_cache(maxsize=256)
+def _words_of(text: str) -> frozenset[str]:
+    return frozenset(re.findall(r"[A-Za-z]\w*", text))
