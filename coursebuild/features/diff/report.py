@@ -233,8 +233,8 @@ def _truth_section(old: Course, new: Course) -> str:
     return section(
         "Truth",
         "Numbers in the text, and those that a script prints, a formula computes, or the author"
-        " gives as known. Whether they hold is what `check` says.",
-        ("in", "numbers", "printed", "computed", "given", "unproven", "proven"),
+        " gives with a source. Whether they hold is what `check` says.",
+        ("in", "numbers", "printed", "computed", "given", "no source", "unproven", "proven"),
         [
             (id, *(a if a == b else f"{a} → {b}" for a, b in zip(old_row, new_row, strict=True)))
             for id, (old_row, new_row) in counts.items()
