@@ -14,8 +14,8 @@ from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import Dimension, find_unit
-from coursebuild.features.arithmetic.chains import FormulaComparison
 from coursebuild.features.arithmetic.identities import check_identity
+from coursebuild.features.arithmetic.numerals import FormulaComparison
 from coursebuild.features.arithmetic.symbol_values import check_formulas, read_symbols
 
 
@@ -34,8 +34,8 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
     """Summarize the formulas of a document; diagnostics are for numbers that are wrong."""
     unread: list[tuple[Span, str]] = []
     identities: list[Excerpt] = []
-    known, comparisons = read_symbols(document), check_formulas(document)
-    diagnostics = list(known.diagnostics)
+    symbols, comparisons = read_symbols(document), check_formulas(document)
+    diagnostics = list(symbols.diagnostics)
     for formula in (f for block in document_blocks(document) for f in block_formulas(block)):
         tex = formula.tex
         is_identity = formula.label is not None and formula.label.check is not None
@@ -48,9 +48,9 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
                 diagnostics.append(mistake)
             elif comparison.kind == "unread":
                 unread.append((span, message))
-    symbols = tuple((symbol.name, symbol.unit_text) for symbol in known.declared.values())
-    is_empty = not (unread or symbols or identities)
-    formulas = FormulaSummary(tuple(unread), symbols, tuple(identities))
+    units = tuple((symbol.name, symbol.unit_text) for symbol in symbols.declarations.values())
+    is_empty = not (unread or units or identities)
+    formulas = FormulaSummary(tuple(unread), units, tuple(identities))
     return Parsed(None if is_empty else formulas, tuple(diagnostics))
 
 

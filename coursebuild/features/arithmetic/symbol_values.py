@@ -26,19 +26,16 @@ from coursebuild.core.pages.quantities import unit_length
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 from coursebuild.core.text.units import Unit, find_unit
-from coursebuild.features.arithmetic.chains import (
-    FormulaComparison,
-    SymbolQuantity,
-    check_arithmetic,
-    read_numeral,
-)
+from coursebuild.features.arithmetic.chains import check_arithmetic
 from coursebuild.features.arithmetic.evaluate import (
     WrongDimensions,
     describe_dimension,
     evaluate,
 )
 from coursebuild.features.arithmetic.expressions import NotUnderstood
+from coursebuild.features.arithmetic.numerals import FormulaComparison, read_numeral
 from coursebuild.features.arithmetic.statements import read_statements
+from coursebuild.features.arithmetic.symbol_comparison import SymbolQuantity
 
 _Formula = model.Math | model.MathBlock
 _Level = tuple[int, ...]
@@ -65,18 +62,20 @@ class _GivenValue(Struct, frozen=True):
 class DocumentSymbols(Struct, frozen=True):
     """The symbols that a document declares, and what is wrong with their values."""
 
-    declared: Mapping[str, SymbolQuantity]
+    declarations: Mapping[str, SymbolQuantity]
     values: Mapping[str, tuple[_GivenValue, ...]]
     places: tuple[_Place, ...]
     diagnostics: tuple[Diagnostic, ...]
 
     def at(self, level: _Level) -> tuple[SymbolQuantity, ...]:
         """The symbols with the values that hold at a level."""
-        quantities = dict(self.declared)
+        quantities = dict(self.declarations)
         for name, values in self.values.items():
-            around = [v for v in values if v.level == level[: len(v.level)]]
-            before = [v for v in values if len(v.level) == 1 and v.level < level]
-            nearest = max(around or before, key=lambda value: value.level, default=None)
+            scope_values = [v for v in values if v.level == level[: len(v.level)]]
+            earlier_values = [v for v in values if len(v.level) == 1 and v.level < level]
+            nearest = max(
+                scope_values or earlier_values, key=lambda value: value.level, default=None
+            )
             if nearest is not None:
                 quantities[name] = nearest.quantity
         return tuple(quantities.values())
@@ -92,12 +91,12 @@ def check_formulas(document: model.Document) -> Mapping[int, tuple[FormulaCompar
 
     def compare() -> dict[int, tuple[FormulaComparison, ...]]:
         symbols = read_symbols(document)
-        given = {value.span for values in symbols.values.values() for value in values}
+        definitions = {value.span for values in symbols.values.values() for value in values}
         levels = {place.level: symbols.at(place.level) for place in symbols.places}
         comparisons: dict[int, tuple[FormulaComparison, ...]] = {}
         for place in symbols.places:
             formula = place.formula
-            if formula.span in given:
+            if formula.span in definitions:
                 continue
             is_identity = formula.label is not None and formula.label.check is not None
             quantities = () if is_identity else levels[place.level]
@@ -110,7 +109,7 @@ def check_formulas(document: model.Document) -> Mapping[int, tuple[FormulaCompar
 
 def _read_symbols(document: model.Document) -> DocumentSymbols:
     places = tuple(_read_places(document))
-    declared: dict[str, SymbolQuantity] = {}
+    declarations: dict[str, SymbolQuantity] = {}
     values: dict[str, list[_GivenValue]] = {}
     diagnostics: list[Diagnostic] = []
     for place in sorted(places, key=lambda place: place.formula.meaning is None):
@@ -122,7 +121,7 @@ def _read_symbols(document: model.Document) -> DocumentSymbols:
         if formula.meaning is None and number is None and source is None:
             continue
         try:
-            quantity = _read_quantity(place, declared, values)
+            quantity = _read_quantity(place, declarations, values)
         except NotUnderstood as error:
             if number is not None or error.kind == "wrong":
                 message = f"`{formula.tex.text}` cannot have this value: {error.reason}"
@@ -131,27 +130,30 @@ def _read_symbols(document: model.Document) -> DocumentSymbols:
         if quantity is None:
             continue
         if formula.meaning is not None:
-            declared.setdefault(quantity.name, replace(quantity, value=None))
+            declarations.setdefault(quantity.name, replace(quantity, value=None))
         if quantity.value is None:
             continue
         level = place.level if formula.meaning is None else place.level[:1]
-        others = values.setdefault(quantity.name, [])
-        same = next((other for other in others if other.level == level), None)
-        if same is None:
-            others.append(_GivenValue(quantity, level, span))
-        elif same.quantity.value != quantity.value:
-            texts = quantity.text, same.quantity.text
+        rivals = values.setdefault(quantity.name, [])
+        rival = next((value for value in rivals if value.level == level), None)
+        if rival is None:
+            rivals.append(_GivenValue(quantity, level, span))
+        elif rival.quantity.value != quantity.value:
+            texts = quantity.text, rival.quantity.text
             message = f"`{quantity.name}` is {texts[0]}, and {texts[1]} in the same section"
             help = "give the other quantity another letter or index, or a section of its own"
-            note = Note("given here", same.span)
+            note = Note("given here", rival.span)
             diagnostics.append(diagnose("symbol-value", span, message, help=help, notes=[note]))
     return DocumentSymbols(
-        declared, {name: tuple(given) for name, given in values.items()}, places, tuple(diagnostics)
+        declarations,
+        {name: tuple(group) for name, group in values.items()},
+        places,
+        tuple(diagnostics),
     )
 
 
 def _read_quantity(
-    place: _Place, declared: Mapping[str, SymbolQuantity], values: Collection[str]
+    place: _Place, declarations: Mapping[str, SymbolQuantity], values: Collection[str]
 ) -> SymbolQuantity | None:
     """The symbol that a formula names, with its value if it says that; `None` for other formulas.
 
@@ -161,6 +163,8 @@ def _read_quantity(
     formula, tex = place.formula, place.formula.tex.text
     number = formula.value if isinstance(formula, model.Math) else None
     sides = [side for statement in read_statements(tex) for side in statement.sides]
+    if number is not None and (len(sides) != 1 or sides[0].get_expression().kind != "symbol"):
+        raise NotUnderstood("it is not a single symbol", 0, len(tex))
     if len(sides) > 2 or not sides or (len(sides) == 2 and not sides[1].is_numeric):
         return None
     symbol = sides[0].get_expression()
@@ -168,8 +172,8 @@ def _read_quantity(
         return None
     name = symbol.text
     unit_text = formula.meaning.unit if formula.meaning is not None else ""
-    if formula.meaning is None and name in declared:
-        unit_text = declared[name].unit_text
+    if formula.meaning is None and name in declarations:
+        unit_text = declarations[name].unit_text
     unit = find_unit(unit_text) if unit_text else None
     if number is not None:
         size = unit.size if unit is not None else Fraction(1)
@@ -186,21 +190,21 @@ def _read_quantity(
     expression = sides[1].get_expression()
     quantity, numeral = evaluate(expression), read_numeral(expression)
     units = [part.text for part in expression.walk() if part.kind == "unit"]
-    written = units[-1] if units else place.unit or unit_text
+    unit_name = units[-1] if units else place.unit or unit_text
     scale = Unit(Fraction(1), quantity.dimension)
-    if not units:
-        scale = find_unit(written) or scale if written else scale
+    if not units and unit_name:
+        scale = find_unit(unit_name) or scale
     if unit is not None and unit.dimension != scale.dimension:
         dimensions = " and not ".join(map(describe_dimension, (unit.dimension, scale.dimension)))
         raise WrongDimensions(f"it is {dimensions}", sides[1].start, sides[1].end)
-    unit = (find_unit(unit_text or written) if unit_text or written else None) or scale
+    unit = (find_unit(unit_text or unit_name) if unit_text or unit_name else None) or scale
     size, factor = Fraction(1), Fraction(1) if units else scale.size
-    if written and (written_unit := find_unit(written)) is not None:
-        size = written_unit.size
+    if unit_name and (own_unit := find_unit(unit_name)) is not None:
+        size = own_unit.size
     value = quantity.value * factor
     step = numeral.step * factor if numeral is not None and not numeral.is_whole else 0
-    text = f"{float(value / size):.10g} {written}".rstrip()
-    return SymbolQuantity(name, unit_text or written, unit, value, step, text)
+    text = f"{float(value / size):.10g} {unit_name}".rstrip()
+    return SymbolQuantity(name, unit_text or unit_name, unit, value, step, text)
 
 
 def _read_places(document: model.Document) -> Iterator[_Place]:

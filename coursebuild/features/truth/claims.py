@@ -28,8 +28,8 @@ from coursebuild.core import model
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.scripts.numbers import Number, scan_prose
 from coursebuild.core.text.source import Excerpt, Span
-from coursebuild.features.arithmetic.chains import FormulaComparison
 from coursebuild.features.arithmetic.expressions import Expression
+from coursebuild.features.arithmetic.numerals import FormulaComparison
 from coursebuild.features.arithmetic.statements import FormulaSide, read_statements
 from coursebuild.features.arithmetic.symbol_values import check_formulas
 from coursebuild.features.truth.sources import NamedNumber, named_numbers
@@ -94,8 +94,8 @@ class Claims(Struct, frozen=True):
     @property
     def counts(self) -> tuple[str, ...]:
         """The numbers of all claims, of those proven in each way, and of the others."""
-        others = len(self.unsourced), len(self.open)
-        return tuple(map(str, (self.all, self.bound, self.computed, self.given, *others)))
+        rest = len(self.unsourced), len(self.open)
+        return tuple(map(str, (self.all, self.bound, self.computed, self.given, *rest)))
 
 
 def course_claims(
@@ -221,12 +221,12 @@ class _Counter:
             proofs = tuple(filter(None, (number.script or above,)))
         kind = _given_kind(number.source) if number.source is not None else "bound"
         for part in scan_prose(number.text):
-            other, scripts = self.marked.setdefault(part.text, (kind, proofs))
+            first_kind, scripts = self.marked.setdefault(part.text, (kind, proofs))
             # What one place gives, or another script prints, is proven by that.
-            if other == kind == "bound":
-                both = tuple(sorted({*scripts, *proofs})) if scripts and proofs else ()
-                self.marked[part.text] = kind, both
-            elif "given" in (other, kind):
+            if first_kind == kind == "bound":
+                union = tuple(sorted({*scripts, *proofs})) if scripts and proofs else ()
+                self.marked[part.text] = kind, union
+            elif "given" in (first_kind, kind):
                 self.marked[part.text] = "given", ()
             elif kind == "bound":
                 self.marked[part.text] = kind, proofs

@@ -17,8 +17,8 @@ from coursebuild.core.scripts.numbers import scan_prose
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
 from coursebuild.core.text.units import find_unit
-from coursebuild.features.arithmetic.chains import read_numeral
 from coursebuild.features.arithmetic.expressions import Expression
+from coursebuild.features.arithmetic.numerals import read_numeral
 from coursebuild.features.arithmetic.statements import read_statements
 
 _PATH = re.compile(r"[\w.-]+(?:/[\w.-]+)+\.[a-z]+")
@@ -33,7 +33,7 @@ class NamedNumber(Struct, frozen=True):
     path: str
     text: str
     values: tuple[tuple[float, float], ...]
-    """Its value and one unit of its last place: as written, and in base units."""
+    """Its value and one unit of its last place: as literals, and in base units."""
 
     def is_in(self, numbers: Iterable[float]) -> bool:
         """Whether one of these, rounded to its digits, is this number."""
@@ -79,19 +79,19 @@ def check_sources(course: model.Course, numbers: Iterable[NamedNumber]) -> Itera
     scripts = (s for document in course.documents for s in model.document_scripts(document))
     texts = {f"models/{file.name}.xml": file.source.text for file in course.models}
     texts |= {script.path: script.code.text for script in scripts}
-    held: dict[str, set[float]] = {}
+    numbers_by_path: dict[str, set[float]] = {}
     for number in numbers:
         if number.path not in texts:
             message = f"`{number.path}` is no script and no model of this course"
             help = did_you_mean(number.path, texts)
             yield diagnose("given-source", number.span, message, help=help)
             continue
-        if number.path not in held:
+        if number.path not in numbers_by_path:
             matches = _NUMBER.finditer(texts[number.path])
-            written = {float(match[0].replace("_", "").rstrip(".")) for match in matches}
-            doubles = {2 * value for value in written if number.path.endswith(".xml")}
-            held[number.path] = written | doubles
-        if not number.is_in(held[number.path]):
+            literals = {float(match[0].replace("_", "").rstrip(".")) for match in matches}
+            doubles = {2 * value for value in literals if number.path.endswith(".xml")}
+            numbers_by_path[number.path] = literals | doubles
+        if not number.is_in(numbers_by_path[number.path]):
             message = f"`{number.path}` has no number `{number.text}`"
             help = "bind the number to an output, or name where it is from"
             yield diagnose("given-source", number.span, message, help=help)
