@@ -92,6 +92,7 @@ def check_formulas(document: model.Document) -> Mapping[int, tuple[FormulaCompar
     def compare() -> dict[int, tuple[FormulaComparison, ...]]:
         symbols = read_symbols(document)
         definitions = {value.span for values in symbols.values.values() for value in values}
+        definitions |= {diagnostic.span for diagnostic in symbols.diagnostics}
         levels = {place.level: symbols.at(place.level) for place in symbols.places}
         comparisons: dict[int, tuple[FormulaComparison, ...]] = {}
         for place in symbols.places:
