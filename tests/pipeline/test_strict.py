@@ -105,7 +105,7 @@ def test_a_script_that_lacks_a_package_proves_nothing(make: Make) -> None:
     assert strict.status == 1
     assert strict.out.startswith("::error file=content/lessons/1.2-two.md,line=3,col=1,")
     truth = folder.main("check", "--truth").out
-    assert "1.2: 0.0 % of 3 numbers proven: 0 bound, 0 computed, 0 given\n" in truth
+    assert "1.2: 0.0 % of 3 numbers proven: 0 bound, 0 computed, 0 given with a source;" in truth
     verify(folder, "truth = 0.5\n")
     assert "error[truth-share]: 0.0 % of the numbers are proven" in folder.main("check").out
     verify(folder, "")

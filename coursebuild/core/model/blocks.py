@@ -308,6 +308,10 @@ class FeatureBlock(Struct, frozen=True):
         """The lines of Markdown in it, outside its child blocks."""
         return ()
 
+    def scopes(self) -> tuple[Span, ...]:
+        """Parts that stand for themselves, as questions do: what one assumes holds in it alone."""
+        return (self.span,)
+
     def summary(self) -> FeatureBlock | None:
         """The block without what only its own page shows; `None` if nothing is left."""
         return None

@@ -95,6 +95,8 @@ class Math(Struct, frozen=True):
     """Only where it is not."""
     source: str | None = None
     """Likewise: the source of its numbers, as in `NumberBinding`."""
+    value: NumberBinding | None = None
+    """What `value=…` says that the symbol is worth."""
 
 
 class Term(Struct, frozen=True):

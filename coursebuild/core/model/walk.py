@@ -183,6 +183,8 @@ def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
         yield inline
         if type(inline) in _INLINE_CONTAINERS:
             yield from walk_inlines(inline.children)  # type: ignore[union-attr]
+        elif type(inline) is Math and inline.value is not None:
+            yield inline.value
 
 
 def block_formulas(block: Block) -> Iterator[Math | MathBlock]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from coursebuild.core.model import Label, Meaning
+from coursebuild.core.model import Label, Meaning, NumberBinding
 from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt
@@ -18,16 +18,20 @@ from coursebuild.core.text.units import check_unit
 Report = Callable[[Diagnostic], None]
 
 TERM = re.compile(r"(\{\s*(?:term|terms|therm|tern|trem|tem|ter)\b[^{}]{0,400}\}?)", re.I)
-SYMBOL = re.compile(r"(\{\s*(?:s[iy]m\w{0,6}|meaning|unit|units|given)\b[^{}]{0,400}\}?)", re.I)
+SYMBOL = re.compile(
+    r"(\{\s*(?:s[iy]m\w{0,6}|meaning|unit|units|value|given)\b[^{}]{0,400}\}?)", re.I
+)
 LABEL = re.compile(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
 """The attributes of a term, a symbol or a formula; group 1 is the braces, the last of which may be
 missing."""
 _PAIR = re.compile(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
 _ID = re.compile(r"\{#(eq:[\w-]+)(?=[\s}])")
 _SPACES = re.compile(r"\s+")
+_NUMBER = re.compile(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
 
 _TERM_HELP = 'write `{term}`, or `{term="headword"}` if the glossary should name it differently'
 _SYMBOL_HELP = 'write `{symbol="what it stands for" unit="m/s"}`, of which the unit may be left out'
+_VALUE_HELP = 'write `value=9.81 given="its source"`, or `value=9.81 out=examples/x.py`'
 _LABEL_HELP = "write `{#eq:name}`, of letters, digits, `-` and `_`"
 _MARK_HELP = 'write `{#eq:name check}`, or `{#eq:name given="its source"}`'
 
@@ -78,23 +82,43 @@ def read_term(braces: Excerpt, report: Report) -> str | None:
     return _value_text(name)
 
 
-def read_meaning(braces: Excerpt, report: Report) -> tuple[Meaning | None, str | None]:
-    """The meaning of a symbol, and the source of given numbers; `None` for what is missing."""
-    values = _read_pairs(braces, ("symbol", "unit", "given"), "symbol-attribute", _SYMBOL_HELP)
+def read_meaning(
+    braces: Excerpt, report: Report
+) -> tuple[Meaning | None, str | None, NumberBinding | None]:
+    """The meaning of a symbol, the source of given numbers, and its value, if they are there."""
+    keys = ("symbol", "unit", "value", "given", "out")
+    values = _read_pairs(braces, keys, "symbol-attribute", _SYMBOL_HELP)
     if isinstance(values, Diagnostic):
         report(values)
-        return None, None
+        return None, None, None
     source = _value_text(values["given"]) if "given" in values else None
-    if source is not None and len(values) == 1:
-        return None, source
+    value = values.get("value")
+    number: NumberBinding | None = None
+    if value is not None and _NUMBER.fullmatch(value.text) and not {"out", "given"} <= {*values}:
+        is_bound = "out" in values
+        script = _value_text(values.get("out")) or None
+        origin = None if is_bound else source or ""
+        number = NumberBinding(braces.span(), value.text, value.span(), script, origin)
+    elif "value" in values or "out" in values:
+        text = "" if value is None else value.text
+        reason = f"`{text}` is no value of a symbol"
+        if _NUMBER.fullmatch(text):
+            reason = "a value is either given or printed by a script"
+        elif "value" not in values:
+            reason = "`out` binds a value, and there is none"
+        place = braces if value is None else value
+        report(diagnose("symbol-attribute", place.span(), reason, help=_VALUE_HELP))
+        return None, source, None
+    if not values.keys() & {"symbol", "unit"}:
+        return None, source, number
     meaning, unit = _value_text(values.get("symbol")), _value_text(values.get("unit"))
     if not meaning or ("unit" in values and not unit):
         missing = "unit is empty" if meaning else "meaning of the symbol is missing"
         report(diagnose("symbol-attribute", braces.span(), f"the {missing}", help=_SYMBOL_HELP))
-        return None, source
+        return None, source, None
     for diagnostic in check_unit(values["unit"]) if unit and values["unit"] is not None else ():
         report(diagnostic)
-    return Meaning(braces.span(), meaning, unit), source
+    return Meaning(braces.span(), meaning, unit), source, number
 
 
 def _value_text(value: Excerpt | None) -> str:

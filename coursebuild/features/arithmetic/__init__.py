@@ -1,8 +1,7 @@
-"""Checks formulas: arithmetic between numbers, and identities between symbols."""
+"""Checks formulas: numbers, symbols with values, units, and identities between symbols."""
 
 from __future__ import annotations
 
-import contextlib
 import functools
 from collections.abc import Iterable, Iterator
 
@@ -15,10 +14,9 @@ from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import Dimension, find_unit
-from coursebuild.features.arithmetic.chains import FormulaComparison, check_arithmetic
-from coursebuild.features.arithmetic.expressions import NotUnderstood
 from coursebuild.features.arithmetic.identities import check_identity
-from coursebuild.features.arithmetic.tex import read_expression
+from coursebuild.features.arithmetic.numerals import FormulaComparison
+from coursebuild.features.arithmetic.symbol_values import check_formulas, read_symbols
 
 
 class FormulaSummary(Struct, frozen=True):
@@ -35,27 +33,24 @@ class FormulaSummary(Struct, frozen=True):
 def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]:
     """Summarize the formulas of a document; diagnostics are for numbers that are wrong."""
     unread: list[tuple[Span, str]] = []
-    symbols: list[tuple[str, str]] = []
     identities: list[Excerpt] = []
-    diagnostics: list[Diagnostic] = []
+    symbols, comparisons = read_symbols(document), check_formulas(document)
+    diagnostics = list(symbols.diagnostics)
     for formula in (f for block in document_blocks(document) for f in block_formulas(block)):
         tex = formula.tex
-        for comparison in check_arithmetic(tex.text):
+        is_identity = formula.label is not None and formula.label.check is not None
+        if is_identity:
+            identities.append(tex)
+        for comparison in comparisons.get(tex.span().start, ()):
             span, message = tex.span(comparison.start, comparison.end), comparison.message
             if comparison.kind == "wrong":
                 mistake = diagnose("formula-arithmetic", span, message, help=comparison.help)
                 diagnostics.append(mistake)
             elif comparison.kind == "unread":
                 unread.append((span, message))
-        if formula.meaning is not None:
-            with contextlib.suppress(NotUnderstood):
-                expression = read_expression(tex.text, 0, len(tex.text))
-                if expression.kind == "symbol":
-                    symbols.append((expression.text, formula.meaning.unit))
-        if formula.label is not None and formula.label.check is not None:
-            identities.append(tex)
-    is_empty = not (unread or symbols or identities)
-    formulas = FormulaSummary(tuple(unread), tuple(symbols), tuple(identities))
+    units = tuple((symbol.name, symbol.unit_text) for symbol in symbols.declarations.values())
+    is_empty = not (unread or units or identities)
+    formulas = FormulaSummary(tuple(unread), units, tuple(identities))
     return Parsed(None if is_empty else formulas, tuple(diagnostics))
 
 
@@ -110,6 +105,9 @@ FEATURE = Feature(
     rules=(
         Rule("formula-arithmetic", "error", "A number in a formula is not what comes out."),
         Rule("formula-identity", "error", "A formula that says `check` does not hold, or may not."),
+        Rule(
+            "symbol-value", "error", "A symbol has two values in one section, or cannot have one."
+        ),
         Rule("formula-unread", "warning", "Arithmetic in a formula is not understood."),
     ),
 )

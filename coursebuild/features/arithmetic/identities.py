@@ -13,7 +13,6 @@ from itertools import pairwise
 from typing import Any
 
 from coursebuild.core.text.units import Dimension
-from coursebuild.features.arithmetic.chains import FormulaComparison
 from coursebuild.features.arithmetic.evaluate import (
     Arithmetic,
     PhysicalQuantity,
@@ -21,6 +20,7 @@ from coursebuild.features.arithmetic.evaluate import (
     evaluate,
 )
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
+from coursebuild.features.arithmetic.numerals import FormulaComparison
 from coursebuild.features.arithmetic.statements import read_statements
 
 _POINTS = 5

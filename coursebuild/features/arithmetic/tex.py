@@ -214,6 +214,8 @@ class _Reader:
             if self.peek() in ("*", "'", r"\prime", r"\top") or power.kind == "^":
                 raise self.not_understood()
             exponent = self.group()
+            if exponent.kind == "symbol" and exponent.text == "T":
+                raise exponent.not_understood("it may be a transpose")
             power = Expression("^", power.start, self.at, (power, exponent))
         if self.take("°"):
             return self.degrees(power)
@@ -289,7 +291,10 @@ class _Reader:
             self.at = start
             raise self.not_understood()
         if self.take("_"):
-            text += f"_{{{self.raw()}}}"
+            upright = self.match(_UPRIGHT)  # `m_\text{eff}`
+            self.at = upright.end() if upright else self.at
+            index = self.raw()
+            text += f"_{{{_UPRIGHT.sub('', index).strip('{}') if upright is None else index}}}"
         while self.take("'"):
             text += "'"
         if text == "e" and self.peek() == "^":

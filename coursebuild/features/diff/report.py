@@ -241,8 +241,8 @@ def _truth_section(old: Course, new: Course) -> str:
     return section(
         "Truth",
         "Numbers in the text, and those that a script prints, a formula computes, or the author"
-        " gives as known. Whether they hold is what `check` says.",
-        ("in", "numbers", "printed", "computed", "given", "unproven", "proven"),
+        " gives with a source. Whether they hold is what `check` says.",
+        ("in", "numbers", "printed", "computed", "given", "no source", "unproven", "proven"),
         [
             (
                 escape_text(id),

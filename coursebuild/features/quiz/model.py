@@ -117,6 +117,10 @@ class Quiz(FeatureBlock, frozen=True):
         """Options, and items to be put in order."""
         return tuple(inline for question in self.questions for inline in _inlines(question))
 
+    def scopes(self) -> tuple[Span, ...]:
+        """The questions."""
+        return tuple(question.span for question in self.questions)
+
     def summary(self) -> Quiz:
         """The quiz with the questions whose answer a script gives, without their texts."""
         bare = (

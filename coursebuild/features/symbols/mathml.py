@@ -1,7 +1,7 @@
 """Finds the symbols of a formula.
 
 Entry points: `symbols(mathml)`; `only_symbol(mathml)`, for a formula of a single one;
-`sort_key(symbol)`.
+`declared_symbol(mathml)`; `sort_key(symbol)`.
 
 A symbol is a letter with all that belongs to it: accents (`q̇`), a subscript of letters, numbers and
 words (`I_zz`), and superscripts that are primes, stars, signs or words. Other superscripts are
@@ -52,6 +52,13 @@ def only_symbol(mathml: str) -> str | None:
     """Return the symbol that is the whole formula; `None` if that is anything else."""
     root = _parse(mathml)
     return None if root is None else _symbol(_unwrap(root), is_declared=True)
+
+
+def declared_symbol(mathml: str) -> str | None:
+    """Return the symbol that a formula declares: itself, or the left side of `m = 2 kg`."""
+    only = only_symbol(mathml)
+    is_value = only is None and "<mo>=</mo>" in mathml and len(symbols(mathml)) == 1
+    return symbols(mathml)[0] if is_value else only
 
 
 def _parse(mathml: str) -> Element | None:

@@ -13,7 +13,7 @@ from msgspec import Struct
 from coursebuild.core import model
 from coursebuild.core.features import Mathml
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
-from coursebuild.features.symbols.mathml import only_symbol, symbols
+from coursebuild.features.symbols.mathml import declared_symbol, symbols
 
 _Formula: TypeAlias = model.Math | model.MathBlock
 
@@ -43,7 +43,7 @@ def document_symbols(document: model.Document, mathml: Mathml) -> Parsed[Documen
     diagnostics: list[Diagnostic] = []
     for formula, section in _formulas(document):
         html, meaning = mathml(formula.tex.text, formula.display), formula.meaning
-        only = only_symbol(html) if meaning is not None else None
+        only = declared_symbol(html) if meaning is not None else None
         for symbol in (only,) if only is not None else symbols(html):
             use = uses.setdefault(symbol, SymbolUse(symbol, section))
             if meaning is not None and not use.meaning:

@@ -1,4 +1,4 @@
-"""Measures how much of a course is proven: numbers that are bound, computed or given.
+"""Measures how much of a course is proven: numbers that are bound, computed or given with a source.
 
 The claims of a document are counted when it is read (`claims`), and stored with it. The fence
 `truth` shows them lesson by lesson, and `[verify] truth` in the course map requires a share.
@@ -13,7 +13,8 @@ from coursebuild.core.model import Course, Document, Lesson
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
-from coursebuild.features.truth.claims import course_claims, document_claims, sum_claims
+from coursebuild.features.truth.claims import Claims, course_claims, document_claims, sum_claims
+from coursebuild.features.truth.sources import check_sources
 from coursebuild.features.truth.table import KIND
 
 _TEXTS = """\
@@ -22,7 +23,8 @@ part = "Lesson or page"
 numbers = "Numbers"
 bound = "Printed by a script"
 computed = "Computed"
-given = "Given"
+given = "Given, with a source"
+unsourced = "Given without a source"
 open = "Unproven"
 share = "Proven"
 all = "All"
@@ -30,8 +32,12 @@ all = "All"
 
 
 def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
-    """Yield an error if less is proven than the course map asks for."""
+    """Yield an error if less is proven than the map asks for, or a source lacks its number."""
     yield from _check_share(course, ())
+    for document in documents:
+        claims = (document.summaries or {}).get("truth")
+        if isinstance(claims, Claims) and claims.named:
+            yield from check_sources(course, claims.named)
 
 
 def check_runs(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:
@@ -47,7 +53,7 @@ def _check_share(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnost
     if claims.proven < course.truth * claims.all:
         required = f"{100 * course.truth:g} %"
         message = f"{claims.share} of the numbers are proven; the course requires {required}"
-        help = f"`coursebuild check --truth` lists the other {len(claims.open)}"
+        help = f"`coursebuild check --truth` lists the other {claims.all - claims.proven}"
         yield diagnose("truth-share", course.truth_span, message, help=help)
 
 
@@ -61,11 +67,16 @@ def unproven(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic |
         if claims.all:
             yield (
                 f"{name}: {claims.share} of {claims.all} numbers proven: {claims.bound} bound,"
-                f" {claims.computed} computed, {claims.given} given"
+                f" {claims.computed} computed, {claims.given} given with a source;"
+                f" {len(claims.unsourced)} given without, {len(claims.open)} with no proof"
             )
     for _, claims in rows:
         for place in claims.open:
             yield diagnose("number-unproven", place, f"nothing proves `{place.text}`")
+        for place in claims.unsourced:
+            message = f"`{place.text}` is given without a source"
+            help = 'name it, as in `{given="models/pendulum.xml"}` or `{given="chosen"}`'
+            yield diagnose("number-unproven", place, message, help=help)
 
 
 FEATURE = Feature(
@@ -79,6 +90,7 @@ FEATURE = Feature(
     texts={"en": _TEXTS},
     rules=(
         Rule("number-unproven", "warning", "A number that nothing in the course proves."),
+        Rule("given-source", "error", "A number is not in the file that is named as its source."),
         Rule("truth-share", "error", "Fewer numbers are proven than the course map asks for."),
         Rule("truth-text", "error", "A `truth` fence holds a text, which nothing reads."),
     ),

@@ -7,7 +7,8 @@ Entry points: `document_claims(document)`, `course_claims(course)`, `sum_claims(
 2. Headings, footnotes (which name sources), code, addresses, links to lessons, pages and models,
    and recorded outputs have no claims.
 3. In formulas a side that is a number is one claim, and so is a side with symbols in which a number
-   has a point. A chain whose arithmetic was checked is one claim.
+   has a point. A chain whose arithmetic was checked is one claim, with symbols that have values
+   too. The value of a symbol is one where it is given, and proven by its source or its script.
 4. A number bound to the output of a script that was not run is not proven.
 5. A number in an alternative text, where nothing can be marked, is proven if the same number is
    bound or given in the document.
@@ -17,21 +18,25 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from operator import itemgetter
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core import model
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.scripts.numbers import Number, scan_prose
 from coursebuild.core.text.source import Excerpt, Span
-from coursebuild.features.arithmetic.chains import check_arithmetic
 from coursebuild.features.arithmetic.expressions import Expression
+from coursebuild.features.arithmetic.numerals import FormulaComparison
 from coursebuild.features.arithmetic.statements import FormulaSide, read_statements
+from coursebuild.features.arithmetic.symbol_values import check_formulas
+from coursebuild.features.truth.sources import NamedNumber, named_numbers
 
 KINDS = ("bound", "computed", "given")
 """The fields of `Claims` that count what is proven."""
+_NO_SOURCE = "unsourced"
 
 _COUNTS = 12
 _YEARS = range(1600, 2100)
@@ -46,17 +51,22 @@ _DIGIT = re.compile("[0-9]")
 
 
 class Claims(Struct, frozen=True):
-    """The number of proven claims of a document, and the places of the others."""
+    """The number of proven claims of a document, and the places of those that are not proven."""
 
     bound: int
     """Printed by a script."""
     computed: int
     """Computed in a formula."""
     given: int
-    """Marked as given by the author."""
+    """Given by the author, with a source."""
     open: tuple[Span, ...]
+    """The places of the others."""
     places: tuple[tuple[Span, tuple[str, ...]], ...] = ()
     """Of those that scripts print: where each stands, and the scripts of which any proves it."""
+    unsourced: tuple[Span, ...] = ()
+    """The places of those that are given without a source, which count as unproven."""
+    named: tuple[NamedNumber, ...] = ()
+    """Those whose source is a file."""
 
     def drop(self, scripts: Collection[str]) -> Claims:
         """The claims where these scripts prove nothing."""
@@ -64,7 +74,7 @@ class Claims(Struct, frozen=True):
         if not lost:
             return self
         order = sorted((*self.open, *lost), key=lambda span: span.start)
-        return Claims(self.bound - len(lost), self.computed, self.given, tuple(order))
+        return replace(self, bound=self.bound - len(lost), open=tuple(order), places=())
 
     @property
     def proven(self) -> int:
@@ -74,7 +84,7 @@ class Claims(Struct, frozen=True):
     @property
     def all(self) -> int:
         """The number of claims."""
-        return self.proven + len(self.open)
+        return self.proven + len(self.unsourced) + len(self.open)
 
     @property
     def share(self) -> str:
@@ -84,8 +94,8 @@ class Claims(Struct, frozen=True):
     @property
     def counts(self) -> tuple[str, ...]:
         """The numbers of all claims, of those proven in each way, and of the others."""
-        counts = (self.all, self.bound, self.computed, self.given, len(self.open))
-        return tuple(map(str, counts))
+        rest = len(self.unsourced), len(self.open)
+        return tuple(map(str, (self.all, self.bound, self.computed, self.given, *rest)))
 
 
 def course_claims(
@@ -108,11 +118,16 @@ def course_claims(
 def sum_claims(claims: Iterable[Claims]) -> Claims:
     """Return the claims of several documents."""
     terms = tuple(claims)
-    places = tuple(place for term in terms for place in term.open)
     bound_count, computed_count, given_count = (
         sum(getattr(term, kind) for term in terms) for kind in KINDS
     )
-    return Claims(bound_count, computed_count, given_count, places)
+    return Claims(
+        bound_count,
+        computed_count,
+        given_count,
+        open=tuple(place for term in terms for place in term.open),
+        unsourced=tuple(place for term in terms for place in term.unsourced),
+    )
 
 
 def document_claims(document: model.Document) -> Claims:
@@ -122,42 +137,52 @@ def document_claims(document: model.Document) -> Claims:
         for r in model.find_blocks(document, model.Recording)
         if r.script
     )
-    counter = _Counter(outputs)
+    counter = _Counter(outputs, check_formulas(document))
     output_ids: set[int] = set()
     for block in model.walk_blocks(document.blocks):
         if isinstance(block, model.Recording):
             output_ids.add(id(block.body))
         if isinstance(block, model.MathBlock):
-            counter.formula(block.tex, block.label.source if block.label else None)
+            counter.formula(block.tex, block.label.source if block.label is not None else None)
         elif not isinstance(block, model.Heading) and id(block) not in output_ids:
             counter.inlines(model.block_inlines(block))
     for span, number in counter.alternatives:
-        proofs = counter.marked.get(number)
-        counter.add("" if proofs is None else "bound", span, proofs or ())
+        counter.add(*counter.marked.get(number, ("", ())), span)
     bound_count, computed_count, given_count = map(counter.kinds.count, KINDS)
     return Claims(
-        bound_count, computed_count, given_count, tuple(counter.open), tuple(counter.places)
+        bound_count,
+        computed_count,
+        given_count,
+        open=tuple(counter.open),
+        places=tuple(counter.places),
+        unsourced=tuple(counter.unsourced),
+        named=tuple(named_numbers(model.document_inlines(document))),
     )
 
 
 class _Counter:
-    def __init__(self, outputs: Sequence[tuple[int, str]]) -> None:
+    def __init__(
+        self,
+        outputs: Sequence[tuple[int, str]],
+        comparisons: Mapping[int, tuple[FormulaComparison, ...]],
+    ) -> None:
         """`outputs` are the ends of recorded outputs, in order, with their scripts."""
-        self.outputs = outputs
+        self.outputs, self.comparisons = outputs, comparisons
         self.kinds: list[str] = []
         self.open: list[Span] = []
+        self.unsourced: list[Span] = []
         self.places: list[tuple[Span, tuple[str, ...]]] = []
-        self.marked: dict[str, tuple[str, ...]] = {}
-        """The scripts that print a number; none if it is given."""
+        self.marked: dict[str, tuple[str, tuple[str, ...]]] = {}
+        """How a number is proven, and the scripts that print it; none if it is given."""
         self.alternatives: list[tuple[Span, str]] = []
 
-    def add(self, kind: str, span: Span, proofs: tuple[str, ...] = ()) -> None:
+    def add(self, kind: str, proofs: tuple[str, ...], span: Span) -> None:
         """Add a claim and what proves it; an empty kind stands for no proof."""
-        if kind:
+        if kind in KINDS:
             self.kinds.append(kind)
             self.places += [(span, proofs)] if proofs else []
         else:
-            self.open.append(span)
+            (self.unsourced if kind else self.open).append(span)
 
     def inlines(self, inlines: Iterable[model.Inline]) -> None:
         """Add the claims of inlines."""
@@ -171,7 +196,11 @@ class _Counter:
                     source = inline.source
                     if source is None and inline.label is not None:
                         source = inline.label.source
+                    if inline.meaning is not None and source is None and inline.value is None:
+                        source = ""  # a symbol stands for a value because the author says so
                     self.formula(inline.tex, source)
+                    if inline.value is not None:
+                        self.marked_number(inline.value)
                 case model.Image():
                     numbers = {number.text for number in find_claims(inline.alt)}
                     self.alternatives += [(inline.span, number) for number in sorted(numbers)]
@@ -190,13 +219,18 @@ class _Counter:
             at = bisect_right(self.outputs, number.span.start, key=itemgetter(0))
             above = self.outputs[at - 1][1] if at else ""
             proofs = tuple(filter(None, (number.script or above,)))
+        kind = _given_kind(number.source) if number.source is not None else "bound"
         for part in scan_prose(number.text):
-            scripts = self.marked.setdefault(part.text, proofs)
+            first_kind, scripts = self.marked.setdefault(part.text, (kind, proofs))
             # What one place gives, or another script prints, is proven by that.
-            self.marked[part.text] = (
-                tuple(sorted({*scripts, *proofs})) if scripts and proofs else ()
-            )
-            self.add("bound" if number.source is None else "given", number.text_span, proofs)
+            if first_kind == kind == "bound":
+                union = tuple(sorted({*scripts, *proofs})) if scripts and proofs else ()
+                self.marked[part.text] = kind, union
+            elif "given" in (first_kind, kind):
+                self.marked[part.text] = "given", ()
+            elif kind == "bound":
+                self.marked[part.text] = kind, proofs
+            self.add(kind, proofs, number.text_span)
 
     def text(self, text: model.Text) -> None:
         """Add the claims of plain text."""
@@ -205,22 +239,23 @@ class _Counter:
             span = text.span
             if is_verbatim:
                 span = Span(span.source, span.start + number.start, span.start + number.end)
-            self.add("", span)
+            self.add("", (), span)
 
     def formula(self, tex: Excerpt, source: str | None) -> None:
         """Add the claims of a formula."""
         if _MAY_CLAIM.search(tex.text) is None:
             return
-        proofs = [c for c in check_arithmetic(tex.text) if c.kind == "holds"]
+        comparisons = self.comparisons.get(tex.span().start, ())
+        proofs = [comparison for comparison in comparisons if comparison.kind == "holds"]
         for statement in read_statements(tex.text):
             first, last = statement.sides[0], statement.sides[-1]
             if any(first.start <= proof.start < last.end for proof in proofs):
-                self.add("computed", tex.span(first.start, last.end))
+                self.add("computed", (), tex.span(first.start, last.end))
                 continue
             for side in statement.sides:
                 if _is_claim(side, tex.text):
                     place = tex.span(*_strip_range(tex.text, side.start, side.end))
-                    self.add("" if source is None else "given", place)
+                    self.add("" if source is None else _given_kind(source), (), place)
 
 
 def find_claims(text: str) -> Iterator[Number]:
@@ -234,6 +269,10 @@ def find_claims(text: str) -> Iterator[Number]:
         is_small = is_whole and (number.value in _YEARS or abs(number.value) <= _COUNTS)
         if not is_small or _UNIT.match(text, number.end):
             yield number
+
+
+def _given_kind(source: str) -> str:
+    return "given" if source else _NO_SOURCE
 
 
 def _is_address(link: model.Link) -> bool:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.pages.library import Library
 
-_COLUMNS = ("part", "share", "numbers", *KINDS, "open")
+_COLUMNS = ("part", "share", "numbers", *KINDS, "unsourced", "open")
 _RIGHT: Literal["right"] = "right"
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from decimal import Decimal
+from fractions import Fraction
 
 from hypothesis import given
 from hypothesis import strategies as st
 
+from coursebuild.core.text.units import find_unit
 from coursebuild.features.arithmetic.chains import check_arithmetic
 from coursebuild.features.arithmetic.identities import check_identity
+from coursebuild.features.arithmetic.symbol_comparison import SymbolQuantity
 
 HOLDS = r"""
 I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168\ \mathrm{kg\,m^2}.
@@ -36,6 +39,7 @@ x \in [0, 1]
 """
 TOKENS = (
     r"0 1 2.5 , . + - * / ^ _ { } ( ) [ ] | = < & \\ \frac \sqrt \sin \pi \cdot \mathrm{kg} \int"
+    r" \ell g m v \dot x t T \approx \omega_0 \mathrm{d}"
 ).split()
 
 
@@ -67,7 +71,7 @@ def test_a_sum_is_wrong_exactly_if_its_last_digit_is(terms: list[Decimal], off: 
 
 @given(st.lists(st.sampled_from(TOKENS), max_size=40).map(" ".join) | st.text(max_size=60))
 def test_any_text_can_be_checked(tex: str) -> None:
-    for comparison in check_arithmetic(tex):
+    for comparison in (*check_arithmetic(tex), *check_arithmetic(tex, KNOWN, "ms")):
         assert 0 <= comparison.start <= comparison.end <= len(tex)
 
 
@@ -90,3 +94,111 @@ IDENTITIES = r"""
 def test_identities_hold() -> None:
     failures = [list(check_identity(tex, {"x": ()})) for tex in IDENTITIES.strip().splitlines()]
     assert failures == [[]] * len(failures)
+
+
+def symbols(*rows: tuple[str, str, str]) -> tuple[SymbolQuantity, ...]:
+    """Return symbols from names, units and values, which may be empty."""
+    quantities = []
+    for name, unit_text, value in rows:
+        unit = find_unit(unit_text)
+        assert unit is not None
+        decimals = len(value.partition(".")[2])
+        quantities.append(
+            SymbolQuantity(
+                name,
+                unit_text,
+                unit,
+                Fraction(value) * unit.size if value else None,
+                Fraction(10) ** -decimals * unit.size if decimals else 0,
+                f"{value} {unit_text}",
+            )
+        )
+    return tuple(quantities)
+
+
+KNOWN = symbols(
+    (r"\ell", "m", "1"),
+    ("g", "m/s^2", "9.81"),
+    ("m", "kg", "2"),
+    ("v", "m/s", "4.43"),
+    (r"\omega_{0}", "rad/s", "3.13"),
+    (r"\theta", "deg", "30"),
+    ("h", "s", "0.002"),
+    (r"m_{eff}", "kg", "0.5"),
+    ("T", "s", ""),
+    ("E", "J", ""),
+    ("x", "m", ""),
+    ("t", "s", ""),
+)
+COMPUTED = r"""
+T = 2\pi\sqrt{\frac{\ell}{g}} \approx 2.006
+2\pi\sqrt{\ell/g} = 2\pi\sqrt{1/9.81} = 2.006\ \mathrm s
+T = 2\pi\sqrt{\ell/g} \approx 2006\ \mathrm{ms}
+T \approx 2\pi\sqrt{\ell/g} \approx 2
+E = \tfrac12 m v^2 = 19.6\ \mathrm J
+m g \ell = \frac12 m v^2
+\omega_0 = \sqrt{g/\ell}
+\omega_{0}^2\,\ell = 9.8
+\theta = 30^\circ
+\theta = 30
+\sin\theta = 0.5
+h = 2.0 \times 10^{-3}
+h = 2\ \mathrm{ms}
+m_\text{eff}/m = m_{\text{eff}}/m = 25\,\%
+\frac{v^2}{2 g \ell} - 1 \approx 0.02\,\%
+"""
+WRONG = r"""
+T = 2\pi\sqrt{\ell/g} \approx 2.060
+2\pi\sqrt{\ell/g} = 2\pi\sqrt{1/9.91}
+T = 2\pi\sqrt{\ell/g} \approx 2.006\ \mathrm m
+m g \ell = \frac12 m v
+\omega_0 = \sqrt{g/\ell} + 0.1\ \mathrm{rad/s}
+m g \ell = m v^2
+h = 2.0 \times 10^{-4}
+\theta = 31
+m_\text{eff}/m = 20\,\%
+E = m v
+x = v\,t + \ell\,t
+\sin t = 1
+\dot x = \ell
+\frac{\mathrm dx}{\mathrm dt} = x
+x < 2\ \mathrm s
+"""
+NOT_JUDGED = r"""
+x = v\,t
+\ddot x = g
+\frac{\mathrm dx}{\mathrm dt} = v
+E \propto v
+m > 3
+x = 1 + t
+E = 9.81\,m
+y = v + x
+x \to 0
+"""
+
+
+def test_symbols_with_values_are_computed_and_units_compared() -> None:
+    for texts, expected in ((COMPUTED, {"holds"}), (WRONG, {"wrong"}), (NOT_JUDGED, set())):
+        for tex in texts.strip().splitlines():
+            kinds = {c.kind for c in check_arithmetic(tex, KNOWN)}
+            kinds -= {"holds"} if expected == {"wrong"} else set()
+            assert kinds == expected, tex
+
+
+def test_what_is_claimed_of_symbols_and_cannot_be_computed_is_said() -> None:
+    for tex, reason in (
+        (r"\mathbf v = 3.0", "it is a vector"),
+        ("l/g = 0.1", "`l` has no value here"),
+        (r"m x = 0.1", "`x` has no value here"),
+        (r"m^T m = 4", "it may be a transpose"),
+        (r"(v - 2.43)/m = 1", "a number in it may leave out its unit"),
+    ):
+        assert [(c.kind, c.message) for c in check_arithmetic(tex, KNOWN)] == [("unread", reason)]
+
+
+def test_a_unit_after_the_formula_is_that_of_its_last_number() -> None:
+    tex = r"2\pi\sqrt{\ell/g} \approx 2006"
+    (comparison,) = check_arithmetic(tex, KNOWN, "ms")
+    assert comparison.kind == "holds"
+    (comparison,) = check_arithmetic(tex, KNOWN, "kg")
+    assert comparison.message == "`time` is held against `mass`"

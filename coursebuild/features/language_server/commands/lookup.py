@@ -36,7 +36,7 @@ from coursebuild.features.language_server.commands.fields import field_place
 from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.resolve import Meaning, resolver_of
-from coursebuild.features.symbols.mathml import only_symbol, symbols
+from coursebuild.features.symbols.mathml import declared_symbol, symbols
 from coursebuild.pipeline.reading import kept_formulas
 
 _STRING = re.compile(r"""(["'])([^"'\s]+)\1""")
@@ -246,7 +246,7 @@ class _Lookup:
         declarations = [
             math
             for math in model.find_inlines(self.document, model.Math)
-            if math.meaning and only_symbol(mathml(math)) in formula_symbols
+            if math.meaning and declared_symbol(mathml(math)) in formula_symbols
         ]
         if not declarations:
             return None

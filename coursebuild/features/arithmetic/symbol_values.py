@@ -1,0 +1,232 @@
+r"""What the symbols of a document stand for at each place: their units and values.
+
+Entry points: `read_symbols(document)`; `check_formulas(document)`, which compares the numbers of
+all formulas with these values.
+
+1. `{symbol=…}` after a formula declares a symbol for the whole document. Its value is `value=…`, or
+   what stands after the sign in `$m = 2\ \mathrm{kg}$`. From then on `{given}` after such a
+   formula, or `{value=…}` after the symbol, gives it another value.
+2. A value holds in its section, before it and after it, and in later sections, up to one that gives
+   another. In a callout, or a question of a quiz, it holds there alone, unless it stands there with
+   the declaration. Two values at the same level are an error.
+3. A formula that leaves out the unit of its last number may have it in the text right after it.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from fractions import Fraction
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.core import model
+from coursebuild.core.pages.quantities import unit_length
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.text.source import Span
+from coursebuild.core.text.units import Unit, find_unit
+from coursebuild.features.arithmetic.chains import check_arithmetic
+from coursebuild.features.arithmetic.evaluate import (
+    WrongDimensions,
+    describe_dimension,
+    evaluate,
+)
+from coursebuild.features.arithmetic.expressions import NotUnderstood
+from coursebuild.features.arithmetic.numerals import FormulaComparison, read_numeral
+from coursebuild.features.arithmetic.statements import read_statements
+from coursebuild.features.arithmetic.symbol_comparison import SymbolQuantity
+
+_Formula = model.Math | model.MathBlock
+_Level = tuple[int, ...]
+"""The number of a section, then the offsets of the callouts and questions inside it."""
+
+
+class _Place(Struct, frozen=True):
+    """A formula, and what belongs to its place."""
+
+    formula: _Formula
+    level: _Level
+    unit: str
+    """The unit in the text right after it."""
+
+
+class _GivenValue(Struct, frozen=True):
+    """A value of a symbol, and where it is given."""
+
+    quantity: SymbolQuantity
+    level: _Level
+    span: Span
+
+
+class DocumentSymbols(Struct, frozen=True):
+    """The symbols that a document declares, and what is wrong with their values."""
+
+    declarations: Mapping[str, SymbolQuantity]
+    values: Mapping[str, tuple[_GivenValue, ...]]
+    places: tuple[_Place, ...]
+    diagnostics: tuple[Diagnostic, ...]
+
+    def at(self, level: _Level) -> tuple[SymbolQuantity, ...]:
+        """The symbols with the values that hold at a level."""
+        quantities = dict(self.declarations)
+        for name, values in self.values.items():
+            scope_values = [v for v in values if v.level == level[: len(v.level)]]
+            earlier_values = [v for v in values if len(v.level) == 1 and v.level < level]
+            nearest = max(
+                scope_values or earlier_values, key=lambda value: value.level, default=None
+            )
+            if nearest is not None:
+                quantities[name] = nearest.quantity
+        return tuple(quantities.values())
+
+
+def read_symbols(document: model.Document) -> DocumentSymbols:
+    """Read the symbols of a document, once."""
+    return model.computed_once(document, "symbol_values", lambda: _read_symbols(document))
+
+
+def check_formulas(document: model.Document) -> Mapping[int, tuple[FormulaComparison, ...]]:
+    """Compare what each formula states; by the offset of its TeX."""
+
+    def compare() -> dict[int, tuple[FormulaComparison, ...]]:
+        symbols = read_symbols(document)
+        definitions = {value.span for values in symbols.values.values() for value in values}
+        definitions |= {diagnostic.span for diagnostic in symbols.diagnostics}
+        levels = {place.level: symbols.at(place.level) for place in symbols.places}
+        comparisons: dict[int, tuple[FormulaComparison, ...]] = {}
+        for place in symbols.places:
+            formula = place.formula
+            if formula.span in definitions:
+                continue
+            is_identity = formula.label is not None and formula.label.check is not None
+            quantities = () if is_identity else levels[place.level]
+            tex = formula.tex
+            comparisons[tex.span().start] = check_arithmetic(tex.text, quantities, place.unit)
+        return comparisons
+
+    return model.computed_once(document, "formula_comparisons", compare)
+
+
+def _read_symbols(document: model.Document) -> DocumentSymbols:
+    places = tuple(_read_places(document))
+    declarations: dict[str, SymbolQuantity] = {}
+    values: dict[str, list[_GivenValue]] = {}
+    diagnostics: list[Diagnostic] = []
+    for place in sorted(places, key=lambda place: place.formula.meaning is None):
+        formula, span = place.formula, place.formula.span
+        number = formula.value if isinstance(formula, model.Math) else None
+        source = formula.source if isinstance(formula, model.Math) else None
+        if formula.label is not None:
+            source = formula.label.source
+        if formula.meaning is None and number is None and source is None:
+            continue
+        try:
+            quantity = _read_quantity(place, declarations, values)
+        except NotUnderstood as error:
+            if number is not None or error.kind == "wrong":
+                message = f"`{formula.tex.text}` cannot have this value: {error.reason}"
+                diagnostics.append(diagnose("symbol-value", span, message))
+            continue
+        if quantity is None:
+            continue
+        if formula.meaning is not None:
+            declarations.setdefault(quantity.name, replace(quantity, value=None))
+        if quantity.value is None:
+            continue
+        level = place.level if formula.meaning is None else place.level[:1]
+        rivals = values.setdefault(quantity.name, [])
+        rival = next((value for value in rivals if value.level == level), None)
+        if rival is None:
+            rivals.append(_GivenValue(quantity, level, span))
+        elif rival.quantity.value != quantity.value:
+            texts = quantity.text, rival.quantity.text
+            message = f"`{quantity.name}` is {texts[0]}, and {texts[1]} in the same section"
+            help = "give the other quantity another letter or index, or a section of its own"
+            note = Note("given here", rival.span)
+            diagnostics.append(diagnose("symbol-value", span, message, help=help, notes=[note]))
+    return DocumentSymbols(
+        declarations,
+        {name: tuple(group) for name, group in values.items()},
+        places,
+        tuple(diagnostics),
+    )
+
+
+def _read_quantity(
+    place: _Place, declarations: Mapping[str, SymbolQuantity], values: Collection[str]
+) -> SymbolQuantity | None:
+    """The symbol that a formula names, with its value if it says that; `None` for other formulas.
+
+    Raises:
+        NotUnderstood: the formula is not understood.
+    """
+    formula, tex = place.formula, place.formula.tex.text
+    number = formula.value if isinstance(formula, model.Math) else None
+    sides = [side for statement in read_statements(tex) for side in statement.sides]
+    if number is not None and (len(sides) != 1 or sides[0].get_expression().kind != "symbol"):
+        raise NotUnderstood("it is not a single symbol", 0, len(tex))
+    if len(sides) > 2 or not sides or (len(sides) == 2 and not sides[1].is_numeric):
+        return None
+    symbol = sides[0].get_expression()
+    if symbol.kind != "symbol":
+        return None
+    name = symbol.text
+    unit_text = formula.meaning.unit if formula.meaning is not None else ""
+    if formula.meaning is None and name in declarations:
+        unit_text = declarations[name].unit_text
+    unit = find_unit(unit_text) if unit_text else None
+    if number is not None:
+        size = unit.size if unit is not None else Fraction(1)
+        mantissa, _, exponent = number.text.replace("−", "-").lower().partition("e")
+        decimals = len(mantissa.partition(".")[2])
+        step = Fraction(10) ** (int(exponent or 0) - decimals) * size if decimals else 0
+        value = Fraction(f"{mantissa}e{exponent or 0}") * size
+        text = f"{number.text} {unit_text}".rstrip()
+        return SymbolQuantity(name, unit_text, unit or Unit(Fraction(1)), value, step, text)
+    if len(sides) == 1:
+        return SymbolQuantity(name, unit_text, unit)
+    if formula.meaning is None and name not in values:
+        return None  # an assumption about a symbol without a value
+    expression = sides[1].get_expression()
+    quantity, numeral = evaluate(expression), read_numeral(expression)
+    units = [part.text for part in expression.walk() if part.kind == "unit"]
+    unit_name = units[-1] if units else place.unit or unit_text
+    scale = Unit(Fraction(1), quantity.dimension)
+    if not units and unit_name:
+        scale = find_unit(unit_name) or scale
+    if unit is not None and unit.dimension != scale.dimension:
+        dimensions = " and not ".join(map(describe_dimension, (unit.dimension, scale.dimension)))
+        raise WrongDimensions(f"it is {dimensions}", sides[1].start, sides[1].end)
+    unit = (find_unit(unit_text or unit_name) if unit_text or unit_name else None) or scale
+    size, factor = Fraction(1), Fraction(1) if units else scale.size
+    if unit_name and (own_unit := find_unit(unit_name)) is not None:
+        size = own_unit.size
+    value = quantity.value * factor
+    step = numeral.step * factor if numeral is not None and not numeral.is_whole else 0
+    text = f"{float(value / size):.10g} {unit_name}".rstrip()
+    return SymbolQuantity(name, unit_text or unit_name, unit, value, step, text)
+
+
+def _read_places(document: model.Document) -> Iterator[_Place]:
+    """Yield the formulas of a document with their levels and the units after them."""
+    blocks = tuple(model.document_blocks(document))
+    headings = [block.span.start for block in blocks if isinstance(block, model.Heading)]
+    parts = sorted(
+        (part.start, part.end)
+        for block in blocks
+        if isinstance(block, model.Callout | model.FeatureBlock)
+        for part in (block.scopes() if isinstance(block, model.FeatureBlock) else (block.span,))
+    )
+    for block in blocks:
+        inlines = tuple(model.walk_inlines(model.block_inlines(block)))
+        formulas: Iterable[_Formula] = [i for i in inlines if isinstance(i, model.Math)]
+        texts = {i.span.start: i.text for i in inlines if isinstance(i, model.Text)}
+        if isinstance(block, model.MathBlock):
+            formulas = (block,)
+        for formula in formulas:
+            start = formula.tex.span().start
+            level = bisect_right(headings, start), *(s for s, end in parts if s <= start < end)
+            after = texts.get(formula.span.end, "")
+            unit = after[: unit_length(after)].strip()
+            yield _Place(formula, level, "" if unit == "A" else unit)
