@@ -12,7 +12,7 @@ changed. A change ends in one of these ways:
 - elsewhere: a message names another line;
 - same: the pages say the same;
 - prose: only words have changed, which nothing can know to be wrong;
-- free: a value that is the author's own choice (`free_choice` says why);
+- reason: nothing can know that it is wrong, or another command lists it (`REASONS`);
 - silent: all others. They are listed.
 """
 
@@ -45,19 +45,20 @@ from coursebuild.core.model import Course  # noqa: E402
 from coursebuild.core.model.results import ScriptJob, ScriptRun  # noqa: E402
 from coursebuild.core.pages import urls  # noqa: E402
 from coursebuild.core.pages.page_list import page_list  # noqa: E402
+from coursebuild.core.registry import unproven  # noqa: E402
 from coursebuild.core.run.runner import ScriptServer  # noqa: E402
 from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
 from coursebuild.pipeline.judge import judge  # noqa: E402
-from coursebuild.pipeline.load import MAP  # noqa: E402
 from coursebuild.pipeline.options import Options, open_store  # noqa: E402
 from coursebuild.pipeline.verify import verify  # noqa: E402
 from coursebuild.preview.session import Session, script_keys  # noqa: E402
 
 DOCS = ROOT / "docs/explanation/mistakes.md"
-ENDS = ("at its place", "in its result", "elsewhere", "same", "prose", "free", "silent")
+ENDS = ("at its place", "in its result", "elsewhere", "same", "prose", "reason", "silent")
+WIDTH = 300
+"""Characters of a change that are listed."""
 SECONDS = 20.0
 """How long a changed script may run."""
-_RUN = ("scripts", "recorded outputs", "labs", "quizzes", "declarations of models", "course map")
 _RUN_PLACES = {"script", "output", "lab", "declarations", "map"}
 
 
@@ -67,7 +68,7 @@ class Outcome(Struct, frozen=True):
     change: Change
     end: str
     note: str = ""
-    """The message, or why the value is free."""
+    """The message, or why there can be none."""
 
 
 class Checker:
@@ -78,14 +79,13 @@ class Checker:
         self.options = Options(root, 1, open_store(root, None, None), run_all=self._run)
         self.session = Session(self.options)
         self.session.read()
-        course = self.session.course
-        assert course is not None
+        course = self._course
         self.verification = verify(course, self.options)
         self.session.take_results(course, self.verification)
         found = judge(course, self.session.diagnostics()).diagnostics
         self.found = Counter(map(_identity, found))
         self.texts = {source.path: source.text for source in (course.map, *course.sources)}
-        self.texts = {path: text for path, text in self.texts.items() if _is_changed(path, course)}
+        self.texts = {p: t for p, t in self.texts.items() if p.startswith("content/")}
         self.texts |= {
             path.relative_to(root).as_posix(): path.read_text("utf-8")
             for path in sorted(root.glob("models/*.toml"))
@@ -100,6 +100,11 @@ class Checker:
         self.server.close()
         self.options.store.close()
 
+    @property
+    def _course(self) -> Course:
+        assert self.session.course is not None
+        return self.session.course
+
     def _run(self, root: Path, jobs: Sequence[ScriptJob], **keywords: Any) -> tuple[ScriptRun, ...]:
         jobs = [replace(job, timeout=min(job.timeout, SECONDS)) for job in jobs]
         return self.server.run(root, jobs, **keywords)
@@ -113,17 +118,17 @@ class Checker:
             if diagnostics:
                 return _judge_place(change, old, new, diagnostics)
             said = self._compare(change)
+            claims = unproven(self._course, self.session.library.results.runs)  # type: ignore[union-attr]
+            listed = [claim for claim in claims if isinstance(claim, Diagnostic)]
         finally:
             self.session.open_texts = {}
             if self.session.edit([change.path], is_saved=False) is None:
                 self.session.read(is_saved=False)
-            course = self.session.course
-            assert course is not None
-            self.session.take_results(course, self.verification)
+            self.session.take_results(self._course, self.verification)
         if said != "other":
             return Outcome(change, said)
-        reason = free_choice(change, old)
-        return Outcome(change, "free" if reason else "silent", reason)
+        reason = find_reason(change, old, listed)
+        return Outcome(change, "reason" if reason else "silent", reason)
 
     def _diagnose(self, path: str, new: str) -> list[Diagnostic]:
         """What is reported of a course with this text, and not of the course as it was."""
@@ -140,7 +145,12 @@ class Checker:
             return found
         keys = script_keys(course)
         known = {p: run for p, run in self.runs.items() if keys.get(p) == self.keys.get(p)}
-        verification = verify(course, self.options, known_runs=known)
+        is_alone = keys == self.keys and path in self._owner_pages  # no other page can change
+        documents = frozenset([path]) if is_alone else None
+        verification = verify(course, self.options, documents, known_runs=known)
+        if is_alone:
+            results = replace(self.verification.results, trials=verification.results.trials)
+            verification = replace(verification, results=results)
         session.take_results(course, verification)
         return self._new(course, session.diagnostics())
 
@@ -171,17 +181,11 @@ class Checker:
         return [entry.path for entry in page_list(self.session.library)]
 
 
-def _is_changed(path: str, course: Course) -> bool:
-    return path == MAP or path.startswith("content/") and path.endswith(".md")
-
-
 def _identity(diagnostic: Diagnostic) -> tuple[str, str, str]:
     return diagnostic.rule, diagnostic.span.path, diagnostic.message
 
 
-def _judge_place(
-    change: Change, old: str, new: str, diagnostics: Sequence[Diagnostic]
-) -> Outcome:
+def _judge_place(change: Change, old: str, new: str, diagnostics: Sequence[Diagnostic]) -> Outcome:
     """Where a change was reported."""
     first = new.count("\n", 0, change.start) + 1
     last = first + change.text.rstrip("\n").count("\n")
@@ -199,9 +203,30 @@ def _describe(diagnostic: Diagnostic) -> str:
     return f"{span.path}:{span.line}: {diagnostic.rule}: {diagnostic.message}"
 
 
-def free_choice(change: Change, old: str) -> str:
-    """Why a changed value cannot be known to be wrong; empty where it should be."""
-    return ""
+REASONS = {
+    "heading": "another level that a heading may have",
+    "formula": "another formula that is whole: what it says is proven where it has numbers",
+    "lab": "another value with which all holds that is claimed of the lab",
+    "script": "the script prints and draws the same",
+    "map": "an address or a setting that nothing contradicts",
+    "declarations": "what is measured is the author's choice",
+    "other block": "the block does what the lesson says of it",
+    "callout": "a quotation is what is left",
+}
+"""Why nothing can know that a changed value is wrong, by the place of the change."""
+
+
+def find_reason(change: Change, old: str, listed: Iterable[Diagnostic]) -> str:
+    """Why a change is no mistake that can be known; empty where it should be."""
+    start, end = change.start, max(change.start + len(change.text), change.start + 1)
+    for claim in listed:
+        span = claim.span
+        if span.path == change.path and span.start <= end and start <= span.end:
+            return "listed by `check --truth`"
+    before = old[old.rfind("\n", 0, start) + 1 : start]
+    if re.search(r"Lessons? (?:[\d.]+ and )?[\d.]*$", before):
+        return "another lesson of the map"
+    return REASONS.get(change.place, "")
 
 
 # --- the run
@@ -238,20 +263,16 @@ def _check(kind: str, seed: int, number: int) -> Outcome | None:
 
 def run(
     course: Path, seeds: Sequence[int], count: int, kinds: Sequence[str], jobs: int
-) -> list[Outcome]:
+) -> Iterator[Outcome]:
     """Check so many changes for each seed, as many of each kind."""
     each = max(1, round(count / len(kinds)))
     tasks = [(kind, seed, number) for seed in seeds for number in range(each) for kind in kinds]
     with tempfile.TemporaryDirectory(prefix="mistakes-") as top:
         pool = ProcessPoolExecutor(jobs, initializer=_prepare, initargs=(course, Path(top)))
         with pool:
-            outcomes: list[Outcome] = []
             for outcome in pool.map(_check, *zip(*tasks, strict=True), chunksize=1):
-                outcomes += [] if outcome is None else [outcome]
-                if sys.stderr.isatty() or len(outcomes) % 100 == 0:
-                    print(f"\r{len(outcomes)} of {len(tasks)}", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
-    return outcomes
+                if outcome is not None:
+                    yield outcome
 
 
 def table(outcomes: Sequence[Outcome]) -> list[str]:
@@ -262,27 +283,35 @@ def table(outcomes: Sequence[Outcome]) -> list[str]:
         if ends:
             cells = (str(ends[end] or "") for end in ENDS)
             lines.append(f"| {kind or '**all**'} | {ends.total()} | {' | '.join(cells)} |")
-    ends = Counter(o.end for o in outcomes)
-    counted = ends.total() - ends["prose"]
-    shares = (f"{100 * ends[end] / max(counted, 1):.1f} % {end}" for end in ("silent", "elsewhere"))
-    lines += ["", f"Of {counted} changes to anything but words of prose: {', '.join(shares)}."]
-    return lines
+    others = [o for o in outcomes if o.change.kind not in ("numbers in prose", "inline code")]
+    for title, counted in (
+        ("changes to anything but words of prose", outcomes),
+        ("those outside of inline code and of numbers in prose", others),
+    ):
+        ends = Counter(o.end for o in counted if o.end != "prose")
+        total = max(ends.total(), 1)
+        silent, elsewhere = (100 * ends[end] / total for end in ("silent", "elsewhere"))
+        lines += [
+            "",
+            f"Of {total} {title}, {silent:.1f} % were silent, {elsewhere:.1f} % elsewhere.",
+        ]
+    reasons = Counter(o.note for o in outcomes if o.end == "reason")
+    lines += ["", "| reason | changes |", "| --- | ---: |"] if reasons else []
+    return lines + [f"| {reason} | {count} |" for reason, count in reasons.most_common()]
 
 
-def listing(outcomes: Iterable[Outcome], texts: dict[str, str]) -> Iterator[str]:
-    """Changes with the text before and after."""
-    for outcome in outcomes:
-        change = outcome.change
-        old = texts[change.path]
-        line = old.count("\n", 0, change.start) + 1
-        start = max(old.rfind("\n", 0, change.start) + 1, change.start - 60)
-        end = min(old.find("\n", change.end) % (len(old) + 1), change.end + 30)
-        before, after = old[start:end], old[start : change.start] + change.text + old[change.end : end]
-        yield f"{outcome.end}: {change.kind} ({change.how}, {change.place}) {change.path}:{line}"
-        yield f"  - {before!r}"
-        yield f"  + {after!r}"
-        if outcome.note:
-            yield f"  {outcome.note}"
+def describe(outcome: Outcome, old: str) -> Iterator[str]:
+    """A change with the text before and after."""
+    change = outcome.change
+    line = old.count("\n", 0, change.start) + 1
+    start = max(old.rfind("\n", 0, change.start) + 1, change.start - 60)
+    end = min(old.find("\n", change.end) % (len(old) + 1), change.end + 30)
+    before, after = old[start:end], old[start : change.start] + change.text + old[change.end : end]
+    yield f"{outcome.end}: {change.kind} ({change.how}, {change.place}) {change.path}:{line}"
+    yield f"  - {before[:WIDTH]!r}"
+    yield f"  + {after[:WIDTH]!r}"
+    if outcome.note:
+        yield f"  {outcome.note}"
 
 
 def main() -> int:
@@ -295,15 +324,13 @@ def main() -> int:
     parser.add_argument("--list", nargs="*", choices=ENDS, default=["silent", "elsewhere"])
     parser.add_argument("--docs", action="store_true", help=f"put the table into {DOCS.name}")
     arguments = parser.parse_args()
-    outcomes = run(
-        arguments.course.resolve(), arguments.seed, arguments.count, arguments.kinds, arguments.jobs
-    )
-    texts = {
-        path: (arguments.course / path).read_text("utf-8")
-        for path in {outcome.change.path for outcome in outcomes}
-    }
-    for end in arguments.list:
-        print(*listing((o for o in outcomes if o.end == end), texts), sep="\n")
+    course: Path = arguments.course.resolve()
+    outcomes: list[Outcome] = []
+    for outcome in run(course, arguments.seed, arguments.count, arguments.kinds, arguments.jobs):
+        outcomes.append(outcome)
+        if outcome.end in arguments.list:
+            old = (course / outcome.change.path).read_text("utf-8")
+            print(*describe(outcome, old), sep="\n", flush=True)
     lines = table(outcomes)
     print("", *lines, sep="\n")
     if arguments.docs:

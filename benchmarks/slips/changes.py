@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from msgspec import Struct
 
 _ROWS = ("`1234567890-=", "qwertyuiop[]\\", "asdfghjkl;'", "zxcvbnm,./")
-_SHIFTED = ("~!@#$%^&*()_+", 'QWERTYUIOP{}|', 'ASDFGHJKL:"', "ZXCVBNM<>?")
+_SHIFTED = ("~!@#$%^&*()_+", "QWERTYUIOP{}|", 'ASDFGHJKL:"', "ZXCVBNM<>?")
 _FENCE = re.compile(r"^(?P<indent>[ >]*)(?P<mark>`{3,}|~{3,})(?P<info>.*)$")
 _BLOCKS = {
     "python": "script",
@@ -220,13 +220,15 @@ def _unclose(text: str, chance: random.Random) -> tuple[int, int, str] | None:
 
 def _rename_key(text: str, chance: random.Random) -> tuple[int, int, str] | None:
     pattern = r'"(\w+)"(?=\s*:)|^([\w-]+)(?=\s*=)|(?<=[{\s])(\w+)(?==["\w./])'
-    keys = [m for m in re.finditer(pattern, text, re.M)]
+    keys = list(re.finditer(pattern, text, re.M))
     if not keys:
         return None
     match = chance.choice(keys)
     start, end = match.span(match.lastindex or 0)
     word = text[start:end]
-    new = chance.choice((f"{word}s", word[:-1], word.upper(), word.title(), f"{word}_", f"my_{word}"))
+    new = chance.choice(
+        (f"{word}s", word[:-1], word.upper(), word.title(), f"{word}_", f"my_{word}")
+    )
     return start, end, new or "key"
 
 
@@ -259,10 +261,15 @@ def _paste(text: str, chance: random.Random) -> tuple[int, int, str] | None:
     return at, at, chance.choice(FOREIGN) + "\n\n"
 
 
+_MARKED = re.compile(
+    r"\[[^\]\n]+\]\([^)\n]+\)|`[^`\n]+`(?:\{[^}\n]*\})?|\*\*[^*\n]+\*\*"
+    r"|\$[^$\n]+\$|\"[^\"\n]{2,}\""
+)
+
+
 def _half_edit(text: str, chance: random.Random) -> tuple[int, int, str]:
-    """The rest of a line, of a word in marks or of a piece of code deleted; or a line begun anew."""
-    pieces = [*re.finditer(r"\[[^\]\n]+\]\([^)\n]+\)|`[^`\n]+`(?:\{[^}\n]*\})?|\*\*[^*\n]+\*\*", text)]
-    pieces += [*re.finditer(r"\$[^$\n]+\$|\"[^\"\n]{2,}\"", text)]
+    """The rest of a line or of what stands in marks deleted, or a line begun anew."""
+    pieces = list(_MARKED.finditer(text))
     if pieces and chance.random() < 0.6:
         start, end = chance.choice(pieces).span()
         return chance.randint(start + 1, end - 1), end, ""
@@ -276,8 +283,8 @@ def _conflict(text: str, chance: random.Random) -> tuple[int, int, str]:
     ours = text[start:end].rstrip("\n")
     theirs = ours.replace(chance.choice(ours.split() or ["x"]), "other", 1)
     marked = f"<<<<<<< HEAD\n{ours}\n=======\n{theirs}\n>>>>>>> branch\n"
-    sloppy = (marked, marked, *(marked.replace(f"{m}\n", "", 1) for m in ("=======", ">>>>>>> branch")))
-    return start, end, chance.choice(sloppy)
+    half = [marked.replace(f"{mark}\n", "", 1) for mark in ("=======", ">>>>>>> branch")]
+    return start, end, chance.choice((marked, marked, *half))
 
 
 _OTHERS: dict[str, Callable[[str, random.Random], tuple[int, int, str] | None]] = {

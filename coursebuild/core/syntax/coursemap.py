@@ -30,6 +30,7 @@ from coursebuild.core.syntax.course_schema import (
 from coursebuild.core.syntax.course_settings import callout_kinds, check_settings, comparison
 from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.fields import check_unique
+from coursebuild.core.syntax.headings import slug
 from coursebuild.core.syntax.nodes import Node, NumberNode, ObjectNode, StringNode
 from coursebuild.core.syntax.theme import ThemeTable, check_contrast, theme
 from coursebuild.core.syntax.toml_text import parse_toml
@@ -40,6 +41,7 @@ from coursebuild.core.text.diagnostics import (
     Parsed,
     diagnose,
     did_you_mean,
+    misspelt,
     sort_diagnostics,
 )
 from coursebuild.core.text.source import Source, Span
@@ -181,7 +183,7 @@ def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diag
 
 
 def _check_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
-    """Check that each lesson stands in the level that its id begins with."""
+    """Check the level that a lesson stands in, by its id, and its slug, by its title."""
     for level in root.objects("level"):
         name = _read_id(level.get("id"))
         for node, fields in decoding.find_structs(LessonTable, level.objects("lesson")):
@@ -189,6 +191,11 @@ def _check_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[
                 message = f"the lesson `{fields.id}` stands in the level `{shorten(name)}`"
                 help = f"an id in this level begins with `{shorten(name)}.`"
                 yield diagnose("field-value", node.place("id"), message, help=help)
+            title = slug(fields.title)
+            if fields.slug != title and misspelt(fields.slug, [title]) and len(title) > 6:
+                message = f"`{fields.slug}` is almost what the title would give"
+                help = f"did you mean `{title}`?"
+                yield diagnose("field-value", node.place("slug"), message, help=help)
 
 
 def _check_files(decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:

@@ -123,13 +123,16 @@ def record_table(
     return Recording(span, caption, caption_span, table, table.span, "", None, script)
 
 
-def check_missing_body(caption: tuple[Inline, ...], span: Span) -> list[Diagnostic]:
+def check_missing_body(
+    caption: tuple[Inline, ...], span: Span, following: Span | None = None
+) -> list[Diagnostic]:
     """Report a caption without a body, if it can be nothing but a caption."""
     if plain_text(caption).strip() != "Output:":
         return []
     message = "no recorded output follows this line"
     help = "put a fence that begins with ```` ```text ````, or a table, directly below it"
-    return [diagnose("recording-body", span, message, help=help)]
+    notes = [] if following is None else [Note("this follows it", following.first_line())]
+    return [diagnose("recording-body", span, message, help=help, notes=notes)]
 
 
 def diagnose_wrong_body(span: Span, subject: str) -> Diagnostic:

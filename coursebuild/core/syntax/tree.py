@@ -288,12 +288,35 @@ class TextReader:
 
     def _read_quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
         span, first_token = self._span(token), self.tokens[self.index]
+        self._check_quote_marks(span)
         if first_token.type == "paragraph_open":
             head = read_head(trim(first_token.text), self.state.callouts)
             if head is not None:
                 self.state.diagnostics += head.diagnostics
                 return self._read_callout(span, head.value)
         return model.BlockQuote(span, self._read_blocks("blockquote_close"))
+
+    def _check_quote_marks(self, span: Span) -> None:
+        """Report a mark too many in the middle of a paragraph, and another character for one."""
+        source = span.source
+        above, line = source.line_text(span.line - 1) if span.line > 1 else "", span.line
+        outer, marks = (_QUOTE_MARKS.match(text) for text in (above, source.line_text(line)))
+        assert outer is not None and marks is not None, "they match nothing as well"
+        is_in_text = above[outer.end() :].strip() and not span.text.startswith("> [!")
+        if is_in_text and 0 < outer[0].count(">") < marks[0].count(">"):
+            start = source.line_start(line)
+            message = "a quotation begins in the middle of a paragraph"
+            help = "take one `>` away, or leave a line with nothing but `>` above it"
+            place = source.span(start, start + len(marks[0].rstrip()))
+            self.state.report(diagnose("markup-unread", place, message, help=help))
+        for line in range(span.line + 1, span.end_line + 1):
+            slip = _SLIP_OF_MARK.match(source.line_text(line))
+            if slip is not None:
+                start = source.line_start(line)
+                message = f"`{slip[1]}` would be shown as written: this line continues a quotation"
+                place = source.span(start + slip.start(1), start + slip.end(1))
+                help = "begin the line with `> `"
+                self.state.report(diagnose("markup-unread", place, message, help=help))
 
     def _read_callout(self, span: Span, head: Head) -> model.Callout:
         title = self.inlines(head.title)
@@ -354,11 +377,15 @@ class TextReader:
             case PositionedToken(type="code_block") as token:
                 place = self._span(token).first_line()
                 self.state.report(diagnose_wrong_body(place, "an indented block"))
-            case _:
-                self.state.diagnostics += check_missing_body(caption, span)
+            case token:
+                following = None if token is None else self._span(token)
+                self.state.diagnostics += check_missing_body(caption, span, following)
         return None
 
 
+_QUOTE_MARKS = re.compile(r"[ >]*")
+_SLIP_OF_MARK = re.compile(r" {0,3}([<.?/,;:|])(?= )")
+"""What a line of a quotation may begin with if `>` was mistyped."""
 _BODIES: tuple[tuple[str, list[str]], ...] = (
     ("fence", ["text"]),
     ("fence", []),
