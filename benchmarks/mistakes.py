@@ -83,6 +83,8 @@ class Checker:
         self.verification = verify(course, self.options)
         self.session.take_results(course, self.verification)
         found = judge(course, self.session.diagnostics()).diagnostics
+        if any(diagnostic.is_error for diagnostic in found):
+            raise SystemExit(f"the course has mistakes of its own: {_describe(found[0])}")
         self.found = Counter(map(_identity, found))
         self.texts = {source.path: source.text for source in (course.map, *course.sources)}
         self.texts = {p: t for p, t in self.texts.items() if p.startswith("content/")}

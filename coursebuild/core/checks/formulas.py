@@ -22,14 +22,14 @@ _WORDS = re.compile(
 _COMMANDS = frozenset(
     """
     alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta iota kappa lambda sigma tau
-    upsilon phi varphi chi psi omega rho Gamma Delta Theta Lambda Sigma Upsilon Phi Psi Omega frac
-    tfrac dfrac sqrt cdot cdots ldots dots times approx leq geq neq equiv infty partial nabla dot
-    ddot hat vec tilde overline mathrm mathbf mathcal boldsymbol sin cos tan cot arcsin arccos
+    upsilon phi varphi chi psi omega rho pi Gamma Delta Theta Lambda Sigma Upsilon Phi Psi Omega
+    frac tfrac dfrac sqrt cdot cdots ldots dots times approx leq geq neq equiv infty partial nabla
+    dot ddot hat vec tilde overline mathrm mathbf mathcal boldsymbol sin cos tan cot arcsin arccos
     arctan sinh cosh tanh exp log lim prod quad qquad langle rangle lVert rVert
     """.split()
 )
 """Commands that no product of letters spells."""
-_SHORT_COMMANDS = frozenset("mu nu pi xi ln le ge ne in to int sum det bar sgn".split())
+_SHORT_COMMANDS = frozenset("mu nu xi ln le ge ne in to int sum det bar sgn".split())
 """Those that one may; they are taken for commands where the text uses them as such."""
 _LETTERS = re.compile(r"\\[A-Za-z]+|\\.|[A-Za-z]+", re.DOTALL)
 _BRACKETS = re.compile(r"\\[{}]|\\[^{}]|[()\[\]]", re.DOTALL)

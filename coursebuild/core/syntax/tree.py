@@ -303,7 +303,7 @@ class TextReader:
         outer, marks = (_QUOTE_MARKS.match(text) for text in (above, source.line_text(line)))
         assert outer is not None and marks is not None, "they match nothing as well"
         is_in_text = above[outer.end() :].strip() and not span.text.startswith("> [!")
-        if is_in_text and 0 < outer[0].count(">") < marks[0].count(">"):
+        if is_in_text and ">>" in marks[0] and 0 < outer[0].count(">") < marks[0].count(">"):
             start = source.line_start(line)
             message = "a quotation begins in the middle of a paragraph"
             help = "take one `>` away, or leave a line with nothing but `>` above it"
