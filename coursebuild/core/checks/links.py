@@ -303,8 +303,9 @@ def _check_anchor(
         if last <= count:
             return
         help = f"the last line of `{path}` is {count}"
-    place = ids.get(nearest(anchor, ids) or "") if isinstance(ids, Mapping) else None
-    notes = [] if place is None else [Note("this one is near it", place.first_line())]
+    near = nearest(anchor, ids)
+    place = ids.get(near) if near is not None and isinstance(ids, Mapping) else None
+    notes = [] if place is None else [Note(f"`#{near}` is here", place.first_line())]
     message = f"{page_name} has no anchor `#{anchor}`"
     yield diagnose("link-anchor", span, message, help=help, notes=notes)
 
