@@ -13,7 +13,7 @@ for quizzes and labs.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from coursebuild.core import model
@@ -110,6 +110,7 @@ class TextReader:
                 break
             block = _READERS[token.type](self, token)
             if block is not None:
+                self._check_torn_callout(blocks, block)
                 blocks.append(block)
         self.balance.leave()
         return tuple(blocks)
@@ -318,6 +319,19 @@ class TextReader:
                 help = "begin the line with `> `"
                 self.state.report(diagnose("markup-unread", place, message, help=help))
 
+    def _check_torn_callout(self, above: Sequence[model.Block], block: model.Block) -> None:
+        """Report a quotation directly below a callout, of which it was surely a part."""
+        callout = above[-1] if above else None
+        if not isinstance(callout, model.Callout) or not isinstance(block, model.BlockQuote):
+            return
+        between = Span(block.span.source, callout.span.end, block.span.start)
+        if not between.text.strip(" \t\r\n>") and between.text.count("\n") <= 2:
+            message = "a quotation begins directly below a callout"
+            help = "begin the empty line between them with `>`, or write a paragraph between them"
+            self.state.report(
+                diagnose("markup-unread", block.span.first_line(), message, help=help)
+            )
+
     def _read_callout(self, span: Span, head: Head) -> model.Callout:
         title = self.inlines(head.title)
         self.index += 3
@@ -384,7 +398,7 @@ class TextReader:
 
 
 _QUOTE_MARKS = re.compile(r"[ >]*")
-_SLIP_OF_MARK = re.compile(r" {0,3}([<.?/,;:|])(?= )")
+_SLIP_OF_MARK = re.compile(r" {0,3}([<.?/,;:|])(?= |$)")
 """What a line of a quotation may begin with if `>` was mistyped."""
 _BODIES: tuple[tuple[str, list[str]], ...] = (
     ("fence", ["text"]),

@@ -52,7 +52,7 @@ _CELL = re.compile(r"\{[=.]?(?:bash|julia|js|ojs|python|py|r|sql)\}\s|r [A-Za-z_
 """How an expression begins that Quarto or R Markdown would compute."""
 
 _STAR = re.compile(
-    r"^\*[^\W\d_]{3,}|[^\W\d_]{3,}\*(?![\w*])"
+    r"^\*[^\W\d_]{3,}|[^\W\d_]{2,}\*(?![\w*])"
     r"|(?<=[a-z] )[+\u2212-]?\d[\d.,]*\*\*(?= [a-z]|[.,;:]?$)",
     re.MULTILINE,
 )
