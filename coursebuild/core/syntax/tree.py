@@ -305,10 +305,9 @@ class TextReader:
         assert outer is not None and marks is not None, "they match nothing as well"
         is_in_text = above[outer.end() :].strip() and not span.text.startswith("> [!")
         if is_in_text and ">>" in marks[0] and 0 < outer[0].count(">") < marks[0].count(">"):
-            start = source.line_start(line)
             message = "a quotation begins in the middle of a paragraph"
             help = "take one `>` away, or leave a line with nothing but `>` above it"
-            place = source.span(start, start + len(marks[0].rstrip()))
+            place = source.span(at := source.line_start(line), at + len(marks[0].rstrip()))
             self.state.report(diagnose("markup-unread", place, message, help=help))
         for line in range(span.line + 1, span.end_line + 1):
             slip = _SLIP_OF_MARK.match(source.line_text(line))
@@ -328,9 +327,8 @@ class TextReader:
         if not between.text.strip(" \t\r\n>") and between.text.count("\n") <= 2:
             message = "a quotation begins directly below a callout"
             help = "begin the empty line between them with `>`, or write a paragraph between them"
-            self.state.report(
-                diagnose("markup-unread", block.span.first_line(), message, help=help)
-            )
+            place = block.span.first_line()
+            self.state.report(diagnose("markup-unread", place, message, help=help))
 
     def _read_callout(self, span: Span, head: Head) -> model.Callout:
         title = self.inlines(head.title)
