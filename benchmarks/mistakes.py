@@ -83,10 +83,10 @@ class Checker:
         course = self._course
         self.verification = verify(course, self.options)
         self.session.take_results(course, self.verification)
-        found = judge(course, self.session.diagnostics()).diagnostics
-        if any(diagnostic.is_error for diagnostic in found):
-            raise SystemExit(f"the course has mistakes of its own: {_describe(found[0])}")
-        self.found = Counter(map(_identity, found))
+        findings = judge(course, self.session.diagnostics()).diagnostics
+        if any(diagnostic.is_error for diagnostic in findings):
+            raise SystemExit(f"the course has mistakes of its own: {_describe(findings[0])}")
+        self.findings = Counter(map(_identity, findings))
         self.texts = {source.path: source.text for source in (course.map, *course.sources)}
         self.texts = {p: t for p, t in self.texts.items() if p.startswith("content/")}
         self.texts |= {
@@ -120,17 +120,17 @@ class Checker:
             diagnostics = self._diagnose(change.path, new)
             if diagnostics:
                 return _judge_place(change, old, new, diagnostics)
-            said = self._compare(change)
-            claims = unproven(self._course, self.session.library.results.runs)  # type: ignore[union-attr]
-            listed = [claim for claim in claims if isinstance(claim, Diagnostic)]
+            verdict = self._compare(change)
+            inventory = unproven(self._course, self.session.library.results.runs)  # type: ignore[union-attr]
+            claims = [claim for claim in inventory if isinstance(claim, Diagnostic)]
         finally:
             self.session.open_texts = {}
             if self.session.edit([change.path], is_saved=False) is None:
                 self.session.read(is_saved=False)
             self.session.take_results(self._course, self.verification)
-        if said != "other":
-            return Outcome(change, said)
-        reason = find_reason(change, old, listed)
+        if verdict != "other":
+            return Outcome(change, verdict)
+        reason = find_reason(change, old, claims)
         return Outcome(change, "reason" if reason else "silent", reason)
 
     def _diagnose(self, path: str, new: str) -> list[Diagnostic]:
@@ -138,19 +138,21 @@ class Checker:
         session = self.session
         session.open_texts = {path: new}
         if session.edit([path], is_saved=False) is not None:
-            found = self._new(session.course, session.reading_diagnostics)
-            if any(d.is_error for d in found):
-                return found
+            findings = self._new(session.course, session.reading_diagnostics)
+            if any(d.is_error for d in findings):
+                return findings
         session.read(is_saved=False)
         course = session.course
-        found = self._new(course, session.reading_diagnostics)
-        if course is None or any(d.is_error for d in found):
-            return found
+        findings = self._new(course, session.reading_diagnostics)
+        if course is None or any(d.is_error for d in findings):
+            return findings
         keys = script_keys(course)
-        known = {p: run for p, run in self.runs.items() if keys.get(p) == self.keys.get(p)}
+        known_runs_by_path = {
+            p: run for p, run in self.runs.items() if keys.get(p) == self.keys.get(p)
+        }
         is_alone = keys == self.keys and path in self._owner_pages  # no other page can change
         documents = frozenset([path]) if is_alone else None
-        verification = verify(course, self.options, documents, known_runs=known)
+        verification = verify(course, self.options, documents, known_runs=known_runs_by_path)
         if is_alone:
             results = replace(self.verification.results, trials=verification.results.trials)
             verification = replace(verification, results=results)
@@ -159,20 +161,20 @@ class Checker:
 
     def _new(self, course: Course | None, diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
         reported = judge(course, diagnostics).diagnostics
-        return [d for d in reported if _identity(d) not in self.found]
+        return [d for d in reported if _identity(d) not in self.findings]
 
     def _compare(self, change: Change) -> str:
         """Whether the pages of the changed course say what they said."""
         paths = [self._owner_pages[change.path]] if change.path in self._owner_pages else None
         if paths is None:  # of the map and of declarations, all
             paths = self._all_pages()
-        whole = change.how in ("line lost", "line repeated", "paragraph moved")
+        whole = change.slip in ("line lost", "line repeated", "paragraph moved")
         whole &= change.place in ("words", "digits", "list", "emphasis", "text", "code", "formula")
         worst = "same"
         changed = {path: self.session.find(path) or b"" for path in paths}
         for path, page in changed.items():
-            said = compare_pages(self.pages.get(path, b""), page, whole_lines=whole)
-            worst = max(worst, said, key=("same", "prose", "other").index)
+            verdict = compare_pages(self.pages.get(path, b""), page, whole_lines=whole)
+            worst = max(worst, verdict, key=("same", "prose", "other").index)
         return worst
 
     def draw(self) -> None:
@@ -222,10 +224,10 @@ REASONS = {
 """Why nothing can know that a changed value is wrong, by the place of the change."""
 
 
-def find_reason(change: Change, old: str, listed: Iterable[Diagnostic]) -> str:
+def find_reason(change: Change, old: str, claims: Iterable[Diagnostic]) -> str:
     """Why a change is no mistake that can be known; empty where it should be."""
     start, end = change.start, max(change.start + len(change.text), change.start + 1)
-    for claim in listed:
+    for claim in claims:
         span = claim.span
         if span.path == change.path and span.start <= end and start <= span.end:
             return "listed by `check --truth`"
@@ -271,8 +273,10 @@ def run(
     course: Path, seeds: Sequence[int], count: int, kinds: Sequence[str], jobs: int
 ) -> Iterator[Outcome]:
     """Check so many changes for each seed, as many of each kind."""
-    each = max(1, round(count / len(kinds)))
-    tasks = [(kind, seed, number) for number in range(each) for seed in seeds for kind in kinds]
+    share_of_kind = max(1, round(count / len(kinds)))
+    tasks = [
+        (kind, seed, number) for number in range(share_of_kind) for seed in seeds for kind in kinds
+    ]
     with tempfile.TemporaryDirectory(prefix="mistakes-", ignore_cleanup_errors=True) as top:
         pool = ProcessPoolExecutor(jobs, initializer=_prepare, initargs=(course, Path(top)))
         try:
@@ -291,12 +295,12 @@ def table(outcomes: Sequence[Outcome]) -> list[str]:
         if ends:
             cells = (str(ends[end] or "") for end in ENDS)
             lines.append(f"| {kind or '**all**'} | {ends.total()} | {' | '.join(cells)} |")
-    others = [o for o in outcomes if o.change.kind not in ("numbers in prose", "inline code")]
-    for title, counted in (
+    rest = [o for o in outcomes if o.change.kind not in ("numbers in prose", "inline code")]
+    for title, part in (
         ("changes to anything but words of prose", outcomes),
-        ("those outside of inline code and of numbers in prose", others),
+        ("those outside of inline code and of numbers in prose", rest),
     ):
-        ends = Counter(o.end for o in counted if o.end != "prose")
+        ends = Counter(o.end for o in part if o.end != "prose")
         total = max(ends.total(), 1)
         silent, elsewhere = (100 * ends[end] / total for end in ("silent", "elsewhere"))
         lines += [
@@ -315,7 +319,7 @@ def describe(outcome: Outcome, old: str) -> Iterator[str]:
     start = max(old.rfind("\n", 0, change.start) + 1, change.start - 60)
     end = min(old.find("\n", change.end) % (len(old) + 1), change.end + 30)
     before, after = old[start:end], old[start : change.start] + change.text + old[change.end : end]
-    yield f"{outcome.end}: {change.kind} ({change.how}, {change.place}) {change.path}:{line}"
+    yield f"{outcome.end}: {change.kind} ({change.slip}, {change.place}) {change.path}:{line}"
     yield f"  - {before[:WIDTH]!r}"
     yield f"  + {after[:WIDTH]!r}"
     if outcome.note:

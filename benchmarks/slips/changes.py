@@ -114,7 +114,7 @@ class Change(Struct, frozen=True):
 
     path: str
     kind: str
-    how: str
+    slip: str
     place: str
     """Where the change begins, as `parts` names it."""
     start: int
@@ -140,21 +140,21 @@ def parts(path: str, text: str) -> list[Part]:
     if path.endswith(".toml"):
         place = "map" if path.endswith("course.toml") else "declarations"
         return [Part(place, m.start(), m.end()) for m in re.finditer(r"^[^#\s].*$", text, re.M)]
-    found: list[Part] = []
+    pieces: list[Part] = []
     prose, at, fence, body = 0, 0, "", ""
     for line in text.splitlines(keepends=True):
         match = _FENCE.match(line.rstrip("\r\n"))
         end = at + len(line.rstrip("\r\n"))
         if match and (not fence or (match["mark"].startswith(fence) and not match["info"].strip())):
-            found += _prose_parts(text, prose, at) if not fence else ()
+            pieces += _prose_parts(text, prose, at) if not fence else ()
             word = (match["info"].split() or [""])[0]
             fence, body = ("", "") if fence else (match["mark"], _BLOCKS.get(word, "other block"))
-            found.append(Part("fence", at, end))
+            pieces.append(Part("fence", at, end))
             prose = at + len(line)
         elif fence and line.strip():
-            found.append(Part(body, at, end))
+            pieces.append(Part(body, at, end))
         at += len(line)
-    return found + ([] if fence else [*_prose_parts(text, prose, at)])
+    return pieces + ([] if fence else [*_prose_parts(text, prose, at)])
 
 
 def _prose_parts(text: str, start: int, end: int) -> Iterator[Part]:
@@ -172,21 +172,21 @@ def _slip(text: str, start: int, end: int, chance: random.Random) -> tuple[str, 
     piece = text[start:end]
     at = chance.choice([n for n, letter in enumerate(piece) if not letter.isspace()] or [0])
     letter, rest = piece[at : at + 1], piece[at + 1 :]
-    how = chance.choice(("dropped", "doubled", "swapped", "mistyped"))
-    if how != "doubled" and letter.isdigit() and chance.random() < 0.6:
+    slip = chance.choice(("dropped", "doubled", "swapped", "mistyped"))
+    if slip != "doubled" and letter.isdigit() and chance.random() < 0.6:
         digits = [digit for digit in "0123456789" if digit != letter]
         return "digit", piece[:at] + chance.choice(digits) + rest
-    if how == "dropped":
-        return how, piece[:at] + rest
-    if how == "doubled":
-        return how, piece[:at] + letter * 2 + rest
-    if how == "swapped":
+    if slip == "dropped":
+        return slip, piece[:at] + rest
+    if slip == "doubled":
+        return slip, piece[:at] + letter * 2 + rest
+    if slip == "swapped":
         changed = piece[:at] + rest[:1] + letter + rest[1:]
-        return (how, changed) if changed != piece and rest[:1].strip() else None
+        return (slip, changed) if changed != piece and rest[:1].strip() else None
     for row in (*_ROWS, *_SHIFTED):
         if letter and letter in row:
             near = row.index(letter) + chance.choice((-1, 1))
-            return how, piece[:at] + row[near % len(row)] + rest
+            return slip, piece[:at] + row[near % len(row)] + rest
     return None
 
 
@@ -248,8 +248,10 @@ def _move(text: str, chance: random.Random) -> tuple[int, int, str] | None:
     first = chance.randrange(len(blocks) - 1)
     last = min(first + chance.randint(1, 3), len(blocks) - 1)
     (start, end), (next_start, _), (_, last_end) = blocks[first], blocks[first + 1], blocks[last]
-    moved = text[next_start:last_end].rstrip("\n") + "\n\n" + text[start:end].rstrip("\n") + "\n"
-    return start, last_end, moved
+    new_order = (
+        text[next_start:last_end].rstrip("\n") + "\n\n" + text[start:end].rstrip("\n") + "\n"
+    )
+    return start, last_end, new_order
 
 
 def _paste(text: str, chance: random.Random) -> tuple[int, int, str] | None:
@@ -282,9 +284,9 @@ def _conflict(text: str, chance: random.Random) -> tuple[int, int, str]:
     start, end = _lines(text, chance)
     ours = text[start:end].rstrip("\n")
     theirs = ours.replace(chance.choice(ours.split() or ["x"]), "other", 1)
-    marked = f"<<<<<<< HEAD\n{ours}\n=======\n{theirs}\n>>>>>>> branch\n"
-    half = [marked.replace(f"{mark}\n", "", 1) for mark in ("=======", ">>>>>>> branch")]
-    return start, end, chance.choice((marked, marked, *half))
+    conflict_text = f"<<<<<<< HEAD\n{ours}\n=======\n{theirs}\n>>>>>>> branch\n"
+    half = [conflict_text.replace(f"{mark}\n", "", 1) for mark in ("=======", ">>>>>>> branch")]
+    return start, end, chance.choice((conflict_text, conflict_text, *half))
 
 
 _OTHERS: dict[str, Callable[[str, random.Random], tuple[int, int, str] | None]] = {
@@ -310,25 +312,24 @@ def make_change(kind: str, texts: dict[str, str], chance: random.Random) -> Chan
         elif kind == "declarations of models":
             path = chance.choice([p for p in sorted(texts) if p.startswith("models/")] or [path])
         text = texts[path]
-        found = parts(path, text)
+        pieces = parts(path, text)
         if kind in _OTHERS:
             if kind in _IN_LESSONS and not path.endswith(".md"):
                 continue
-            made = _OTHERS[kind](text, chance)
-            how = kind
+            edit = _OTHERS[kind](text, chance)
+            slip = kind
         else:
-            places = [part for part in found if _PLACES[part.place] == kind]
+            places = [part for part in pieces if _PLACES[part.place] == kind]
             if not places:
                 continue
             part = chance.choice(places)
-            slip = _slip(text, part.start, part.end, chance)
-            made = None if slip is None else (part.start, part.end, slip[1])
-            how = "" if slip is None else slip[0]
-        if made is None or text[made[0] : made[1]] == made[2]:
+            slip, piece = _slip(text, part.start, part.end, chance) or ("", None)
+            edit = None if piece is None else (part.start, part.end, piece)
+        if edit is None or text[edit[0] : edit[1]] == edit[2]:
             continue
-        start, end, new = made
+        start, end, new = edit
         inside = start if start < end else start - 1  # the end of the line before
-        near = [p.place for p in found if p.start <= inside <= p.end]
-        near += [p.place for p in found if start <= p.start < max(end, start + 1)]
-        return Change(path, kind, how, near[0] if near else "text", start, end, new)
+        near = [p.place for p in pieces if p.start <= inside <= p.end]
+        near += [p.place for p in pieces if start <= p.start < max(end, start + 1)]
+        return Change(path, kind, slip, near[0] if near else "text", start, end, new)
     return None

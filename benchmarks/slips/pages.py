@@ -41,11 +41,11 @@ class _Reader(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         values = {name: value or "" for name, value in attrs}
         structural = "id for name href".split()
-        shown = {n: v for n, v in values.items() if n not in _SAID and n not in structural}
-        shown = {n: v for n, v in shown.items() if not n.startswith(("aria-", "data-"))}
+        visible = {n: v for n, v in values.items() if n not in _SAID and n not in structural}
+        visible = {n: v for n, v in visible.items() if not n.startswith(("aria-", "data-"))}
         if "href" in values:
-            shown["href"] = values["href"].partition("#")[0]
-        self.tokens.append(("tag", tag + json.dumps(shown, sort_keys=True)))
+            visible["href"] = values["href"].partition("#")[0]
+        self.tokens.append(("tag", tag + json.dumps(visible, sort_keys=True)))
         for name, value in values.items():
             if name in _SAID:
                 self._say(value)
@@ -75,17 +75,17 @@ class _Reader(HTMLParser):
 
     def _read_data(self, value: str) -> None:
         with contextlib.suppress(ValueError):  # a key of the tool's own, which nobody sees
-            self._walk(json.loads(value), said=False)
+            self._walk(json.loads(value), is_prose=False)
 
-    def _walk(self, value: Any, *, said: bool) -> None:
+    def _walk(self, value: Any, *, is_prose: bool) -> None:
         if isinstance(value, dict):
             for key, inner in value.items():
                 self.tokens.append(("key", key))
-                self._walk(inner, said=key in _SAID_FIELDS)
+                self._walk(inner, is_prose=key in _SAID_FIELDS)
         elif isinstance(value, list):
             for inner in value:
-                self._walk(inner, said=said)
-        elif isinstance(value, str) and said:
+                self._walk(inner, is_prose=is_prose)
+        elif isinstance(value, str) and is_prose:
             self._say(value)
         else:
             self.tokens.append(("code", json.dumps(value)))
@@ -118,7 +118,9 @@ def compare_pages(
             [value.partition("{")[0] for kind, value in tokens if kind == "tag"]
             for tokens in (before, after)
         )
-        kept = [name for name in blocks if name in _BLOCKS]
-        return "prose" if kept == [name for name in new_blocks if name in _BLOCKS] else "other"
+        block_names = [name for name in blocks if name in _BLOCKS]
+        return (
+            "prose" if block_names == [name for name in new_blocks if name in _BLOCKS] else "other"
+        )
     rest, new_rest = ([t for t in tokens if t[0] != "word"] for tokens in (before, after))
     return "prose" if rest == new_rest else "other"

@@ -60,8 +60,10 @@ def check_formulas(
     """One diagnostic for each place where a formula that does not parse stands."""
     diagnostics: list[Diagnostic] = []
     uses = [*_formula_uses(document)]
-    used = {command[1:] for _, tex in uses for command in re.findall(r"\\[A-Za-z]+", tex.text)}
-    commands = _COMMANDS | (_SHORT_COMMANDS & used)
+    used_commands = {
+        command[1:] for _, tex in uses for command in re.findall(r"\\[A-Za-z]+", tex.text)
+    }
+    commands = _COMMANDS | (_SHORT_COMMANDS & used_commands)
     for formula, tex in uses:
         result = typeset[formula]
         if not isinstance(result, MathError):

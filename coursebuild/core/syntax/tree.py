@@ -323,8 +323,8 @@ class TextReader:
         callout = above[-1] if above else None
         if not isinstance(callout, model.Callout) or not isinstance(block, model.BlockQuote):
             return
-        between = Span(block.span.source, callout.span.end, block.span.start)
-        if not between.text.strip(" \t\r\n>") and between.text.count("\n") <= 2:
+        gap = Span(block.span.source, callout.span.end, block.span.start)
+        if not gap.text.strip(" \t\r\n>") and gap.text.count("\n") <= 2:
             message = "a quotation begins directly below a callout"
             help = "begin the empty line between them with `>`, or write a paragraph between them"
             place = block.span.first_line()
