@@ -118,9 +118,9 @@ def compare_pages(
             [value.partition("{")[0] for kind, value in tokens if kind == "tag"]
             for tokens in (before, after)
         )
-        block_names = [name for name in blocks if name in _BLOCKS]
-        return (
-            "prose" if block_names == [name for name in new_blocks if name in _BLOCKS] else "other"
+        before_blocks, after_blocks = (
+            [name for name in names if name in _BLOCKS] for names in (blocks, new_blocks)
         )
+        return "prose" if before_blocks == after_blocks else "other"
     rest, new_rest = ([t for t in tokens if t[0] != "word"] for tokens in (before, after))
     return "prose" if rest == new_rest else "other"
