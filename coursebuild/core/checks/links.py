@@ -28,6 +28,7 @@ from coursebuild.core.model import (
     Link,
     MjcfModel,
     ModelTarget,
+    NumberBinding,
     PageTarget,
     RawInline,
     Target,
@@ -50,7 +51,7 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.model.figures import recorded_figures
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean, nearest
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Span
 
 _NamedTarget: TypeAlias = (
@@ -122,9 +123,24 @@ def check_links(course: Course, document: Document, targets: LinkTargets) -> Ite
                 yield from _check_media(
                     "the image ", inline.url, inline.url_span, document, targets
                 )
+            elif isinstance(inline, NumberBinding) and _FILE.fullmatch(inline.source or ""):
+                yield from _check_source(inline, targets)
             elif isinstance(inline, RawInline):
                 yield from _check_html_rules(inline, course)
                 yield from _check_html_links(inline, document, targets)
+
+
+_FILE = re.compile(r"[\w.-]+(?:/[\w.-]+)+\.\w{1,4}")
+
+
+def _check_source(number: NumberBinding, targets: LinkTargets) -> Iterator[Diagnostic]:
+    """Report a number whose source is called a file, and is none."""
+    path = number.source or ""
+    models = {model.source.path for model in targets.models.values()}
+    if path not in {*targets.files, *targets.scripts, *models}:
+        help = did_you_mean(path, [name for name in models if nearest(path, [name])])
+        message = f"the source of `{number.text}` is said to be `{path}`, and there is no such file"
+        yield diagnose("link-file", number.span, message, help=help)
 
 
 def _check_html_rules(html: HtmlBlock | RawInline, course: Course) -> Iterator[Diagnostic]:
@@ -266,7 +282,11 @@ def _check_model_anchor(
 
 
 def _check_anchor(
-    span: Span, anchor: str, page_name: str, ids: Collection[str], listings: Mapping[str, str]
+    span: Span,
+    anchor: str,
+    page_name: str,
+    ids: Collection[str],
+    listings: Mapping[str, str],
 ) -> Iterator[Diagnostic]:
     """Report an anchor that is no id of a page and names no lines of its listings."""
     name = unquote(anchor)
@@ -281,7 +301,11 @@ def _check_anchor(
         if last <= count:
             return
         help = f"the last line of `{path}` is {count}"
-    yield diagnose("link-anchor", span, f"{page_name} has no anchor `#{anchor}`", help=help)
+    near = nearest(anchor, ids)
+    place = ids.get(near) if near is not None and isinstance(ids, Mapping) else None
+    notes = [] if place is None else [Note(f"`#{near}` is here", place.first_line())]
+    message = f"{page_name} has no anchor `#{anchor}`"
+    yield diagnose("link-anchor", span, message, help=help, notes=notes)
 
 
 def _check_url(

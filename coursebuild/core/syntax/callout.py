@@ -19,6 +19,7 @@ from coursebuild.core.text.source import Excerpt, Span
 _HEAD = re.compile(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
 _BROKEN_HEAD = re.compile(
     r"(?:\w?[^\w\s\\]{0,2}![^\w\s\\]?[ ]?([A-Za-z][\w-]*)[^\w\s(]?+"  # `!note`, `[!note`, `![note]`
+    r"|\[([A-Za-z]!\w[\w-]*)\]"  # `[n!ote]`
     r"|\[[^\w\s\\]?([A-Za-z][\w-]*)[!\])}]{1,2}+)-?+(?![(\[:])([^\n]*)(?:\n|$)"  # `[note]`
 )
 """A line that was surely meant to be the first of a callout if the word is a kind."""
@@ -68,13 +69,13 @@ def _read_broken_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head
     match = _BROKEN_HEAD.match(paragraph.text)
     if match is None:
         return None
-    kind = (match[1] or match[2]).lower()
+    kind = (match[1] or match[2] or match[3]).replace("!", "").lower()
     if kind not in kinds:
         kind = misspelt(kind, [name for name in kinds if len(name) > 5]) or ""
     if not kind:
         return None
-    title = trim(paragraph.slice(*match.span(3)))
-    place = trim(paragraph.slice(0, match.start(3)))
+    title = trim(paragraph.slice(*match.span(4)))
+    place = trim(paragraph.slice(0, match.start(4)))
     head = Head(kind, place.span(), title, False, trim(paragraph.slice(match.end())))
     help = f"write `> [!{kind}] Title`, or a backslash before the bracket that is meant to be seen"
     message = f"`{place.text}` does not begin a callout"

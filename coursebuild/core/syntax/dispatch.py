@@ -13,7 +13,7 @@ import re
 from coursebuild.core.features import FenceKind
 from coursebuild.core.model import Block, CodeBlock, FeatureBlock, Mjcf, Script
 from coursebuild.core.registry import fence_kind
-from coursebuild.core.syntax.fence import Fence, check_kind
+from coursebuild.core.syntax.fence import Fence, check_kind, find_likely_end, find_likely_start
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
 from coursebuild.core.syntax.script import parse_python
@@ -63,6 +63,12 @@ def _read_unclosed(fence: Fence, state: ParsingState) -> CodeBlock:
     if fence.inner is not None:
         message = "this code fence is not closed before another one begins"
         notes = [Note("this line is read as text of the fence above it", fence.inner)]
+    likely_end = find_likely_end(fence)
+    likely_start = None if fence.info.text else find_likely_start(fence.head)
+    if likely_end is not None:
+        notes.append(Note("its block seems to end here", likely_end))
+    if likely_start is not None:
+        notes.append(Note("or a block that begins here has lost its first line", likely_start))
     state.report(diagnose("fence-unclosed", fence.head, message, help=help, notes=notes))
     if fence.kind == "python" or fence.inner is not None:
         state.script, state.has_invalid_script = None, True

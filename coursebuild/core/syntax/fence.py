@@ -6,6 +6,8 @@ look misspelt or need a feature that is not installed.
 
 from __future__ import annotations
 
+import ast
+import json
 import re
 from collections.abc import Iterator, Sequence
 
@@ -103,6 +105,65 @@ def _find_inner_opening(body: Excerpt, marks: str) -> Span | None:
     opening = re.compile(rf"^ {{0,3}}({re.escape(marks[0])}{{{len(marks)},}} *\w[^`\n]*)$", re.M)
     match = opening.search(body.text)
     return None if match is None else body.span(match.start(1), match.end(1))
+
+
+_MOST_LINES = 300
+"""Lines above a fence among which the first one of its block is looked for."""
+_TEXT_AGAIN = re.compile(r"\n[ \t]*\n(?=[A-Z#>$*`|\[]|\d+\. |- )")
+"""An empty line, and what begins like a paragraph or another block."""
+
+
+def find_likely_end(fence: Fence) -> Span | None:
+    """The last line that fits to the kind of a fence without end, if more follows it."""
+    text = fence.body.text
+    if text.lstrip().startswith("{"):
+        try:
+            end = json.JSONDecoder().raw_decode(text, len(text) - len(text.lstrip()))[1]
+        except ValueError:
+            return None
+    elif fence.kind == "python":
+        try:
+            ast.parse(text)
+        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+            line = error.lineno or 0 if isinstance(error, SyntaxError) else 0
+            end = len("".join(text.splitlines(keepends=True)[: max(line - 1, 0)]).rstrip())
+        else:
+            return None
+    else:
+        match = _TEXT_AGAIN.search(text)
+        end = 0 if match is None else match.start()
+    start = text.rfind("\n", 0, end) + 1
+    return fence.body.span(start, end) if text[start:end].strip() else None
+
+
+def find_likely_start(head: Span) -> Span | None:
+    """The first line of the block that ends with a fence without a kind, if it has lost its own.
+
+    It is the farthest one above from which on all is Python or JSON, else that of the paragraph.
+    """
+    source, line = head.source, head.line
+    start = None
+    while line > 1 and head.line - line < _MOST_LINES:
+        line -= 1
+        if source.line_text(line).startswith(("```", "~~~", "#")):
+            break
+        if source.line_text(line).strip(" \t>") and not source.line_text(line - 1).strip(" \t>"):
+            text = source.text[source.line_start(line) : source.line_start(head.line)]
+            if start is None or _is_python(text) or text.startswith("{"):
+                start = source.line_start(line)
+    if start is None:
+        return None
+    end = source.text.find("\n", start)
+    return source.span(start, end)
+
+
+def _is_python(text: str) -> bool:
+    """Whether a text parses as Python."""
+    try:
+        ast.parse(text)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return False
+    return True
 
 
 def _body_lines(span: Span, head: Span, is_closed: bool) -> tuple[Span, str]:

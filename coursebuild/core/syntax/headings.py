@@ -135,11 +135,18 @@ def check_heading(
     if re.match(r"#+[^\W\d_]", plain_text(children)):
         message, help = "a `#` would be shown before the title", "write all `#` before the blank"
         diagnostics.append(diagnose("markup-unread", span.first_line(), message, help=help))
+    before = span.source.text[: span.start].rstrip().rpartition("\n")[2]
+    if before == "---" and re.fullmatch(r"[a-z][\w-]*: .*\n-+", span.text.strip(), re.DOTALL):
+        message, help = "front matter stands in the text, which would show it", "delete it"
+        diagnostics.append(diagnose("front-matter", span.first_line(), message, help=help))
     if lesson and level == 1:
         help = "the title comes from the course map; begin with `## `"
         if span.text.rstrip().endswith("\n======="):
             help = "a merge conflict may have left the line of `=` behind: delete it"
         message = "a lesson has no heading of level 1"
+        diagnostics.append(diagnose("heading-top", span, message, help=help))
+    elif level == 1 and previous is not None and previous > 1:
+        message, help = "a heading of level 1 stands below others", "begin it with `## `"
         diagnostics.append(diagnose("heading-top", span, message, help=help))
     if previous is not None and level > previous + 1:
         message = f"a heading of level {level} follows one of level {previous}"

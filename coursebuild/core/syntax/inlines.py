@@ -53,7 +53,11 @@ from coursebuild.core.syntax.markdown import References
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.safe_html import find_forbidden
 from coursebuild.core.syntax.spans import PositionedToken
-from coursebuild.core.syntax.unread_markup import check_inline_code, check_unread_markup
+from coursebuild.core.syntax.unread_markup import (
+    check_inline_code,
+    check_unread_markup,
+    find_stars,
+)
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -141,6 +145,8 @@ class _TokenReader:
         self._flush()
         for diagnostic in check_unread_markup(self.content, self.texts, html=html):
             self.report(diagnostic)
+        if not html and not self.open_literals:
+            self.state.stars += find_stars(self.content, self.texts)
         return tuple(self.stack[0].nodes)
 
     # -- texts

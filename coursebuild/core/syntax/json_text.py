@@ -279,7 +279,7 @@ class _Reader:
         match = _WORD.match(text, at)
         word = match[0] if match else text[at]
         notes: tuple[Note, ...] = ()
-        if opening is not None and word in "]}":
+        if opening is not None and word in "]}:":
             notes = (
                 Note(f"`{text[opening]}` is opened here", self.body.span(opening, opening + 1)),
             )

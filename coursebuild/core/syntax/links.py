@@ -44,6 +44,8 @@ _BLANK = "".join(map(chr, range(33)))
 _IGNORED_CHARACTER = re.compile("[\t\n\r]")
 """Characters that browsers ignore in an address, as they do those of `_BLANK` at its ends."""
 _COURSE_SCHEMES = ("lesson", "model", "page", "term")
+_OTHER_SCHEMES = frozenset("http https mailto ftp ftps git ssh tel".split())
+"""Schemes that are no misspelt ones."""
 
 
 def classify(url: str) -> Target:
@@ -76,8 +78,8 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
         help = "link to an address with `https:`, to a file, or by "
         help += "`lesson:`, `page:`, `model:`, `term:`"
         return diagnose("link-scheme", span, f"`{scheme}:` is not allowed in a page", help=help)
-    likely = nearest(scheme, _COURSE_SCHEMES, cutoff=0.75)
-    if likely is None:
+    likely = nearest(scheme, (*_COURSE_SCHEMES, "https", "mailto"), cutoff=0.75)
+    if likely is None or scheme in _OTHER_SCHEMES:
         return None
     message, help = f"no link scheme `{match[1]}:`", f"did you mean `{likely}:`?"
     return diagnose("link-scheme", span, message, help=help)

@@ -130,6 +130,20 @@ FOREIGN = {
         "commands of Jupyter are not read",
         "leave it out, or put it into backticks if readers should see it",
     ),
+    "adoc": MarkupKind(
+        r"^\[(?:source|listing|NOTE|TIP|WARNING|IMPORTANT|CAUTION|stem|latexmath|verse|quote)"
+        r"(?:,[^\]\n\0]*)?\]$|^(?:image|include|video|audio|toc|stem)::[^\s\[\0]*\[[^\]\n\0]*\]"
+        r"|^#\+[A-Z_]+(?::|\b)|^h[1-6]\. (?=\w)|\{(?:code|panel|info|noformat)(?::[^{}\n\0]*)?\}"
+        r"|(?-i:^[AWTEDQ]> )",
+        "markup of AsciiDoc, Org, Textile or a wiki is not read",
+        "write it as Markdown: `## Title`, `![what it shows](x.svg)`, a fence of three backticks",
+    ),
+    "prompt": MarkupKind(
+        r"^(?-i:In|Out) ?\[\d*\]:|^@@ -\d+(?:,\d+)? \+\d+(?:,\d+)? @@"
+        r"|^(?:import|export)\b[^\n\0]* from ['\"][^'\"\n\0]+['\"];?$",
+        "it belongs to a program or to what shows one",
+        "leave it out, or put it into backticks if readers are to see it",
+    ),
     "emoji": MarkupKind(
         r"(?<![\w:])(?-i::[a-z][a-z0-9]+(?:_[a-z0-9]+)*:)(?![\w:\0])",
         "names of emoji are not read",
@@ -153,7 +167,7 @@ BROKEN = {
         'write `[word]{term}`, `$x${symbol="meaning"}`, `## Heading {.further}`',
         "markup-unread",
     ),
-    "braces": MarkupKind(r"(?<=[\0\]])\{(?![ \t]*[.#:%{])(?:[^{}\n\0]*\}|\w*)", "", ""),
+    "braces": MarkupKind(r"(?<=[\0\]])\{(?![%{]|[ \t]*[.#:])(?:[^{}\n\0]*\}|\w*)", "", ""),
     "link": MarkupKind(
         r"(?<!\\)!?\[[^\[\]]{0,200}(?<!\\)\][ \t]+\(" + _ADDRESS + r"[^)\n]*\)"
         r"|(?:(?<!\\)!?\[[^\[\]]{0,200})?(?<!\\)\]\([^\s)]*\)?"
@@ -165,6 +179,13 @@ BROKEN = {
         r"|(?<!\\)\[[^\[\]]{0,200}\]#\([^()\s]*\)|(?<=\0)\]|\[(?=\0)",
         "this is not a complete link",
         "a link is `[text](address)`, with no blank before the `(` and none in the address",
+        "markup-unread",
+        once=True,
+    ),
+    "bracket": MarkupKind(
+        r"(?<![\\\w])\[(?=[^\W\d_]{2})(?![^\[\]]*\])",
+        "no link begins here",
+        "a link is `[text](address)`; write a backslash before a bracket that is meant to be seen",
         "markup-unread",
         once=True,
     ),
@@ -202,6 +223,19 @@ BROKEN = {
         r"^[-*+]\[[ xX]?\](?=[ \t])|\A\[(?: [xX] ?|[xX] |)\](?=[ \t]*\w)",
         "no task begins here",
         "a task is `- [ ] text` or `- [x] text`",
+        "markup-unread",
+    ),
+    "mention": MarkupKind(
+        r"(?<![\w\\])(?-i:Lesson) \d+(?:(?:[,;/:]|\.\.)\d+(?![\w,])|(?<=\d\d)(?![\w.,]))",
+        "no lesson has such a number",
+        "a lesson is mentioned as `Lesson 1.2`, with a point",
+        "markup-unread",
+    ),
+    "item": MarkupKind(
+        r"^\d{1,2}(?:[.)][.,)]|[,;]) (?=(?-i:[A-Z\0]))|^\d{1,2}[.)](?=(?-i:[A-Z][a-z]))"
+        r"|^-(?=(?-i:[A-Z][a-z]))",
+        "no item of a list begins here",
+        "an item is `- text` or `1. text`, with one blank after the mark",
         "markup-unread",
     ),
     "fence": MarkupKind(
@@ -242,7 +276,7 @@ BROKEN = {
         once=True,
     ),
     "character": MarkupKind(
-        "[\ufffd\x01-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]",
+        "[\ufffd\x01-\x08\x0b\x0e-\x1f\x7f-\x9f]",
         "",
         "delete it, or write the character that was meant",
         "control-character",

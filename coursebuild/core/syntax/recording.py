@@ -185,13 +185,16 @@ def _own_caption(caption: tuple[Inline, ...], words: Words) -> tuple[Inline, ...
     return () if is_plain and _is_bare(caption, words) else caption
 
 
-def check_missing_body(caption: tuple[Inline, ...], span: Span, words: Words) -> list[Diagnostic]:
+def check_missing_body(
+    caption: tuple[Inline, ...], span: Span, words: Words, following: Span | None = None
+) -> list[Diagnostic]:
     """Report a caption without a body, if it can be nothing but a caption."""
     if not _is_bare(caption, words):
         return []
     message = "no recorded output follows this line"
     help = "put a fence that begins with ```` ```output ````, or a table, directly below it"
-    return [diagnose("recording-body", span, message, help=help)]
+    notes = [] if following is None else [Note("this follows it", following.first_line())]
+    return [diagnose("recording-body", span, message, help=help, notes=notes)]
 
 
 def diagnose_wrong_body(span: Span, subject: str) -> Diagnostic:

@@ -60,6 +60,11 @@ def _read_cells(
         help = "write `\\|` for a `|` that is part of a cell, and `\\vert` for one in a formula"
         span = cells[columns].span().to(cells[-1].span())
         report(diagnose("table-cells", span, message, help=help))
+    elif len(cells) < columns:
+        count = "1 cell" if len(cells) == 1 else f"{len(cells)} cells"
+        message = f"this row has {count} and the header {columns}"
+        help = "write `|` between cells, and `| |` for a cell with nothing in it"
+        report(diagnose("table-cells", base.span(row.start, row.end), message, help=help))
     empty = Excerpt(base.source, "", ((0, base.offset(row.end)),))
     cells = [*cells, *[empty] * columns][:columns]
     return tuple([Cell(cell.span(), cell, inlines(cell)) for cell in cells])

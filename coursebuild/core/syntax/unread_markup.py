@@ -23,7 +23,9 @@ from coursebuild.core.text.source import Excerpt, Span
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
 _SIGNS = re.compile(
     r"[{}\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f]|[!?=:._']{2}|:\w|[´‘’]{3}"
-    r"|\((?:out|given)\)|\A_\Z"
+    r"|\((?:out|given)\)|\A_\Z|^\d{1,2}[.,;)][^\d\s]|^\d{1,2}[,;] |^-[A-Z]|^h\d\. |^[A-Z]> "
+    r"|^import |Lesson \d",
+    re.MULTILINE,
 )
 """What all unread markup has at least once, so that most texts are passed over quickly."""
 _DOLLAR = re.compile(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
@@ -49,6 +51,12 @@ _ANY_KIND, _ANY_IN_HTML = _one_pattern(_KINDS), _one_pattern(IN_HTML)
 _CELL = re.compile(r"\{[=.]?(?:bash|julia|js|ojs|python|py|r|sql)\}\s|r [A-Za-z_.][\w.]*[($\[]")
 """How an expression begins that Quarto or R Markdown would compute."""
 
+_STAR = re.compile(
+    r"^\*[^\W\d_]{3,}|[^\W\d_]{2,}\*(?![\w*])"
+    r"|(?<=[a-z] )[+\u2212-]?\d[\d.,]*\*\*(?= [a-z]|[.,;:]?$)",
+    re.MULTILINE,
+)
+"""A star at the start of a line before a word or after a word, or two after a number in a text."""
 _LETTER_BEFORE, _LETTER_AFTER = re.compile(r"(?:^|(?<=\s))\w\Z"), re.compile(r"\w")
 
 
@@ -64,11 +72,7 @@ def check_unread_markup(
     has_escaped_bracket = "\\(" in whole or "\\[" in whole
     if not has_escaped_bracket and not any(_SIGNS.search(text) for _, text in texts):
         return
-    parts, end = list[str](), 0
-    for at, text in texts:
-        parts += [_mask(whole[end:at]), text]
-        end = at + len(text)
-    masked = "".join([*parts, _mask(whole[end:])])
+    masked = _mask_all_but(texts, whole)
     dollars = [*_check_dollars(content, texts, masked)]
     yield from dollars
     reported = set[str]()
@@ -197,6 +201,25 @@ def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:
     return diagnose("markup-foreign", span, message, help=help)
 
 
+def find_stars(
+    content: Excerpt, texts: Sequence[tuple[int, str]]
+) -> Iterator[tuple[bool, Diagnostic]]:
+    """Single stars at one end of a word, each with whether it stands before it.
+
+    One may be the mark of a footnote, if the document has one of the other sort as well.
+    """
+    if not any("*" in text for _, text in texts):
+        return
+    kind = BROKEN["emphasis"]
+    masked = _mask_all_but(texts, content.text)
+    for match in _STAR.finditer(masked):
+        if match[0].endswith("**") and masked.count("*") > 2:
+            continue  # stars of significance
+        message = f"`{match[0]}` would be shown as written: {kind.reason}"
+        diagnostic = diagnose(kind.rule, content.span(*match.span()), message, help=kind.help)
+        yield match[0].startswith("*"), diagnostic
+
+
 def check_inline_code(content: Excerpt, start: int, end: int, code: str) -> Iterator[Diagnostic]:
     """Report code in a line that another tool would compute, or whose backticks are misplaced."""
     text, span = content.text, content.span(start, end)
@@ -217,6 +240,15 @@ def check_inline_code(content: Excerpt, start: int, end: int, code: str) -> Iter
         message = f"`{letter[0]}` stands directly beside a backtick that begins or ends code"
         help = "move the backtick, or write a blank between them"
         yield diagnose("markup-unread", content.span(*letter.span()), message, help=help)
+
+
+def _mask_all_but(texts: Sequence[tuple[int, str]], whole: str) -> str:
+    """A content in which only these texts, each with its offset, are not masked."""
+    parts, end = list[str](), 0
+    for at, text in texts:
+        parts += [_mask(whole[end:at]), text]
+        end = at + len(text)
+    return "".join([*parts, _mask(whole[end:])])
 
 
 def _mask(text: str) -> str:

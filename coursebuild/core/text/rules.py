@@ -90,6 +90,8 @@ _SUMMARIES = {
     "feature-broken": "A feature of the course's own cannot be loaded.",
     "feature-missing": "A fence needs a feature that is not installed.",
     "math-syntax": "A formula does not parse.",
+    "math-command": "A command of a formula has lost its backslash.",
+    "math-brackets": "A formula has more opening brackets than closing ones, or fewer.",
     "math-unclosed": "Display math is never closed.",
     "math-unread": "A text has a dollar sign that was meant for a formula.",
     "markup-unread": "Markdown, or an attribute in braces, is not whole, so that readers would see "
@@ -107,8 +109,8 @@ _SUMMARIES = {
     "symbol-formula": "What is declared as a symbol is not a single symbol.",
     "unit-unknown": "The unit of a quiz's answer or of a symbol does not exist.",
     "symbol-repeated": "A text says twice what a symbol stands for.",
-    "table-cells": "A row of a table has more cells than its header; what is in them would not be "
-    "shown.",
+    "table-cells": "A row of a table has more cells than its header, which would not be shown, or "
+    "fewer.",
     "footnote-undefined": "A footnote is referred to but never defined.",
     "footnote-unused": "A footnote is defined but never referred to.",
     "footnote-repeated": "A footnote is defined twice.",

@@ -1,0 +1,360 @@
+"""Change a course in small ways as hands do, check each change, and count what nobody is told of.
+
+Run: python benchmarks/mistakes.py [--seed 37 …] [--count 1200] [--kinds KIND …] [--jobs 2]
+         [--course DIR] [--list END …] [--minutes N] [--docs]
+
+The course is verified once. Then each change of a lesson, a page, the map or what is declared of a
+model is checked in memory, in a copy of the course; of scripts and labs those run whose text has
+changed. A change ends in one of these ways:
+
+- at its place: a message names a changed line, or the one before or after it;
+- in its result: what runs was changed, and a message names what came of it, such as the output;
+- elsewhere: a message names another line;
+- same: the pages say the same;
+- prose: only words have changed, which nothing can know to be wrong;
+- reason: nothing can know that it is wrong, or another command lists it (`REASONS`);
+- silent: all others. They are listed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import re
+import shutil
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT)]
+
+from benchmarks.measure.report import put_into  # noqa: E402
+from benchmarks.slips.changes import KINDS, Change, make_change  # noqa: E402
+from benchmarks.slips.pages import compare_pages  # noqa: E402
+from coursebuild.core.files.trust import FOLDER  # noqa: E402
+from coursebuild.core.model import Course  # noqa: E402
+from coursebuild.core.model.results import ScriptJob, ScriptRun  # noqa: E402
+from coursebuild.core.pages import urls  # noqa: E402
+from coursebuild.core.pages.page_list import page_list  # noqa: E402
+from coursebuild.core.registry import unproven  # noqa: E402
+from coursebuild.core.run.runner import ScriptServer  # noqa: E402
+from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
+from coursebuild.pipeline.judge import judge  # noqa: E402
+from coursebuild.pipeline.options import Options, open_store  # noqa: E402
+from coursebuild.pipeline.verify import verify  # noqa: E402
+from coursebuild.preview.session import Session, script_keys  # noqa: E402
+
+DOCS = ROOT / "docs/explanation/mistakes.md"
+ENDS = ("at its place", "in its result", "elsewhere", "same", "prose", "reason", "silent")
+WIDTH = 300
+"""Characters of a change that are listed."""
+SECONDS = 20.0
+"""How long a changed script may run."""
+_RUN_PLACES = {"script", "output", "lab", "declarations", "map"}
+
+
+class Outcome(Struct, frozen=True):
+    """What became of a change."""
+
+    change: Change
+    end: str
+    note: str = ""
+    """The message, or why there can be none."""
+
+
+class Checker:
+    """A course in memory in which changes are checked, one after the other."""
+
+    def __init__(self, root: Path) -> None:
+        self.server = ScriptServer()
+        self.options = Options(root, 1, open_store(root, None, None), run_all=self._run)
+        self.session = Session(self.options)
+        self.session.read()
+        course = self._course
+        self.verification = verify(course, self.options)
+        self.session.take_results(course, self.verification)
+        findings = judge(course, self.session.diagnostics()).diagnostics
+        if any(diagnostic.is_error for diagnostic in findings):
+            raise SystemExit(f"the course has mistakes of its own: {_describe(findings[0])}")
+        self.findings = Counter(map(_identity, findings))
+        self.texts = {source.path: source.text for source in (course.map, *course.sources)}
+        self.texts = {p: t for p, t in self.texts.items() if p.startswith("content/")}
+        self.texts |= {
+            path.relative_to(root).as_posix(): path.read_text("utf-8")
+            for path in sorted(root.glob("models/*.toml"))
+        }
+        self.runs = {run.path: run for run in self.verification.results.runs}
+        self.keys = script_keys(course)
+        self.pages: dict[str, bytes] = {}
+        self._owner_pages = {owner.path: urls.owner_path(owner) for owner in course.owners}
+
+    def close(self) -> None:
+        self.session.close()
+        self.server.close()
+        self.options.store.close()
+
+    @property
+    def _course(self) -> Course:
+        assert self.session.course is not None
+        return self.session.course
+
+    def _run(self, root: Path, jobs: Sequence[ScriptJob], **keywords: Any) -> tuple[ScriptRun, ...]:
+        jobs = [replace(job, timeout=min(job.timeout, SECONDS)) for job in jobs]
+        return self.server.run(root, jobs, **keywords)
+
+    def check(self, change: Change) -> Outcome:
+        """Check a change, and undo it."""
+        old = self.texts[change.path]
+        new = change.apply(old)
+        try:
+            diagnostics = self._diagnose(change.path, new)
+            if diagnostics:
+                return _judge_place(change, old, new, diagnostics)
+            verdict = self._compare(change)
+            inventory = unproven(self._course, self.session.library.results.runs)  # type: ignore[union-attr]
+            claims = [claim for claim in inventory if isinstance(claim, Diagnostic)]
+        finally:
+            self.session.open_texts = {}
+            if self.session.edit([change.path], is_saved=False) is None:
+                self.session.read(is_saved=False)
+            self.session.take_results(self._course, self.verification)
+        if verdict != "other":
+            return Outcome(change, verdict)
+        reason = find_reason(change, old, claims)
+        return Outcome(change, "reason" if reason else "silent", reason)
+
+    def _diagnose(self, path: str, new: str) -> list[Diagnostic]:
+        """What is reported of a course with this text, and not of the course as it was."""
+        session = self.session
+        session.open_texts = {path: new}
+        if session.edit([path], is_saved=False) is not None:
+            findings = self._new(session.course, session.reading_diagnostics)
+            if any(d.is_error for d in findings):
+                return findings
+        session.read(is_saved=False)
+        course = session.course
+        findings = self._new(course, session.reading_diagnostics)
+        if course is None or any(d.is_error for d in findings):
+            return findings
+        keys = script_keys(course)
+        known_runs_by_path = {
+            p: run for p, run in self.runs.items() if keys.get(p) == self.keys.get(p)
+        }
+        is_alone = keys == self.keys and path in self._owner_pages  # no other page can change
+        documents = frozenset([path]) if is_alone else None
+        verification = verify(course, self.options, documents, known_runs=known_runs_by_path)
+        if is_alone:
+            results = replace(self.verification.results, trials=verification.results.trials)
+            verification = replace(verification, results=results)
+        session.take_results(course, verification)
+        return self._new(course, session.diagnostics())
+
+    def _new(self, course: Course | None, diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+        reported = judge(course, diagnostics).diagnostics
+        return [d for d in reported if _identity(d) not in self.findings]
+
+    def _compare(self, change: Change) -> str:
+        """Whether the pages of the changed course say what they said."""
+        paths = [self._owner_pages[change.path]] if change.path in self._owner_pages else None
+        if paths is None:  # of the map and of declarations, all
+            paths = self._all_pages()
+        whole = change.slip in ("line lost", "line repeated", "paragraph moved")
+        whole &= change.place in ("words", "digits", "list", "emphasis", "text", "code", "formula")
+        worst = "same"
+        changed = {path: self.session.find(path) or b"" for path in paths}
+        for path, page in changed.items():
+            verdict = compare_pages(self.pages.get(path, b""), page, whole_lines=whole)
+            worst = max(worst, verdict, key=("same", "prose", "other").index)
+        return worst
+
+    def draw(self) -> None:
+        """Draw all pages of the course as it is."""
+        self.pages = {path: self.session.find(path) or b"" for path in self._all_pages()}
+
+    def _all_pages(self) -> list[str]:
+        assert self.session.library is not None
+        return [entry.path for entry in page_list(self.session.library)]
+
+
+def _identity(diagnostic: Diagnostic) -> tuple[str, str, str]:
+    return diagnostic.rule, diagnostic.span.path, diagnostic.message
+
+
+def _judge_place(change: Change, old: str, new: str, diagnostics: Sequence[Diagnostic]) -> Outcome:
+    """Where a change was reported."""
+    first = new.count("\n", 0, change.start) + 1
+    last = first + change.text.rstrip("\n").count("\n")
+    spans = [(d, d.span) for d in diagnostics]
+    spans += [(d, n.span) for d in diagnostics for n in d.notes if n.span is not None]
+    for diagnostic, span in spans:
+        if span.path == change.path and span.line <= last + 1 and first - 1 <= span.end_line:
+            return Outcome(change, "at its place", _describe(diagnostic))
+    end = "in its result" if change.place in _RUN_PLACES else "elsewhere"
+    return Outcome(change, end, _describe(diagnostics[0]))
+
+
+def _describe(diagnostic: Diagnostic) -> str:
+    span = diagnostic.span
+    return f"{span.path}:{span.line}: {diagnostic.rule}: {diagnostic.message}"
+
+
+REASONS = {
+    "heading": "another level that a heading may have",
+    "formula": "another formula that is whole: what it says is proven where it has numbers",
+    "lab": "another value with which all holds that is claimed of the lab",
+    "script": "the script prints and draws the same",
+    "map": "an address or a setting that nothing contradicts",
+    "declarations": "what is measured is the author's choice",
+    "other block": "the block does what the lesson says of it",
+    "callout": "a quotation is what is left",
+    "quiz": "a question that is whole without it",
+    "fence": "a name that nothing else names",
+    "number": "given by the author: no script prints it",
+}
+"""Why nothing can know that a changed value is wrong, by the place of the change."""
+
+
+def find_reason(change: Change, old: str, claims: Iterable[Diagnostic]) -> str:
+    """Why a change is no mistake that can be known; empty where it should be."""
+    start, end = change.start, max(change.start + len(change.text), change.start + 1)
+    for claim in claims:
+        span = claim.span
+        if span.path == change.path and span.start <= end and start <= span.end:
+            return "listed by `check --truth`"
+    before = old[old.rfind("\n", 0, start) + 1 : start]
+    if re.search(r"Lessons? (?:[\d.]+ and )?[\d.]*$", before):
+        return "another lesson of the map"
+    return REASONS.get(change.place, "")
+
+
+# --- the run
+
+_checker: Checker | None = None
+"""That of this process."""
+
+
+def _prepare(course: Path, top: Path) -> None:
+    global _checker
+    folder = Path(tempfile.mkdtemp(dir=top)) / "course"
+    copy_course(course, folder)
+    _checker = Checker(folder)
+    _checker.draw()
+
+
+def copy_course(course: Path, folder: Path) -> None:
+    """Copy what belongs to a course, with the results of its scripts."""
+    names = (*"content models lib runs docs plugins mjcourse examples".split(), FOLDER)
+    for name in names:
+        if (course / name).is_dir():
+            shutil.copytree(course / name, folder / name, symlinks=True)
+    for file in course.iterdir():
+        if file.is_file():
+            shutil.copy(file, folder / file.name)
+
+
+def _check(kind: str, seed: int, number: int) -> Outcome | None:
+    assert _checker is not None
+    chance = random.Random(f"{seed} {kind} {number}")
+    change = make_change(kind, _checker.texts, chance)
+    return None if change is None else _checker.check(change)
+
+
+def run(
+    course: Path, seeds: Sequence[int], count: int, kinds: Sequence[str], jobs: int
+) -> Iterator[Outcome]:
+    """Check so many changes for each seed, as many of each kind."""
+    share_of_kind = max(1, round(count / len(kinds)))
+    tasks = [
+        (kind, seed, number) for number in range(share_of_kind) for seed in seeds for kind in kinds
+    ]
+    with tempfile.TemporaryDirectory(prefix="mistakes-", ignore_cleanup_errors=True) as top:
+        pool = ProcessPoolExecutor(jobs, initializer=_prepare, initargs=(course, Path(top)))
+        try:
+            for outcome in pool.map(_check, *zip(*tasks, strict=True), chunksize=1):
+                if outcome is not None:
+                    yield outcome
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def table(outcomes: Sequence[Outcome]) -> list[str]:
+    """The counts by kind, and what they come to."""
+    lines = [f"| kind of change | tried | {' | '.join(ENDS)} |", "| --- |" + " ---: |" * 8]
+    for kind in [*KINDS, ""]:
+        ends = Counter(o.end for o in outcomes if not kind or o.change.kind == kind)
+        if ends:
+            cells = (str(ends[end] or "") for end in ENDS)
+            lines.append(f"| {kind or '**all**'} | {ends.total()} | {' | '.join(cells)} |")
+    rest = [o for o in outcomes if o.change.kind not in ("numbers in prose", "inline code")]
+    for title, part in (
+        ("changes to anything but words of prose", outcomes),
+        ("those outside of inline code and of numbers in prose", rest),
+    ):
+        ends = Counter(o.end for o in part if o.end != "prose")
+        total = max(ends.total(), 1)
+        silent, elsewhere = (100 * ends[end] / total for end in ("silent", "elsewhere"))
+        lines += [
+            "",
+            f"Of {total} {title}, {silent:.1f} % were silent, {elsewhere:.1f} % elsewhere.",
+        ]
+    reasons = Counter(o.note for o in outcomes if o.end == "reason")
+    lines += ["", "| reason | changes |", "| --- | ---: |"] if reasons else []
+    return lines + [f"| {reason} | {count} |" for reason, count in reasons.most_common()]
+
+
+def describe(outcome: Outcome, old: str) -> Iterator[str]:
+    """A change with the text before and after."""
+    change = outcome.change
+    line = old.count("\n", 0, change.start) + 1
+    start = max(old.rfind("\n", 0, change.start) + 1, change.start - 60)
+    end = min(old.find("\n", change.end) % (len(old) + 1), change.end + 30)
+    before, after = old[start:end], old[start : change.start] + change.text + old[change.end : end]
+    yield f"{outcome.end}: {change.kind} ({change.slip}, {change.place}) {change.path}:{line}"
+    yield f"  - {before[:WIDTH]!r}"
+    yield f"  + {after[:WIDTH]!r}"
+    if outcome.note:
+        yield f"  {outcome.note}"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])  # type: ignore[union-attr]
+    parser.add_argument("--seed", type=int, nargs="+", default=[37])
+    parser.add_argument("--count", type=int, default=1200, help="changes for each seed")
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS, metavar="KIND")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--minutes", type=float, default=float("inf"), help="stop after so long")
+    parser.add_argument("--course", type=Path, default=ROOT)
+    parser.add_argument("--list", nargs="*", choices=ENDS, default=["silent", "elsewhere"])
+    parser.add_argument("--docs", action="store_true", help=f"put the table into {DOCS.name}")
+    arguments = parser.parse_args()
+    course: Path = arguments.course.resolve()
+    outcomes: list[Outcome] = []
+    began = time.monotonic()
+    for outcome in run(course, arguments.seed, arguments.count, arguments.kinds, arguments.jobs):
+        outcomes.append(outcome)
+        if outcome.end in arguments.list:
+            old = (course / outcome.change.path).read_text("utf-8")
+            print(*describe(outcome, old), sep="\n", flush=True)
+        if time.monotonic() - began > arguments.minutes * 60:
+            break
+    lines = table(outcomes)
+    print("", *lines, sep="\n")
+    if arguments.docs:
+        command = " ".join(sys.argv).replace(str(ROOT) + "/", "")
+        head = f"`python {command}`, {date.today().isoformat()}:"
+        put_into(DOCS, "\n".join([head, "", *lines]))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
