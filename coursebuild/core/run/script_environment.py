@@ -18,7 +18,7 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.engine.up_to_date import DECISIVE
+from coursebuild.core.files.course_root import DECISIVE
 
 _SAYS_NOTHING = (
     "PATH",

@@ -15,8 +15,7 @@ from textwrap import shorten
 
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import add_running, add_sandbox, available_cores
-from coursebuild.cli.output import print_report
+from coursebuild.cli.arguments import add_running, add_sandbox, available_cores, print_report
 from coursebuild.core.files.changes import FileChange, undo_changes
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.model import Recording, Script

@@ -16,7 +16,8 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.cli.output import CLEAN, FAILURE, style_of, write
+from coursebuild.cli.arguments import style_of
+from coursebuild.cli.output import CLEAN, FAILURE, write
 from coursebuild.core.engine.memo import SIZE
 from coursebuild.core.files.course_root import find_course_root
 from coursebuild.core.files.errors import EffectError, UsageError
