@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, NewType, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeAlias, TypeVar
 
 from markupsafe import Markup
 from msgspec import Struct
@@ -47,22 +47,9 @@ if TYPE_CHECKING:  # types of the layers above, which functions of features take
     from coursebuild.core.run.memory import Memory
     from coursebuild.core.syntax.fence import Fence
     from coursebuild.core.syntax.texts import TextParser
-else:  # names that `help` can show, without importing the layers above
-    for name in (
-        "Assets",
-        "ExportContext",
-        "Fence",
-        "Inputs",
-        "Library",
-        "Memory",
-        "PageContext",
-        "PageInputs",
-        "Place",
-        "Renderer",
-        "SiteContext",
-        "TextParser",
-    ):
-        globals()[name] = NewType(name, object)
+else:  # so that `help` can show the signatures without importing these layers
+    Assets = ExportContext = Fence = Inputs = Library = Memory = PageContext = PageInputs = Any
+    Place = Renderer = SiteContext = TextParser = Any
 
 B = TypeVar("B", bound=FeatureBlock)
 
@@ -183,7 +170,6 @@ class PageKind(Struct, frozen=True, kw_only=True):
 
     @property
     def path(self) -> str:
-        """Its site path."""
         return f"{self.name}/index.html"
 
 
