@@ -13,9 +13,8 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.engine.digests import file_state
+from coursebuild.core.engine.digests import file_state, step_key
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
@@ -24,8 +23,8 @@ from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.dark import dark_colours, dark_drawing
 from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.library import Library
-from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.packages import distributions, module_files
+from coursebuild.core.run.script_environment import course_environment
 from coursebuild.pipeline.documents import Documents
 
 _DIGEST = hashlib.sha256().digest_size * 2

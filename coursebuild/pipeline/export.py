@@ -13,13 +13,12 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from coursebuild.core.engine.archives import check_target, write_export
-from coursebuild.core.engine.prepared import prepared_folder
 from coursebuild.core.features import Exporter
 from coursebuild.core.files.course_features import load_course_features
 from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes, read_sources
-from coursebuild.core.files.resources import Bundle, template_texts
+from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Course, Document
 from coursebuild.core.model.results import Results, SiteFile
 from coursebuild.core.pages.added_files import ExportContext

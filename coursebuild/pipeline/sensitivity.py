@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.model.sensitivity import HALVED_RUN, RUNS, Sensitivity
-from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.sensitivity import is_worth_moving, sensitivity
 from coursebuild.pipeline.options import Options

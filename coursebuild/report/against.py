@@ -14,17 +14,17 @@ from coursebuild.core.model.results import Change, DriftKind
 from coursebuild.core.scripts.diff import shorten
 from coursebuild.core.scripts.findings import closeness
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.report.terminal import (
+from coursebuild.report.text import (
     BOLD,
     FAINT,
     GREEN,
     RED,
     YELLOW,
     Style,
+    location,
     visible,
     visible_lines,
 )
-from coursebuild.report.text import location
 from coursebuild.report.values import json_text, plain, plural
 
 _STATUSES = {

@@ -12,7 +12,7 @@ from typing import Literal
 from msgspec import Struct
 
 from coursebuild.core.text.rules import Rule
-from coursebuild.report.terminal import BOLD, FAINT, GREEN, YELLOW, Style, visible
+from coursebuild.report.text import BOLD, FAINT, GREEN, YELLOW, Style, visible
 from coursebuild.report.values import plural
 
 State = Literal["remembered", "would run", "norun"]

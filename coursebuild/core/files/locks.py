@@ -1,13 +1,21 @@
-"""One writer at a time: locks that vanish with the process that holds them.
+"""Locks that vanish with the process that holds them, and temporary folders, which are locked.
 
 Entry points: `project_lock`, held by a command that writes into a course; `folder_lock`, held while
 a site is swapped; `try_lock` and `is_abandoned`, which tell whether the writer of a temporary file
-is alive.
+is alive; `temporary_folder`, `remove_folder`.
 
 A lock is an flock: killing its holder frees it at once, so no lock can be stale. Where a file
-system has none, as on some network drives, it is a file that names its holder; the next run takes
-over that of a process which is gone from this machine. Where the folder cannot be written, the work
-goes on without: every write of the tool is whole by itself.
+system has none, as on some network drives, it is filelock's file that names its holder; the next
+run takes over that of a process which is gone from this machine. Where the folder cannot be
+written, the work goes on without: every write of the tool is whole by itself. (filelock's own
+flocks would leave a file beside a site, cannot hold a folder, and do not say who has them.)
+
+1. A temporary folder is locked as long as the process that made it lives. So one that can be locked
+   is abandoned; it is removed by the next process that makes one, if it is the same user's.
+2. In a folder for temporary files others may put what they like. Only folders are removed that are
+   private to this user and have a name as given here, and only where nobody else can have moved
+   them there. Links are not followed.
+3. A new folder may be taken for an abandoned one before it is locked; then another one is made.
 """
 
 from __future__ import annotations
@@ -15,12 +23,17 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import functools
 import os
+import re
+import shutil
+import stat
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
+from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.trust import find_store, make_store
 
 _BUSY = frozenset({errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES})
@@ -149,3 +162,90 @@ def _is_at(fd: int, path: Path) -> bool:
         return os.path.samestat(os.fstat(fd), path.stat())
     except OSError:
         return False
+
+
+# --- temporary folders
+
+
+_PREFIX = "coursebuild.tmp."
+_NAME = re.compile(re.escape(_PREFIX) + r"[a-z0-9_]{8}")
+_OPEN_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[str]:
+    """A new folder, removed at the end with everything in it.
+
+    Raises:
+        EffectError: there is no place for it.
+    """
+    import tempfile  # not above: processes that run scripts import this module, and not that
+
+    try:
+        _remove_abandoned(tempfile.gettempdir())
+        while True:
+            folder = tempfile.mkdtemp(prefix=_PREFIX)
+            if (fd := _lock(folder)) is not None:
+                break
+    except OSError as error:
+        raise EffectError(f"there is no place for temporary files: {reason(error)}") from None
+    try:
+        yield folder
+    finally:
+        remove_folder(folder)
+        os.close(fd)
+
+
+def _lock(folder: str) -> int | None:
+    """Lock a new folder; `None` if another process has taken it for abandoned."""
+    try:
+        fd = os.open(folder, _OPEN_FOLDER)
+    except FileNotFoundError:
+        return None
+    if try_lock(fd) is not False and Path(folder).exists():
+        return fd
+    os.close(fd)
+    return None
+
+
+@functools.cache
+def _remove_abandoned(place: str) -> None:
+    """Remove the folders here that this user's processes have left; once in a process."""
+    with contextlib.suppress(OSError), os.scandir(place) as entries:
+        status, me = os.stat(place), os.geteuid()  # noqa: PTH116
+        is_shared = status.st_mode & _OTHERS_WRITE and not status.st_mode & stat.S_ISVTX
+        if is_shared or status.st_uid not in (0, me):
+            return  # others can move this user's folders
+        for entry in entries:
+            if _NAME.fullmatch(entry.name):
+                with contextlib.suppress(OSError):
+                    _remove_if_abandoned(entry.path, me)
+
+
+def _remove_if_abandoned(folder: str, me: int) -> None:
+    fd = os.open(folder, _OPEN_FOLDER)
+    try:
+        status = os.fstat(fd)
+        is_ours = status.st_uid == me and stat.S_IMODE(status.st_mode) == stat.S_IRWXU
+        if is_ours and try_lock(fd):
+            remove_folder(folder)
+    finally:
+        os.close(fd)
+
+
+def remove_folder(folder: str) -> None:
+    """Remove a temporary folder, even if a script has removed permissions in it."""
+    try:
+        os.rmdir(folder)  # noqa: PTH106 (mostly it is empty)
+        return
+    except FileNotFoundError:
+        return
+    except OSError:
+        pass
+    shutil.rmtree(folder, ignore_errors=True)
+    if Path(folder).exists():
+        with contextlib.suppress(OSError):
+            for parent, _, _ in os.walk(folder):
+                Path(parent).chmod(0o700)
+        shutil.rmtree(folder, ignore_errors=True)

@@ -30,10 +30,10 @@ from coursebuild.core.engine.digests import SPECIAL, file_state
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model import Limits
 from coursebuild.core.model.results import CompileResult, ModelFacts
-from coursebuild.core.run import mjcf_worker, mujoco_files
+from coursebuild.core.run import compile_main, mujoco_files
 from coursebuild.core.run.child import LIMITS, JsonChild
 from coursebuild.core.run.mujoco_files import ModelFiles
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.values import fingerprint
 
 _ONE = 0.5
@@ -111,7 +111,7 @@ def model_key(root: Path, path: str, text: str) -> str:
 @functools.cache
 def _code() -> tuple[bytes, ...]:
     """The code that compiles models and reads their facts."""
-    files = (__file__, mjcf_worker.__file__, mujoco_files.__file__)
+    files = (__file__, compile_main.__file__, mujoco_files.__file__)
     return tuple(Path(file).read_bytes() for file in files)
 
 
@@ -119,7 +119,7 @@ class _Compiler(JsonChild):
     """The child that compiles."""
 
     def __init__(self, root: Path, limits: Limits, python: str | None) -> None:
-        super().__init__(mjcf_worker.__file__, limits.models, python, memory=limits.memory)
+        super().__init__(compile_main.__file__, limits.models, python, memory=limits.memory)
         self.root = root
         self.seconds = self.left = limits.models
 

@@ -1,7 +1,7 @@
 """Turn a process into a script that finds what a bare `python examples/x.py` finds, and is traced.
 
 Entry points: `PreloadedPackages`, the packages that are imported once for all scripts;
-`ScriptProcess`, which sets up this process; `worker_main` then executes the script.
+`ScriptProcess`, which sets up this process; `script_main` then executes the script.
 
 Only two things differ from a bare Python: there is one more frame below the script's own, and
 `sys.modules` holds modules of the standard library that the script has not imported.

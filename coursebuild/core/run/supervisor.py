@@ -1,6 +1,6 @@
-"""The process that runs scripts for `runner` and cleans up after them.
+"""The process that runs scripts for `script_server` and cleans up after them.
 
-Entry point: `main`, called by the program `worker_main`.
+Entry point: `main`, called by the program `script_main`.
 
 It runs one script after another, each in a session of its own, so that
 
@@ -14,7 +14,7 @@ runs scripts in copies of itself. Where that is impossible, it starts this progr
 script. It has one thread, so that it may fork.
 
 The protocol: JSON objects, each after its length in 4 bytes; from the tool a `Job`, and back a
-`ChildReport` for each (see `workers`), after `STARTED` if there is something to wait for.
+`ChildReport` for each (see `script_worker`), after `STARTED` if there is something to wait for.
 
 In a sandbox this process is the first one, with number 1: signals from in there do not reach it,
 and nobody in there may look into it.
@@ -43,7 +43,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
 from coursebuild.core.engine.lifetime import end_with_parent
-from coursebuild.core.files.temporary import remove_folder
+from coursebuild.core.files.locks import remove_folder
 from coursebuild.core.run.script_process import (
     Job,
     PreloadedPackages,
@@ -61,14 +61,14 @@ from coursebuild.core.run.watching import (
 LENGTH = struct.Struct(">I")
 STARTED = LENGTH.pack(0)
 """What is sent when a script has been started."""
-PROGRAM = str(Path(__file__).with_name("worker_main.py"))
+PROGRAM = str(Path(__file__).with_name("script_main.py"))
 
 FIGURE_LIMIT = 4 << 20
 """Bytes that a figure may have."""
 _NOTES_BYTES = 1 << 20
 """The bytes of shared memory for a script's notes; further notes go to files."""
 _OUR_FRAME = re.compile(rb'  File "%s", line \d+ in <module>\n' % re.escape(os.fsencode(PROGRAM)))
-"""The frame of `worker_main` in Python's fault dumps, below the script's own frames."""
+"""The frame of `script_main` in Python's fault dumps, below the script's own frames."""
 _COUNTER = itertools.count()
 _PROCESSES = 4096
 """Processes of its user that a script in a sandbox may see started; the tool allows fewer."""

@@ -23,8 +23,7 @@ from coursebuild.features.authoring.course_map import with_lesson_renamed
 from coursebuild.features.authoring.references import doubtful_places, rename_references
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import documents_by_name
-from coursebuild.report.terminal import visible
-from coursebuild.report.text import location
+from coursebuild.report.text import location, visible
 from coursebuild.report.values import plural
 
 EXAMPLES = """\

@@ -19,7 +19,7 @@ from coursebuild.features.bench.commands.measurement import (
     measurement_text,
 )
 from coursebuild.pipeline.options import Options
-from coursebuild.report.terminal import Style
+from coursebuild.report.text import Style
 
 
 def add_report_options(parser: argparse.ArgumentParser) -> None:
