@@ -189,19 +189,15 @@ def _state(root: str, input_paths: list[str], began: int | None = None) -> str:
     add(sys.version, sys.executable, *(os.environ.get(name, "") for name in _VARIABLES))
     installed = (folder for folder in sys.path if folder.endswith(_PACKAGES))
     course = (os.path.join(root, name) for name in FOLDERS)
-    for path in (*installed, *course, *_tool(), *input_paths):
+    package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    source = os.path.dirname(package)
+    tool = [package]
+    if os.path.isdir(os.path.join(source, "site", "dist")):
+        tool += (os.path.join(source, n) for n in ("mjcourse", "templates", "site/dist"))
+    for path in (*installed, *course, *tool, *input_paths):
         for parts in _rows(path, began):
             add(*parts)
     return digest.hexdigest()
-
-
-def _tool() -> list[str]:
-    """The folders of the tool's own files."""
-    package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    source = os.path.dirname(package)
-    if not os.path.isdir(os.path.join(source, "site", "dist")):
-        return [package]
-    return [package, *(os.path.join(source, n) for n in ("mjcourse", "templates", "site/dist"))]
 
 
 def _rows(path: str, began: int | None) -> Iterator[tuple[object, ...]]:

@@ -84,8 +84,14 @@ def to_junit(report: Report) -> str:
     for path in dict.fromkeys(d.span.path for d in report.diagnostics):
         case = _add_case(suite, "course", path, 0.0)
         for d in report.diagnostics:
-            if d.span.path == path:
-                _add_diagnostic(case, d)
+            if d.span.path != path:
+                continue
+            if d.is_error:
+                message = clean_xml(f"{location(d.span)}: {d.message}")
+                element = SubElement(case, "failure", type=d.rule, message=message)
+            else:
+                element = SubElement(case, "system-out")
+            element.text = clean_xml(diagnostic_text(d, Style()))
     suite.attrib |= {
         "tests": str(len(suite)),
         "failures": str(sum(case.find("failure") is not None for case in suite)),
@@ -99,15 +105,6 @@ def to_junit(report: Report) -> str:
 
 def _add_case(suite: Element, group: str, name: str, seconds: float) -> Element:
     return SubElement(suite, "testcase", classname=group, name=name, time=f"{seconds:.3f}")
-
-
-def _add_diagnostic(case: Element, d: Diagnostic) -> None:
-    if d.is_error:
-        message = clean_xml(f"{location(d.span)}: {d.message}")
-        element = SubElement(case, "failure", type=d.rule, message=message)
-    else:
-        element = SubElement(case, "system-out")
-    element.text = clean_xml(diagnostic_text(d, Style()))
 
 
 # --- SARIF

@@ -154,7 +154,8 @@ def _script(script: ScriptComparison, version: str, style: Style) -> list[str]:
 
 
 def _change(change: Change, engine: str) -> str:
-    recorded, printed = (_first_line(text) for text in (change.recorded, change.printed))
+    first_lines = (text.strip().split("\n")[0] for text in (change.recorded, change.printed))
+    recorded, printed = (shorten(line, _WIDTH) for line in first_lines)
     distance = closeness(change)
     match change.kind:
         case DriftKind.ROUNDING | DriftKind.NUMERIC:
@@ -167,10 +168,6 @@ def _change(change: Change, engine: str) -> str:
         case DriftKind.EXTRA:
             lines = change.printed.count("\n") + 1
             return f"{engine} printed {plural(lines, 'more line')} here: `{printed}`"
-
-
-def _first_line(text: str) -> str:
-    return shorten(text.strip().split("\n")[0], _WIDTH)
 
 
 def _summary(report: ComparisonReport, lost: int) -> str:

@@ -124,7 +124,8 @@ def _replace(
         entries, paths = site.fill(slot, jobs, stage)
         if not holds(slot, entries):
             raise EffectError(f"somebody else changes what is being written to {place}")
-        slot.chmod(_mode(place))
+        # The permissions of the site's folder: those it has already, else the usual ones.
+        slot.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o755)
         _swap(slot, place)
     finally:
         _recover(place)
@@ -210,13 +211,6 @@ def _recover(place: Path) -> None:
         old.rename(place)
 
 
-def _mode(place: Path) -> int:
-    """The permissions of the site's folder: those it has already, else the usual ones."""
-    with contextlib.suppress(FileNotFoundError):
-        return stat.S_IMODE(place.stat().st_mode)
-    return 0o755
-
-
 def _sibling(place: Path, suffix: str) -> Path:
     """A folder of ours beside the place: `new`, the slot while it is filled, or `old`."""
     return place.with_name(f".{place.name}.coursebuild-{suffix}")
@@ -263,10 +257,14 @@ class NewSite(Struct, frozen=True):
         self, slot: Path, jobs: int, stage: Callable[[], AbstractContextManager[None]]
     ) -> tuple[dict[str, ManifestEntry], list[str]]:
         """Fill the slot with the site; return its entries and the paths that were written."""
-        folders = _folders(self.keys)
+        folders = {path.rpartition("/")[0] for path in self.keys}
+        for folder in list(folders):
+            while folder := folder.rpartition("/")[0]:
+                folders.add(folder)
+        folders.discard("")
         old_entries = {p: e for p, k in self.keys.items() if (e := self.old.entry(p, k))}
-        entries = _remove_stale(f"{slot}/", "", old_entries, frozenset(folders))
-        for folder in folders:
+        entries = _remove_stale(f"{slot}/", "", old_entries, folders)
+        for folder in sorted(folders):  # each after its parent
             (slot / folder).mkdir(exist_ok=True)
             (slot / folder).chmod(0o755)  # whatever the umask is
         for path, entry in old_entries.items():
@@ -335,6 +333,7 @@ def new_site(old: Manifest, files: Iterable[SiteFile], file_list: FileList | Non
         ValueError: a path is not valid in a site, or two files have the same.
     """
     by_path: dict[str, SiteFile] = {}
+    keys: dict[str, str] = {}
     for file in files:
         path = file.path
         if _NO_PATH.search(path) or path == MARKER:
@@ -342,27 +341,15 @@ def new_site(old: Manifest, files: Iterable[SiteFile], file_list: FileList | Non
         if path in by_path or (file_list is not None and path == file_list.path):
             raise ValueError(f"the site has two files {path}")
         by_path[path] = file
-    keys = {path: _key(file) for path, file in by_path.items()}
+        if isinstance(file, OutputFile):
+            keys[path] = f"={hashlib.sha256(file.data).hexdigest()}"
+        else:
+            keys[path] = file.key
     if file_list is not None:
         # Of the keys of all files, since the list names all of them.
         text = "\n".join((file_list.key, *(f"{key} {path}" for path, key in keys.items())))
         keys[file_list.path] = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
     return NewSite(old, by_path, file_list, keys)
-
-
-def _key(file: SiteFile) -> str:
-    if isinstance(file, OutputFile):
-        return f"={hashlib.sha256(file.data).hexdigest()}"
-    return file.key
-
-
-def _folders(paths: Iterable[str]) -> list[str]:
-    """The folders that files need, each after its parent."""
-    folders = {path.rpartition("/")[0] for path in paths}
-    for folder in list(folders):
-        while folder := folder.rpartition("/")[0]:
-            folders.add(folder)
-    return sorted(folders - {""})
 
 
 def open_slot(root: Path, slot: Path) -> None:

@@ -61,7 +61,12 @@ def change_files(
             check_unchanged(_check_path(root, change), change.path, change.old)
         journal = journal_path(root)
         if journal is not None:
-            _write_journal(journal, root, changes)
+            data = seal(_NAME, msgspec.msgpack.encode(changes), store_key(str(root)))
+            try:
+                journal.parent.mkdir(exist_ok=True)
+                replace_file(str(journal), data)
+            except OSError as error:
+                raise EffectError(f"{journal} cannot be written: {reason(error)}") from None
         try:
             for change in changes:
                 _replace(root, change.path, change.old, change.new)
@@ -93,15 +98,6 @@ def journal_path(root: Path) -> Path | None:
         return None
     name = hashlib.sha256(os.fsencode(os.path.realpath(root))).hexdigest()
     return Path(folder, "journals", name)
-
-
-def _write_journal(journal: Path, root: Path, changes: Sequence[FileChange]) -> None:
-    data = seal(_NAME, msgspec.msgpack.encode(changes), store_key(str(root)))
-    try:
-        journal.parent.mkdir(exist_ok=True)
-        replace_file(str(journal), data)
-    except OSError as error:
-        raise EffectError(f"{journal} cannot be written: {reason(error)}") from None
 
 
 def _undo(root: Path, tell: Callable[[str], None] | None) -> None:

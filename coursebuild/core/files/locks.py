@@ -30,7 +30,6 @@ import shutil
 import stat
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 from coursebuild.core.files.errors import EffectError, reason
@@ -69,66 +68,52 @@ def project_lock(
         on_wait: is called once, with a message, if another run has the lock.
         name: the name of the lock's file.
     """
-    folder = find_store(str(root.resolve()))[0]
-    with _hold_if_possible(_file_lock(root.resolve(), Path(folder, name), on_wait)):
+    root = root.resolve()
+    path = Path(find_store(str(root))[0], name)
+    named_file = path.with_name(f"{name}-held")
+    with _hold_if_possible(lambda: _lock_file(root, path, on_wait), named_file, on_wait):
         yield
 
 
 @contextlib.contextmanager
 def folder_lock(folder: Path) -> Iterator[None]:
     """Hold a folder locked while something in it is replaced, without leaving a file there."""
-    with _hold_if_possible(_folder_lock(folder)):
-        yield
 
-
-@contextlib.contextmanager
-def _hold_if_possible(lock: AbstractContextManager[None]) -> Iterator[None]:
-    """Hold a lock if it can be had; if the file system refuses, go on without."""
-    with contextlib.ExitStack() as stack:
-        with contextlib.suppress(OSError):
-            stack.enter_context(lock)
-        yield
-
-
-@contextlib.contextmanager
-def _folder_lock(folder: Path) -> Iterator[None]:
-    fd = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
-    try:
+    def lock() -> int:
+        fd = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
         if try_lock(fd) is False:
             fcntl.flock(fd, fcntl.LOCK_EX)
-        with nullcontext() if try_lock(fd) else _named_lock(folder / ".coursebuild-lock"):
-            yield
-    finally:
-        os.close(fd)
+        return fd
 
-
-@contextlib.contextmanager
-def _file_lock(root: Path, path: Path, on_wait: Callable[[str], None] | None) -> Iterator[None]:
-    fd = _lock_file(root, path, on_wait)
-    try:
-        named_file = path.with_name(f"{path.name}-held")
-        with nullcontext() if try_lock(fd) else _named_lock(named_file, on_wait):
-            yield
-    finally:
-        os.close(fd)
-
-
-@contextlib.contextmanager
-def _named_lock(path: Path, on_wait: Callable[[str], None] | None = None) -> Iterator[None]:
-    """Hold a file that names this process, where there are no locks."""
-    from filelock import SoftFileLock, Timeout
-
-    lock = SoftFileLock(path)
-    try:
-        lock.acquire(timeout=0)
-    except Timeout:
-        if on_wait is not None:
-            on_wait(f"{_waiting_message(str(lock.pid))} (if there is none, remove {path})")
-        lock.acquire()
-    try:
+    with _hold_if_possible(lock, folder / ".coursebuild-lock"):
         yield
-    finally:
-        lock.release()
+
+
+@contextlib.contextmanager
+def _hold_if_possible(
+    lock: Callable[[], int], named_file: Path, on_wait: Callable[[str], None] | None = None
+) -> Iterator[None]:
+    """Hold what `lock` opens and locks; if the file system refuses, go on without.
+
+    Where there are no locks, hold a file that names this process.
+    """
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):
+            fd = lock()
+            stack.callback(os.close, fd)
+            if not try_lock(fd):
+                from filelock import SoftFileLock, Timeout
+
+                named_lock = SoftFileLock(named_file)
+                try:
+                    named_lock.acquire(timeout=0)
+                except Timeout:
+                    if on_wait is not None:
+                        message = _waiting_message(str(named_lock.pid))
+                        on_wait(f"{message} (if there is none, remove {named_file})")
+                    named_lock.acquire()
+                stack.callback(named_lock.release)
+        yield
 
 
 def _lock_file(root: Path, path: Path, on_wait: Callable[[str], None] | None) -> int:
@@ -142,10 +127,11 @@ def _lock_file(root: Path, path: Path, on_wait: Callable[[str], None] | None) ->
                     on_wait(_waiting_message(os.pread(fd, 32, 0).decode("ascii", "replace")))
                     on_wait = None
                 fcntl.flock(fd, fcntl.LOCK_EX)
-            if _is_at(fd, path):
-                os.ftruncate(fd, 0)
-                os.pwrite(fd, f"{os.getpid()}\n".encode(), 0)
-                return fd
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(fd), path.stat()):
+                    os.ftruncate(fd, 0)
+                    os.pwrite(fd, f"{os.getpid()}\n".encode(), 0)
+                    return fd
         except BaseException:
             os.close(fd)
             raise
@@ -155,13 +141,6 @@ def _lock_file(root: Path, path: Path, on_wait: Callable[[str], None] | None) ->
 def _waiting_message(holder: str) -> str:
     process = f" (process {holder.strip()})" if holder.strip().isdigit() else ""
     return f"another coursebuild{process} is at work on this course; waiting for it"
-
-
-def _is_at(fd: int, path: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(fd), path.stat())
-    except OSError:
-        return False
 
 
 # --- temporary folders

@@ -60,7 +60,12 @@ def write_atomic(
             check_unchanged(target, path, expected)
             _move(temporary, target, path, new=expected is None)
             if durable:
-                _sync_folder(target.parent)
+                with contextlib.suppress(OSError):  # without, the file is whole all the same
+                    folder = os.open(target.parent, os.O_RDONLY | os.O_CLOEXEC)
+                    try:
+                        os.fsync(folder)
+                    finally:
+                        os.close(folder)
                 remove_leftovers([target.parent])
         finally:
             os.close(fd)
@@ -183,13 +188,3 @@ def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
     raise FileChangedError(
         f"{path} was changed in the meantime", help="nothing was written; run the command again"
     )
-
-
-def _sync_folder(folder: Path) -> None:
-    """Sync a rename to the disk; where that is not possible, the file is whole all the same."""
-    with contextlib.suppress(OSError):
-        fd = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
-        try:
-            os.fsync(fd)
-        finally:
-            os.close(fd)

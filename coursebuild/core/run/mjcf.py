@@ -146,7 +146,9 @@ class _Compiler(JsonChild):
         if facts is not None:
             facts |= {"includes": existing_files(self.root, path, text)}
             return CompileResult("", facts=msgspec.convert(facts, ModelFacts))
-        message = self._without_paths(error.strip())
+        message = error.strip().replace(f"{self.root}/", "")  # as it would be on any machine
+        message = message.replace(f"models/{_TEXT_NAME}", _TEXT_NAME)
+        message = message.replace(f"'{_TEXT_NAME}'", "this text").replace(_TEXT_NAME, "this text")
         if _NO_MEMORY.search(message):
             return CompileResult(f"{OWN_FAULT}takes more than {self.memory} MiB of memory for it")
         return CompileResult(message, error_line(message, text))
@@ -154,11 +156,6 @@ class _Compiler(JsonChild):
     def _no_time_left(self) -> CompileResult:
         message = f"was not compiled: others took the {self.seconds:g} s that all may take"
         return CompileResult(message, timeout=True)
-
-    def _without_paths(self, message: str) -> str:
-        """The message as it would be on any machine."""
-        message = message.replace(f"{self.root}/", "").replace(f"models/{_TEXT_NAME}", _TEXT_NAME)
-        return message.replace(f"'{_TEXT_NAME}'", "this text").replace(_TEXT_NAME, "this text")
 
 
 def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:

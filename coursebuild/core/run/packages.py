@@ -138,7 +138,8 @@ def _map_distributions(store: Memo, folders: Sequence[str]) -> Mapping[str, str]
     """The distributions, with versions, of each top-level module in these folders."""
     key = hashlib.sha256(repr((sys.version, *map(_names, folders))).encode()).hexdigest()
     # It is no result of the course, so that `--no-cache` does not make it again.
-    names = store.peek("installed", key, _read)
+    decode = functools.partial(msgspec.json.decode, type=dict[str, str])
+    names = store.peek("installed", key, decode)
     if names is None:
         names = _scan(folders)
         store.put_value("installed", key, names)
@@ -151,10 +152,6 @@ def _names(folder: str) -> list[str]:
         return sorted(os.listdir(folder))  # noqa: PTH208
     except OSError:
         return []
-
-
-def _read(data: bytes) -> dict[str, str]:
-    return msgspec.json.decode(data, type=dict[str, str])
 
 
 def _scan(folders: Sequence[str]) -> dict[str, str]:
@@ -305,7 +302,9 @@ def _create_environment(prefix: Path, engine: str) -> None:
         status, output = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
         if status:
             message = f"MuJoCo {engine} cannot be imported beside the other packages of here"
-            raise EffectError(f"{message}: {_last_line(output)}")
+            output_lines = [line.strip() for line in output.splitlines() if line.strip()]
+            last_line = output_lines[-1] if output_lines else "no reason"
+            raise EffectError(f"{message}: {last_line}")
         new.rename(prefix)
     finally:
         shutil.rmtree(new, ignore_errors=True)
@@ -343,12 +342,6 @@ def _pip_error(engine: str, output: str) -> EffectError:
     reasons = errors if errors != ["Exception:"] else lines[-1:]  # pip's own traceback
     return EffectError(
         f"pip cannot install MuJoCo {engine}: {'; '.join((reasons or lines)[-_LINES:])}"
-    )
-
-
-def _last_line(output: str) -> str:
-    return next(
-        (line.strip() for line in reversed(output.splitlines()) if line.strip()), "no reason"
     )
 
 

@@ -68,7 +68,9 @@ class RunRecord(
             modules=tuple(names[Kind.MODULE]),
             sought=tuple(names[Kind.SOUGHT]),
         )
-        stderr = _insert_places(self.stored_run.stderr, places)
+        stderr = self.stored_run.stderr
+        for name, folder in places if _MARK in stderr else ():
+            stderr = stderr.replace(f"{_MARK}{name}{_MARK}", folder.rstrip("/"))
         return replace(self.stored_run, stderr=stderr, cached=True, trace=trace)
 
 
@@ -116,12 +118,6 @@ def _replace_places(text: str, places: Iterable[tuple[str, str]]) -> str:
     return text
 
 
-def _insert_places(text: str, places: Iterable[tuple[str, str]]) -> str:
-    for name, folder in places if _MARK in text else ():
-        text = text.replace(f"{_MARK}{name}{_MARK}", folder.rstrip("/"))
-    return text
-
-
 # --- from notes to a trace
 
 
@@ -145,7 +141,11 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
                 target, file, line = value.rsplit("\t", 2)
                 effects.append(Effect(EffectKind(kind), target, file, int(line)))
             elif kind == "d":
-                divergences.append(_parse_divergence(value))
+                sign, detail, time, model, path, line = value.split("\t")
+                depth, *geoms = detail.split("\x1f")
+                divergences.append(
+                    Divergence(Sign(sign), time, model, path, int(line), depth, tuple(geoms))
+                )
     files = {_resolve(path, top) for path in values_by_kind["r"]}
     inside = {path.removeprefix(f"{top}/") for path in files if path.startswith(f"{top}/")}
     return Trace(
@@ -179,12 +179,6 @@ def _resolve(path: str, top: str) -> str:
             resolved = os.path.realpath(path)
             path = resolved if resolved.startswith(f"{top}/") else path
     return path
-
-
-def _parse_divergence(fields: str) -> Divergence:
-    sign, detail, time, model, path, line = fields.split("\t")
-    depth, *geoms = detail.split("\x1f")
-    return Divergence(Sign(sign), time, model, path, int(line), depth, tuple(geoms))
 
 
 def _join_sought(records: Iterable[str], top: str) -> tuple[str, ...]:

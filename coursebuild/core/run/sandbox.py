@@ -41,16 +41,16 @@ from coursebuild.core.run.seccomp import compile_filter
 SIZE = 1 << 30
 """Bytes that may be written, in memory."""
 PROGRAM = str(Path(__file__).with_name("sandbox_main.py"))
-_SYSTEM = (
-    *("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/nix/store", "/sys/devices/system/cpu"),
-    *("/etc/alternatives", "/etc/fonts", "/etc/ld.so.cache", "/etc/localtime"),
-)
+_SYSTEM = """
+/usr /bin /sbin /lib /lib32 /lib64 /nix/store /sys/devices/system/cpu
+/etc/alternatives /etc/fonts /etc/ld.so.cache /etc/localtime
+""".split()
 _PYTHON_PARTS = ("bin", "lib", "lib64", "pyvenv.cfg")
 """The parts that an interpreter needs of the folder that it is installed in."""
-_NAMESPACES = (
-    *("--unshare-all", "--unshare-user", "--disable-userns", "--cap-drop", "ALL", "--as-pid-1"),
-    *("--die-with-parent", "--new-session", "--clearenv", "--chdir", "/"),
-)
+_NAMESPACES = """
+--unshare-all --unshare-user --disable-userns --cap-drop ALL --as-pid-1
+--die-with-parent --new-session --clearenv --chdir /
+""".split()
 _HIDDEN = ("/proc/keys", "/proc/key-users", "/proc/timer_list", "/proc/kcore")
 """Files of the system that tell of what is outside."""
 _ALLOW = (

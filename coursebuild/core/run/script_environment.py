@@ -130,18 +130,13 @@ def conditions(
     values["Python"] = f"{platform.python_implementation()} {version}"
     if interpreter is not None and interpreter.name:
         values["environment"] = interpreter.name
-    values["platform"] = f"{sys.platform} {platform.machine()} {_c_library()}".strip()
+    c_library = ""  # whose mathematical functions Python uses
+    with contextlib.suppress(OSError, ValueError):
+        c_library = os.confstr("CS_GNU_LIBC_VERSION") or ""
+    values["platform"] = f"{sys.platform} {platform.machine()} {c_library}".strip()
     fixed = json.dumps(_FIXED, sort_keys=True).encode()
     values["the fixed environment of scripts"] = hashlib.sha256(fixed).hexdigest()[:12]
     return tuple(sorted(values.items()))
-
-
-def _c_library() -> str:
-    """The C library, whose mathematical functions Python uses."""
-    try:
-        return os.confstr("CS_GNU_LIBC_VERSION") or ""
-    except (OSError, ValueError):
-        return ""
 
 
 def places(
@@ -222,8 +217,10 @@ def course_environment(root: Path, course: Course) -> Parsed[Interpreter | None]
         )
         return _reject(named_path, message)
     version_text = settings.get("version") or settings.get("version_info", "")
-    major, minor, version = _parse_version(version_text)
-    if (major, minor) < _OLDEST:
+    # Such as 3.12.1, or virtualenv's 3.12.1.final.0.
+    match = re.match(r"(\d+)\.(\d+)\.\d+", version_text)
+    major, minor = (int(match[1]), int(match[2])) if match is not None else (0, 0)
+    if match is None or (major, minor) < _OLDEST:
         message = f"`{named_path.path}` is of Python {version_text}, and scripts need 3.11 or newer"
         return _reject(named_path, message)
     packages = str(prefix / "lib" / f"python{major}.{minor}" / "site-packages")
@@ -233,14 +230,8 @@ def course_environment(root: Path, course: Course) -> Parsed[Interpreter | None]
         help = f"run `{named_path.path} -m pip install mujoco=={required}`"
         return _reject(named_path, f"MuJoCo is not installed for `{named_path.path}`", help)
     base = str(Path(settings.get("home", "")).parent)
-    interpreter = Interpreter("", str(python), str(prefix), base, version, engine, (packages,))
+    interpreter = Interpreter("", str(python), str(prefix), base, match[0], engine, (packages,))
     return Parsed(interpreter, ())
-
-
-def _parse_version(text: str) -> tuple[int, int, str]:
-    """The parts of a version such as 3.12.1, or virtualenv's 3.12.1.final.0."""
-    match = re.match(r"(\d+)\.(\d+)\.\d+", text)
-    return (int(match[1]), int(match[2]), match[0]) if match is not None else (0, 0, "")
 
 
 def _reject(named_path: NamedPath, message: str, help: str = "") -> Parsed[Interpreter | None]:
@@ -294,7 +285,12 @@ def one_processor() -> Iterator[None]:
 def cpu_name() -> str:
     """What the processor calls itself; empty where it does not say."""
     if platform.system() == "Darwin":
-        return _run("sysctl", "-n", "machdep.cpu.brand_string")
+        command = ["sysctl", "-n", "machdep.cpu.brand_string"]
+        try:
+            process = subprocess.run(command, capture_output=True, timeout=10, check=False)
+        except (OSError, subprocess.SubprocessError):
+            return ""
+        return _tidy(process.stdout.decode("utf-8", "replace"))
     return find_cpu_name(_read(_INFO)) or _tidy(platform.processor())
 
 
@@ -317,11 +313,3 @@ def _read(path: Path) -> str:
 
 def _tidy(text: str) -> str:
     return " ".join(text.split())[:100]
-
-
-def _run(*command: str) -> str:
-    try:
-        process = subprocess.run(command, capture_output=True, timeout=10, check=False)
-    except (OSError, subprocess.SubprocessError):
-        return ""
-    return _tidy(process.stdout.decode("utf-8", "replace"))

@@ -245,7 +245,11 @@ class SandboxWatch:
             self.close()  # it still sees ours
             return False
         try:
-            self._folders = [_open_mount(root, at, dev) for at, dev in self._mounts_in_memory()]
+            for point, device in self._mounts_in_memory():
+                fd = os.open(f"{root}{point}", os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+                self._folders.append(fd)
+                if os.fstat(fd).st_dev != device:  # a script may put something in its place
+                    raise OSError("not mounted there any more")
         except OSError:
             self.close()
             return False
@@ -320,15 +324,6 @@ class SandboxWatch:
             finally:
                 os.close(fd)
         return data
-
-
-def _open_mount(root: str, point: str, device: int) -> int:
-    """Open a mount point, which a script may have put something else in place of."""
-    fd = os.open(f"{root}{point}", os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    if os.fstat(fd).st_dev != device:
-        os.close(fd)
-        raise OSError("not mounted there any more")
-    return fd
 
 
 def _sum(pattern: re.Pattern[bytes], text: bytes) -> int:

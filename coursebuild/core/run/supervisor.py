@@ -143,7 +143,10 @@ class _Supervisor:
             self.libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
             if os.getpid() == _FIRST:
                 self.libc.prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
-                _avoid_fork_server()
+                if sys.version_info >= (3, 14):  # Python's default listens at a socket in a folder
+                    from multiprocessing import context
+
+                    context._default_context._default_context = context._concrete_contexts["spawn"]
         os.chdir("/")
         self.scratch = ""
 
@@ -194,7 +197,12 @@ class _Supervisor:
             finally:
                 script.end()
             trace = _read_notes(script.shared, notes_folder(folder))
-            return _report_finished(script, trace, _read_figures(folder, job["figures"]))
+            stdout, stderr = script.stdout[:STDOUT_LIMIT], script.stderr[-STDERR_KEPT:]
+            figures = _read_figures(folder, job["figures"])
+            parts = bytes(stdout), _OUR_FRAME.sub(b"", bytes(stderr)), trace, *figures
+            status = script.exit_status()
+            outcome = script.limit or ("killed" if status < 0 else "failed" if status else "ok")
+            return _report(outcome, abs(status), script.seconds, parts=parts)
         finally:
             if folder and not isinstance(script, ScriptProcess):
                 remove_folder(folder)
@@ -254,17 +262,6 @@ class _Supervisor:
         if most == resource.RLIM_INFINITY or most > memory:
             resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
         os.chdir(job["root"])
-
-
-def _avoid_fork_server() -> None:
-    """Let processes be spawned by default in a sandbox.
-
-    Python's default since 3.14 is a server that listens at a socket in a folder.
-    """
-    if sys.version_info >= (3, 14):
-        from multiprocessing import context
-
-        context._default_context._default_context = context._concrete_contexts["spawn"]
 
 
 def _sibling_names(job: Job) -> frozenset[str]:
@@ -384,14 +381,6 @@ def _read_figures(folder: str, names: Sequence[str]) -> list[bytes | None]:
                     data = file.read(FIGURE_LIMIT + 1)
         figures.append(data)
     return figures
-
-
-def _report_finished(run: RunningScript, trace: bytes, figures: Sequence[bytes | None]) -> bytes:
-    stdout, stderr = bytes(run.stdout[:STDOUT_LIMIT]), bytes(run.stderr[-STDERR_KEPT:])
-    status = run.exit_status()
-    outcome = run.limit or ("killed" if status < 0 else "failed" if status else "ok")
-    parts = stdout, _OUR_FRAME.sub(b"", stderr), trace, *figures
-    return _report(outcome, abs(status), run.seconds, parts=parts)
 
 
 def _report_unstartable(text: str) -> bytes:
