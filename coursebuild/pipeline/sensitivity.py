@@ -3,8 +3,8 @@
 Entry point: `measure(course, options, runs, documents)`.
 
 Scripts that use MuJoCo and print what is recorded run four times with their initial states moved
-(`core.run.initial_state_perturbation`), each with three times the time limit. `check` runs them a
-fifth time, with halved timesteps (`core.run.half_steps`). All runs are remembered like others.
+(`core.run.perturbation`), each with three times the time limit. `check` runs them a
+fifth time, with halved timesteps. All runs are remembered like others.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from collections.abc import Callable, Mapping
 from types import FrameType, ModuleType
 from typing import Any
 
-from coursebuild.core.run import initial_state_perturbation, mujoco_tracing
+from coursebuild.core.run import mujoco_tracing, perturbation
 
 DEEP = 1.0
 """A contact is deep where the smaller of two geoms has sunk in by more than this part of its
@@ -137,7 +137,7 @@ class _Watch:
 
     def _check_finally(self, data: Any) -> None:
         self._check(data)
-        initial_state_perturbation.note_final_state(data)
+        perturbation.note_final_state(data)
 
     def _check(self, data: Any) -> None:
         """Note what is wrong with a simulation, once for each of them."""

@@ -10,10 +10,10 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import options_of
 from coursebuild.cli.output import FAILURE, fail
-from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.course_root import FOLDERS
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.read import read_bytes, read_sources
+from coursebuild.core.files.write import FileChange
 from coursebuild.core.model import Course, Lesson
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.text.diagnostics import Edit
