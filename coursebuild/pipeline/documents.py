@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
-from coursebuild.core.engine.digests import step_key
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Course, Declarations, Document
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.source import Source, key_of

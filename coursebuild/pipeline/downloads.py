@@ -13,8 +13,9 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.engine.digests import file_state, step_key
+from coursebuild.core.engine.digests import file_state
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model.figures import recorded_figures
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile

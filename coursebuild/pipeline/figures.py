@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 from coursebuild.core.drawing.safe_svg import read_svg
-from coursebuild.core.engine.digests import step_key
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import write_atomic

@@ -17,7 +17,7 @@ from typing import Any
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from coursebuild.core.engine.digests import tool_digest
+from coursebuild.core.engine.tool import tool_digest
 from coursebuild.core.model import (
     Course,
     Document,

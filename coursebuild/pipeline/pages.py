@@ -21,8 +21,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
-from coursebuild.core.engine.digests import step_key
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages.added_files import NotedPage
 from coursebuild.core.pages.common_files import PageFacts

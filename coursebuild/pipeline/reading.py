@@ -22,8 +22,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.checks.formulas import check_formulas, document_formulas
-from coursebuild.core.engine.digests import step_key, typesetter_digest
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.tool import step_key, typesetter_digest
 from coursebuild.core.files.resources import prepared_folder, template_texts
 from coursebuild.core.model import Document, document_scripts
 from coursebuild.core.model.results import Formula, MathError

@@ -10,7 +10,7 @@ import pytest
 from markupsafe import Markup
 from msgspec.structs import replace
 
-from coursebuild.core.engine.digests import step_key
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 
 import msgspec
 
-from coursebuild.core.engine.digests import step_key
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Lesson, document_scripts
 from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages import urls, zips

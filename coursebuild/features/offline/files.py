@@ -19,7 +19,7 @@ import textwrap
 from collections.abc import Iterable, Iterator
 
 from coursebuild.core.drawing.contrast import GROUNDS_LIGHT
-from coursebuild.core.engine.digests import step_key
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile
 from coursebuild.core.model.theme import ThemeFile

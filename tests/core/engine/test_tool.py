@@ -6,8 +6,8 @@ import os
 import shutil
 from pathlib import Path
 
-from coursebuild.core.engine import digests
-from coursebuild.core.engine.digests import code_digest, package_versions
+from coursebuild.core.engine import tool
+from coursebuild.core.engine.tool import code_digest, package_versions
 
 
 def fill(folder: Path) -> Path:
@@ -20,19 +20,19 @@ def fill(folder: Path) -> Path:
 
 def test_it_depends_on_every_file_and_not_on_their_place(tmp_path: Path) -> None:
     folder, second = fill(tmp_path / "one"), fill(tmp_path / "two")
-    names = {digests._digest(str(folder))}
+    names = {tool._digest(str(folder))}
     (second / "__pycache__").mkdir()
     (second / "__pycache__" / "a.pyc").write_text("x")
-    assert names == {digests._digest(str(second))}
+    assert names == {tool._digest(str(second))}
     os.utime(folder / "inner" / "b.html", ns=(2, 2))
-    names.add(digests._digest(str(folder)))
+    names.add(tool._digest(str(folder)))
     (folder / "a.py").write_text("xy")
     os.utime(folder / "a.py", ns=(1, 1))
-    names.add(digests._digest(str(folder)))
+    names.add(tool._digest(str(folder)))
     (folder / "c.py").write_text("")
-    names.add(digests._digest(str(folder)))
+    names.add(tool._digest(str(folder)))
     (folder / "a.py").unlink()
-    names.add(digests._digest(str(folder)))
+    names.add(tool._digest(str(folder)))
     assert len(names) == 5
 
 

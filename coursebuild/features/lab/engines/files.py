@@ -10,7 +10,7 @@ import functools
 import hashlib
 from pathlib import Path
 
-from coursebuild.core.engine.digests import code_digest
+from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.resources import assets_dir
 
 

@@ -20,7 +20,7 @@ from typing import TypeVar
 
 from msgspec.structs import replace
 
-from coursebuild.core.engine.digests import code_digest
+from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_course
 from coursebuild.core.run.script_environment import machine
