@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, NewType, Protocol, TypeAlias, TypeVar
 
 from markupsafe import Markup
 from msgspec import Struct
@@ -47,9 +47,19 @@ if TYPE_CHECKING:  # types of the layers above, which functions of features take
     from coursebuild.core.run.memory import Memory
     from coursebuild.core.syntax.fence import Fence
     from coursebuild.core.syntax.texts import TextParser
-else:  # so that `help` can show the signatures without importing these layers
-    Assets = ExportContext = Fence = Inputs = Library = Memory = PageContext = PageInputs = Any
-    Place = Renderer = SiteContext = TextParser = Any
+else:  # names that `help` can show, without importing these layers
+    Assets = NewType("Assets", object)
+    ExportContext = NewType("ExportContext", object)
+    Fence = NewType("Fence", object)
+    Inputs = NewType("Inputs", object)
+    Library = NewType("Library", object)
+    Memory = NewType("Memory", object)
+    PageContext = NewType("PageContext", object)
+    PageInputs = NewType("PageInputs", object)
+    Place = NewType("Place", object)
+    Renderer = NewType("Renderer", object)
+    SiteContext = NewType("SiteContext", object)
+    TextParser = NewType("TextParser", object)
 
 B = TypeVar("B", bound=FeatureBlock)
 

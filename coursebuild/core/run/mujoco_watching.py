@@ -117,7 +117,7 @@ class _Watch:
 
     def _hold(self, data: Any) -> None:
         self._data_by_id[id(data)] = data
-        size = sum(int(held.nbuffer) for held in list(self._data_by_id.values())[:_MOST_NOTES])
+        size = sum(int(item.nbuffer) for item in list(self._data_by_id.values())[:_MOST_NOTES])
         if len(self._data_by_id) > self._release_limit or size > _MOST_HELD:
             self._release_unused()
             self._release_limit = max(2, 2 * len(self._data_by_id))
