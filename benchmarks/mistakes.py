@@ -47,7 +47,7 @@ from coursebuild.core.model.results import ScriptJob, ScriptRun  # noqa: E402
 from coursebuild.core.pages import urls  # noqa: E402
 from coursebuild.core.pages.page_list import page_list  # noqa: E402
 from coursebuild.core.registry import unproven  # noqa: E402
-from coursebuild.core.run.runner import ScriptServer  # noqa: E402
+from coursebuild.core.run.script_server import ScriptServer  # noqa: E402
 from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
 from coursebuild.pipeline.judge import judge  # noqa: E402
 from coursebuild.pipeline.options import Options, open_store  # noqa: E402

@@ -1,4 +1,4 @@
-"""Compresses the files that pages of every course use: see `coursebuild/core/engine/prepared.py`.
+"""Compresses the files that pages of every course use: see `coursebuild/core/files/resources.py`.
 
     python site/prepare_copies.py FOLDER
 

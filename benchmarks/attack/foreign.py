@@ -17,8 +17,8 @@ import msgspec
 
 from benchmarks.attack.grounds import EDITED_LESSON, SECRET, Grounds, Try, Victim, all_files
 from coursebuild.core.engine.memo import HASH
-from coursebuild.core.files.changes import FileChange, journal_path
 from coursebuild.core.files.trust import seal, store_key, unseal
+from coursebuild.core.files.write import FileChange, journal_path
 from support.mortal_commands import Mortals
 from support.poisoned_values import mutate
 from support.workflows import git

@@ -22,8 +22,8 @@ from playwright.sync_api import sync_playwright
 from benchmarks.attack.grounds import MEGABYTES, SECONDS, SECRET, Grounds, Try
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob
-from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.sandbox import find_sandbox
+from coursebuild.core.run.script_server import ScriptServer
 from support.chromium import Browsers
 from support.hostile_svg import HARMLESS, HOSTILE, mutants
 from support.mortal_commands import Mortals

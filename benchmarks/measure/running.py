@@ -35,7 +35,7 @@ print(total)
 """
 RUNNER = """
 import pathlib, sys, time
-from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.engine.memo import Memo
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options

@@ -1,18 +1,27 @@
-"""Arguments of several commands.
+"""What several commands share: their arguments, and how they print what they have found.
 
-Entry points: `options_of`, from arguments to options; `add_lessons`, `add_format` and others, which
-declare arguments.
+Entry points: `add_lessons`, `add_format` and others, which declare arguments; `options_of`, from
+arguments to options; `print_report`; `run_unless_unchanged`.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import sys
+from collections.abc import Callable
+from typing import TextIO
 
+from msgspec.structs import replace
+
+from coursebuild.cli.output import CLEAN, FAILURE, terminal_style, write
+from coursebuild.cli.unchanged import Watcher, identify_command
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.registry import package_paths
 from coursebuild.core.run.sandbox import find_sandbox
 from coursebuild.pipeline.options import Options, find_course, open_store
 from coursebuild.pipeline.progress import Progress
+from coursebuild.report import Report, Style, render_report, unchanged_report
 
 
 def options_of(arguments: argparse.Namespace) -> Options:
@@ -128,3 +137,47 @@ def add_format(parser: argparse.ArgumentParser, *formats: str) -> None:
     parser.add_argument(
         "--format", choices=formats, default="text", help="how to print it (default: %(default)s)"
     )
+
+
+# --- what is printed
+
+
+def print_report(report: Report, form: str, options: Options) -> int:
+    """Write a report in one of its formats; return the status of the command."""
+    options.store.close()
+    return write(report_text(report, form, options), CLEAN if report.ok else FAILURE)
+
+
+def report_text(report: Report, form: str, options: Options) -> str:
+    """Return the report as it is printed; as text and if quiet, only what is wrong."""
+    if options.progress.quiet and form == "text":
+        if not report.diagnostics:
+            return ""
+        report = replace(report, scripts=(), labs=(), remarks=(), sensitivity=None)
+    return render_report(report, form, style_of(sys.stdout))
+
+
+def style_of(stream: TextIO | None) -> Style:
+    """The style of text on a stream."""
+    return Style(*terminal_style(is_terminal=stream is not None and stream.isatty()))
+
+
+def run_unless_unchanged(
+    arguments: argparse.Namespace,
+    outputs: tuple[str, ...],
+    work: Callable[[Options], Report],
+) -> int:
+    """Do the work; if it succeeds, the same command has nothing to do while nothing changes.
+
+    `outputs` are the folders that the command writes.
+    """
+    options = options_of(arguments)
+    command = identify_command(arguments.words)
+    watcher = None if command is None else Watcher(str(options.root), command)
+    report = work(options)
+    status = print_report(report, "text", options)
+    if watcher is not None and report.ok and report.depends is not None:
+        remark = f"nothing has changed since the last {arguments.words[0]}"
+        output = report_text(unchanged_report(report, remark), "text", options)
+        watcher.keep(output, (*report.depends, *package_paths()), outputs)
+    return status

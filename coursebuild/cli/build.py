@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from coursebuild.cli.arguments import add_running, add_sandbox, add_strict
-from coursebuild.cli.unchanged import run_unless_unchanged
+from coursebuild.cli.arguments import add_running, add_sandbox, add_strict, run_unless_unchanged
 from coursebuild.pipeline.build import build
 
 EXAMPLES = """\

@@ -13,9 +13,11 @@ from coursebuild.cli.arguments import (
     add_sandbox,
     add_strict,
     options_of,
+    print_report,
+    run_unless_unchanged,
+    style_of,
 )
-from coursebuild.cli.output import CLEAN, print_report, style_of, write
-from coursebuild.cli.unchanged import run_unless_unchanged
+from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.errors import UsageError
 from coursebuild.pipeline.check import check
 from coursebuild.pipeline.options import Options

@@ -1,27 +1,36 @@
-"""The list of commands, and the choice of one by the words of a command line.
+"""The list of commands, the choice of one by the words of a command line, and how it ends.
 
-Entry points: `run_command`; `known_commands`; `parser_of`, the argument parser of a command.
+Entry points: `run`; `known_commands`; `parser_of`, the argument parser of a command.
 
 A command is a name, a summary, and a module with `declare(parser)`, which adds its arguments, and
 `run(arguments)`, which gives the exit status. `EXAMPLES` of the module, if there, end its help.
 Features have further commands (`core.features.Command`). Only the module of the command that is
 run is imported.
+
+Ctrl-C and SIGTERM raise `KeyboardInterrupt` wherever the command is, so that it ends what it has
+begun. A library in C may make another exception of it, such as a failed import: the signal counts.
 """
 
 from __future__ import annotations
 
 import argparse
+import gc
 import importlib
 import re
-from collections.abc import Sequence
+import resource
+import signal
+import threading
+from typing import TYPE_CHECKING, NoReturn
 
-from coursebuild.cli.output import CLEAN, USAGE, say, write
-from coursebuild.core.files.errors import UsageError
+from coursebuild.cli.output import CLEAN, FAILURE, USAGE, fail, say, write
+from coursebuild.core.files.errors import (
+    EffectError,
+    PublishRefusedError,
+    UsageError,
+    lacking,
+)
 
-TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
-if TYPE_CHECKING:
-    from typing import NoReturn
-
+if TYPE_CHECKING:  # asking for the version loads nothing heavy
     from coursebuild.core.features import Command
 
 _OF_OTHER_TOOLS = {
@@ -32,6 +41,10 @@ _OF_OTHER_TOOLS = {
     "watch": "did you mean `serve`?",
 }
 """What to do instead of commands that other tools have."""
+_FILES_NEEDED = 64
+"""For pipes of processes, the store, event loops, and what scripts open."""
+_SIGNALS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+
 _OVERVIEW = """\
 usage: coursebuild [-C DIR] COMMAND ...
 
@@ -46,7 +59,61 @@ anywhere on the line:
 """
 
 
-def run_command(directory: str | None, words: Sequence[str]) -> int:
+def run(directory: str | None, words: list[str], *, alone: bool) -> int:
+    """Run the command that the words name, in a folder; return the exit status.
+
+    `alone`: the command is that of this process, which ends with it.
+    """
+    thresholds, handlers = gc.get_threshold(), {}
+    # The objects of a command live until its end, and hardly any are in cycles: collecting garbage
+    # takes time for nothing, most of all when the process ends.
+    gc.set_threshold(1_000_000 if alone else 200_000, 50, 50)
+    received: list[int] = []
+
+    def interrupt(number: int, frame: object) -> NoReturn:
+        received.append(number)
+        raise KeyboardInterrupt
+
+    try:
+        try:
+            if threading.current_thread() is threading.main_thread():
+                for number in _SIGNALS:
+                    if signal.getsignal(number) is not signal.SIG_IGN:  # as in the background
+                        handlers[number] = signal.signal(number, interrupt)
+            return _run_command(directory, words)
+        finally:
+            if not alone:
+                gc.set_threshold(*thresholds)
+            for number, handler in handlers.items():
+                signal.signal(number, signal.SIG_IGN if alone else handler)
+    except BaseException as error:
+        if not received and not isinstance(error, KeyboardInterrupt):
+            raise
+        number = signal.Signals(received[-1]) if received else signal.SIGINT
+        return say(128 + number, _SIGNALS[number])
+
+
+def _run_command(directory: str | None, words: list[str]) -> int:
+    limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    if limit < _FILES_NEEDED:
+        message = f"only {limit} files may be open at a time, and {_FILES_NEEDED} are needed"
+        return fail(FAILURE, message, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
+    try:
+        return _choose_command(directory, words)
+    except UsageError as error:
+        return fail(USAGE, str(error))
+    except PublishRefusedError as error:
+        return fail(USAGE, error.message, error.help)
+    except EffectError as error:
+        return fail(FAILURE, error.message, error.help)
+    except (MemoryError, OSError, RuntimeError) as error:
+        lack = lacking(error)
+        if lack is None:
+            raise
+        return fail(FAILURE, lack.message, lack.help)
+
+
+def _choose_command(directory: str | None, words: list[str]) -> int:
     """Run the command that the words name, in a folder; return the exit status.
 
     Raises:

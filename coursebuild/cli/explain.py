@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-from coursebuild.cli.arguments import add_format, options_of
-from coursebuild.cli.output import CLEAN, style_of, write
+from coursebuild.cli.arguments import add_format, options_of, style_of
+from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.resources import rules_page
 from coursebuild.core.registry import installed_features
 from coursebuild.core.text.rules import RULES

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from coursebuild.cli.arguments import add_running, options_of
-from coursebuild.cli.output import print_report
+from coursebuild.cli.arguments import add_running, options_of, print_report
 from coursebuild.core.registry import features
 from coursebuild.pipeline.export import export
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from coursebuild.cli.arguments import add_quiet, options_of
-from coursebuild.cli.output import print_report
+from coursebuild.cli.arguments import add_quiet, options_of, print_report
 from coursebuild.pipeline.extract import extract
 
 EXAMPLES = """\

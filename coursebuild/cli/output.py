@@ -1,19 +1,12 @@
 """What commands write to standard output and error, and their exit status.
 
-Entry points: `write`, `say`, `fail`; `print_report`, `report_text`.
+Entry points: `write`, `say`, `fail`; `terminal_style`.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-
-TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
-if TYPE_CHECKING:
-    from typing import TextIO
-
-    from coursebuild.pipeline.options import Options
-    from coursebuild.report import Report, Style
 
 CLEAN, FAILURE, USAGE, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 
@@ -57,32 +50,12 @@ def _discard_stdout() -> None:
     os.close(null)
 
 
-def print_report(report: Report, form: str, options: Options) -> int:
-    """Write a report in one of its formats; return the status of the command."""
-    options.store.close()
-    return write(report_text(report, form, options), CLEAN if report.ok else FAILURE)
-
-
-def report_text(report: Report, form: str, options: Options) -> str:
-    """Return the report as it is printed; as text and if quiet, only what is wrong."""
-    from msgspec.structs import replace
-
-    from coursebuild.report import render_report
-
-    if options.progress.quiet and form == "text":
-        if not report.diagnostics:
-            return ""
-        report = replace(report, scripts=(), labs=(), remarks=(), sensitivity=None)
-    return render_report(report, form, style_of(sys.stdout))
-
-
-def terminal_style(stream: TextIO | None) -> tuple[bool, int]:
-    """Return whether to use colours, and the number of columns.
+def terminal_style(*, is_terminal: bool) -> tuple[bool, int]:
+    """Return whether to use colours on a stream, and the number of its columns.
 
     Colours are used on a terminal, unless its user asks for none (https://no-color.org), and
     wherever the user asks for them (https://force-color.org).
     """
-    is_terminal = stream is not None and stream.isatty()
     is_capable = is_terminal and os.environ.get("TERM") != "dumb"
     colour = bool(is_capable or os.environ.get("FORCE_COLOR")) and not os.environ.get("NO_COLOR")
     if not is_terminal:
@@ -90,10 +63,3 @@ def terminal_style(stream: TextIO | None) -> tuple[bool, int]:
     import shutil
 
     return colour, shutil.get_terminal_size((100, 24)).columns
-
-
-def style_of(stream: TextIO | None) -> Style:
-    """The style of text on a stream."""
-    from coursebuild.report import Style
-
-    return Style(*terminal_style(stream))

@@ -7,8 +7,7 @@ import re
 import sys
 from typing import NoReturn
 
-from coursebuild.cli.arguments import add_running, options_of
-from coursebuild.cli.output import style_of
+from coursebuild.cli.arguments import add_running, options_of, style_of
 from coursebuild.preview.serve import serve
 
 EXAMPLES = """\

@@ -1,36 +1,56 @@
 """Recognizes a command that has nothing to do, before its arguments are parsed.
 
-Entry points: `previous_output`, what such a command prints; `run_unless_unchanged`, which stores
-it; `split_directory`, which finds the course's folder among the arguments.
+Entry points: `previous_output`, what such a command prints; `Watcher`, made before the work begins,
+whose `keep` records the state after it; `identify_command`; `split_directory`, which finds the
+course's folder among the arguments.
 
-A command is identified by its arguments as they were given, and by whatever else decides what it
-prints. Parsing arguments takes longer than looking at the files of a course; so a command that is
-spelled in another way counts as another command.
+1. A command is identified by its arguments as they were given, and by whatever else decides what it
+   prints. Parsing arguments takes longer than looking at the files of a course; so a command that
+   is spelled in another way counts as another command.
+2. It depends on whole folders (the course's, the tool's), on single files that scripts read, on the
+   folders that packages are installed in, and on its own outputs (the extracted scripts, the site).
+   One hash is taken over all of them: names, modes, sizes, times and inodes.
+3. The hash is kept only if nothing changed while the command worked, nor so shortly before that the
+   clock of the file system could not show it. In doubt the next run does all its work.
+
+A run with nothing to do loads only this module, so it imports little: paths are strings.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
+import stat
 import sys
+import time
+from collections.abc import Iterator
 
-from coursebuild.cli.output import print_report, report_text, terminal_style
-from coursebuild.core.engine.up_to_date import Watcher, unchanged
-from coursebuild.core.files.course_root import find_course_root
-
-TYPE_CHECKING = False  # without `typing`, see `coursebuild.cli`
-if TYPE_CHECKING:
-    import argparse
-    from collections.abc import Callable, Sequence
-
-    from coursebuild.pipeline.options import Options
-    from coursebuild.report import Report
+from coursebuild.cli.output import terminal_style
+from coursebuild.core.files.course_root import DECISIVE, FOLDERS, find_course_root, is_dropping
+from coursebuild.core.files.trust import (
+    FOREIGN,
+    find_store,
+    make_store,
+    replace_file,
+    seal,
+    store_key,
+    unseal,
+)
 
 _NO_CACHE = "--no-cache"
-_VARIABLES = ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_KEY", "COURSEBUILD_CACHE_SIZE")
+_ARGUMENT_VARIABLES = ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_KEY", "COURSEBUILD_CACHE_SIZE")
 """Environment variables that replace arguments."""
+_HEADER = "coursebuild up to date 1"
+_FINE = 50_000_000
+"""ns: a file changed longer ago than this would get another time by another change."""
+_COARSE = 2_100_000_000
+"""The same on a file system that counts whole milliseconds or longer."""
+_PACKAGES = ("site-packages", "dist-packages")
+"""What folders with installed packages are called."""
+_VARIABLES = (*DECISIVE, "PYTHONPATH", "VIRTUAL_ENV")
 
 
-def split_directory(all_words: Sequence[str]) -> tuple[str | None, list[str]]:
+def split_directory(all_words: list[str]) -> tuple[str | None, list[str]]:
     """Return the folder that `-C DIR` names, anywhere before `--`, and all other words."""
     directory, words = None, []
     rest = iter(all_words)
@@ -48,9 +68,9 @@ def split_directory(all_words: Sequence[str]) -> tuple[str | None, list[str]]:
     return directory, words
 
 
-def previous_output(directory: str | None, words: Sequence[str]) -> str | None:
+def previous_output(directory: str | None, words: list[str]) -> str | None:
     """Return what this command printed when all was as it is now; `None` if that is unknown."""
-    command = _identify_command(words)
+    command = identify_command(words)
     if command is None or _NO_CACHE in words:  # most commands store nothing
         return None
     try:
@@ -60,42 +80,167 @@ def previous_output(directory: str | None, words: Sequence[str]) -> str | None:
         return None
 
 
-def run_unless_unchanged(
-    arguments: argparse.Namespace,
-    outputs: tuple[str, ...],
-    work: Callable[[Options], Report],
-) -> int:
-    """Do the work; if it succeeds, the same command has nothing to do while nothing changes.
-
-    `outputs` are the folders that the command writes.
-    """
-    from coursebuild.cli.arguments import options_of
-
-    options = options_of(arguments)
-    command = _identify_command(arguments.words)
-    watcher = None if command is None else Watcher(str(options.root), command)
-    report = work(options)
-    status = print_report(report, "text", options)
-    if watcher is not None and report.ok and report.depends is not None:
-        from coursebuild.core.registry import package_paths
-        from coursebuild.report import unchanged_report
-
-        remark = f"nothing has changed since the last {arguments.words[0]}"
-        output = report_text(unchanged_report(report, remark), "text", options)
-        watcher.keep(output, (*report.depends, *package_paths()), outputs)
-    return status
-
-
-def _identify_command(words: Sequence[str]) -> tuple[str, ...] | None:
+def identify_command(words: list[str]) -> tuple[str, ...] | None:
     """The identity of a command; `None` where it cannot have one.
 
     The course is no part of it, since its folder holds what was printed.
     """
     relevant_words = [word for word in words if word != _NO_CACHE]
-    conditions = [*terminal_style(sys.stdout), *map(os.environ.get, _VARIABLES)]
-    if any("/" in w or os.sep in w or os.path.exists(w) for w in relevant_words):  # noqa: PTH110
+    is_terminal = sys.stdout is not None and sys.stdout.isatty()
+    style = terminal_style(is_terminal=is_terminal)
+    conditions = [*style, *map(os.environ.get, _ARGUMENT_VARIABLES)]
+    if any("/" in w or os.sep in w or os.path.exists(w) for w in relevant_words):
         try:
-            conditions.append(os.getcwd())  # noqa: PTH109  # from where paths are meant
+            conditions.append(os.getcwd())  # from where paths are meant
         except OSError:
             return None
     return (*relevant_words, *map(repr, conditions))
+
+
+class _UnclearError(Exception):
+    """Something here may have changed without a sign of it."""
+
+
+class Watcher:
+    """The state of what a command depends on, taken before it begins and when it is done."""
+
+    def __init__(self, root: str, command: tuple[str, ...]) -> None:
+        self.root = root
+        self.command = command
+        self.began = time.time_ns()
+        self.before = self._look([])
+
+    def keep(self, message: str, files: tuple[str, ...], outputs: tuple[str, ...]) -> bool:
+        """Record the state, if it is certainly the one that the command saw.
+
+        Args:
+            message: what a later run with nothing to do prints instead of working.
+            files: further files that the command depends on, absolute or relative to the root;
+                they need not exist.
+            outputs: the folders and files that the command made, likewise.
+
+        Returns:
+            Whether the state was recorded.
+        """
+        input_paths = sorted({os.path.join(self.root, path) for path in files})
+        output_paths = sorted(os.path.join(self.root, path) for path in outputs)
+        if any("\n" in path for path in (*input_paths, *output_paths)):
+            return False
+        if self.before is None or self._look([]) != self.before or self._look(input_paths) is None:
+            return False
+        try:
+            state = _state(self.root, [*input_paths, *output_paths])
+        except (OSError, _UnclearError):
+            return False
+        body = "\n".join((_HEADER, state, *input_paths, *output_paths, "", message))
+        data = body.encode("utf-8", "surrogateescape")
+        name = _name(self.command)
+        store, reason = find_store(self.root)
+        if reason and reason != FOREIGN:  # it is worth a warning, in the next run too
+            return False
+        path = os.path.join(store, name)
+        try:
+            make_store(store, self.root)
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            replace_file(path, seal(name, data, store_key(self.root)))
+        except OSError:
+            return False
+        return True
+
+    def _look(self, input_paths: list[str]) -> str | None:
+        """The state of the inputs; `None` where it is not reliable."""
+        try:
+            return _state(self.root, input_paths, self.began)
+        except (OSError, _UnclearError):
+            return None
+
+
+def unchanged(root: str, command: tuple[str, ...]) -> str | None:
+    """The message of the command's last run; `None` where anything has changed since."""
+    try:
+        name = _name(command)
+        store, reason = find_store(root)
+        if reason and reason != FOREIGN:
+            return None
+        with open(os.path.join(store, name), "rb") as file:
+            body = unseal(name, file.read(), store_key(root)) or b""
+        head, _, message = body.decode("utf-8", "surrogateescape").partition("\n\n")
+        header, *lines = head.split("\n")
+        if header != _HEADER:
+            return None
+        return message if _state(root, lines[1:]) == lines[0] else None
+    except (OSError, ValueError, _UnclearError):
+        return None
+
+
+def _state(root: str, input_paths: list[str], began: int | None = None) -> str:
+    """A hash over the stat of all that the command depends on.
+
+    Raises:
+        _UnclearError: there is a link to a folder, whose content is elsewhere; or a file was
+            changed after `began`, or so shortly before that its time proves nothing.
+        OSError: something cannot be read.
+    """
+    digest = hashlib.blake2b(digest_size=32)
+
+    def add(*parts: object) -> None:
+        digest.update("\0".join(map(str, (*parts, ""))).encode("utf-8", "surrogateescape") + b"\n")
+
+    add(sys.version, sys.executable, *(os.environ.get(name, "") for name in _VARIABLES))
+    installed = (folder for folder in sys.path if folder.endswith(_PACKAGES))
+    course = (os.path.join(root, name) for name in FOLDERS)
+    package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    source = os.path.dirname(package)
+    tool = [package]
+    if os.path.isdir(os.path.join(source, "site", "dist")):
+        tool += (os.path.join(source, n) for n in ("mjcourse", "templates", "site/dist"))
+    for path in (*installed, *course, *tool, *input_paths):
+        for parts in _rows(path, began):
+            add(*parts)
+    return digest.hexdigest()
+
+
+def _rows(path: str, began: int | None) -> Iterator[tuple[object, ...]]:
+    """What is at a path, a row each; a folder with everything in it."""
+    try:
+        status = os.stat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        yield path, "nothing"
+        return
+    if path.endswith(_PACKAGES):  # each package has a folder with its version in the name
+        yield path, status.st_mtime_ns, status.st_ino
+        return
+    if not stat.S_ISDIR(status.st_mode):
+        yield path, *_numbers(status, began)
+        return
+    folders = [path]
+    for folder in folders:
+        yield folder, "folder"
+        with os.scandir(folder) as entries:
+            contents = sorted(
+                (entry.name, entry) for entry in entries if not is_dropping(entry.name)
+            )
+        for name, entry in contents:
+            if entry.is_dir(follow_symlinks=False):
+                folders.append(entry.path)
+            elif not entry.is_symlink():
+                yield name, *_numbers(entry.stat(follow_symlinks=False), began)
+            elif entry.is_dir():
+                raise _UnclearError
+            else:
+                yield name, os.readlink(entry.path)
+                yield from _rows(entry.path, began)
+
+
+def _numbers(status: os.stat_result, began: int | None) -> tuple[int, ...]:
+    modified = status.st_mtime_ns
+    if began is not None and modified > began - (_FINE if modified % 1_000_000 else _COARSE):
+        raise _UnclearError
+    # With the time of the last change of any kind, as an edit may set the modification time back.
+    return status.st_mode, status.st_size, modified, status.st_ctime_ns, status.st_ino
+
+
+def _name(command: tuple[str, ...]) -> str:
+    """The name of the record of a command in the store."""
+    text = "\0".join(command).encode("utf-8", "surrogateescape")
+    return f"unchanged/{hashlib.blake2b(text, digest_size=32).hexdigest()}"

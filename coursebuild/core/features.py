@@ -49,24 +49,21 @@ if TYPE_CHECKING:  # types of the layers above, which functions of features take
     from coursebuild.core.run.script_environment import Interpreter
     from coursebuild.core.syntax.fence import Fence
     from coursebuild.core.syntax.texts import TextParser
-else:  # names that `help` can show, without importing the layers above
-    for name in (
-        "Assets",
-        "ExportContext",
-        "Fence",
-        "Inputs",
-        "Interpreter",
-        "Library",
-        "Memo",
-        "Memory",
-        "PageContext",
-        "PageInputs",
-        "Place",
-        "Renderer",
-        "SiteContext",
-        "TextParser",
-    ):
-        globals()[name] = NewType(name, object)
+else:  # names that `help` can show, without importing these layers
+    Assets = NewType("Assets", object)
+    ExportContext = NewType("ExportContext", object)
+    Fence = NewType("Fence", object)
+    Inputs = NewType("Inputs", object)
+    Interpreter = NewType("Interpreter", object)
+    Library = NewType("Library", object)
+    Memo = NewType("Memo", object)
+    Memory = NewType("Memory", object)
+    PageContext = NewType("PageContext", object)
+    PageInputs = NewType("PageInputs", object)
+    Place = NewType("Place", object)
+    Renderer = NewType("Renderer", object)
+    SiteContext = NewType("SiteContext", object)
+    TextParser = NewType("TextParser", object)
 
 B = TypeVar("B", bound=FeatureBlock)
 
@@ -187,7 +184,6 @@ class PageKind(Struct, frozen=True, kw_only=True):
 
     @property
     def path(self) -> str:
-        """Its site path."""
         return f"{self.name}/index.html"
 
 

@@ -24,13 +24,12 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.registry import losses_against
-from coursebuild.core.run.environments import (
+from coursebuild.core.run.packages import (
     check_other_version,
     latest_version,
     prepare_environment,
 )
-from coursebuild.core.run.script_environment import Interpreter
-from coursebuild.core.run.versions import engine_version, python_version
+from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
 from coursebuild.core.scripts.against import (
     RunStanding,
     judge,
@@ -168,7 +167,7 @@ class _Comparison(Struct):
         fresh: bool = False,
     ) -> dict[str, RunStanding]:
         """How the scripts do there, by path."""
-        from coursebuild.core.run.runner import ScriptServer
+        from coursebuild.core.run.script_server import ScriptServer
 
         options_there = replace(self.options, interpreter=interpreter)
         memory = options_there.memory(fresh=fresh)

@@ -36,7 +36,7 @@ from coursebuild.pipeline.reading import (
 )
 
 if TYPE_CHECKING:
-    from coursebuild.core.engine.workers import Workers
+    from coursebuild.core.engine.page_pool import Workers
     from coursebuild.core.pages.context import PageContext
     from coursebuild.core.pages.page_inputs import PageInputs
 
@@ -217,7 +217,7 @@ class Documents(Parser):
         first = tuple(islice(requests, max(_MIN_PARALLEL, self._jobs * _MIN_PARALLEL // 2)))
         requests = chain(first, requests)
         if self._workers is None and len(first) >= _MIN_PARALLEL and self._jobs > 1:
-            from coursebuild.core.engine.workers import Workers, can_fork
+            from coursebuild.core.engine.page_pool import Workers, can_fork
 
             # Before the stage begins, which may start a thread: a fork does not copy threads.
             if can_fork():

@@ -24,8 +24,8 @@ from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.dark import dark_colours, dark_drawing
 from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.library import Library
-from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.packages import distributions, module_files
+from coursebuild.core.run.script_environment import course_environment
 from coursebuild.pipeline.documents import Documents
 
 _DIGEST = hashlib.sha256().digest_size * 2

@@ -14,21 +14,21 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import SIZE, Memo
-from coursebuild.core.files.changes import undo_changes
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.errors import UsageError as UsageError
 from coursebuild.core.files.read import find_root
 from coursebuild.core.files.trust import FOLDER, FOREIGN
+from coursebuild.core.files.write import undo_changes
 from coursebuild.core.model import Course, Lesson, Owner
-from coursebuild.core.run.interpreter import course_environment
 from coursebuild.core.run.memory import Memory
+from coursebuild.core.run.script_environment import course_environment
 from coursebuild.core.text.diagnostics import did_you_mean, nearest
 from coursebuild.pipeline.progress import Progress
 
 if TYPE_CHECKING:
-    from coursebuild.core.run.runner import RunAll
     from coursebuild.core.run.sandbox import Sandbox
     from coursebuild.core.run.script_environment import Interpreter
+    from coursebuild.core.run.script_server import RunAll
 
 
 class Options(Struct, frozen=True):

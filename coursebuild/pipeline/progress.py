@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from coursebuild.report.terminal import clip
+from coursebuild.report.text import clip
 
 _INTERVAL = 0.1
 """Seconds between updates of the live line."""

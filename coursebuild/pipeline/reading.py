@@ -23,9 +23,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.checks.formulas import check_formulas, document_formulas
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.prepared import prepared_folder
 from coursebuild.core.engine.tool import step_key, typesetter_digest
-from coursebuild.core.files.resources import template_texts
+from coursebuild.core.files.resources import prepared_folder, template_texts
 from coursebuild.core.model import Document, document_scripts
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.summary import without_prose

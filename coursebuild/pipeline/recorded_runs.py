@@ -29,9 +29,9 @@ from coursebuild.core.run.dependencies import (
     inputs_of,
     state_changes,
 )
-from coursebuild.core.run.machine import machine
 from coursebuild.core.run.memory import States
 from coursebuild.core.run.run_record import RunRecord, record_of
+from coursebuild.core.run.script_environment import machine
 from coursebuild.core.scripts.extract import Extraction, jobs
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.numerics.reports.records import FOLDER

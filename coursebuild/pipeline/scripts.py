@@ -140,7 +140,7 @@ def _run(
     """Run scripts, the longest first, and remember what they did."""
     if not jobs_to_run:
         return ()
-    from coursebuild.core.run.runner import ScriptServer
+    from coursebuild.core.run.script_server import ScriptServer
 
     progress = options.progress
     last_runs = (memory.last_record(job.path) for job in jobs_to_run)

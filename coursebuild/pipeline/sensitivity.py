@@ -3,8 +3,8 @@
 Entry point: `measure(course, options, runs, documents)`.
 
 Scripts that use MuJoCo and print what is recorded run four times with their initial states moved
-(`core.run.initial_state_perturbation`), each with three times the time limit. `check` runs them a
-fifth time, with halved timesteps (`core.run.half_steps`). All runs are remembered like others.
+(`core.run.perturbation`), each with three times the time limit. `check` runs them a
+fifth time, with halved timesteps. All runs are remembered like others.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.model.sensitivity import HALVED_RUN, RUNS, Sensitivity
-from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.sensitivity import is_worth_moving, sensitivity
 from coursebuild.pipeline.options import Options

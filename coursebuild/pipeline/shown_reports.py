@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TypeVar
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model import Course, Declarations, MjcfModel
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.reports import Reports

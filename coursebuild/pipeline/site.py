@@ -17,11 +17,12 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.prepared import (
+from coursebuild.core.files.resources import (
+    Bundle,
     prepared_file,
     prepared_folder,
+    template_texts,
 )
-from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import (
     Course,
     HtmlBlock,

@@ -27,7 +27,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import check_writable, write_atomic
 from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
-from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.extract import extract

@@ -35,7 +35,7 @@ from coursebuild.core.model.results import (
 )
 from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.run.memory import Memory
-from coursebuild.core.run.versions import engine_version, python_version
+from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.core.scripts.bindings import BindingEvidence, document_bindings
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.extract import Extraction

@@ -28,7 +28,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptJob, ScriptRun
-from coursebuild.core.run.runner import OnFinish, RunAll, RunStoppedError, ScriptServer
+from coursebuild.core.run.script_server import OnFinish, RunAll, RunStoppedError, ScriptServer
 from coursebuild.core.scripts.bindings import BindingEvidence
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic

@@ -22,10 +22,9 @@ from msgspec.structs import replace
 
 from coursebuild.core.checks.course import check_document
 from coursebuild.core.checks.links import LinkTargets, link_targets
-from coursebuild.core.engine.prepared import prepared_folder
 from coursebuild.core.features import PublishedTrials
 from coursebuild.core.files.read import read_sources
-from coursebuild.core.files.resources import Bundle, template_texts
+from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Course, Document, Lesson, Owner, Page
 from coursebuild.core.model.results import Outcome, Results, ScriptJob, ScriptRun
 from coursebuild.core.pages import urls
@@ -33,7 +32,7 @@ from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.templates import TemplateFailure
 from coursebuild.core.registry import publish_trials
-from coursebuild.core.run.versions import engine_version, python_version
+from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.scripts.source_parts import shown_files

@@ -1,24 +1,192 @@
-"""Diagnostics and verdicts as text, JSON, JUnit, SARIF and CI annotations.
+"""Diagnostics and verdicts as text, and for machines: JSON, JUnit XML, SARIF 2.1.0, CI annotations.
 
-Entry points: `Report`, `render_report(report, format, style)`.
+Entry points: `Report`, `render_report(report, format, style)`; `FORMATS`, those for machines.
 """
 
 from __future__ import annotations
 
-from coursebuild.report.terminal import Style as Style
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from coursebuild.core.model.results import TrialLine
+from coursebuild.core.model.sensitivity import Sensitivity
+from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.rules import HELP, RULES
+from coursebuild.core.text.source import Span
+from coursebuild.core.text.xml import clean_xml
+from coursebuild.report.text import Style as Style
 from coursebuild.report.text import diagnostic_text as diagnostic_text
-from coursebuild.report.text import to_text
+from coursebuild.report.text import location, to_text
 from coursebuild.report.values import Report as Report
 from coursebuild.report.values import ScriptLine as ScriptLine
 from coursebuild.report.values import Summary as Summary
+from coursebuild.report.values import json_text, plain
 from coursebuild.report.values import summary_line as summary_line
 from coursebuild.report.values import unchanged_report as unchanged_report
 
 
 def render_report(report: Report, form: str, style: Style) -> str:
-    """Return the report as `text` or in a format of `machine`; ends in a newline, or is empty."""
-    if form == "text":
-        return to_text(report, style)
-    from coursebuild.report.machine import FORMATS
+    """Return the report as `text` or in a format of `FORMATS`; ends in a newline, or is empty."""
+    return to_text(report, style) if form == "text" else FORMATS[form](report)
 
-    return FORMATS[form](report)
+
+def to_json(report: Report) -> str:
+    """The report as one JSON object: `diagnostics`, `scripts`, `labs`, `summary`.
+
+    In the summary, `ran` counts the scripts run just now, `cached` those with a remembered result.
+    """
+    s = report.summary
+    summary = {"ok": report.ok, **plain(s), "ran": s.ran - s.cached, "seconds": round(s.seconds, 3)}
+    value: dict[str, Any] = {
+        "diagnostics": report.diagnostics,
+        "scripts": [_line_value(line) for line in report.scripts],
+        "labs": [_line_value(line) for line in report.labs],
+        "summary": summary,
+    }
+    if report.sensitivity is not None:
+        value["sensitivity"] = [
+            _sensitivity_value(sensitivity) for sensitivity in report.sensitivity
+        ]
+    return json_text(value)
+
+
+def _line_value(line: ScriptLine | TrialLine) -> dict[str, Any]:
+    value: dict[str, Any] = plain(line, unexported="no_python_export")
+    return value | {"seconds": round(line.seconds, 3)}
+
+
+def _sensitivity_value(s: Sensitivity) -> dict[str, Any]:
+    """The sensitivity of a script; an amplification without bounds is `null`."""
+    value: dict[str, Any] = plain(s, standing="status")
+    for name, rows in (("doubts", s.doubts), ("flips", s.flips)):
+        value[name] = [{"file": row.span.path, **plain(row)} for row in rows]
+    return {**value, "chaotic": s.chaotic}
+
+
+# --- JUnit
+
+
+def to_junit(report: Report) -> str:
+    """One test case for each script, lab, and file with diagnostics; errors are failures."""
+    suites = Element("testsuites")
+    suite = SubElement(suites, "testsuite", name="coursebuild")
+    for script in report.scripts:
+        case = _add_case(suite, f"lesson {script.lesson}", script.path, script.seconds)
+        if not script.did_run:
+            reason = f"needs {', '.join(script.missing)}" if script.missing else "not run"
+            SubElement(case, "skipped", message=reason)
+        elif script.status != "ok":
+            SubElement(case, "failure", type=script.status, message=script.status)
+    for lab in report.labs:
+        case = _add_case(suite, f"lesson {lab.lesson}", lab.name, lab.seconds)
+        if lab.status != "ok":
+            SubElement(case, "failure", type=lab.status, message=lab.status)
+    for path in dict.fromkeys(d.span.path for d in report.diagnostics):
+        case = _add_case(suite, "course", path, 0.0)
+        for d in report.diagnostics:
+            if d.span.path != path:
+                continue
+            if d.is_error:
+                message = clean_xml(f"{location(d.span)}: {d.message}")
+                element = SubElement(case, "failure", type=d.rule, message=message)
+            else:
+                element = SubElement(case, "system-out")
+            element.text = clean_xml(diagnostic_text(d, Style()))
+    suite.attrib |= {
+        "tests": str(len(suite)),
+        "failures": str(sum(case.find("failure") is not None for case in suite)),
+        "errors": "0",
+        "skipped": str(sum(case.find("skipped") is not None for case in suite)),
+        "time": f"{report.summary.seconds:.3f}",
+    }
+    indent(suites)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(suites, encoding="unicode")}\n'
+
+
+def _add_case(suite: Element, group: str, name: str, seconds: float) -> Element:
+    return SubElement(suite, "testcase", classname=group, name=name, time=f"{seconds:.3f}")
+
+
+# --- SARIF
+
+
+def to_sarif(report: Report) -> str:
+    """The report as SARIF 2.1.0; columns count code points."""
+    rule_names = sorted({d.rule for d in report.diagnostics})
+    rules = [
+        {
+            "id": name,
+            "shortDescription": {"text": RULES[name].summary},
+            "helpUri": HELP.format(name),
+            "defaultConfiguration": {"level": RULES[name].severity},
+        }
+        for name in rule_names
+    ]
+    run = {
+        "tool": {"driver": {"name": "coursebuild", "rules": rules}},
+        "columnKind": "unicodeCodePoints",
+        "results": [_result(d, rule_names.index(d.rule)) for d in report.diagnostics],
+    }
+    value = {
+        "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
+        "version": "2.1.0",
+        "runs": [run],
+    }
+    return json_text(value)
+
+
+def _result(d: Diagnostic, rule: int) -> dict[str, Any]:
+    result: dict[str, Any] = {
+        "ruleId": d.rule,
+        "ruleIndex": rule,
+        "level": d.severity,
+        "message": {"text": _message(d)},
+        "locations": [_location(d.span)],
+    }
+    related_locations = [
+        {**_location(note.span), "message": {"text": note.message}}
+        for note in d.notes
+        if note.span is not None
+    ]
+    return result | ({"relatedLocations": related_locations} if related_locations else {})
+
+
+def _location(span: Span) -> dict[str, Any]:
+    region = {
+        "startLine": span.line,
+        "startColumn": span.column,
+        "endLine": span.end_line,
+        "endColumn": span.end_column,
+    }
+    file = {"uri": span.path, "uriBaseId": "ROOT"}
+    return {"physicalLocation": {"artifactLocation": file, "region": region}}
+
+
+def _message(d: Diagnostic) -> str:
+    parts = (d.message, d.label, f"help: {d.help}" if d.help else "")
+    return "\n".join(part for part in parts if part)
+
+
+# --- annotations
+
+
+def to_annotations(report: Report) -> str:
+    """One workflow command for each diagnostic; CI services show it beside the changed lines."""
+    return "".join(
+        f"::{d.severity} file={_escape_property(d.span.path)},"
+        f"line={d.span.line},col={d.span.column},"
+        f"endLine={d.span.end_line},endColumn={d.span.end_column},"
+        f"title={_escape_property(d.rule)}::{_escape_data(_message(d))}\n"
+        for d in report.diagnostics
+    )
+
+
+def _escape_property(text: str) -> str:
+    return _escape_data(text).replace(":", "%3A").replace(",", "%2C")
+
+
+def _escape_data(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+FORMATS = {"json": to_json, "junit": to_junit, "sarif": to_sarif, "github": to_annotations}

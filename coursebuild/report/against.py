@@ -14,17 +14,17 @@ from coursebuild.core.model.results import Change, DriftKind
 from coursebuild.core.scripts.diff import shorten
 from coursebuild.core.scripts.findings import closeness
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.report.terminal import (
+from coursebuild.report.text import (
     BOLD,
     FAINT,
     GREEN,
     RED,
     YELLOW,
     Style,
+    location,
     visible,
     visible_lines,
 )
-from coursebuild.report.text import location
 from coursebuild.report.values import json_text, plain, plural
 
 _STATUSES = {
@@ -165,7 +165,8 @@ def _script(script: ScriptComparison, version: str, style: Style) -> list[str]:
 
 
 def _change(change: Change, engine: str) -> str:
-    recorded, printed = (_first_line(text) for text in (change.recorded, change.printed))
+    first_lines = (text.strip().split("\n")[0] for text in (change.recorded, change.printed))
+    recorded, printed = (shorten(line, _WIDTH) for line in first_lines)
     distance = closeness(change)
     match change.kind:
         case DriftKind.ROUNDING | DriftKind.NUMERIC:
@@ -178,10 +179,6 @@ def _change(change: Change, engine: str) -> str:
         case DriftKind.EXTRA:
             lines = change.printed.count("\n") + 1
             return f"{engine} printed {plural(lines, 'more line')} here: `{printed}`"
-
-
-def _first_line(text: str) -> str:
-    return shorten(text.strip().split("\n")[0], _WIDTH)
 
 
 def _summary(report: ComparisonReport, lost: int) -> str:

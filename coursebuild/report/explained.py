@@ -12,7 +12,7 @@ from typing import Literal
 from msgspec import Struct
 
 from coursebuild.core.text.rules import Rule
-from coursebuild.report.terminal import BOLD, FAINT, GREEN, YELLOW, Style, visible
+from coursebuild.report.text import BOLD, FAINT, GREEN, YELLOW, Style, visible
 from coursebuild.report.values import plural
 
 State = Literal["remembered", "would run", "norun"]
@@ -118,7 +118,11 @@ def _verdict(run: RunExplanation, style: Style) -> str:
 def _full_text(run: RunExplanation, style: Style) -> list[str]:
     lines = [f"{style.paint(visible(run.name), BOLD)} {_verdict(run, style)}"]
     lines += [f"  because {visible(reason)}" for reason in run.reasons]
-    lines.append(style.paint(f"  {_last_run(run)}", FAINT))
+    last = "not run yet on this machine"
+    if run.made is not None and run.seconds is not None:
+        time_text = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(run.made))
+        last = f"last run {time_text}, {run.seconds:.2f} s: {run.outcome}"
+    lines.append(style.paint(f"  of {run.owner}, {last}", FAINT))
     if run.depends:
         lines += ["", "its last result depends on:"]
         lines += [f"  {visible(line)}" for line in run.depends]
@@ -128,11 +132,3 @@ def _full_text(run: RunExplanation, style: Style) -> list[str]:
 def _short_text(run: RunExplanation, style: Style) -> list[str]:
     line = f"{visible(run.name)} {_verdict(run, style)}"
     return [line, *(f"  because {visible(reason)}" for reason in run.reasons)]
-
-
-def _last_run(run: RunExplanation) -> str:
-    owner = f"of {run.owner}"
-    if run.made is None or run.seconds is None:
-        return f"{owner}, not run yet on this machine"
-    time_text = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(run.made))
-    return f"{owner}, last run {time_text}, {run.seconds:.2f} s: {run.outcome}"

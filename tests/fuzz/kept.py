@@ -18,9 +18,9 @@ from msgspec import Struct
 from coursebuild.core.engine.manifest import KIND, MARKER
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.publish import publish
-from coursebuild.core.files.changes import journal_path, undo_changes
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.trust import FOLDER, seal, store_key
+from coursebuild.core.files.write import journal_path, undo_changes
 from coursebuild.core.model.results import CompileResult, OutputFile
 from coursebuild.core.run.run_record import from_bytes
 from coursebuild.core.syntax.document import parse_document

@@ -22,8 +22,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
-from coursebuild.report.terminal import Style
-from coursebuild.report.text import diagnostic_text
+from coursebuild.report.text import Style, diagnostic_text
 from support.fixture_cases import read_cases
 from support.plain_html import plain_html
 from support.random_lessons import KINDS

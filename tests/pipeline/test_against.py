@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.files.trust import store_key
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.script_environment import engine_version
 from support.scratch_course import CommandResult, Folder, Make, block, kill_at_end, wait_until_alone
 from support.waiting import wait_for_file
 

@@ -13,8 +13,8 @@ import msgspec
 import pytest
 
 from coursebuild.core.engine.manifest import MARKER
-from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.trust import seal
+from coursebuild.core.files.write import FileChange
 from support.editor import Editor
 from support.scratch_course import GOOD, Folder, Make, block
 from support.workflows import git

@@ -12,7 +12,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model import Declarations
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.numerics.reports.records import BENCH, DIET, STABILITY
 from coursebuild.pipeline.load import load_course

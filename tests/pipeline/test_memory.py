@@ -18,7 +18,7 @@ from coursebuild.core.run.dependencies import describe
 from coursebuild.core.run.memory import longest_first
 from coursebuild.core.scripts.sensitivity import amplification
 from coursebuild.report.explained import Explanation, RunExplanation, explanation_text
-from coursebuild.report.terminal import Style
+from coursebuild.report.text import Style
 from support.fake_runs import EMPTY_TRACE, JOB, MODEL_TRACE, PATH, SCRIPT, Desk
 from support.poisoned_values import mutations
 

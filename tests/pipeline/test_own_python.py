@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy
 import pytest
 
-from coursebuild.core.run.versions import engine_version, python_version
+from coursebuild.core.run.script_environment import engine_version, python_version
 from support.sandboxes import require_sandbox
 from support.scratch_course import Folder, Make, block
 

@@ -10,9 +10,8 @@ import pytest
 from markupsafe import Markup
 from msgspec.structs import replace
 
-from coursebuild.core.engine.prepared import prepared_folder
 from coursebuild.core.engine.tool import step_key
-from coursebuild.core.files.resources import Bundle, template_texts
+from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame
 from coursebuild.core.pages.library import Library

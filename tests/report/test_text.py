@@ -13,7 +13,7 @@ from coursebuild.report import (
     diagnostic_text,
     render_report,
 )
-from coursebuild.report.terminal import clip, visible
+from coursebuild.report.text import clip, visible
 
 
 def render(diagnostic: Diagnostic, width: int = 100) -> str:

@@ -29,7 +29,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.shared_cache import shared_cache
-from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.pipeline.judge import judge

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
-from coursebuild.core.run import runner
-from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run import script_server
+from coursebuild.core.run.script_server import ScriptServer
 from support.waiting import wait_for_file, wait_until
 
-SOURCE_TREE = Path(runner.__file__).parents[3]
+SOURCE_TREE = Path(script_server.__file__).parents[3]
 Run = Callable[..., ScriptRun]
 both_ways = pytest.mark.parametrize("server", ["forking", "spawning"], indirect=True)
 """Scripts are run forked from a server, and each with an interpreter of its own: a smoke test."""
@@ -21,7 +21,8 @@ forked_or_not = pytest.mark.parametrize("fork", [True, False], ids=["forked", "s
 TOOL = """
 import sys
 from pathlib import Path
-from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run import script_server
+from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.model.results import ScriptJob
 try:
     with ScriptServer(fork=sys.argv[2] == "True") as server:

@@ -40,6 +40,9 @@ T = TypeVar("T")
 class FolderPlace:
     """A folder, perhaps on a network file system.
 
+    Not by fsspec, which is an extra, and whose `file://` writes a file in place: another machine
+    would read half an entry.
+
     Paths in it are POSIX and relative. An exception of any kind means that the place failed.
     """
 

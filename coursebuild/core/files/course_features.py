@@ -39,7 +39,12 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
             tell(entry, error.message, "write it, as `coursebuild new feature NAME` does")
             continue
         imports |= _imported_modules(code)
-        feature = _run(entry.path, code)
+        # An unchanged file is not run again: that would define its classes anew, and blocks read
+        # earlier would no longer be instances of them.
+        last = _last.get(entry.path)
+        if last is None or last[0] != code:
+            last = _last[entry.path] = code, _run(entry.path, code)
+        feature = last[1]
         if isinstance(feature, str):
             tell(entry, feature)
         elif reason := find_clash(feature, (*installed_features(), *features)):
@@ -72,23 +77,12 @@ def _imported_modules(code: bytes) -> set[str]:
     return modules
 
 
-def _run(path: str, code: bytes) -> Feature | str:
-    """The feature of a file, or a message that says why there is none.
-
-    An unchanged file is not run again: that would define its classes anew, and blocks read earlier
-    would no longer be instances of them.
-    """
-    last = _last.get(path)
-    if last is None or last[0] != code:
-        last = _last[path] = code, _first_run(path, code)
-    return last[1]
-
-
 _last: dict[str, tuple[bytes, Feature | str]] = {}
 """By path: the code that was run last, and its feature or message."""
 
 
-def _first_run(path: str, code: bytes) -> Feature | str:
+def _run(path: str, code: bytes) -> Feature | str:
+    """The feature of a file, or a message that says why there is none."""
     module = ModuleType(f"course_{path.removesuffix('.py').replace('/', '.')}")
     module.__file__ = path
     sys.modules[module.__name__] = module  # where decoding looks for its classes

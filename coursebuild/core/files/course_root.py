@@ -1,6 +1,7 @@
-"""Where a course is, by strings and stat alone, since a run with nothing to do loads this module.
+"""Where a course is, and what decides its results beside its files.
 
-Entry points: `find_course_root`; `is_dropping`, for names that are not files of a course.
+Entry points: `find_course_root`; `is_dropping`, for names that are not files of a course. A run
+with nothing to do loads this module, so it works by strings and stat alone.
 """
 
 from __future__ import annotations
@@ -11,6 +12,20 @@ MAP = "content/course.toml"
 """The file that makes a folder a course."""
 FOLDERS = ("content", "features", "models", "mjcourse", "theme")
 """The folders that a course's author writes, and the library that a course may have."""
+DECISIVE = (
+    "MUJOCO_GL",
+    "MUJOCO_EGL_DEVICE_ID",
+    "PYOPENGL_PLATFORM",
+    "LD_LIBRARY_PATH",
+    "DYLD_LIBRARY_PATH",
+    "DYLD_FALLBACK_LIBRARY_PATH",
+    "CUDA_HOME",
+    "CUDA_PATH",
+    "CUDA_VISIBLE_DEVICES",
+    "NVIDIA_VISIBLE_DEVICES",
+    "NVIDIA_DRIVER_CAPABILITIES",
+)
+"""Environment variables that decide how scripts draw or compute something."""
 
 
 def is_dropping(name: str) -> bool:

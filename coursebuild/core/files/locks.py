@@ -1,13 +1,21 @@
-"""One writer at a time: locks that vanish with the process that holds them.
+"""Locks that vanish with the process that holds them, and temporary folders, which are locked.
 
 Entry points: `project_lock`, held by a command that writes into a course; `folder_lock`, held while
 a site is swapped; `try_lock` and `is_abandoned`, which tell whether the writer of a temporary file
-is alive.
+is alive; `temporary_folder`, `remove_folder`.
 
 A lock is an flock: killing its holder frees it at once, so no lock can be stale. Where a file
-system has none, as on some network drives, it is a file that names its holder; the next run takes
-over that of a process which is gone from this machine. Where the folder cannot be written, the work
-goes on without: every write of the tool is whole by itself.
+system has none, as on some network drives, it is filelock's file that names its holder; the next
+run takes over that of a process which is gone from this machine. Where the folder cannot be
+written, the work goes on without: every write of the tool is whole by itself. (filelock's own
+flocks would leave a file beside a site, cannot hold a folder, and do not say who has them.)
+
+1. A temporary folder is locked as long as the process that made it lives. So one that can be locked
+   is abandoned; it is removed by the next process that makes one, if it is the same user's.
+2. In a folder for temporary files others may put what they like. Only folders are removed that are
+   private to this user and have a name as given here, and only where nobody else can have moved
+   them there. Links are not followed.
+3. A new folder may be taken for an abandoned one before it is locked; then another one is made.
 """
 
 from __future__ import annotations
@@ -15,12 +23,16 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import functools
 import os
+import re
+import shutil
+import stat
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
+from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.trust import find_store, make_store
 
 _BUSY = frozenset({errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES})
@@ -56,66 +68,52 @@ def project_lock(
         on_wait: is called once, with a message, if another run has the lock.
         name: the name of the lock's file.
     """
-    folder = find_store(str(root.resolve()))[0]
-    with _hold_if_possible(_file_lock(root.resolve(), Path(folder, name), on_wait)):
+    root = root.resolve()
+    path = Path(find_store(str(root))[0], name)
+    named_file = path.with_name(f"{name}-held")
+    with _hold_if_possible(lambda: _lock_file(root, path, on_wait), named_file, on_wait):
         yield
 
 
 @contextlib.contextmanager
 def folder_lock(folder: Path) -> Iterator[None]:
     """Hold a folder locked while something in it is replaced, without leaving a file there."""
-    with _hold_if_possible(_folder_lock(folder)):
-        yield
 
-
-@contextlib.contextmanager
-def _hold_if_possible(lock: AbstractContextManager[None]) -> Iterator[None]:
-    """Hold a lock if it can be had; if the file system refuses, go on without."""
-    with contextlib.ExitStack() as stack:
-        with contextlib.suppress(OSError):
-            stack.enter_context(lock)
-        yield
-
-
-@contextlib.contextmanager
-def _folder_lock(folder: Path) -> Iterator[None]:
-    fd = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
-    try:
+    def lock() -> int:
+        fd = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
         if try_lock(fd) is False:
             fcntl.flock(fd, fcntl.LOCK_EX)
-        with nullcontext() if try_lock(fd) else _named_lock(folder / ".coursebuild-lock"):
-            yield
-    finally:
-        os.close(fd)
+        return fd
 
-
-@contextlib.contextmanager
-def _file_lock(root: Path, path: Path, on_wait: Callable[[str], None] | None) -> Iterator[None]:
-    fd = _lock_file(root, path, on_wait)
-    try:
-        named_file = path.with_name(f"{path.name}-held")
-        with nullcontext() if try_lock(fd) else _named_lock(named_file, on_wait):
-            yield
-    finally:
-        os.close(fd)
-
-
-@contextlib.contextmanager
-def _named_lock(path: Path, on_wait: Callable[[str], None] | None = None) -> Iterator[None]:
-    """Hold a file that names this process, where there are no locks."""
-    from filelock import SoftFileLock, Timeout
-
-    lock = SoftFileLock(path)
-    try:
-        lock.acquire(timeout=0)
-    except Timeout:
-        if on_wait is not None:
-            on_wait(f"{_waiting_message(str(lock.pid))} (if there is none, remove {path})")
-        lock.acquire()
-    try:
+    with _hold_if_possible(lock, folder / ".coursebuild-lock"):
         yield
-    finally:
-        lock.release()
+
+
+@contextlib.contextmanager
+def _hold_if_possible(
+    lock: Callable[[], int], named_file: Path, on_wait: Callable[[str], None] | None = None
+) -> Iterator[None]:
+    """Hold what `lock` opens and locks; if the file system refuses, go on without.
+
+    Where there are no locks, hold a file that names this process.
+    """
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):
+            fd = lock()
+            stack.callback(os.close, fd)
+            if not try_lock(fd):
+                from filelock import SoftFileLock, Timeout
+
+                named_lock = SoftFileLock(named_file)
+                try:
+                    named_lock.acquire(timeout=0)
+                except Timeout:
+                    if on_wait is not None:
+                        message = _waiting_message(str(named_lock.pid))
+                        on_wait(f"{message} (if there is none, remove {named_file})")
+                    named_lock.acquire()
+                stack.callback(named_lock.release)
+        yield
 
 
 def _lock_file(root: Path, path: Path, on_wait: Callable[[str], None] | None) -> int:
@@ -129,10 +127,11 @@ def _lock_file(root: Path, path: Path, on_wait: Callable[[str], None] | None) ->
                     on_wait(_waiting_message(os.pread(fd, 32, 0).decode("ascii", "replace")))
                     on_wait = None
                 fcntl.flock(fd, fcntl.LOCK_EX)
-            if _is_at(fd, path):
-                os.ftruncate(fd, 0)
-                os.pwrite(fd, f"{os.getpid()}\n".encode(), 0)
-                return fd
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(fd), path.stat()):
+                    os.ftruncate(fd, 0)
+                    os.pwrite(fd, f"{os.getpid()}\n".encode(), 0)
+                    return fd
         except BaseException:
             os.close(fd)
             raise
@@ -144,8 +143,88 @@ def _waiting_message(holder: str) -> str:
     return f"another coursebuild{process} is at work on this course; waiting for it"
 
 
-def _is_at(fd: int, path: Path) -> bool:
+# --- temporary folders
+
+
+_PREFIX = "coursebuild.tmp."
+_NAME = re.compile(re.escape(_PREFIX) + r"[a-z0-9_]{8}")
+_OPEN_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[str]:
+    """A new folder, removed at the end with everything in it.
+
+    Raises:
+        EffectError: there is no place for it.
+    """
+    import tempfile  # not above: processes that run scripts import this module, and not that
+
     try:
-        return os.path.samestat(os.fstat(fd), path.stat())
+        _remove_abandoned(tempfile.gettempdir())
+        while True:
+            folder = tempfile.mkdtemp(prefix=_PREFIX)
+            if (fd := _lock(folder)) is not None:
+                break
+    except OSError as error:
+        raise EffectError(f"there is no place for temporary files: {reason(error)}") from None
+    try:
+        yield folder
+    finally:
+        remove_folder(folder)
+        os.close(fd)
+
+
+def _lock(folder: str) -> int | None:
+    """Lock a new folder; `None` if another process has taken it for abandoned."""
+    try:
+        fd = os.open(folder, _OPEN_FOLDER)
+    except FileNotFoundError:
+        return None
+    if try_lock(fd) is not False and Path(folder).exists():
+        return fd
+    os.close(fd)
+    return None
+
+
+@functools.cache
+def _remove_abandoned(place: str) -> None:
+    """Remove the folders here that this user's processes have left; once in a process."""
+    with contextlib.suppress(OSError), os.scandir(place) as entries:
+        status, me = os.stat(place), os.geteuid()  # noqa: PTH116
+        is_shared = status.st_mode & _OTHERS_WRITE and not status.st_mode & stat.S_ISVTX
+        if is_shared or status.st_uid not in (0, me):
+            return  # others can move this user's folders
+        for entry in entries:
+            if _NAME.fullmatch(entry.name):
+                with contextlib.suppress(OSError):
+                    _remove_if_abandoned(entry.path, me)
+
+
+def _remove_if_abandoned(folder: str, me: int) -> None:
+    fd = os.open(folder, _OPEN_FOLDER)
+    try:
+        status = os.fstat(fd)
+        is_ours = status.st_uid == me and stat.S_IMODE(status.st_mode) == stat.S_IRWXU
+        if is_ours and try_lock(fd):
+            remove_folder(folder)
+    finally:
+        os.close(fd)
+
+
+def remove_folder(folder: str) -> None:
+    """Remove a temporary folder, even if a script has removed permissions in it."""
+    try:
+        os.rmdir(folder)  # noqa: PTH106 (mostly it is empty)
+        return
+    except FileNotFoundError:
+        return
     except OSError:
-        return False
+        pass
+    shutil.rmtree(folder, ignore_errors=True)
+    if Path(folder).exists():
+        with contextlib.suppress(OSError):
+            for parent, _, _ in os.walk(folder):
+                Path(parent).chmod(0o700)
+        shutil.rmtree(folder, ignore_errors=True)

@@ -2,18 +2,23 @@
 
 Entry points: `assets_dir`, the folder of what is bundled for browsers, and `Bundle`, its files;
 `templates_dir`, the folder of the pages' templates, and `template_texts`; `rules_page`, the page of
-all rules; `locked_requirements`, what the tool was tested with.
+all rules; `locked_requirements`, what the tool was tested with; `prepared_file`, by its key, and
+`prepared_folder`.
 
 An installed package holds all of them. In a source tree they are in `site/dist`, `templates`,
-`docs` and its root.
+`docs` and its root. The modules `site/prepare_*.py` make the prepared files (fonts cut to their
+usual characters, templates, copies) when site/dist is made. A file whose input has changed since
+then has another key, is not found, and is made during the build.
 """
 
 from __future__ import annotations
 
 import functools
+import json
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from coursebuild.core.files.errors import EffectError
 
@@ -118,3 +123,32 @@ def _find_folder(installed: Path, in_tree: Path, problem: str) -> Path:
         f"{problem}: there is no {installed}",
         help="in a source tree, run `make site`; otherwise install coursebuild again",
     )
+
+
+# --- what is prepared when the tool is made
+
+
+PREPARED = "prepared"
+"""Its name in the folder of the bundled files."""
+
+
+def prepared_folder() -> Path:
+    """The folder of the prepared files."""
+    return assets_dir() / PREPARED
+
+
+def prepared_file(kind: str, key: str) -> bytes | None:
+    """A prepared file by its kind and key: of `fonts` the result of a job, of `copies` a copy."""
+    file: str | None = _read_list(f"{kind}.json").get(key)
+    return None if file is None else (prepared_folder() / file).read_bytes()
+
+
+@functools.cache
+def _read_list(name: str) -> dict[str, Any]:
+    """The list of one kind of prepared files; empty in a bundle that was made without them."""
+    try:
+        text = (prepared_folder() / name).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return {}
+    files: dict[str, Any] = json.loads(text)
+    return files

@@ -25,7 +25,7 @@ from typing import Any, Self
 
 from coursebuild.core.engine.lifetime import bound_command
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.files.temporary import temporary_folder
+from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model import Limits
 from coursebuild.core.run.script_environment import clean_environment
 

@@ -229,7 +229,12 @@ class Memory:
         if not reason:
             assert run.outcome in STORABLE_OUTCOMES
             if self.fresh:
-                self._compare(record, run)
+                for before in self.results(inputs):
+                    if before.dependencies == dependencies:
+                        old = before.restore(states.places)
+                        is_same = old.outcome == run.outcome and old.status == run.status
+                        if not is_same or old.stdout != run.stdout:
+                            self.differing_runs.append((old, run))
             key = f"{group_key(inputs)}/{result_key(dependencies)}"
             self.store.put(_RESULTS, key, to_bytes(record, self.states.places), shared=True)
         self._note(record)
@@ -292,14 +297,6 @@ class Memory:
         data = to_bytes(replace(record, stored_run=run), ())
         if self.store.peek(_LAST, key, bytes) != data:
             self.store.put(_LAST, key, data)
-
-    def _compare(self, record: RunRecord, run: ScriptRun) -> None:
-        """Compare a run made afresh with what is remembered for the same dependencies."""
-        for before in self.results(record.inputs):
-            if before.dependencies == record.dependencies:
-                old = before.restore(self.states.places)
-                if (old.outcome, old.status, old.stdout) != (run.outcome, run.status, run.stdout):
-                    self.differing_runs.append((old, run))
 
 
 def _fits(record: RunRecord, inputs: Inputs) -> bool:

@@ -31,10 +31,10 @@ from coursebuild.core.engine.digests import SPECIAL, file_state
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.model import Limits
 from coursebuild.core.model.results import CompileResult, ModelFacts
-from coursebuild.core.run import mjcf_worker, mujoco_files
+from coursebuild.core.run import compile_main, mujoco_files
 from coursebuild.core.run.child import LIMITS, JsonChild
 from coursebuild.core.run.mujoco_files import ModelFiles
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.values import fingerprint
 
 _ONE = 0.5
@@ -112,7 +112,7 @@ def model_key(root: Path, path: str, text: str) -> str:
 @functools.cache
 def _code() -> tuple[bytes, ...]:
     """The code that compiles models and reads their facts."""
-    files = (__file__, mjcf_worker.__file__, mujoco_files.__file__)
+    files = (__file__, compile_main.__file__, mujoco_files.__file__)
     return tuple(Path(file).read_bytes() for file in files)
 
 
@@ -120,7 +120,7 @@ class _Compiler(JsonChild):
     """The child that compiles."""
 
     def __init__(self, root: Path, limits: Limits, python: str | None) -> None:
-        super().__init__(mjcf_worker.__file__, limits.models, python, memory=limits.memory)
+        super().__init__(compile_main.__file__, limits.models, python, memory=limits.memory)
         self.root = root
         self.seconds = self.left = limits.models
 
@@ -147,7 +147,9 @@ class _Compiler(JsonChild):
         if facts is not None:
             facts |= {"includes": existing_files(self.root, path, text)}
             return CompileResult("", facts=msgspec.convert(facts, ModelFacts))
-        message = self._without_paths(error.strip())
+        message = error.strip().replace(f"{self.root}/", "")  # as it would be on any machine
+        message = message.replace(f"models/{_TEXT_NAME}", _TEXT_NAME)
+        message = message.replace(f"'{_TEXT_NAME}'", "this text").replace(_TEXT_NAME, "this text")
         if _PARSER.search(message):
             return CompileResult(message, _line_of_xml_error(text) or error_line(message, text))
         if _NO_MEMORY.search(message):
@@ -157,11 +159,6 @@ class _Compiler(JsonChild):
     def _no_time_left(self) -> CompileResult:
         message = f"was not compiled: others took the {self.seconds:g} s that all may take"
         return CompileResult(message, timeout=True)
-
-    def _without_paths(self, message: str) -> str:
-        """The message as it would be on any machine."""
-        message = message.replace(f"{self.root}/", "").replace(f"models/{_TEXT_NAME}", _TEXT_NAME)
-        return message.replace(f"'{_TEXT_NAME}'", "this text").replace(_TEXT_NAME, "this text")
 
 
 def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ from collections.abc import Callable, Mapping
 from types import FrameType, ModuleType
 from typing import Any
 
-from coursebuild.core.run import initial_state_perturbation, mujoco_tracing
+from coursebuild.core.run import mujoco_tracing, perturbation
 
 DEEP = 1.0
 """A contact is deep where the smaller of two geoms has sunk in by more than this part of its
@@ -83,7 +83,7 @@ class _Watch:
         self._noted: set[tuple[int, str]] = set()
         data, wrap = mujoco.MjData, mujoco_tracing.wrap_method
         for name in ("__init__", "__setstate__"):
-            wrap(data, name, None, self._hold_new)
+            wrap(data, name, None, lambda args, keywords, result: self._hold(args[0]))
         for name in ("__copy__", "__deepcopy__"):
             wrap(data, name, None, lambda args, keywords, result: self._hold(result))
         spec = getattr(mujoco, "MjSpec", None)  # there was none before MuJoCo 3.2
@@ -106,30 +106,21 @@ class _Watch:
                 if text in message:
                     self._warned.add(kind)
                     time = message.rpartition("Time = ")[2].rstrip(". ")
-                    self._note(kind, "", time, self._model_at(time))
+                    # Of the model whose clock shows this time, if there is only one.
+                    all_data = list(self._data_by_id.values())
+                    names = {_name(data) for data in all_data if f"{data.time:.4f}" == time}
+                    self._note(kind, "", time, names.pop() if len(names) == 1 else "")
         except Exception:  # the script's own step must not fail for this
             pass
 
-    def _model_at(self, time: str) -> str:
-        """The name of the model whose clock shows this time, if there is only one."""
-        names = {
-            _name(data) for data in list(self._data_by_id.values()) if f"{data.time:.4f}" == time
-        }
-        return names.pop() if len(names) == 1 else ""
-
     # --- checks
-
-    def _hold_new(self, args: tuple[Any, ...], keywords: Mapping[str, Any], result: Any) -> None:
-        self._hold(args[0])
 
     def _hold(self, data: Any) -> None:
         self._data_by_id[id(data)] = data
-        if len(self._data_by_id) > self._release_limit or self._held_bytes() > _MOST_HELD:
+        size = sum(int(item.nbuffer) for item in list(self._data_by_id.values())[:_MOST_NOTES])
+        if len(self._data_by_id) > self._release_limit or size > _MOST_HELD:
             self._release_unused()
             self._release_limit = max(2, 2 * len(self._data_by_id))
-
-    def _held_bytes(self) -> int:
-        return sum(int(data.nbuffer) for data in list(self._data_by_id.values())[:_MOST_NOTES])
 
     def _release_unused(self) -> None:
         """Check and release data that nothing else refers to."""
@@ -146,7 +137,7 @@ class _Watch:
 
     def _check_finally(self, data: Any) -> None:
         self._check(data)
-        initial_state_perturbation.note_final_state(data)
+        perturbation.note_final_state(data)
 
     def _check(self, data: Any) -> None:
         """Note what is wrong with a simulation, once for each of them."""

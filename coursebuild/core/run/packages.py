@@ -1,10 +1,21 @@
-"""Which installed package, in which version, provides a module; nothing is imported to find out.
+"""The packages that scripts import: which are installed, and environments with others.
 
-Entry points: `InstalledPackages`; `distributions`, `module_files`, for archives of scripts.
+Entry points: `InstalledPackages`, which says which package in which version provides a module,
+importing nothing; `distributions`, `module_files`, for archives of scripts.
+`prepare_environment` makes an environment with another version of MuJoCo and, apart from that, the
+packages installed here; `check_other_version`, for what the user names; `latest_version`, the one
+that pip finds.
 
 Reading what each distribution provides takes a quarter of a second, so the whole map is stored
 under the names in the folders with installed packages, which say their versions. A module that no
 distribution names, and one of this tool's own, is identified by the content of its files.
+
+1. Environments lie in the user's own state folder, since what a course's folder holds is never run.
+   They are used again, for all courses. The ones used last are kept.
+2. A new one is made under a temporary name, and renamed when MuJoCo can be imported in it, so that
+   none is ever incomplete. What a killed process left is removed the next time.
+3. pip, as the user has configured it, installs MuJoCo with the packages that it consists of, and
+   nothing else. All other packages are used from where they are installed here.
 """
 
 from __future__ import annotations
@@ -14,17 +25,30 @@ import functools
 import hashlib
 import importlib.metadata
 import importlib.util
+import json
 import os
+import platform
+import re
+import shutil
+import signal
+import subprocess
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+import tempfile
+import venv
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 
 import msgspec
 
 from coursebuild.core.engine.digests import file_state
+from coursebuild.core.engine.lifetime import bound_command
 from coursebuild.core.engine.memo import Memo
+from coursebuild.core.files.errors import EffectError, UsageError, reason
+from coursebuild.core.files.locks import folder_lock
+from coursebuild.core.files.trust import TEMPORARY, state_folder
 from coursebuild.core.model.results import OutputFile
+from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
 
 ABSENT = ""
 _TOOL_PACKAGE = "coursebuild"
@@ -114,7 +138,8 @@ def _map_distributions(store: Memo, folders: Sequence[str]) -> Mapping[str, str]
     """The distributions, with versions, of each top-level module in these folders."""
     key = hashlib.sha256(repr((sys.version, *map(_names, folders))).encode()).hexdigest()
     # It is no result of the course, so that `--no-cache` does not make it again.
-    names = store.peek("installed", key, _read)
+    decode = functools.partial(msgspec.json.decode, type=dict[str, str])
+    names = store.peek("installed", key, decode)
     if names is None:
         names = _scan(folders)
         store.put_value("installed", key, names)
@@ -127,10 +152,6 @@ def _names(folder: str) -> list[str]:
         return sorted(os.listdir(folder))  # noqa: PTH208
     except OSError:
         return []
-
-
-def _read(data: bytes) -> dict[str, str]:
-    return msgspec.json.decode(data, type=dict[str, str])
 
 
 def _scan(folders: Sequence[str]) -> dict[str, str]:
@@ -159,3 +180,200 @@ def _modules(distribution: importlib.metadata.Distribution) -> set[str]:
         elif len(file.parts) == 1 and file.suffix in (".py", ".so", ".pyd"):
             modules.add(first.split(".")[0])
     return modules
+
+
+# --- environments with other versions
+
+
+_FOLDER = "environments"
+_MAX_ENVIRONMENTS = 4
+"""Environments that are kept."""
+_VERSION = re.compile(
+    r"\d+(\.\d+){0,3}((a|b|rc)\d+)?(\.post\d+)?(\.dev\d+)?(\+[a-z0-9.]+)?", re.ASCII
+)
+_ENGINE = "mujoco"
+_INSTALL = ("install", "--no-deps", "--no-input", "--progress-bar", "off", "--only-binary", ":all:")
+_LINES = 4
+"""The most lines of pip's that an error quotes."""
+_OFFLINE = (
+    "without a network let pip find the wheels in a folder, by the environment variables "
+    "PIP_FIND_LINKS and PIP_NO_INDEX"
+)
+
+
+def check_other_version(text: str) -> str:
+    """The version of MuJoCo that a text names, which must not be the one installed here.
+
+    Raises:
+        UsageError: it is no version, or the one installed here.
+    """
+    if not _VERSION.fullmatch(text):
+        raise UsageError(f"--against: {text!r} is not a version of MuJoCo, such as 3.13.0")
+    if _without_zeros(text) == _without_zeros(engine_version()):
+        raise UsageError(f"--against: MuJoCo {engine_version()} is the version installed here")
+    return text
+
+
+def latest_version() -> str:
+    """The newest version of MuJoCo that pip, as the user has configured it, would install here.
+
+    Raises:
+        EffectError: it finds none.
+    """
+    _require_pip()
+    pip = [sys.executable, "-m", "pip", *_INSTALL, "--dry-run", "--ignore-installed", "--quiet"]
+    status, output = _run([*pip, "--report", "-", _ENGINE])
+    if status:
+        raise _pip_error("at all", output)
+    report, _ = json.JSONDecoder().raw_decode(output, output.index("{"))  # among pip's warnings
+    version: str = report["install"][0]["metadata"]["version"]
+    return version
+
+
+def _without_zeros(version: str) -> str:
+    """A version without trailing zeros: 3.13 for 3.13.0."""
+    return re.sub(r"(\.0)+(?=$|[a-z+]|\.(?:post|dev))", "", version)
+
+
+def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> Interpreter:
+    """The environment with this version of MuJoCo; made if it is not there.
+
+    Raises:
+        EffectError: it cannot be made.
+    """
+    parts = [sys.version, sys.base_prefix, site_folders()]
+    name = f"mujoco-{engine}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
+    state = state_folder(str(root))
+    if state is None:
+        raise EffectError(
+            f"there is no place for an environment with MuJoCo {engine}",
+            help="HOME or XDG_STATE_HOME gives one, outside of the course",
+        )
+    folder = Path(state, _FOLDER)
+    prefix = folder / name
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with folder_lock(folder):
+            for remains in folder.glob(f"{TEMPORARY}*"):
+                shutil.rmtree(remains, ignore_errors=True)
+            if not (prefix / "pyvenv.cfg").is_file():
+                say(f"installing MuJoCo {engine} into {prefix}")
+                _create_environment(prefix, engine)
+            os.utime(prefix)
+            _remove_unused(folder, prefix)
+    except OSError as error:
+        raise EffectError(f"{prefix.name} cannot be made: {reason(error)}") from None
+    return Interpreter(
+        name,
+        f"{prefix}/bin/python",
+        str(prefix),
+        sys.base_prefix,
+        python_version(),
+        engine,
+        (str(_packages(prefix)), *site_folders()),
+    )
+
+
+def _packages(prefix: Path) -> Path:
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    return prefix / "lib" / f"python{version}" / "site-packages"
+
+
+def _require_pip() -> None:
+    if importlib.util.find_spec("pip") is None:
+        raise EffectError(
+            "pip is not installed for this Python, and nothing can be installed without it",
+            help="run `python -m ensurepip`",
+        )
+
+
+def _create_environment(prefix: Path, engine: str) -> None:
+    _require_pip()
+    new = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=prefix.parent))
+    try:
+        venv.create(new, symlinks=True)
+        configured = Path(sys.prefix) / "pip.conf"
+        if configured.is_file():
+            shutil.copyfile(configured, new / "pip.conf")
+        python = str(new / "bin" / "python")
+        _install_engine(python, _packages(new), engine)
+        lines = (f"import site; site.addsitedir({folder!r})\n" for folder in site_folders())
+        (_packages(new) / "packages_of_here.pth").write_text("".join(lines))
+        status, output = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
+        if status:
+            message = f"MuJoCo {engine} cannot be imported beside the other packages of here"
+            output_lines = [line.strip() for line in output.splitlines() if line.strip()]
+            last_line = output_lines[-1] if output_lines else "no reason"
+            raise EffectError(f"{message}: {last_line}")
+        new.rename(prefix)
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
+
+
+def _install_engine(python: str, packages: Path, engine: str) -> None:
+    """Install MuJoCo, and the packages of its own that it requires, and theirs in turn."""
+    pip = [sys.executable, "-m", "pip", "--python", python, *_INSTALL]
+    requirements, installed = {f"{_ENGINE}=={engine}"}, set[str]()
+    while requirements:
+        status, output = _run([*pip, *sorted(requirements)])
+        if status:
+            raise _pip_error(engine, output)
+        installed |= requirements
+        requirements = _mujoco_requirements(packages) - installed
+
+
+def _mujoco_requirements(packages: Path) -> set[str]:
+    """The packages of MuJoCo's own that it requires, as `mujoco-core==4.0.0`."""
+    needs = {
+        need
+        for installed in importlib.metadata.distributions(path=[str(packages)])
+        for need in installed.requires or ()
+    }
+    return {need for need in needs if need.startswith(f"{_ENGINE}-") and "extra ==" not in need}
+
+
+def _pip_error(engine: str, output: str) -> EffectError:
+    """Why pip did not install this version of MuJoCo, mostly in its own words."""
+    if f"No matching distribution found for {_ENGINE}" in output:
+        host = f"Python {'.'.join(platform.python_version_tuple()[:2])} on {platform.machine()}"
+        return EffectError(f"pip finds no MuJoCo {engine} for {host}", help=_OFFLINE)
+    lines = [line.strip() for line in output.splitlines() if line.strip()]
+    errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
+    reasons = errors if errors != ["Exception:"] else lines[-1:]  # pip's own traceback
+    return EffectError(
+        f"pip cannot install MuJoCo {engine}: {'; '.join((reasons or lines)[-_LINES:])}"
+    )
+
+
+def _run(command: Sequence[str]) -> tuple[int, str]:
+    """Run a program: its status and output; an interrupt ends it with its children."""
+    # Variables for this process's Python, such as warnings as errors, would disturb pip's.
+    excluded = ("PYTHON", "PIP_TARGET", "PIP_PREFIX", "PIP_PYTHON")
+    outer = {name: value for name, value in os.environ.items() if not name.startswith(excluded)}
+    ours = {"PIP_USER": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1", "LC_ALL": "C.UTF-8"}
+    with subprocess.Popen(
+        bound_command(command),
+        env={"PIP_RETRIES": "1", **outer, **ours},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        encoding="utf-8",
+        errors="backslashreplace",
+        start_new_session=True,
+    ) as process:
+        try:
+            output, _ = process.communicate()
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.killpg(process.pid, signal.SIGKILL)
+            raise
+    return process.returncode, output
+
+
+def _remove_unused(folder: Path, current: Path) -> None:
+    """Remove all environments except those that were used last."""
+    rest = [path for path in folder.iterdir() if path != current]
+    rest.sort(key=lambda path: path.stat().st_mtime, reverse=True)
+    for path in rest[_MAX_ENVIRONMENTS - 1 :]:
+        shutil.rmtree(path, ignore_errors=True)

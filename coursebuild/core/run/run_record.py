@@ -1,6 +1,7 @@
-"""The result of a script as it is stored: what it depends on, and what it did.
+"""What a script did: the trace that its notes give, and its result as it is stored.
 
-Entry points: `RunRecord`, `to_bytes`, `from_bytes`.
+Entry points: `read_records`, from a `Tracer`'s records to a `Trace`; `RunRecord` with what it
+depends on, `to_bytes`, `from_bytes`.
 
 In a script's error output, paths of this machine are replaced by marks; when the record is read,
 the marks become the paths of the machine that reads it.
@@ -8,8 +9,11 @@ the marks become the paths of the machine that reads it.
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import re
+from collections import defaultdict
 from collections.abc import Iterable
 from typing import Annotated, TypeAlias
 
@@ -17,7 +21,15 @@ import msgspec
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model.results import Outcome, ScriptRun, Trace
+from coursebuild.core.model.results import (
+    Divergence,
+    Effect,
+    EffectKind,
+    Outcome,
+    ScriptRun,
+    Sign,
+    Trace,
+)
 from coursebuild.core.run.dependencies import Dependency, Inputs, Kind
 
 Moment: TypeAlias = Annotated[int, Meta(ge=0, lt=1 << 37)]
@@ -56,7 +68,9 @@ class RunRecord(
             modules=tuple(names[Kind.MODULE]),
             sought=tuple(names[Kind.SOUGHT]),
         )
-        stderr = _insert_places(self.stored_run.stderr, places)
+        stderr = self.stored_run.stderr
+        for name, folder in places if _MARK in stderr else ():
+            stderr = stderr.replace(f"{_MARK}{name}{_MARK}", folder.rstrip("/"))
         return replace(self.stored_run, stderr=stderr, cached=True, trace=trace)
 
 
@@ -104,7 +118,75 @@ def _replace_places(text: str, places: Iterable[tuple[str, str]]) -> str:
     return text
 
 
-def _insert_places(text: str, places: Iterable[tuple[str, str]]) -> str:
-    for name, folder in places if _MARK in text else ():
-        text = text.replace(f"{_MARK}{name}{_MARK}", folder.rstrip("/"))
-    return text
+# --- from notes to a trace
+
+
+def read_records(records: bytes, root: str, script: str) -> Trace:
+    """The trace that records hold, each of which ends with a null byte.
+
+    Args:
+        records: those of one script; see `tracing` for what they hold.
+        root: the project's folder, resolved.
+        script: the script's path relative to it.
+    """
+    top = root.rstrip("/")
+    values_by_kind: dict[str, list[str]] = defaultdict(list)
+    effects: list[Effect] = []
+    divergences: list[Divergence] = []
+    for record in records.decode("utf-8", "surrogateescape").split("\0"):
+        kind, value = record[:1], record[1:]
+        values_by_kind[kind].append(value)
+        with contextlib.suppress(ValueError):  # a killed script may leave half a record
+            if kind in ("w", "c"):
+                target, file, line = value.rsplit("\t", 2)
+                effects.append(Effect(EffectKind(kind), target, file, int(line)))
+            elif kind == "d":
+                sign, detail, time, model, path, line = value.split("\t")
+                depth, *geoms = detail.split("\x1f")
+                divergences.append(
+                    Divergence(Sign(sign), time, model, path, int(line), depth, tuple(geoms))
+                )
+    files = {_resolve(path, top) for path in values_by_kind["r"]}
+    inside = {path.removeprefix(f"{top}/") for path in files if path.startswith(f"{top}/")}
+    return Trace(
+        files=tuple(sorted(inside - {os.path.normpath(script)})),
+        folders=tuple(
+            sorted({_make_relative(folder, top) or "." for folder in values_by_kind["l"]})
+        ),
+        outside=tuple(sorted(path for path in files if not path.startswith(f"{top}/"))),
+        modules=tuple(sorted(set(values_by_kind["m"]))),
+        opaque=next(iter(values_by_kind["o"]), ""),
+        divergences=tuple(dict.fromkeys(divergences)),
+        effects=tuple(effects),
+        is_perturbed=bool(values_by_kind["p"]),
+        states=tuple(values_by_kind["s"]),
+        sought=_join_sought(values_by_kind["v"], top),
+    )
+
+
+def _make_relative(folder: str, top: str) -> str:
+    """A folder relative to the project's; empty for the project's own."""
+    return folder.removeprefix(top).lstrip("/")
+
+
+def _resolve(path: str, top: str) -> str:
+    """The path of a compiled module's source, or of the project's file that a link leads to."""
+    folder, _, name = path.rpartition("/")
+    if name.endswith(".pyc") and folder.endswith("/__pycache__"):
+        path = f"{folder.removesuffix('/__pycache__')}/{name.partition('.')[0]}.py"
+    if not path.startswith(f"{top}/"):
+        with contextlib.suppress(OSError):
+            resolved = os.path.realpath(path)
+            path = resolved if resolved.startswith(f"{top}/") else path
+    return path
+
+
+def _join_sought(records: Iterable[str], top: str) -> tuple[str, ...]:
+    """The modules that were looked for in vain, as `folder/{one,two}`."""
+    names_by_folder: dict[str, set[str]] = defaultdict(set)
+    for record in records:
+        folder, _, names = record.partition("\t")
+        names_by_folder[_make_relative(folder, top)].update(names.split(","))
+    return tuple(
+        f"{folder}/{{{','.join(sorted(n))}}}" for folder, n in sorted(names_by_folder.items())
+    )

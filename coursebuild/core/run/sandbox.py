@@ -2,7 +2,7 @@
 
 Entry points: `find_sandbox` and `examine_sandbox`, which try to start one; `Sandbox`.
 
-A supervisor runs in namespaces of its own, and (see `runner`) runs only one script, so that a
+A supervisor runs in namespaces of its own, and only one script (see `script_server`), so that a
 script that takes over its supervisor can falsify only its own result:
 
 1. It sees Python, what is installed for it, the system's libraries and the course, all read-only,
@@ -13,7 +13,7 @@ script that takes over its supervisor can falsify only its own result:
    of its own, of which it can make none. Its environment is that of scripts. System calls are
    filtered (`seccomp`), and its session keyring is new and empty (`sandbox_main`).
 3. Its supervisor is the first process, which no signal from inside reaches. What it takes in all is
-   limited from outside, by systemd where that is to be had, and by `sandbox_watching`.
+   limited from outside, by systemd where that is to be had, and by `script_worker`.
 4. It ends with the process that started it, and so does everything in it.
 """
 
@@ -34,23 +34,23 @@ from msgspec import Struct
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob, Trace
 from coursebuild.core.run.packages import site_folders
-from coursebuild.core.run.sandbox_watching import PROCESSES, SUPERVISOR_MEMORY, SandboxWatch
 from coursebuild.core.run.script_environment import Interpreter, library_folder
+from coursebuild.core.run.script_worker import PROCESSES, SUPERVISOR_MEMORY, SandboxWatch
 from coursebuild.core.run.seccomp import compile_filter
 
 SIZE = 1 << 30
 """Bytes that may be written, in memory."""
 PROGRAM = str(Path(__file__).with_name("sandbox_main.py"))
-_SYSTEM = (
-    *("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/nix/store", "/sys/devices/system/cpu"),
-    *("/etc/alternatives", "/etc/fonts", "/etc/ld.so.cache", "/etc/localtime"),
-)
+_SYSTEM = """
+/usr /bin /sbin /lib /lib32 /lib64 /nix/store /sys/devices/system/cpu
+/etc/alternatives /etc/fonts /etc/ld.so.cache /etc/localtime
+""".split()
 _PYTHON_PARTS = ("bin", "lib", "lib64", "pyvenv.cfg")
 """The parts that an interpreter needs of the folder that it is installed in."""
-_NAMESPACES = (
-    *("--unshare-all", "--unshare-user", "--disable-userns", "--cap-drop", "ALL", "--as-pid-1"),
-    *("--die-with-parent", "--new-session", "--clearenv", "--chdir", "/"),
-)
+_NAMESPACES = """
+--unshare-all --unshare-user --disable-userns --cap-drop ALL --as-pid-1
+--die-with-parent --new-session --clearenv --chdir /
+""".split()
 _HIDDEN = ("/proc/keys", "/proc/key-users", "/proc/timer_list", "/proc/kcore")
 """Files of the system that tell of what is outside."""
 _ALLOW = (

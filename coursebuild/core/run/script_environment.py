@@ -1,24 +1,35 @@
-"""The environment of processes that run scripts.
+"""Where scripts run: their environment, their interpreter, the versions and the machine.
 
-Entry points: `clean_environment`, `library_folder`, `wanted_packages`; `Interpreter`, one other
-than the tool's; `conditions` and `places`, on which results depend.
+Entry points: `clean_environment`, `library_folder`, `wanted_packages`; `conditions` and `places`,
+on which results depend; `engine_version`, `package_version` and others; `Interpreter`, one other
+than the tool's, as `course_environment` finds it where the map names one, by reading its files;
+`machine()`, as reports name it, and `one_processor()`, while something is timed. Nothing is
+imported to find a version, and nothing of an environment is run.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import json
 import os
 import platform
 import re
+import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import distributions
 from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.engine.up_to_date import DECISIVE
+from coursebuild.core.files.course_root import DECISIVE
+from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.model import Course, NamedPath
+from coursebuild.core.model.results import Machine
+from coursebuild.core.text.diagnostics import Parsed, diagnose
 
 _SAYS_NOTHING = (
     "PATH",
@@ -119,18 +130,13 @@ def conditions(
     values["Python"] = f"{platform.python_implementation()} {version}"
     if interpreter is not None and interpreter.name:
         values["environment"] = interpreter.name
-    values["platform"] = f"{sys.platform} {platform.machine()} {_c_library()}".strip()
+    c_library = ""  # whose mathematical functions Python uses
+    with contextlib.suppress(OSError, ValueError):
+        c_library = os.confstr("CS_GNU_LIBC_VERSION") or ""
+    values["platform"] = f"{sys.platform} {platform.machine()} {c_library}".strip()
     fixed = json.dumps(_FIXED, sort_keys=True).encode()
     values["the fixed environment of scripts"] = hashlib.sha256(fixed).hexdigest()[:12]
     return tuple(sorted(values.items()))
-
-
-def _c_library() -> str:
-    """The C library, whose mathematical functions Python uses."""
-    try:
-        return os.confstr("CS_GNU_LIBC_VERSION") or ""
-    except (OSError, ValueError):
-        return ""
 
 
 def places(
@@ -148,3 +154,162 @@ def places(
         "home": outer.get("HOME", ""),
     }
     return tuple(sorted(folders.items(), key=lambda item: (-len(item[1]), item[0])))
+
+
+# --- versions
+
+
+def python_version() -> str:
+    """The version of the interpreter that runs this tool and the scripts, such as `3.11.7`."""
+    return sys.version.split()[0]
+
+
+@functools.cache
+def engine_version() -> str:
+    """The version of the installed MuJoCo, such as `3.14.0`.
+
+    Raises:
+        EffectError: there is none.
+    """
+    version = version_in(sys.path, "mujoco")
+    if version is None:
+        raise EffectError(
+            "MuJoCo is not installed for this Python", help="run `pip install coursebuild` again"
+        )
+    return version
+
+
+def package_version(name: str, folders: Iterable[str] | None = None) -> str:
+    """The version of a distribution, here or in these folders; `none` where it is not installed."""
+    return version_in(sys.path if folders is None else folders, name) or "none"
+
+
+def version_in(folders: Iterable[str], name: str) -> str | None:
+    """The version of a distribution that is installed in one of these folders."""
+    installed = distributions(name=name, path=list(folders))
+    return next((distribution.version for distribution in installed), None)
+
+
+# --- the course's own environment
+
+
+_OLDEST = (3, 11)
+"""The oldest Python that can run the modules of this package."""
+_SETTING = re.compile(r"^(\w+) *= *(.*?) *$", re.MULTILINE)
+
+
+def course_environment(root: Path, course: Course) -> Parsed[Interpreter | None]:
+    """The environment that the map names, or why scripts cannot run there."""
+    named_path = course.python
+    if named_path is None:
+        return Parsed(None, ())
+    python = root / named_path.path
+    prefix = python.parent.parent
+    if not os.access(python, os.X_OK):
+        folder = named_path.path.rpartition("/bin/")[0]
+        help = f"make it: `python -m venv {folder}`, then install there what scripts import"
+        return _reject(named_path, f"there is no interpreter `{named_path.path}`", help)
+    try:
+        settings = dict(_SETTING.findall((prefix / "pyvenv.cfg").read_text("utf-8", "replace")))
+    except OSError as error:
+        message = (
+            f"`{named_path.path}` is not of a virtual environment: no pyvenv.cfg, {reason(error)}"
+        )
+        return _reject(named_path, message)
+    version_text = settings.get("version") or settings.get("version_info", "")
+    # Such as 3.12.1, or virtualenv's 3.12.1.final.0.
+    match = re.match(r"(\d+)\.(\d+)\.\d+", version_text)
+    major, minor = (int(match[1]), int(match[2])) if match is not None else (0, 0)
+    if match is None or (major, minor) < _OLDEST:
+        message = f"`{named_path.path}` is of Python {version_text}, and scripts need 3.11 or newer"
+        return _reject(named_path, message)
+    packages = str(prefix / "lib" / f"python{major}.{minor}" / "site-packages")
+    engine = version_in((packages,), "mujoco")
+    if engine is None:
+        required = course.engine or engine_version()
+        help = f"run `{named_path.path} -m pip install mujoco=={required}`"
+        return _reject(named_path, f"MuJoCo is not installed for `{named_path.path}`", help)
+    base = str(Path(settings.get("home", "")).parent)
+    interpreter = Interpreter("", str(python), str(prefix), base, match[0], engine, (packages,))
+    return Parsed(interpreter, ())
+
+
+def _reject(named_path: NamedPath, message: str, help: str = "") -> Parsed[Interpreter | None]:
+    return Parsed(None, (diagnose("script-python", named_path.span, message, help=help),))
+
+
+# --- the machine
+
+
+_INFO = Path("/proc/cpuinfo")
+_GOVERNOR = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
+_NAMES = ("model name", "Model", "Hardware", "cpu model", "uarch")
+"""The keys of the name in kernels for different processors, the best one first."""
+_CAN_PIN = hasattr(os, "sched_setaffinity")
+
+
+def machine(*, pinned: bool = False, interpreter: Interpreter | None = None) -> Machine:
+    """Versions, system and processor; `pinned`: times are taken on one processor alone.
+
+    `interpreter` is another one than runs the tool.
+
+    Raises:
+        EffectError: MuJoCo is not installed.
+    """
+    return Machine(
+        engine=engine_version() if interpreter is None else interpreter.engine,
+        python=python_version() if interpreter is None else interpreter.version,
+        numpy=package_version("numpy", None if interpreter is None else interpreter.packages),
+        system=f"{platform.system()} {platform.machine()}".strip(),
+        cpu=cpu_name(),
+        governor=_read(_GOVERNOR).strip(),
+        processors=len(os.sched_getaffinity(0)) if _CAN_PIN else os.cpu_count() or 0,
+        pinned=pinned and _CAN_PIN,
+    )
+
+
+@contextmanager
+def one_processor() -> Iterator[None]:
+    """Keep this thread on one of the processors that it may use, where the system can do that."""
+    if not _CAN_PIN:
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(before)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def cpu_name() -> str:
+    """What the processor calls itself; empty where it does not say."""
+    if platform.system() == "Darwin":
+        command = ["sysctl", "-n", "machdep.cpu.brand_string"]
+        try:
+            process = subprocess.run(command, capture_output=True, timeout=10, check=False)
+        except (OSError, subprocess.SubprocessError):
+            return ""
+        return _tidy(process.stdout.decode("utf-8", "replace"))
+    return find_cpu_name(_read(_INFO)) or _tidy(platform.processor())
+
+
+def find_cpu_name(text: str) -> str:
+    """The name in a text such as that of `/proc/cpuinfo`; empty where there is none."""
+    fields = [line.partition(":") for line in text.splitlines()]
+    for name in _NAMES:
+        for key, _, value in fields:
+            if key.strip() == name and value.strip():
+                return _tidy(value)
+    return ""
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text("utf-8", "replace")
+    except OSError:
+        return ""
+
+
+def _tidy(text: str) -> str:
+    return " ".join(text.split())[:100]

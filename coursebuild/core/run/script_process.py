@@ -1,7 +1,7 @@
 """Turn a process into a script that finds what a bare `python examples/x.py` finds, and is traced.
 
 Entry points: `PreloadedPackages`, the packages that are imported once for all scripts;
-`ScriptProcess`, which sets up this process; `worker_main` then executes the script.
+`ScriptProcess`, which sets up this process; `script_main` then executes the script.
 
 Only two things differ from a bare Python: there is one more frame below the script's own, and
 `sys.modules` holds modules of the standard library that the script has not imported.
@@ -27,10 +27,9 @@ from types import CodeType, ModuleType
 from typing import Any, TypedDict
 
 from coursebuild.core.run import (
-    half_steps,
-    initial_state_perturbation,
     mujoco_tracing,
     mujoco_watching,
+    perturbation,
 )
 from coursebuild.core.run.tracing import Tracer
 
@@ -68,8 +67,8 @@ class Job(TypedDict):
     memory: int
     """MiB that it may take."""
     perturbation: int
-    """The direction in which initial states are moved (`initial_state_perturbation`); 0: none;
-    −1: steps are halved (`half_steps`)."""
+    """The direction in which initial states are moved (`perturbation`); 0: none;
+    −1: steps are halved."""
 
 
 class PreloadedPackages:
@@ -202,9 +201,9 @@ class ScriptProcess:
         if job["perturbation"] and (mujoco := preloaded.module("mujoco")) is not None:
             numpy = preloaded.module("numpy")
             if job["perturbation"] < 0:
-                half_steps.install(mujoco, numpy)
+                perturbation.halve_steps(mujoco, numpy)
             else:
-                initial_state_perturbation.install(mujoco, numpy, job["perturbation"])
+                perturbation.perturb(mujoco, numpy, job["perturbation"])
         tracer.has_mujoco = preloaded.module("mujoco") is not None
         for name in [name for name in sys.modules if name.partition(".")[0] == "coursebuild"]:
             del sys.modules[name]

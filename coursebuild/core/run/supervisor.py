@@ -1,6 +1,6 @@
-"""The process that runs scripts for `runner` and cleans up after them.
+"""The process that runs scripts for `script_server` and cleans up after them.
 
-Entry point: `main`, called by the program `worker_main`.
+Entry point: `main`, called by the program `script_main`.
 
 It runs one script after another, each in a session of its own, so that
 
@@ -14,7 +14,7 @@ runs scripts in copies of itself. Where that is impossible, it starts this progr
 script. It has one thread, so that it may fork.
 
 The protocol: JSON objects, each after its length in 4 bytes; from the tool a `Job`, and back a
-`ChildReport` for each (see `workers`), after `STARTED` if there is something to wait for.
+`ChildReport` for each (see `script_worker`), after `STARTED` if there is something to wait for.
 
 In a sandbox this process is the first one, with number 1: signals from in there do not reach it,
 and nobody in there may look into it.
@@ -43,7 +43,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
 from coursebuild.core.engine.lifetime import end_with_parent
-from coursebuild.core.files.temporary import remove_folder
+from coursebuild.core.files.locks import remove_folder
 from coursebuild.core.run.script_process import (
     Job,
     PreloadedPackages,
@@ -61,14 +61,14 @@ from coursebuild.core.run.watching import (
 LENGTH = struct.Struct(">I")
 STARTED = LENGTH.pack(0)
 """What is sent when a script has been started."""
-PROGRAM = str(Path(__file__).with_name("worker_main.py"))
+PROGRAM = str(Path(__file__).with_name("script_main.py"))
 
 FIGURE_LIMIT = 4 << 20
 """Bytes that a figure may have."""
 _NOTES_BYTES = 1 << 20
 """The bytes of shared memory for a script's notes; further notes go to files."""
 _OUR_FRAME = re.compile(rb'  File "%s", line \d+ in <module>\n' % re.escape(os.fsencode(PROGRAM)))
-"""The frame of `worker_main` in Python's fault dumps, below the script's own frames."""
+"""The frame of `script_main` in Python's fault dumps, below the script's own frames."""
 _COUNTER = itertools.count()
 _PROCESSES = 4096
 """Processes of its user that a script in a sandbox may see started; the tool allows fewer."""
@@ -143,7 +143,10 @@ class _Supervisor:
             self.libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
             if os.getpid() == _FIRST:
                 self.libc.prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
-                _avoid_fork_server()
+                if sys.version_info >= (3, 14):  # Python's default listens at a socket in a folder
+                    from multiprocessing import context
+
+                    context._default_context._default_context = context._concrete_contexts["spawn"]
         os.chdir("/")
         self.scratch = ""
 
@@ -194,7 +197,12 @@ class _Supervisor:
             finally:
                 script.end()
             trace = _read_notes(script.shared, notes_folder(folder))
-            return _report_finished(script, trace, _read_figures(folder, job["figures"]))
+            stdout, stderr = script.stdout[:STDOUT_LIMIT], script.stderr[-STDERR_KEPT:]
+            figures = _read_figures(folder, job["figures"])
+            parts = bytes(stdout), _OUR_FRAME.sub(b"", bytes(stderr)), trace, *figures
+            status = script.exit_status()
+            outcome = script.limit or ("killed" if status < 0 else "failed" if status else "ok")
+            return _report(outcome, abs(status), script.seconds, parts=parts)
         finally:
             if folder and not isinstance(script, ScriptProcess):
                 remove_folder(folder)
@@ -254,17 +262,6 @@ class _Supervisor:
         if most == resource.RLIM_INFINITY or most > memory:
             resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
         os.chdir(job["root"])
-
-
-def _avoid_fork_server() -> None:
-    """Let processes be spawned by default in a sandbox.
-
-    Python's default since 3.14 is a server that listens at a socket in a folder.
-    """
-    if sys.version_info >= (3, 14):
-        from multiprocessing import context
-
-        context._default_context._default_context = context._concrete_contexts["spawn"]
 
 
 def _sibling_names(job: Job) -> frozenset[str]:
@@ -384,14 +381,6 @@ def _read_figures(folder: str, names: Sequence[str]) -> list[bytes | None]:
                     data = file.read(FIGURE_LIMIT + 1)
         figures.append(data)
     return figures
-
-
-def _report_finished(run: RunningScript, trace: bytes, figures: Sequence[bytes | None]) -> bytes:
-    stdout, stderr = bytes(run.stdout[:STDOUT_LIMIT]), bytes(run.stderr[-STDERR_KEPT:])
-    status = run.exit_status()
-    outcome = run.limit or ("killed" if status < 0 else "failed" if status else "ok")
-    parts = stdout, _OUR_FRAME.sub(b"", stderr), trace, *figures
-    return _report(outcome, abs(status), run.seconds, parts=parts)
 
 
 def _report_unstartable(text: str) -> bytes:

@@ -276,7 +276,10 @@ class MathEngine:
         request = json.dumps([{"tex": f.tex, "display": f.display} for f in formulas])
         seconds = _BATCH_SECONDS if len(formulas) > 1 else _SINGLE_SECONDS
         try:
-            self._isolate = self._isolate or Isolate(*_scripts())
+            if self._isolate is None:
+                temml = assets_dir() / "temml" / "temml.min.js"
+                scripts = (temml, Path(__file__).with_name("typeset.js"))
+                self._isolate = Isolate(*(path.read_text(encoding="utf-8") for path in scripts))
             replies = json.loads(self._isolate.call("typeset", request, seconds))
             yield from (_result(f, reply) for f, reply in zip(formulas, replies, strict=True))
         except LimitError as error:
@@ -288,24 +291,14 @@ class MathEngine:
                 yield MathError(f"the formula {error}", None)
 
 
-def _scripts() -> tuple[str, ...]:
-    paths = (assets_dir() / "temml" / "temml.min.js", Path(__file__).with_name("typeset.js"))
-    return tuple(path.read_text(encoding="utf-8") for path in paths)
-
-
 def _result(formula: Formula, reply: str | dict[str, Any]) -> str | MathError:
     if isinstance(reply, str):
         return reply
     position = reply["position"]
-    if position is not None:
-        position = _code_points(formula.tex, position)
+    if position is not None:  # in UTF-16 units
+        units = formula.tex.encode("utf-16-le", "surrogatepass")[: 2 * position]
+        position = len(units.decode("utf-16-le", "ignore"))
     return MathError(readable(reply["message"]), position)
-
-
-def _code_points(text: str, utf16: int) -> int:
-    """An offset in UTF-16 units as one in code points."""
-    units = text.encode("utf-16-le", "surrogatepass")[: 2 * utf16]
-    return len(units.decode("utf-16-le", "ignore"))
 
 
 _WORDING = (

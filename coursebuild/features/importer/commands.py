@@ -15,10 +15,9 @@ from textwrap import shorten
 
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import add_running, add_sandbox, available_cores
-from coursebuild.cli.output import print_report
-from coursebuild.core.files.changes import FileChange, undo_changes
+from coursebuild.cli.arguments import add_running, add_sandbox, available_cores, print_report
 from coursebuild.core.files.errors import UsageError
+from coursebuild.core.files.write import FileChange, undo_changes
 from coursebuild.core.model import Recording, Script
 from coursebuild.core.model.results import Change, Outcome, ScriptRun, Sign
 from coursebuild.core.pages.marks import fence

@@ -16,9 +16,9 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.files.changes import FileChange, change_files
 from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.read import read_bytes
+from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.pages.marks import fence
 from coursebuild.core.values import fingerprint
 from coursebuild.features.importer.blocks import convert_segment

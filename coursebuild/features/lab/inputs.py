@@ -13,7 +13,7 @@ from coursebuild.core.features import Trial
 from coursebuild.core.model import Course, find_blocks
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.dependencies import Inputs
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.source import key_of
 from coursebuild.features.lab.compile import LabModule, compile_lab
 from coursebuild.features.lab.engines.files import engine_digest, lab_digest

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from coursebuild.core.checks.compiled import line_span
 from coursebuild.core.run.mjcf import error_line, readable_error
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.lab.compile import LabCode
 from coursebuild.features.lab.model import MJCF, Entry, Lab

@@ -17,8 +17,7 @@ from msgspec import Struct
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.child import JsonChild
-from coursebuild.core.run.script_environment import Interpreter
-from coursebuild.core.run.versions import engine_version, python_version
+from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
 from coursebuild.core.text.source import key_of
 from coursebuild.features.names import introspect
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from coursebuild.core.files.changes import FileChange, change_files, journal_path, undo_changes
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.trust import seal, store_key
+from coursebuild.core.files.write import FileChange, change_files, journal_path, undo_changes
 
 
 def files(root: Path) -> dict[str, bytes]:

@@ -9,7 +9,7 @@ import pytest
 
 from coursebuild.core.files import resources
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.run import versions
+from coursebuild.core.run import script_environment
 
 
 @pytest.mark.parametrize("ask", [resources.assets_dir, resources.templates_dir])
@@ -52,6 +52,6 @@ def test_bundle_and_templates_are_read_by_their_paths(
 
 def test_no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "path", ["/nowhere"])
-    versions.engine_version.cache_clear()
+    script_environment.engine_version.cache_clear()
     with pytest.raises(EffectError, match="MuJoCo is not installed"):
-        versions.engine_version()
+        script_environment.engine_version()

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.files.temporary import temporary_folder
+from coursebuild.core.files.locks import temporary_folder
 from support.run_code import run_code
 from support.runners import SOURCE_TREE
 
-MAKE = "from coursebuild.core.files.temporary import temporary_folder\n"
+MAKE = "from coursebuild.core.files.locks import temporary_folder\n"
 HOLD = (
     f"{MAKE}import os, sys\n"
     "with temporary_folder() as folder:\n"

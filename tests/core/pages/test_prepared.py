@@ -12,8 +12,7 @@ from typing import Any
 import brotli
 import pytest
 
-from coursebuild.core.engine.prepared import FOLDER, prepared_file
-from coursebuild.core.files.resources import assets_dir, template_texts
+from coursebuild.core.files.resources import FOLDER, assets_dir, prepared_file, template_texts
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.assets import SCRIPTS, Assets, page_script
 from coursebuild.core.pages.compressed import compressed_files

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.model.results import ScriptRun
-from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.script_server import ScriptServer
 from support.runners import Run, job
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.core.files.errors import UsageError
-from coursebuild.core.run.environments import check_other_version
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.packages import check_other_version
+from coursebuild.core.run.script_environment import engine_version
 
 
 @pytest.mark.parametrize(

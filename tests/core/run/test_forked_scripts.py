@@ -15,13 +15,13 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.script_environment import (
     Interpreter,
     clean_environment,
     library_folder,
+    python_version,
 )
-from coursebuild.core.run.versions import python_version
+from coursebuild.core.run.script_server import ScriptServer
 from support.probe_scripts import FAILURES, PROBES
 from support.runners import job
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.core.run.machine import cpu_name, find_cpu_name, machine
+from coursebuild.core.run.script_environment import cpu_name, find_cpu_name, machine
 
 X86 = """\
 processor\t: 0

@@ -13,7 +13,7 @@ import pytest
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model import Limits
 from coursebuild.core.model.results import CompileResult, ModelFacts
-from coursebuild.core.run import mjcf, mjcf_worker
+from coursebuild.core.run import compile_main, mjcf
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.mjcf import TEXT_PATH, compile_all, model_files, readable_error
 from support.growth import processor_time_growth
@@ -293,15 +293,15 @@ BAD_WORKER = f"""\
 import sys
 sys.path.insert(0, {str(Path(mjcf.__file__).parents[3])!r})
 import ctypes, os
-from coursebuild.core.run import mjcf_worker
-really = mjcf_worker._compile
+from coursebuild.core.run import compile_main
+really = compile_main._compile
 def compile(mujoco, path, text):
     if 'crash' in text: ctypes.string_at(0)
     if 'exit' in text: os._exit(7)
     if 'noise' in text: print('noise'); os.write(1, b'noise')
     return really(mujoco, path, text)
-mjcf_worker._compile = compile
-mjcf_worker.main()
+compile_main._compile = compile
+compile_main.main()
 """
 
 
@@ -310,7 +310,7 @@ def test_a_compiler_that_crashes_or_cannot_be_loaded(
 ) -> None:
     worker = tmp_path / "worker.py"
     worker.write_text(BAD_WORKER)
-    monkeypatch.setattr(mjcf_worker, "__file__", str(worker))
+    monkeypatch.setattr(compile_main, "__file__", str(worker))
     good = "<mujoco model='noise'/>"
     results = texts(root, [good, "<!-- crash -->", good, "<!-- exit -->", good])
     assert [result.error for result in results] == [

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import pytest
 
 from coursebuild.core.model.results import ScriptJob, ScriptRun
-from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.script_environment import clean_environment
+from coursebuild.core.run.script_server import ScriptServer
 from support.model_files import TETRAHEDRON, png
 
 pytestmark = pytest.mark.site

@@ -18,9 +18,9 @@ import pytest
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import sandbox
-from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.sandbox import examine_sandbox, find_sandbox
 from coursebuild.core.run.script_environment import Interpreter
+from coursebuild.core.run.script_server import ScriptServer
 from support.runners import wait_until_ended
 from support.sandbox_probes import (
     CALLS,

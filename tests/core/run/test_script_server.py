@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.script_server import ScriptServer
 from support.runners import Run, job, wait_until_ended
 
 pytestmark = pytest.mark.site

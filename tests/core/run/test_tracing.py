@@ -14,7 +14,7 @@ import pytest
 
 from coursebuild.core.model.results import Trace
 from coursebuild.core.run import tracing
-from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.run.tracing import Tracer
 from support.runners import Run, both_ways, job, run_hanging
 

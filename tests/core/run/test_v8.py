@@ -368,7 +368,7 @@ class TestIsolate:
 
     def test_a_copy_of_a_process_in_which_v8_was_started_has_its_own(self) -> None:
         code = (
-            "from coursebuild.core.engine.workers import Workers, can_fork\n"
+            "from coursebuild.core.engine.page_pool import Workers, can_fork\n"
             "from coursebuild.core.run.v8 import MathEngine, start\n"
             "from coursebuild.core.model.results import Formula\n"
             "def typeset(tex):\n"

@@ -6,8 +6,7 @@ from coursebuild.core.model import Comparison
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.findings import drift_diagnostic
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.report.terminal import Style
-from coursebuild.report.text import diagnostic_text
+from coursebuild.report.text import Style, diagnostic_text
 from support.sample_lessons import EXACT, recording
 
 

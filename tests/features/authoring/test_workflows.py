@@ -16,7 +16,7 @@ from jsonschema import Draft7Validator
 
 from coursebuild import __version__
 from coursebuild.cli.commands import known_commands, parser_of
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.script_environment import engine_version
 from support.markdown_files import DOCS, ROOT, fences
 from support.sandboxes import require_sandbox
 from support.scratch_course import FIRST, SECOND, Folder

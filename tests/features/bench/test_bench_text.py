@@ -22,7 +22,7 @@ from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.bench import RowVerdict
 from coursebuild.numerics.reports.departures import Departure, RecordCheck
 from coursebuild.report import Style
-from coursebuild.report.terminal import Column, cells, table
+from coursebuild.report.text import Column, cells, table
 from support.bench_reports import awkward, row, scenario, scene
 from support.fixture_cases import check_text
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.run.machine import machine
+from coursebuild.core.run.script_environment import machine
 from coursebuild.features.bench.commands.bench.measuring import add_card
 from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.pipeline.scenes import find_scenes

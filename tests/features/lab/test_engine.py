@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from coursebuild.core.files.errors import EffectError
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.run.v8 import StoppedError
-from coursebuild.core.run.versions import engine_version
 from coursebuild.features.lab.engines import browser, files
 from coursebuild.features.lab.engines.browser import LabEngine
 from support.lab_values import BALL, Bench, make_lab, request

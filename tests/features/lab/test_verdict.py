@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.features.lab.reply import (
     Attempt,
     Parity,

@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Callable
 
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.script_environment import engine_version
 from support.scratch_course import Folder, block
 
 MakeCourse = Callable[..., Folder]

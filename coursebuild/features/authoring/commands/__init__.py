@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from coursebuild.cli.output import CLEAN, write
-from coursebuild.core.files.changes import FileChange, change_files
 from coursebuild.core.files.errors import UsageError
+from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.pipeline.progress import Progress
 
 

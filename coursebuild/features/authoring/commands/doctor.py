@@ -16,7 +16,8 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.cli.output import CLEAN, FAILURE, style_of, write
+from coursebuild.cli.arguments import style_of
+from coursebuild.cli.output import CLEAN, FAILURE, write
 from coursebuild.core.engine.memo import SIZE
 from coursebuild.core.files.course_root import find_course_root
 from coursebuild.core.files.errors import EffectError, UsageError
@@ -24,9 +25,9 @@ from coursebuild.core.files.locks import try_lock
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.files.trust import FOLDER, find_store, store_key
 from coursebuild.core.run.sandbox import examine_sandbox
-from coursebuild.core.run.versions import engine_version, python_version
+from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.features.lab.engines.browser import LabEngine
-from coursebuild.report.terminal import GREEN, RED, YELLOW, Style, visible
+from coursebuild.report.text import GREEN, RED, YELLOW, Style, visible
 
 EXAMPLES = """\
 examples:

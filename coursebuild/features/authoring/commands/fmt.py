@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 from coursebuild.cli.arguments import add_lessons, options_of
 from coursebuild.cli.output import CLEAN, FAILURE, fail, write
-from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.read import read_bytes
+from coursebuild.core.files.write import FileChange
 from coursebuild.core.model import Course, Lesson
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source

@@ -13,8 +13,8 @@ from jinja2 import Environment
 
 from coursebuild.cli.arguments import options_of
 from coursebuild.cli.output import CLEAN, write
-from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.errors import UsageError
+from coursebuild.core.files.write import FileChange
 from coursebuild.core.model.theme import TEMPLATES
 from coursebuild.core.registry import CORE_FENCES, features, fence_names
 from coursebuild.core.syntax.course_schema import slug_of

@@ -10,10 +10,10 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import options_of
 from coursebuild.cli.output import FAILURE, fail
-from coursebuild.core.files.changes import FileChange
 from coursebuild.core.files.course_root import FOLDERS
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.read import read_bytes, read_sources
+from coursebuild.core.files.write import FileChange
 from coursebuild.core.model import Course, Lesson
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.text.diagnostics import Edit, did_you_mean
@@ -23,8 +23,7 @@ from coursebuild.features.authoring.course_map import with_lesson_renamed
 from coursebuild.features.authoring.references import doubtful_places, rename_references
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import documents_by_name
-from coursebuild.report.terminal import visible
-from coursebuild.report.text import location
+from coursebuild.report.text import location, visible
 from coursebuild.report.values import plural
 
 EXAMPLES = """\

@@ -12,14 +12,14 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from coursebuild.cli.arguments import options_of
-from coursebuild.cli.output import CLEAN, FAILURE, style_of, write
+from coursebuild.cli.arguments import options_of, style_of
+from coursebuild.cli.output import CLEAN, FAILURE, write
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
     measurement_text,
 )
 from coursebuild.pipeline.options import Options
-from coursebuild.report.terminal import Style
+from coursebuild.report.text import Style
 
 
 def add_report_options(parser: argparse.ArgumentParser) -> None:

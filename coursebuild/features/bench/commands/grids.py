@@ -15,7 +15,7 @@ from coursebuild.core.files.resources import template_texts
 from coursebuild.core.pages.assets import strings_for
 from coursebuild.core.pages.strings import Strings
 from coursebuild.features.bench.figures import Grid
-from coursebuild.report.terminal import FAINT, Column, Style, table, visible
+from coursebuild.report.text import FAINT, Column, Style, table, visible
 
 _SUPERSCRIPTS = str.maketrans("-\u22120123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

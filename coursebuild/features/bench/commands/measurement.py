@@ -14,7 +14,7 @@ from msgspec import Struct
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports.departures import Departure, RecordCheck
 from coursebuild.numerics.reports.records import ReportFailure
-from coursebuild.report.terminal import (
+from coursebuild.report.text import (
     BOLD,
     FAINT,
     GREEN,
@@ -22,10 +22,10 @@ from coursebuild.report.terminal import (
     YELLOW,
     Column,
     Style,
+    diagnostic_paragraphs,
     table,
     visible,
 )
-from coursebuild.report.text import diagnostic_paragraphs
 from coursebuild.report.values import json_text, plural
 
 _T = TypeVar("_T")

@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from coursebuild.core.features import Trial, TrialContext
 from coursebuild.core.model import Course
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.values import fingerprint
 from coursebuild.features.lab.engines.files import lab_digest
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError

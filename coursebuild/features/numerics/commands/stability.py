@@ -18,8 +18,7 @@ import time
 from msgspec.structs import replace
 
 from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.run.machine import machine, one_processor
-from coursebuild.core.run.versions import engine_version
+from coursebuild.core.run.script_environment import engine_version, machine, one_processor
 from coursebuild.core.text.diagnostics import nearest
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.features.bench.commands.runs import MeasuringRun, write_records

@@ -13,7 +13,7 @@ from coursebuild.features.numerics.page import case_view
 from coursebuild.numerics.reports.cases import CaseReport, ErrorLine
 from coursebuild.numerics.reports.plot import case_quantities
 from coursebuild.numerics.reports.text import seconds_text, status_text
-from coursebuild.report.terminal import BOLD, Column, Style, table
+from coursebuild.report.text import BOLD, Column, Style, table
 
 
 def stability_text(reports: Sequence[CaseReport], style: Style) -> str:

@@ -26,8 +26,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.results import ScriptJob
 from coursebuild.core.model.scenarios import DeclaredSweep
-from coursebuild.core.run.machine import one_processor
-from coursebuild.core.run.runner import ScriptServer
+from coursebuild.core.run.script_environment import one_processor
+from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.runs import CannotMeasureError

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 from msgspec.structs import replace
 
 from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.run.machine import machine
+from coursebuild.core.run.script_environment import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.bench import measuring
 from coursebuild.features.bench.commands.measurement import Measurement

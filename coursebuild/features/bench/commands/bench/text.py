@@ -12,7 +12,7 @@ from coursebuild.features.bench.figures import Grid, machine_text, power
 from coursebuild.features.bench.scenarios import scenario_view
 from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport, WorkPrecisionRow
 from coursebuild.numerics.reports.sweep import SweepReport
-from coursebuild.report.terminal import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
+from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 
 _OWN_MARK, _FRONT_MARK = ">", "*"
 _INDENT = "  "

@@ -17,9 +17,9 @@ from typing import Any
 
 import mujoco
 
-from coursebuild.core.files.changes import FileChange, change_files
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import CourseFiles, read_bytes
+from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model import Course, MjcfModel
 from coursebuild.core.model.results import Machine
 from coursebuild.core.run.mjcf import TEXT_PATH, model_files

@@ -20,8 +20,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.files.read import CourseFiles, read_bytes
-from coursebuild.core.files.temporary import temporary_folder
 from coursebuild.core.model import Course, FeatureBlock, find_blocks
 from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.scripts.extract import extract

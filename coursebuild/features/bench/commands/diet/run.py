@@ -23,7 +23,7 @@ from msgspec.structs import replace
 from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_course
-from coursebuild.core.run.machine import machine
+from coursebuild.core.run.script_environment import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.diet.model import DietModel
 from coursebuild.features.bench.commands.diet.readers import Reruns

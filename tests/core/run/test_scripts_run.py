@@ -12,8 +12,8 @@ import pytest
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import Outcome
-from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.run.script_environment import clean_environment
+from coursebuild.core.run.script_server import ScriptServer
 from support.run_code import run_code
 from support.runners import SOURCE_TREE, TOOL, Run, both_ways, forked_or_not, job, run_hanging
 

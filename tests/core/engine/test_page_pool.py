@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.engine.workers import Workers, can_fork
+from coursebuild.core.engine.page_pool import Workers, can_fork
 from coursebuild.core.files.errors import EffectError
 from support.run_code import run_code
 from support.runners import wait_until_ended
@@ -98,7 +98,7 @@ def test_where_standard_input_is_closed() -> None:
     """A worker's pipe may then have the number of standard input."""
     code = (
         "import os\n"
-        "from coursebuild.core.engine.workers import Workers\n"
+        "from coursebuild.core.engine.page_pool import Workers\n"
         "with Workers(lambda task: os.getpid(), 2) as workers:\n"
         "    print(os.getpid() not in [p for p, _ in workers.map([(None, 1), (None, 2)])])\n"
     )
@@ -127,7 +127,7 @@ def test_a_signal_at_the_moment_of_a_fork_is_for_the_process_that_forks(
     """A terminal sends a signal to all of its processes; the worker gets it at once."""
     code = (
         "import os, signal, sys\n"
-        "from coursebuild.core.engine.workers import Workers\n"
+        "from coursebuild.core.engine.page_pool import Workers\n"
         "number = int(sys.argv[1])\n"
         "def heard(*_): print('heard by', os.getpid() == here, flush=True)\n"
         "here = os.getpid()\n"
@@ -162,7 +162,7 @@ def test_workers_end_with_the_process(number: signal.Signals, tmp_path: Path) ->
     script = tmp_path / "p.py"
     script.write_text(
         "import os\n"
-        "from coursebuild.core.engine.workers import Workers\n"
+        "from coursebuild.core.engine.page_pool import Workers\n"
         "def work(n):\n"
         "    os.write(1, b'%d\\n' % os.getpid())\n"
         "    while True: pass\n"

@@ -29,9 +29,10 @@ from typing import Self, TypeAlias
 from msgspec.structs import replace
 
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.files.temporary import temporary_folder
+from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run.packages import site_folders
+from coursebuild.core.run.run_record import read_records
 from coursebuild.core.run.sandbox import (
     Sandbox,
     copied_folders,
@@ -46,9 +47,8 @@ from coursebuild.core.run.script_environment import (
     wanted_packages,
 )
 from coursebuild.core.run.script_process import Job
-from coursebuild.core.run.trace_records import read_records
+from coursebuild.core.run.script_worker import ChildReport, Enclose, Worker
 from coursebuild.core.run.watching import STDERR_KEPT
-from coursebuild.core.run.workers import ChildReport, Enclose, Worker
 
 OnStart: TypeAlias = Callable[[str], object]
 """Called with the path of a script that begins."""

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.run.runner import RunStoppedError, ScriptServer
+from coursebuild.core.run.script_server import RunStoppedError, ScriptServer
 from support.runners import (
     SOURCE_TREE,
     TOOL,

@@ -9,6 +9,9 @@ Entry points: `Workers`, a context manager; `can_fork`, whether there can be any
 3. The task of a worker that died is done in this process. An exception in a worker is raised here.
 4. Workers are killed when the work is over, however it ends, and when this process is: they have
    nothing to save.
+
+Python's own `ProcessPoolExecutor` cannot reserve a task for the worker that remembers its document,
+gives up all tasks when one worker dies, and forks with a thread of its own beside it.
 """
 
 from __future__ import annotations

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -11,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.engine import up_to_date
-from coursebuild.core.engine.up_to_date import Watcher, unchanged
+from coursebuild.cli.unchanged import Watcher, unchanged
+from support.run_code import run_code
 from support.workflows import git
 
 COMMAND = ("build", "public")
@@ -217,22 +216,15 @@ def test_a_note_that_cannot_be_written_costs_only_time(
 
 def test_looking_imports_next_to_nothing() -> None:
     code = (
-        "import sys; import coursebuild.cli, coursebuild.cli.unchanged\n"
+        "import sys; before = set(sys.modules); import coursebuild.cli, coursebuild.cli.unchanged\n"
         "print(sorted(m for m in sys.modules if m.startswith('coursebuild.')))\n"
-        "large = {'argparse', 'collections', 'contextlib', 'pathlib', 're', 'typing'}\n"
-        "print(sorted(large & set(sys.modules)))\n"
+        "large = {'argparse', 'contextlib', 'pathlib', 'typing'}\n"
+        "print(sorted(large & set(sys.modules) - before))\n"
     )
-    process = subprocess.run(
-        [sys.executable, "-S", "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "PYTHONPATH": str(Path(up_to_date.__file__).parents[3])},
-    )
+    process = run_code(code)
     assert process.stdout.splitlines() == [
         "['coursebuild.cli', 'coursebuild.cli.output', 'coursebuild.cli.unchanged', "
-        "'coursebuild.core', 'coursebuild.core.engine', 'coursebuild.core.engine.up_to_date', "
-        "'coursebuild.core.files', 'coursebuild.core.files.course_root', "
+        "'coursebuild.core', 'coursebuild.core.files', 'coursebuild.core.files.course_root', "
         "'coursebuild.core.files.trust']",
         "[]",
     ]
