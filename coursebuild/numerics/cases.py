@@ -20,6 +20,7 @@ from msgspec.structs import asdict, astuple
 
 from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import DeclaredScenario
+from coursebuild.numerics.costs import Clock, scenario_job, time_jobs
 from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.engine import (
     EngineStates,
@@ -29,7 +30,7 @@ from coursebuild.numerics.engine import (
     refsafe_active,
     simulate,
 )
-from coursebuild.numerics.forward import forward_motion
+from coursebuild.numerics.integrate import forward_motion
 from coursebuild.numerics.measure import (
     energy_drift,
     errors,
@@ -51,7 +52,6 @@ from coursebuild.numerics.problem import (
     Sizes,
 )
 from coursebuild.numerics.problems import all_problems
-from coursebuild.numerics.reports.bench import Errors, OrderRow
 from coursebuild.numerics.reports.cases import (
     CaseReport,
     ErrorLine,
@@ -59,9 +59,9 @@ from coursebuild.numerics.reports.cases import (
     ReferenceLine,
     StepCost,
 )
+from coursebuild.numerics.reports.scene_report import Errors, OrderRow
 from coursebuild.numerics.scene import Scene, SceneError
 from coursebuild.numerics.stability import boundaries
-from coursebuild.numerics.timing import Clock, scenario_job, time_jobs
 from mjcourse.spatial import quat_conj, quat_mul
 
 _ENGINE = SecondReference("MuJoCo’s accelerations over the MJCF, DOP853", forward_motion)

@@ -41,21 +41,29 @@ from coursebuild.numerics.engine import (
     states_of,
     with_integrator,
 )
-from coursebuild.numerics.forward import Method, forward_states, tends_to
-from coursebuild.numerics.integrate import NoConvergenceError, bulirsch_stoer, dop853
+from coursebuild.numerics.integrate import (
+    Method,
+    NoConvergenceError,
+    bulirsch_stoer,
+    dop853,
+    forward_states,
+    tends_to,
+)
 from coursebuild.numerics.measure import (
+    Sticks,
     energy_drift,
     energy_scale,
     errors,
+    find_sticks,
     largest_errors,
     momentum_drift,
+    visible_error,
 )
-from coursebuild.numerics.observe import Sticks, find_sticks, visible_error
 from coursebuild.numerics.pilot import Pilot, position_distances
 from coursebuild.numerics.problem import ROUNDING, Integrator, Setup, Sizes
-from coursebuild.numerics.reports.bench import FLOORS
+from coursebuild.numerics.reports.scene_report import FLOORS
 from coursebuild.numerics.scene import ExactMotion, SceneError
-from coursebuild.numerics.settings import CONES
+from coursebuild.numerics.stability import CONES
 
 EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
 """Accelerations that a reference may take."""

@@ -23,6 +23,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import DeclaredSweep, SweepValue, Variation
+from coursebuild.numerics.costs import Clock, Job, scenario_job, time_jobs
 from coursebuild.numerics.engine import (
     EngineStates,
     advance,
@@ -32,7 +33,7 @@ from coursebuild.numerics.engine import (
     simulate,
     with_integrator,
 )
-from coursebuild.numerics.observe import (
+from coursebuild.numerics.measure import (
     Pair,
     contact_speeds,
     quantity_name,
@@ -42,9 +43,8 @@ from coursebuild.numerics.observe import (
 )
 from coursebuild.numerics.problem import Scenario, Setup
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.sweep import SweepReport, SweepRow
+from coursebuild.numerics.reports.scene_report import SweepReport, SweepRow
 from coursebuild.numerics.scene import Scene, SceneError, thickness
-from coursebuild.numerics.timing import Clock, Job, scenario_job, time_jobs
 
 THREADS = "threads"
 _PARAMETER = re.compile(r"(?P<kind>[a-z]+)(:(?P<name>.+))?\.(?P<field>\w+)(\[(?P<at>\d+)\])?")

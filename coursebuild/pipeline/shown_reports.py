@@ -22,10 +22,10 @@ from coursebuild.core.text.source import Source
 from coursebuild.numerics.reports import Reports
 
 if TYPE_CHECKING:  # a course without reports needs none of it
-    from coursebuild.numerics.reports.bench import SceneReport
     from coursebuild.numerics.reports.cases import CaseReport
     from coursebuild.numerics.reports.diet import DietReport
     from coursebuild.numerics.reports.records import ReportFailure, ReportKind
+    from coursebuild.numerics.reports.scene_report import SceneReport
 
     _Scene = TypeVar("_Scene", SceneReport, DietReport)
 

@@ -7,9 +7,9 @@ import functools
 import mujoco
 import pytest
 
-from coursebuild.numerics.bench import measure_scenario
-from coursebuild.numerics.reports.bench import ScenarioReport
+from coursebuild.numerics.reports.scene_report import ScenarioReport
 from coursebuild.numerics.scene import scenes
+from coursebuild.numerics.work_precision import measure_scenario
 from support.bench_runs import FAMILY, MODELS, orders, row
 from support.surveys import parse_declared
 

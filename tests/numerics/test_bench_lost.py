@@ -7,8 +7,8 @@ from typing import Any
 import mujoco
 import pytest
 
-from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.scene import SceneError, scenes
+from coursebuild.numerics.work_precision import measure_scenario
 from support.bench_runs import measure
 from support.surveys import NO_DECLARATIONS
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.numerics.front import FrontPoint, front, verdict
+from coursebuild.numerics.costs import FrontPoint, front, verdict
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.bench import WorkPrecisionRow
+from coursebuild.numerics.reports.scene_report import WorkPrecisionRow
 from support.bench_reports import diverged_row, row
 
 Point = tuple[float, float] | None

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coursebuild.numerics.engine import EngineStates
-from coursebuild.numerics.observe import find_sticks, measure_slip
+from coursebuild.numerics.measure import find_sticks, measure_slip
 from coursebuild.numerics.scene import Scene, scenes
 from support.surveys import NO_DECLARATIONS
 

@@ -8,10 +8,10 @@ from collections.abc import Callable
 import mujoco
 import pytest
 
+from coursebuild.numerics.costs import MIN_ROUNDS, Job, costs, time_jobs
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.bench import MeasuredSetting
+from coursebuild.numerics.reports.scene_report import MeasuredSetting
 from coursebuild.numerics.scene import scenes
-from coursebuild.numerics.timing import MIN_ROUNDS, Job, costs, time_jobs
 from support.surveys import NO_DECLARATIONS
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from coursebuild.numerics.reports import Interval, Reports
-from coursebuild.numerics.reports.bench import OrderRow, SceneCard, SceneReport
 from coursebuild.numerics.reports.cases import (
     BoundaryLine,
     CaseReport,
@@ -23,6 +22,7 @@ from coursebuild.numerics.reports.diet import (
     ModelPlace,
     Saving,
 )
+from coursebuild.numerics.reports.scene_report import OrderRow, SceneCard, SceneReport
 from support.bench_reports import FIRST, MACHINE, awkward, swing
 from support.bench_reports import row as row
 from support.bench_reports import scenario as scenario

@@ -21,9 +21,8 @@ from coursebuild.core.pages.marks import escape_marks, guard_lines
 from coursebuild.features.bench.figures import Grid, machine_text
 from coursebuild.features.bench.model import Bench, declared_scenarios
 from coursebuild.features.bench.scenarios import ScenarioView, plots, scenario_view
-from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.records import BENCH
-from coursebuild.numerics.reports.sweep import SweepReport
+from coursebuild.numerics.reports.scene_report import ScenarioReport, SceneReport, SweepReport
 
 if TYPE_CHECKING:
     from coursebuild.core.features import IndexReader, MarkdownWriter

@@ -26,15 +26,19 @@ from coursebuild.features.bench.figures import (
     power,
     sentence,
 )
-from coursebuild.numerics.reports.bench import (
+from coursebuild.numerics.reports.scene_report import (
+    FIGURES,
     FittedOrder,
     MeasuredRun,
     OrderRow,
     ScenarioReport,
     StableRow,
+    SweepReport,
+    SweepRow,
     WorkPrecisionRow,
+    cell,
+    shown_figures,
 )
-from coursebuild.numerics.reports.sweep import FIGURES, SweepReport, SweepRow, cell, shown_figures
 from coursebuild.numerics.reports.text import (
     FEWEST_STEPS,
     Quantity,

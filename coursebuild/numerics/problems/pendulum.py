@@ -17,7 +17,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.forward import forward_motion
+from coursebuild.numerics.integrate import forward_motion
 from coursebuild.numerics.problem import (
     Array,
     Motion,

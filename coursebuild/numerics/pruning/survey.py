@@ -25,6 +25,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import Keep
+from coursebuild.numerics.costs import Clock
 from coursebuild.numerics.pruning.candidates import (
     KINDS,
     Item,
@@ -56,7 +57,6 @@ from coursebuild.numerics.reports.diet import (
     TextEdit,
 )
 from coursebuild.numerics.scene import Scene
-from coursebuild.numerics.timing import Clock
 
 MIN_SPEEDUP = 1.05
 """The speedup from which on a finding that is not proved is worth a word."""

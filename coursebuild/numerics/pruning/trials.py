@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
+from coursebuild.numerics.costs import Clock, Timing, scenario_job, time_jobs
 from coursebuild.numerics.engine import STATE, advance, full_state, initial_data, silent
 from coursebuild.numerics.pruning.candidates import Item
 from coursebuild.numerics.pruning.compare import MotionComparison, compare, without_reset
@@ -30,7 +31,6 @@ from coursebuild.numerics.pruning.markup import Element
 from coursebuild.numerics.pruning.model_text import ModelText, model_bytes
 from coursebuild.numerics.reports.diet import Saving
 from coursebuild.numerics.scene import Scene
-from coursebuild.numerics.timing import Clock, Timing, scenario_job, time_jobs
 
 _T = TypeVar("_T")
 _DRAWS = 2

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 from msgspec import Struct, field
 
 if TYPE_CHECKING:  # a course without reports needs none of it
-    from coursebuild.numerics.reports.bench import SceneReport
     from coursebuild.numerics.reports.cases import CaseReport
     from coursebuild.numerics.reports.diet import DietReport
+    from coursebuild.numerics.reports.scene_report import SceneReport
 
 
 class Record(Struct, frozen=True, forbid_unknown_fields=True):

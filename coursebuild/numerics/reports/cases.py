@@ -13,7 +13,7 @@ from msgspec.structs import asdict
 
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Interval, Record
-from coursebuild.numerics.reports.bench import (
+from coursebuild.numerics.reports.scene_report import (
     MeasuredRun,
     OrderRow,
     ScenarioReport,

@@ -18,16 +18,16 @@ from typing import TypeAlias
 from msgspec import Struct
 
 from coursebuild.core.model.scenarios import BenchTable
-from coursebuild.numerics.reports.bench import (
+from coursebuild.numerics.reports.cases import CaseReport, FigureLine
+from coursebuild.numerics.reports.scene_report import (
     FLOORS,
     MeasuredRun,
     OrderRow,
     ScenarioReport,
     SceneReport,
     StableRow,
+    SweepReport,
 )
-from coursebuild.numerics.reports.cases import CaseReport, FigureLine
-from coursebuild.numerics.reports.sweep import SweepReport
 from coursebuild.numerics.reports.text import seconds_text, setting_text, status_text
 
 _STABLE = 0.01

@@ -17,7 +17,6 @@ import statistics
 from collections.abc import Iterator, Sequence
 
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.bench import FLOORS, ScenarioReport, WorkPrecisionRow
 from coursebuild.numerics.reports.cases import CaseReport
 from coursebuild.numerics.reports.chart import (
     NARROW_SIZE,
@@ -28,6 +27,7 @@ from coursebuild.numerics.reports.chart import (
     Point,
     chart_svg,
 )
+from coursebuild.numerics.reports.scene_report import FLOORS, ScenarioReport, WorkPrecisionRow
 from coursebuild.numerics.reports.strokes import Entry
 from coursebuild.numerics.reports.text import (
     INTEGRATORS,

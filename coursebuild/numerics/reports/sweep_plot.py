@@ -14,6 +14,14 @@ from itertools import groupby, pairwise
 from coursebuild.core.drawing.marks import shorten_to_width, text_width
 from coursebuild.core.drawing.scales import Scale, log
 from coursebuild.numerics.reports.chart import NARROW_SIZE, WIDE_SIZE
+from coursebuild.numerics.reports.scene_report import (
+    FIGURES,
+    SweepReport,
+    SweepRow,
+    cell,
+    figure_interval,
+    shown_figures,
+)
 from coursebuild.numerics.reports.strokes import (
     FINE,
     MARK,
@@ -31,14 +39,6 @@ from coursebuild.numerics.reports.strokes import (
     svg,
     symbol,
     symbols,
-)
-from coursebuild.numerics.reports.sweep import (
-    FIGURES,
-    SweepReport,
-    SweepRow,
-    cell,
-    figure_interval,
-    shown_figures,
 )
 
 _SPREAD = 20.0

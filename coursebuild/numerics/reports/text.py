@@ -11,7 +11,12 @@ from collections.abc import Iterable
 from msgspec import Struct
 
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.bench import FLOORS, MeasuredRun, MeasuredSetting, ScenarioReport
+from coursebuild.numerics.reports.scene_report import (
+    FLOORS,
+    MeasuredRun,
+    MeasuredSetting,
+    ScenarioReport,
+)
 
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
 """Integrators in the order in which they are shown, which also sets their colour and mark."""

@@ -19,8 +19,8 @@ from coursebuild.features.bench.commands.measurement import (
     measurement_json,
 )
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.bench import RowVerdict
 from coursebuild.numerics.reports.departures import Departure, RecordCheck
+from coursebuild.numerics.reports.scene_report import RowVerdict
 from coursebuild.report import Style
 from coursebuild.report.terminal import Column, cells, table
 from support.bench_reports import awkward, row, scenario, scene

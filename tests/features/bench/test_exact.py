@@ -8,7 +8,7 @@ import pytest
 
 from coursebuild.features.bench.commands.bench.measuring import compile_scene, run_scenario
 from coursebuild.features.bench.commands.runs import CannotMeasureError
-from coursebuild.numerics.reports.bench import ScenarioReport
+from coursebuild.numerics.reports.scene_report import ScenarioReport
 from coursebuild.pipeline.scenes import find_scenes
 from support.measured_course import write
 

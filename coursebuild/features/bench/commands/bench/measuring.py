@@ -31,17 +31,21 @@ from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.runs import CannotMeasureError
-from coursebuild.numerics.bench import measure_scenario
 from coursebuild.numerics.engine import silent
 from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.pruning.compare import watch
 from coursebuild.numerics.pruning.reachability import possible_pairs
-from coursebuild.numerics.reports.bench import ScenarioReport, SceneCard, SceneReport
 from coursebuild.numerics.reports.cases import exact_file
-from coursebuild.numerics.reports.sweep import SweepReport
+from coursebuild.numerics.reports.scene_report import (
+    ScenarioReport,
+    SceneCard,
+    SceneReport,
+    SweepReport,
+)
 from coursebuild.numerics.scene import EXACT_SCRIPT, ExactMotion, SceneError, scenes
 from coursebuild.numerics.scene import Scene as PhysicsScene
 from coursebuild.numerics.sweep import measure_sweep
+from coursebuild.numerics.work_precision import measure_scenario
 from coursebuild.pipeline.scenes import CourseScene
 
 _SECONDS = 20.0

@@ -23,10 +23,9 @@ from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.bench import measuring
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.features.bench.commands.runs import MeasuringRun, forbid_quick, write_records
-from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
 from coursebuild.numerics.reports.departures import RecordCheck, scene_departures
 from coursebuild.numerics.reports.records import BENCH, ReportFailure
-from coursebuild.numerics.reports.sweep import SweepReport
+from coursebuild.numerics.reports.scene_report import ScenarioReport, SceneReport, SweepReport
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.pipeline.shown_reports import read_record

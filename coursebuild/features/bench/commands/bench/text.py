@@ -10,8 +10,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from coursebuild.features.bench.commands.grids import english, grid_lines, plain_text
 from coursebuild.features.bench.figures import Grid, machine_text, power
 from coursebuild.features.bench.scenarios import scenario_view
-from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport, WorkPrecisionRow
-from coursebuild.numerics.reports.sweep import SweepReport
+from coursebuild.numerics.reports.scene_report import (
+    ScenarioReport,
+    SceneReport,
+    SweepReport,
+    WorkPrecisionRow,
+)
 from coursebuild.report.terminal import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 
 _OWN_MARK, _FRONT_MARK = ">", "*"

@@ -5,11 +5,11 @@ Entry point: `measure_scenario(model, scene, quick=…, clock=…, tell=…)`.
 1. A first run in small steps shows what acts in a scenario and how long its motion can be
    predicted (`pilot`).
 2. The reference is computed twice, in two ways (`references`).
-3. Every setting is run, judged and compared, then timed beside the model's own (`timing`). The
+3. Every setting is run, judged and compared, then timed beside the model's own (`costs`). The
    error of a lost run is not given; no other is below ten floors of the reference. Errors count to
    the horizon, and what should be conserved is watched to the end. Errors are also given as a
    learner sees them: how far bodies are displaced or turned in a picture, where 1 is just visible.
-4. Orders are fitted, stability limits looked for, the front drawn (`front`).
+4. Orders are fitted, stability limits looked for, the front drawn.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
+from coursebuild.numerics.costs import Clock, costs, front, verdict
 from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.engine import (
     EngineStates,
@@ -32,9 +33,16 @@ from coursebuild.numerics.engine import (
     refsafe_from,
     simulate,
 )
-from coursebuild.numerics.front import front, verdict
-from coursebuild.numerics.measure import energy_drift, errors, fit_orders, momentum_drift
-from coursebuild.numerics.observe import measure_slip, quantity_name, quantity_values, visible_error
+from coursebuild.numerics.measure import (
+    energy_drift,
+    errors,
+    fit_orders,
+    measure_slip,
+    momentum_drift,
+    quantity_name,
+    quantity_values,
+    visible_error,
+)
 from coursebuild.numerics.pilot import Pilot, run_pilot
 from coursebuild.numerics.problem import STANDARD, Sizes
 from coursebuild.numerics.references import (
@@ -44,7 +52,7 @@ from coursebuild.numerics.references import (
     find_references,
     mean_late_energy,
 )
-from coursebuild.numerics.reports.bench import (
+from coursebuild.numerics.reports.scene_report import (
     FLOORS,
     MeasuredSetting,
     OrderRow,
@@ -55,9 +63,13 @@ from coursebuild.numerics.reports.bench import (
 )
 from coursebuild.numerics.reports.text import setting_text
 from coursebuild.numerics.scene import Scene, thickness
-from coursebuild.numerics.settings import own_setting, settings, stable_rows, with_setting
-from coursebuild.numerics.stability import run_trial
-from coursebuild.numerics.timing import Clock, costs
+from coursebuild.numerics.stability import (
+    own_setting,
+    run_trial,
+    settings,
+    stable_rows,
+    with_setting,
+)
 from mjcourse.spatial import angular_distance
 
 
