@@ -52,7 +52,7 @@ from coursebuild.numerics.problem import (
     Sizes,
 )
 from coursebuild.numerics.problems import all_problems
-from coursebuild.numerics.reports.cases import (
+from coursebuild.numerics.reports.case_report import (
     CaseReport,
     ErrorLine,
     FigureLine,

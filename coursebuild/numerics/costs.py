@@ -34,7 +34,7 @@ from coursebuild.numerics.engine import STATE, full_state, initial_data, silent
 from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, RowVerdict, WorkPrecisionRow
-from coursebuild.numerics.reports.text import setting_text
+from coursebuild.numerics.reports.wording import setting_text
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.stability import apply, with_setting
 

@@ -49,9 +49,9 @@ from coursebuild.numerics.problem import (
     Problem,
     Setup,
 )
-from coursebuild.numerics.reports.cases import BoundaryLine
+from coursebuild.numerics.reports.case_report import BoundaryLine
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, StableRow
-from coursebuild.numerics.reports.text import FEWEST_STEPS
+from coursebuild.numerics.reports.wording import FEWEST_STEPS
 from coursebuild.numerics.scene import thickness
 
 _REACH = 10.0

@@ -61,7 +61,7 @@ from coursebuild.numerics.reports.scene_report import (
     StableRow,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.text import setting_text
+from coursebuild.numerics.reports.wording import setting_text
 from coursebuild.numerics.scene import Scene, thickness
 from coursebuild.numerics.stability import (
     own_setting,

@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import BenchTable
-from coursebuild.numerics.reports.cases import BoundaryLine, FigureLine
+from coursebuild.numerics.reports.case_report import BoundaryLine, FigureLine
 from coursebuild.numerics.reports.departures import Departure, case_departures, scene_departures
 from coursebuild.numerics.reports.scene_report import (
     FittedOrder,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from coursebuild.numerics.reports import Interval, Reports
-from coursebuild.numerics.reports.cases import (
+from coursebuild.core.model.results import Reports
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.case_report import (
     BoundaryLine,
     CaseReport,
     ErrorLine,
@@ -13,7 +14,7 @@ from coursebuild.numerics.reports.cases import (
     ReferenceLine,
     StepCost,
 )
-from coursebuild.numerics.reports.diet import (
+from coursebuild.numerics.reports.diet_report import (
     MEASURED_LABEL,
     PROVED_LABEL,
     DietReport,

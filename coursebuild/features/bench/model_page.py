@@ -17,8 +17,9 @@ from coursebuild.core.pages.strings import Strings
 from coursebuild.features.bench.figures import factor, machine_text, power, sentence, size, unbroken
 from coursebuild.features.bench.model import declared_scenarios
 from coursebuild.features.bench.scenarios import ScenarioView, plots, scenario_view
-from coursebuild.numerics.reports.diet import DietReport, Finding, Saving
+from coursebuild.numerics.reports.diet_report import DietReport, Finding, Saving
 from coursebuild.numerics.reports.records import BENCH, DIET
+from coursebuild.numerics.reports.scene_report import SceneReport
 
 
 class FindingView(Struct, frozen=True):
@@ -62,7 +63,8 @@ class MeasurementsView(Struct, frozen=True):
 def measurements_view(library: Library, place: urls.Place, model: MjcfModel) -> MeasurementsView:
     """Make what the page of a model shows of its reports."""
     words, name = library.words, model.name
-    scene, diet = library.reports.scenes.get(name), library.reports.diets.get(name)
+    scene: SceneReport | None = library.reports.scenes.get(name)
+    diet: DietReport | None = library.reports.diets.get(name)
     scenarios = () if scene is None else scene.scenarios
     sweeps = () if scene is None else scene.sweeps
     titles = declared_scenarios(library.course, name)
@@ -102,7 +104,8 @@ def draw_measurements(renderer: Renderer, view: MeasurementsView) -> Markup:
 
 def measurement_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, str], ...]:
     """Say what the model is made of, and how fast it runs, as pairs of words."""
-    words, scene = library.words, library.reports.scenes.get(model.name)
+    words = library.words
+    scene: SceneReport | None = library.reports.scenes.get(model.name)
     missing = words("measured.not")
 
     def speed(times: float | None) -> str:

@@ -47,7 +47,7 @@ class BenchView(Struct, frozen=True):
 
 def bench_view(library: Library, place: urls.Place, bench: Bench) -> BenchView:
     """Find the report that a block on a page shows, and make what the page shows of it."""
-    scene = library.reports.scenes.get(bench.model)
+    scene: SceneReport | None = library.reports.scenes.get(bench.model)
     report = None if scene is None else _find_report(scene, bench)
     anchor = "measured"
     if isinstance(report, SweepReport):
@@ -93,7 +93,7 @@ def draw_bench(page: PageContext, block: Bench) -> Markup:
 
 def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
     """Write the report without its plot, and what the plot shows."""
-    from coursebuild.numerics.reports.plot import work_precision
+    from coursebuild.numerics.reports.plots import work_precision
 
     view = _view(writer.page, block)
     html = writer.page.template("bench/bench.html", bench=view, plots=())

@@ -39,7 +39,7 @@ from coursebuild.numerics.reports.scene_report import (
     cell,
     shown_figures,
 )
-from coursebuild.numerics.reports.text import (
+from coursebuild.numerics.reports.wording import (
     FEWEST_STEPS,
     Quantity,
     interval_text,
@@ -284,8 +284,10 @@ def _sweep_view(words: Strings, sweep: SweepReport, anchor: str) -> ScenarioView
 
 def plots(name: str, report: ScenarioReport | SweepReport) -> tuple[Markup, ...]:
     """Draw a plot for wide and for narrow screens; `name` is unique on the page."""
-    from coursebuild.numerics.reports.plot import plot_svg  # late: few pages need it
-    from coursebuild.numerics.reports.sweep_plot import sweep_svg
+    from coursebuild.numerics.reports.plots import (
+        plot_svg,  # late: few pages need it
+        sweep_svg,
+    )
 
     svgs = (
         sweep_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")

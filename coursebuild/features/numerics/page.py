@@ -6,7 +6,7 @@ Entry points: `numerics_values(library)`; `case_view`, of one case.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from operator import attrgetter
 
@@ -36,15 +36,16 @@ from coursebuild.features.bench.scenarios import (
     stable_cells,
     stable_title,
 )
-from coursebuild.numerics.reports.cases import (
+from coursebuild.numerics.reports.case_report import (
     BoundaryLine,
     CaseReport,
     FigureLine,
     course_cases,
 )
-from coursebuild.numerics.reports.plot import case_quantities, case_svg
+from coursebuild.numerics.reports.plots import case_quantities, case_svg
 from coursebuild.numerics.reports.records import STABILITY
-from coursebuild.numerics.reports.text import INTEGRATORS, Quantity, seconds_text, status_text
+from coursebuild.numerics.reports.scene_report import SceneReport
+from coursebuild.numerics.reports.wording import INTEGRATORS, Quantity, seconds_text, status_text
 
 _RIGHT = 1e-3
 """m or rad: the error at which costs are compared."""
@@ -90,9 +91,12 @@ class CaseGroup(Struct, frozen=True):
 def numerics_values(library: Library) -> dict[str, object]:
     """The values for the template of the page."""
     words, place = library.words, urls.Place(urls.NUMERICS)
-    scenes = library.reports.scenes
+    scenes: Mapping[str, SceneReport] = library.reports.scenes
     course_reports = [report for name in sorted(scenes) for report in course_cases(scenes[name])]
-    cases = [*sorted(library.reports.cases, key=attrgetter("case")), *course_reports]
+    cases: list[CaseReport] = [
+        *sorted(library.reports.cases, key=attrgetter("case")),
+        *course_reports,
+    ]
     return {
         "groups": tuple(
             _group(words, place, number, tuple(group))

@@ -22,12 +22,17 @@ import numpy as np
 from msgspec import Struct
 
 from coursebuild.numerics.problem import Scenario
-from coursebuild.numerics.pruning.compare import WatchedRun
-from coursebuild.numerics.pruning.edits import ModelEdit, set_attributes, set_option
-from coursebuild.numerics.pruning.markup import Element, place_of
+from coursebuild.numerics.pruning.comparison import WatchedRun
 from coursebuild.numerics.pruning.model_text import ModelText, section_of, thing_kind
 from coursebuild.numerics.pruning.reachability import Pair, find_separate, iterate_pairs
-from coursebuild.numerics.reports.diet import name_list
+from coursebuild.numerics.pruning.xml_edits import (
+    Element,
+    ModelEdit,
+    place_of,
+    set_attributes,
+    set_option,
+)
+from coursebuild.numerics.reports.diet_report import name_list
 
 MOST_PAIRS = 100_000
 """With so many pairs of geoms no contact is examined."""

@@ -36,15 +36,13 @@ from coursebuild.numerics.pruning.candidates import (
     unreachable_contacts,
     unread_elements,
 )
-from coursebuild.numerics.pruning.compare import TOLERANCE, MotionComparison, WatchedRun, watch
-from coursebuild.numerics.pruning.differences import difference, unrelated_fields
-from coursebuild.numerics.pruning.edits import ModelEdit, merge_edits
-from coursebuild.numerics.pruning.markup import place_of
+from coursebuild.numerics.pruning.comparison import TOLERANCE, MotionComparison, WatchedRun, watch
 from coursebuild.numerics.pruning.model_text import ModelText
 from coursebuild.numerics.pruning.reachability import PREMISES
-from coursebuild.numerics.pruning.readers import Reader
+from coursebuild.numerics.pruning.readers import Reader, difference, unrelated_fields
 from coursebuild.numerics.pruning.trials import PrunedModel, PruningTrials, largest_subset
-from coursebuild.numerics.reports.diet import (
+from coursebuild.numerics.pruning.xml_edits import ModelEdit, merge_edits, place_of
+from coursebuild.numerics.reports.diet_report import (
     MEASURED_LABEL,
     PROVED_LABEL,
     DietReport,

@@ -16,9 +16,20 @@ from msgspec import Struct
 from coursebuild.numerics.costs import Clock, Timing, scenario_job, time_jobs
 from coursebuild.numerics.engine import STATE, advance, full_state, initial_data, silent
 from coursebuild.numerics.pruning.candidates import Item
-from coursebuild.numerics.pruning.compare import MotionComparison, compare, without_reset
-from coursebuild.numerics.pruning.differences import difference
-from coursebuild.numerics.pruning.edits import (
+from coursebuild.numerics.pruning.comparison import (
+    KEY_SIZES,
+    IndexMap,
+    MotionComparison,
+    compare,
+    fits,
+    index_map,
+    transfer,
+    without_reset,
+)
+from coursebuild.numerics.pruning.model_text import ModelText, model_bytes
+from coursebuild.numerics.pruning.readers import difference
+from coursebuild.numerics.pruning.xml_edits import (
+    Element,
     ModelEdit,
     drop_attribute,
     drop_numbers,
@@ -26,10 +37,7 @@ from coursebuild.numerics.pruning.edits import (
     merge_edits,
     remove_elements,
 )
-from coursebuild.numerics.pruning.index_map import KEY_SIZES, IndexMap, fits, index_map, transfer
-from coursebuild.numerics.pruning.markup import Element
-from coursebuild.numerics.pruning.model_text import ModelText, model_bytes
-from coursebuild.numerics.reports.diet import Saving
+from coursebuild.numerics.reports.diet_report import Saving
 from coursebuild.numerics.scene import Scene
 
 _T = TypeVar("_T")

@@ -11,8 +11,14 @@ import numpy as np
 from coursebuild.core.model.scenarios import BenchTable, DeclaredScenario
 from coursebuild.numerics.engine import initial_data
 from coursebuild.numerics.problem import Scenario
-from coursebuild.numerics.pruning.compare import compare, pruning_scenes
-from coursebuild.numerics.pruning.index_map import IndexMap, fits, index_map, transfer
+from coursebuild.numerics.pruning.comparison import (
+    IndexMap,
+    compare,
+    fits,
+    index_map,
+    pruning_scenes,
+    transfer,
+)
 from coursebuild.numerics.scene import Scene
 from support.surveys import NO_DECLARATIONS, parse_declared
 

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.numerics.pruning.edits import ModelEdit, apply_edits, drop_numbers, remove_elements
-from coursebuild.numerics.pruning.markup import Markup, MarkupError, parse_markup
+from coursebuild.numerics.pruning.xml_edits import (
+    Markup,
+    MarkupError,
+    ModelEdit,
+    apply_edits,
+    drop_numbers,
+    parse_markup,
+    remove_elements,
+)
 
 
 def document(text: str) -> Markup:

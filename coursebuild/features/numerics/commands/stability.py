@@ -23,7 +23,7 @@ from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import nearest
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.features.bench.commands.runs import MeasuringRun, write_records
-from coursebuild.numerics.reports.cases import CaseReport
+from coursebuild.numerics.reports.case_report import CaseReport
 from coursebuild.numerics.reports.departures import RecordCheck, case_departures
 from coursebuild.numerics.reports.records import STABILITY, ReportFailure
 from coursebuild.pipeline.options import Options, UsageError

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from coursebuild.core.pages import urls
 from coursebuild.features.bench.commands.grids import english, grid_lines, plain_text
 from coursebuild.features.numerics.page import case_view
-from coursebuild.numerics.reports.cases import CaseReport, ErrorLine
-from coursebuild.numerics.reports.plot import case_quantities
-from coursebuild.numerics.reports.text import seconds_text, status_text
+from coursebuild.numerics.reports.case_report import CaseReport, ErrorLine
+from coursebuild.numerics.reports.plots import case_quantities
+from coursebuild.numerics.reports.wording import seconds_text, status_text
 from coursebuild.report.terminal import BOLD, Column, Style, table
 
 

@@ -33,9 +33,9 @@ from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.runs import CannotMeasureError
 from coursebuild.numerics.engine import silent
 from coursebuild.numerics.problem import Array, Scenario
-from coursebuild.numerics.pruning.compare import watch
+from coursebuild.numerics.pruning.comparison import watch
 from coursebuild.numerics.pruning.reachability import possible_pairs
-from coursebuild.numerics.reports.cases import exact_file
+from coursebuild.numerics.reports.case_report import exact_file
 from coursebuild.numerics.reports.scene_report import (
     ScenarioReport,
     SceneCard,

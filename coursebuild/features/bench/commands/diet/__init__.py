@@ -11,7 +11,7 @@ from coursebuild.features.bench.commands import run_measurement
 from coursebuild.features.bench.commands.diet.run import diet
 from coursebuild.features.bench.commands.diet.text import diet_text, diet_values
 from coursebuild.features.bench.commands.measurement import Measurement, measurement_json
-from coursebuild.numerics.reports.diet import DietReport
+from coursebuild.numerics.reports.diet_report import DietReport
 from coursebuild.pipeline.options import Options
 
 EXAMPLES = """\

@@ -28,11 +28,11 @@ from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.bench.measuring import report_errors
 from coursebuild.features.bench.commands.diet.readers import readers_of
 from coursebuild.features.bench.commands.runs import CannotMeasureError
-from coursebuild.numerics.pruning.compare import pruning_scenes
-from coursebuild.numerics.pruning.markup import MarkupError
+from coursebuild.numerics.pruning.comparison import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelTextError, model_bytes, open_model
 from coursebuild.numerics.pruning.readers import Reader
 from coursebuild.numerics.pruning.survey import Rerun, Survey, Surveyor
+from coursebuild.numerics.pruning.xml_edits import MarkupError
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
 
 _TEXT = Path(TEXT_PATH).name

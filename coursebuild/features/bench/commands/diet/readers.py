@@ -26,8 +26,7 @@ from coursebuild.core.model import Course, FeatureBlock, find_blocks
 from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.scripts.extract import extract
 from coursebuild.features.lab.model import Lab
-from coursebuild.numerics.pruning.differences import VIEWS
-from coursebuild.numerics.pruning.readers import Reader, read_code
+from coursebuild.numerics.pruning.readers import VIEWS, Reader, read_code
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress

@@ -31,7 +31,7 @@ from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.features.bench.commands.runs import MeasuringRun, forbid_quick, write_records
 from coursebuild.numerics.engine import silent
 from coursebuild.numerics.pruning.survey import Survey
-from coursebuild.numerics.reports.diet import DietReport
+from coursebuild.numerics.reports.diet_report import DietReport
 from coursebuild.numerics.reports.records import DIET, ReportFailure
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options

@@ -10,7 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coursebuild.numerics.reports.diet import DietReport, Finding, Saving, TextEdit, name_list
+from coursebuild.numerics.reports.diet_report import (
+    DietReport,
+    Finding,
+    Saving,
+    TextEdit,
+    name_list,
+)
 from coursebuild.report.terminal import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 from coursebuild.report.values import plain, plural
 

@@ -1,19 +1,24 @@
-"""Case 7: a block and a ball on a slope: the cone of friction, rolling, creep of what should stick.
+"""Cases 7 and 9: a block and a ball on a slope, and a heavy body that rests on a light one.
 
-Entry point: `problems()`.
+Entry point: `problems()`; `RestingStack` is the closed form of the latter.
 
-Gravity is tilted instead of the floor, along an axis of the contact's frame or half-way between its
-two: a pyramidal cone gives only 1/√2 of the friction there.
+1. *Slope*: the cone of friction, rolling, creep of what should stick. Gravity is tilted instead of
+   the floor, along an axis of the contact's frame or half-way between its two: a pyramidal cone
+   gives only 1/√2 of the friction there.
+2. *Stack*: at rest a contact's force f gives way by r = f (1 − d) Â/(k d²), with the impedance d,
+   the stiffness k = 1/(d² timeconst² dampratio²) and Â, the sum of the inverse masses that it
+   connects: whatever the bodies weigh, the depth grows with their ratio.
 
 Sources: C.-A. de Coulomb's law, a = g (sin α − μ cos α) when sliding; a solid ball that rolls
-without slipping has a = 5/7 g sin α (L. D. Landau, E. M. Lifshitz, Mechanics, § 38).
+without slipping has a = 5/7 g sin α (L. D. Landau, E. M. Lifshitz, Mechanics, § 38); MuJoCo
+documentation, Computation, Constraint model.
 """
 
 from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
@@ -30,8 +35,9 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
     SecondReference,
+    Sizes,
 )
-from coursebuild.numerics.problems.common import model_text, run_steps
+from coursebuild.numerics.problems.common import model_text, motion_without_attitude, run_steps
 from mjcourse.spatial import axis_angle_to_quat
 
 Cone = Literal["pyramidal", "elliptic"]
@@ -130,15 +136,6 @@ def _speed(text: str, integrator: Integrator, seconds: float) -> float:
     return math.hypot(data.qvel[0], data.qvel[1])
 
 
-def problems() -> tuple[Problem, ...]:
-    """Sliding along an axis and between two, rolling, sticking; with both cones."""
-    return (
-        *(_sliding_problem(cone, is_diagonal) for cone in _CONES for is_diagonal in (False, True)),
-        *(_rolling_problem(cone) for cone in _CONES),
-        *(_sticking_problem(cone) for cone in _CONES),
-    )
-
-
 def _sliding_problem(cone: Cone, is_diagonal: bool) -> Problem:
     slide = Incline(math.radians(45), 0.5, is_diagonal)
     text = mjcf("box", DIAGONAL_SLIDING if is_diagonal else SLIDING, cone, "0.5")
@@ -152,7 +149,7 @@ def _sliding_problem(cone: Cone, is_diagonal: bool) -> Problem:
         checks.append(_acceleration(name, text, blunted, "|f₁| + |f₂| ≤ μ f"))
     course = "between the axes" if is_diagonal else "along an axis"
     article = "an" if cone == "elliptic" else "a"
-    return _problem(
+    return _slope_problem(
         f"sliding-block-{cone}-{'across' if is_diagonal else 'along'}",
         f"Block sliding {course} of {article} {cone} cone",
         text,
@@ -166,7 +163,7 @@ def _rolling_problem(cone: Cone) -> Problem:
     roll = Incline(math.radians(20), None)
     text = mjcf("sphere", ROLLING, cone, "1")
     name, law = "acceleration when rolling, from 0.5 s to 1 s at 1 ms", "a = 5/7 g sin α"
-    problem = _problem(
+    problem = _slope_problem(
         f"rolling-ball-{cone}",
         f"Ball rolling, {cone} cone",
         text,
@@ -181,7 +178,7 @@ def _sticking_problem(cone: Cone) -> Problem:
     text = mjcf("box", STICKING, cone, "0.5")
     creep = partial(_speed, text, seconds=2.0)
     law = "Coulomb's law: tan α < μ, so that it rests"
-    problem = _problem(
+    problem = _slope_problem(
         f"sticking-block-{cone}",
         f"Block that should stick, {cone} cone",
         text,
@@ -196,7 +193,7 @@ def _acceleration(name: str, text: str, exact: float, law: str) -> ScalarCheck:
     return ScalarCheck(name, "m/s²", exact, partial(acceleration, text), law)
 
 
-def _problem(
+def _slope_problem(
     name: str,
     title: str,
     text: str,
@@ -219,4 +216,106 @@ def _problem(
         checks=checks,
         smooth=False,
         note=note,
+    )
+
+
+RATIOS = (1.0, 1e1, 1e2, 1e3, 1e4)
+"""Mass of the upper body in kg; the lower one has 1 kg."""
+_RESTS = {
+    1.0: (-3.1392e-06, -6.2784e-06),
+    1e1: (-1.726560e-05, -3.453120e-05),
+    1e2: (-1.585296e-04, -3.170592e-04),
+    1e3: (-1.5711696e-03, -3.1423392e-03),
+    1e4: (-1.56975696e-02, -3.13951392e-02),
+}
+"""By that mass, where the balls rest, m: the scenarios begin there."""
+_SETTLING = 3.0
+
+
+def _stack_mjcf(ratio: float) -> str:
+    """Two balls that slide up and down over a floor."""
+    contact = 'condim="1" solref="0.004 1" solimp="0.99 0.99 0.001 0.5 2"'
+    plane = f'    <geom type="plane" size="1 1 1" {contact}/>'
+    balls = [
+        f'    <body pos="0 0 {height}"><joint type="slide" axis="0 0 1"/>'
+        f'<geom size="0.1" mass="{mass:g}" {contact}/></body>'
+        for height, mass in (("0.1", 1.0), ("0.3", ratio))
+    ]
+    option = 'gravity="0 0 -9.81" tolerance="0" iterations="200"'
+    return model_text("\n".join((plane, *balls)), option)
+
+
+class RestingStack(Struct, frozen=True):
+    """A stack at rest, sunk as deep as its contacts give way."""
+
+    upper: float
+    lower: float = 1.0
+    gravity: float = 9.81
+    impedance: float = 0.99
+    timeconst: float = 0.004
+
+    @property
+    def depths(self) -> Array:
+        """The depths of the lower and the upper contact, (2,) m."""
+        forces = self.gravity * np.array([self.lower + self.upper, self.upper])
+        inverse = np.array([1 / self.lower, 1 / self.lower + 1 / self.upper])
+        depths: Array = forces * inverse * (1 - self.impedance) * self.timeconst**2
+        return depths
+
+    def motion(self, times: Array) -> Motion:
+        """The motion at the times (n,) s."""
+        still = np.zeros((len(times), 2))
+        return motion_without_attitude(times, still - np.cumsum(self.depths), still)
+
+
+def _settle(integrator: Integrator, ratio: float) -> Any:
+    """`mjData` of the stack, let go without overlap and left to itself for a while."""
+    scenario = Scenario(1.0, 0.1, (0.0, 0.0))
+    return run_steps(_stack_mjcf(ratio), scenario, integrator, 1e-3, round(_SETTLING / 1e-3))
+
+
+def problems() -> tuple[Problem, ...]:
+    """Sliding along an axis and between two, rolling, sticking, with both cones; stacks."""
+    return (
+        *(_sliding_problem(cone, is_diagonal) for cone in _CONES for is_diagonal in (False, True)),
+        *(_rolling_problem(cone) for cone in _CONES),
+        *(_sticking_problem(cone) for cone in _CONES),
+        *map(_stack_problem, RATIOS),
+    )
+
+
+def _stack_problem(ratio: float) -> Problem:
+    solution = RestingStack(ratio)
+    depth = solution.depths.sum()
+    return Problem(
+        name=f"stack-{ratio:g}",
+        title=f"Stack of 1 kg under {ratio:g} kg",
+        case=9,
+        mjcf=_stack_mjcf(ratio),
+        scenario=Scenario(0.2, 0.002, _RESTS[ratio]),
+        position_bound=1.0,
+        velocity_bound=10.0,
+        reference=Reference("closed", "r = f (1 − d) Â/(k d²)", solution),
+        precision=Sizes(1e-13, 0.0, 1e-11),
+        timesteps=(2e-3, 1e-3, 5e-4),
+        checks=(
+            ScalarCheck(
+                f"how far the upper body sinks, let go without overlap, {_SETTLING:g} s at 1 ms",
+                "m",
+                float(depth),
+                # Contacts would not say it of balls that passed each other.
+                lambda integrator: float(-_settle(integrator, ratio).qpos[1]),
+                "r = f (1 − d) Â/(k d²), both contacts",
+            ),
+            ScalarCheck(
+                "velocity that is left then",
+                "m/s",
+                0.0,
+                lambda integrator: float(np.max(np.abs(_settle(integrator, ratio).qvel))),
+                "at rest",
+            ),
+        ),
+        smooth=False,
+        penetration_bound=0.05,
+        note="rigid bodies would not sink at all: the depth is the error of the soft model",
     )
