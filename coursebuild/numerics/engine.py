@@ -239,6 +239,16 @@ def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
     return Run(states, table[:, :2], table[:, 2:], peaks.penetration, judgement)
 
 
+def run_steps(
+    mjcf: str, scenario: Scenario, integrator: Integrator, timestep: float, steps: int
+) -> Any:
+    """`mjData` after so many steps from where a scenario begins."""
+    model = compile_model(mjcf, integrator, timestep)
+    data = initial_data(scenario, model)
+    advance(model, data, steps)
+    return data
+
+
 def invariants(model: Any, scratch: Any, qpos: Array, qvel: Array) -> Array:
     """Potential and kinetic energy (J) and angular momentum (kg m²/s) of a state: (5,).
 

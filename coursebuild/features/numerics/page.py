@@ -16,7 +16,7 @@ from msgspec import Struct
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.strings import Strings
-from coursebuild.features.bench.figures import (
+from coursebuild.features.bench.grids import (
     FigurePart,
     Grid,
     NamedRow,
@@ -27,7 +27,7 @@ from coursebuild.features.bench.figures import (
     power,
     sentence,
 )
-from coursebuild.features.bench.scenarios import (
+from coursebuild.features.bench.scenario_view import (
     STABLE,
     integrator_table,
     lost_runs,

@@ -25,7 +25,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import compile_model
+from coursebuild.numerics.engine import compile_model, run_steps
 from coursebuild.numerics.problem import (
     Array,
     Integrator,
@@ -36,8 +36,9 @@ from coursebuild.numerics.problem import (
     Scenario,
     SecondReference,
     Sizes,
+    model_text,
+    motion_without_attitude,
 )
-from coursebuild.numerics.problems.common import model_text, motion_without_attitude, run_steps
 from mjcourse.spatial import axis_angle_to_quat
 
 Cone = Literal["pyramidal", "elliptic"]

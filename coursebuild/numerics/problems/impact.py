@@ -29,8 +29,11 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.numerics.engine import run_steps
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
+    NO_CONTACT,
+    NO_GRAVITY,
     Array,
     Integrator,
     Motion,
@@ -39,14 +42,9 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
     Sizes,
-)
-from coursebuild.numerics.problems.common import (
-    NO_CONTACT,
-    NO_GRAVITY,
     divisions,
     model_text,
     motion_without_attitude,
-    run_steps,
 )
 
 _STEP = 0.01

@@ -31,6 +31,7 @@ from coursebuild.numerics.engine import advance, compile_model, initial_data, si
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.measure import reference_motion
 from coursebuild.numerics.problem import (
+    NO_CONTACT,
     Array,
     Integrator,
     Motion,
@@ -39,9 +40,6 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
     Sizes,
-)
-from coursebuild.numerics.problems.common import (
-    NO_CONTACT,
     divisions,
     model_text,
     motion_without_attitude,

@@ -33,6 +33,8 @@ from msgspec.structs import replace
 
 from coursebuild.numerics.integrate import forward_motion
 from coursebuild.numerics.problem import (
+    NO_CONTACT,
+    NO_GRAVITY,
     Array,
     Integrator,
     Limit,
@@ -41,10 +43,6 @@ from coursebuild.numerics.problem import (
     Reference,
     Scenario,
     SecondReference,
-)
-from coursebuild.numerics.problems.common import (
-    NO_CONTACT,
-    NO_GRAVITY,
     divisions,
     model_text,
     motion_without_attitude,

@@ -11,7 +11,10 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
+from coursebuild.numerics.engine import run_steps
 from coursebuild.numerics.problem import (
+    NO_CONTACT,
+    NO_GRAVITY,
     Array,
     Integrator,
     Motion,
@@ -20,14 +23,9 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
     Sizes,
-)
-from coursebuild.numerics.problems.common import (
-    NO_CONTACT,
-    NO_GRAVITY,
     divisions,
     model_text,
     motion_without_attitude,
-    run_steps,
 )
 from coursebuild.numerics.problems.tops import FreeTop, free_body, spinning, top_reference
 

@@ -19,8 +19,11 @@ import math
 import numpy as np
 from msgspec import Struct
 
+from coursebuild.numerics.engine import run_steps
 from coursebuild.numerics.integrate import cumulative_integral
 from coursebuild.numerics.problem import (
+    NO_CONTACT,
+    NO_GRAVITY,
     Array,
     Integrator,
     Limit,
@@ -29,13 +32,8 @@ from coursebuild.numerics.problem import (
     Reference,
     ScalarCheck,
     Scenario,
-)
-from coursebuild.numerics.problems.common import (
-    NO_CONTACT,
-    NO_GRAVITY,
     divisions,
     model_text,
-    run_steps,
     turning_at_rest,
 )
 from coursebuild.numerics.problems.oscillators import rk4_factor

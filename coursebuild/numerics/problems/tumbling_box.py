@@ -15,9 +15,11 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import advance, compile_model, initial_data
+from coursebuild.numerics.engine import advance, compile_model, initial_data, run_steps
 from coursebuild.numerics.integrate import cumulative_integral
 from coursebuild.numerics.problem import (
+    NO_CONTACT,
+    NO_GRAVITY,
     Array,
     Integrator,
     Motion,
@@ -25,13 +27,8 @@ from coursebuild.numerics.problem import (
     Reference,
     ScalarCheck,
     Scenario,
-)
-from coursebuild.numerics.problems.common import (
-    NO_CONTACT,
-    NO_GRAVITY,
     divisions,
     model_text,
-    run_steps,
     turning_at_rest,
 )
 from coursebuild.numerics.problems.tops import NEVER_STABLE

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.features.bench.commands.bench.run import bench, check
+from coursebuild.features.bench.commands.bench import bench, check
 from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.numerics.reports.records import BENCH
 from coursebuild.numerics.reports.scene_report import ScenarioReport, SceneReport

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coursebuild.features.bench.commands.bench.text import bench_text
+from coursebuild.features.bench.commands.bench import bench_text
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
     format_checks,

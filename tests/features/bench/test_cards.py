@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.run.machine import machine
-from coursebuild.features.bench.commands.bench.measuring import add_card
+from coursebuild.features.bench.commands.measuring import add_card
 from coursebuild.numerics.reports.scene_report import SceneReport
 from coursebuild.pipeline.scenes import find_scenes
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from coursebuild.features.bench.commands.diet.text import diet_text
+from coursebuild.features.bench.commands.diet import diet_text
 from coursebuild.numerics.reports.diet_report import (
     DietScenario,
     ModelPlace,

@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import Reports
-from coursebuild.features.bench.figures import bounded, factor, percent, power, sentence, size
+from coursebuild.features.bench.grids import bounded, factor, percent, power, sentence, size
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.case_report import StepCost
 from support.bench_reports import awkward, swing

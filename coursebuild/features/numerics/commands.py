@@ -1,6 +1,7 @@
-"""`coursebuild stability`: measure MuJoCo on the hard cases, beside what theory says.
+"""`coursebuild stability`: MuJoCo on hard cases, beside what theory says.
 
-Entry points: `stability(options, names)`, `check_stability`.
+Entry points: `stability(options, names)`, `check_stability`; `stability_text`, what the page of a
+case says, and the errors of its plots.
 
 1. A name means a problem, or a family of them (`damped-spring` is all of its damping ratios).
 2. Measurements are cached by the machine, its versions and the code that measures. `--check`
@@ -13,24 +14,83 @@ Entry points: `stability(options, names)`, `check_stability`.
 
 from __future__ import annotations
 
+import argparse
 import time
+from collections.abc import Sequence
+from typing import Any
 
 from msgspec.structs import replace
 
+from coursebuild.cli.arguments import add_cache, add_format, add_quiet
 from coursebuild.core.engine.tool import code_digest
+from coursebuild.core.pages import urls
 from coursebuild.core.run.machine import machine, one_processor
 from coursebuild.core.run.versions import engine_version
 from coursebuild.core.text.diagnostics import nearest
-from coursebuild.features.bench.commands.measurement import Measurement
-from coursebuild.features.bench.commands.runs import MeasuringRun, write_records
-from coursebuild.numerics.reports.case_report import CaseReport
+from coursebuild.features.bench.commands.measurement import (
+    Measurement,
+    MeasuringRun,
+    add_report_options,
+    english,
+    grid_lines,
+    measurement_json,
+    plain_text,
+    run_measurement,
+    write_records,
+)
+from coursebuild.features.numerics.page import case_view
+from coursebuild.numerics.reports.case_report import CaseReport, ErrorLine
 from coursebuild.numerics.reports.departures import RecordCheck, case_departures
+from coursebuild.numerics.reports.plots import case_quantities
 from coursebuild.numerics.reports.records import STABILITY, ReportFailure
+from coursebuild.numerics.reports.wording import seconds_text, status_text
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.shown_reports import read_record
+from coursebuild.report.terminal import BOLD, Column, Style, table
+from coursebuild.report.values import json_text
 
 _CODE = ("coursebuild/numerics", "mjcourse/spatial")
 """The code that measurements depend on."""
+EXAMPLES = """\
+examples:
+  coursebuild stability impact           one family of hard cases
+"""
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_quiet(parser)
+    parser.add_argument(
+        "problems",
+        nargs="*",
+        metavar="PROBLEM",
+        help="a hard case, or a family of them (default: all)",
+    )
+    add_format(parser, "text", "json")
+    add_report_options(parser)
+    add_cache(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, or check by measuring again."""
+    names = tuple(arguments.problems)
+
+    def measure(options: Options) -> Measurement[Any]:
+        if arguments.check:
+            return check_stability(options, names)
+        return stability(options, names, record=arguments.record)
+
+    def as_json(measurement: Measurement[Any]) -> str:
+        if measurement.ok and not (arguments.record or arguments.check):
+            return json_text(measurement.reports)
+        return measurement_json({"cases": measurement.reports}, measurement)
+
+    return run_measurement(
+        arguments,
+        measure,
+        lambda reports, style: "" if arguments.check else stability_text(reports, style),
+        as_json,
+    )
 
 
 def stability(
@@ -139,3 +199,39 @@ def _select_problems(names: tuple[str, ...]) -> list[str]:
             raise UsageError(f"no hard case is called `{name}`", help=help)
         selection |= matches
     return [problem for problem in problem_names if problem in selection]
+
+
+def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
+    """The reports as text, with a blank line between cases."""
+    return "\n".join(_case(report, style) for report in reports)
+
+
+def _case(report: CaseReport, style: Style) -> str:
+    view = case_view(english(), urls.Place(urls.NUMERICS), report)
+    number = f"case {report.case}: " if report.case else ""
+    lines = [style.paint(report.name, BOLD) + f"  {number}{report.title}"]
+    for text in (*view.sentences, *view.notes):
+        lines += style.wrap(plain_text(text), "  ")
+    for block in (*(grid_lines(grid, style) for grid in view.grids), _errors(report)):
+        lines += ["", *(f"  {line}".rstrip() for line in block)] if block else []
+    return "\n".join(lines) + "\n"
+
+
+def _errors(report: CaseReport) -> list[str]:
+    """The largest error of each run, by timestep and integrator."""
+    quantity = next(iter(case_quantities(report)), None)
+    if quantity is None:
+        return []
+    runs = {(line.timestep, line.integrator): line for line in report.errors}
+    steps = sorted({step for step, _ in runs}, reverse=True)
+
+    def cell(run: ErrorLine | None) -> str:
+        error = None if run is None else quantity.value_of(run)
+        if run is None or error is None:
+            return "" if run is None else status_text(run.status)
+        return f"<{quantity.least:.1e}" if error <= quantity.least * (1 + 1e-9) else f"{error:.2e}"
+
+    columns = [Column(quantity.label, tuple(seconds_text(h, 4) for h in steps), left=True)]
+    for name in dict.fromkeys(name for _, name in runs):
+        columns.append(Column(name, tuple(cell(runs.get((step, name))) for step in steps)))
+    return table(columns)

@@ -1,6 +1,7 @@
 """`coursebuild bench`: speed against error of the course's models.
 
-Entry points: `bench(options, names, …)`, `check(…)`.
+Entry points: `bench(options, names, …)`, `check(…)`; `bench_text(scenes, style)`, the tables of the
+models' pages, on a terminal.
 
 1. Names mean models. One that does not compile is reported, and the others are measured.
 2. Each scenario's report is stored by all that it depends on, so that a run that was stopped goes
@@ -11,32 +12,90 @@ Entry points: `bench(options, names, …)`, `check(…)`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import argparse
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any, TypeVar
 
 from msgspec.structs import replace
 
+from coursebuild.cli.arguments import add_cache, add_format, add_quiet
 from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.run.machine import machine
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.features.bench.commands.bench import measuring
-from coursebuild.features.bench.commands.measurement import Measurement
-from coursebuild.features.bench.commands.runs import MeasuringRun, forbid_quick, write_records
+from coursebuild.features.bench.commands import measuring
+from coursebuild.features.bench.commands.measurement import (
+    Measurement,
+    MeasuringRun,
+    add_report_options,
+    english,
+    forbid_quick,
+    grid_lines,
+    measurement_json,
+    plain_text,
+    run_measurement,
+    write_records,
+)
+from coursebuild.features.bench.grids import Grid, machine_text, power
+from coursebuild.features.bench.scenario_view import scenario_view
 from coursebuild.numerics.reports.departures import RecordCheck, scene_departures
 from coursebuild.numerics.reports.records import BENCH, ReportFailure
-from coursebuild.numerics.reports.scene_report import ScenarioReport, SceneReport, SweepReport
+from coursebuild.numerics.reports.scene_report import (
+    ScenarioReport,
+    SceneReport,
+    SweepReport,
+    WorkPrecisionRow,
+)
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.pipeline.shown_reports import read_record
+from coursebuild.report.terminal import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 
 _T = TypeVar("_T")
 _CODE = (
     "coursebuild/numerics",
-    "coursebuild/features/bench/commands/bench/measuring.py",
+    "coursebuild/features/bench/commands/measuring.py",
     "mjcourse/spatial",
 )
 """The code on which reports depend."""
+_INDENT = "  "
+EXAMPLES = """\
+examples:
+  coursebuild bench --quick              a first look at all models
+  coursebuild bench pendulum --record    what pages show of it
+"""
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_quiet(parser)
+    parser.add_argument(
+        "scenes", nargs="*", metavar="SCENE", help="a model, as in models/SCENE.xml (default: all)"
+    )
+    add_format(parser, "text", "json")
+    parser.add_argument(
+        "--quick", action="store_true", help="fewer settings and rough times, for a first look"
+    )
+    add_report_options(parser)
+    add_cache(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure models, or check their recorded reports."""
+    names, quick = tuple(arguments.scenes), arguments.quick
+
+    def measure(options: Options) -> Measurement[Any]:
+        if arguments.check:
+            return check(options, names, quick=quick)
+        return bench(options, names, quick=quick, record=arguments.record)
+
+    return run_measurement(
+        arguments,
+        measure,
+        lambda reports, style: "" if arguments.check else bench_text(reports, style),
+        lambda measurement: measurement_json({"scenes": measurement.reports}, measurement),
+        empty="there is no model to measure\n",
+    )
 
 
 def bench(
@@ -192,3 +251,90 @@ class SceneRun(MeasuringRun):
             report = measure()
             self.save(kind, parts, report)
         return report
+
+
+_OWN_MARK, _FRONT_MARK = ">", "*"
+
+
+def bench_text(scenes: Sequence[SceneReport], style: Style) -> str:
+    """Write every model with its scenarios, and a blank line between models."""
+    return "\n".join(_scene(scene, style) for scene in scenes)
+
+
+def _scene(scene: SceneReport, style: Style) -> str:
+    head = style.paint(visible(scene.model), BOLD)
+    if scene.quick:
+        head += "  " + style.paint("quick: fewer settings, rough times", YELLOW)
+    lines = [head, *style.wrap(machine_text(english(), scene.machine), _INDENT)]
+    if not scene.scenarios:
+        lines.append(f"{_INDENT}nothing can move in it, so that nothing was measured")
+    for scenario in scene.scenarios:
+        lines += ["", *_scenario(scenario, style)]
+    for sweep in scene.sweeps:
+        lines += ["", *_sweep(sweep, style)]
+    return "\n".join(lines) + "\n"
+
+
+def _scenario(report: ScenarioReport, style: Style) -> list[str]:
+    view = scenario_view(english(), report)
+    lines = [_title(report.name, report.title, style)]
+    for text in (*map(plain_text, view.description), *_plot_remarks(report), *report.notes):
+        lines += style.wrap(text, 2 * _INDENT)
+    legend = f"{_OWN_MARK} the scene's own   {_FRONT_MARK} on the Pareto front"
+    lines += _table(view.settings, map(_mark, report.rows), legend, style)
+    colour = GREEN if report.verdict.on_front and not report.verdict.noticeable else YELLOW
+    if report.verdict.text:
+        lines += ["", *style.wrap(report.verdict.text, 2 * _INDENT, colour)]
+    for grid in (view.orders, view.stable):
+        if grid is not None:
+            lines += ["", *(f"{2 * _INDENT}{line}".rstrip() for line in grid_lines(grid, style))]
+    return [*lines, *_notes(view.notes, style)]
+
+
+def _sweep(sweep: SweepReport, style: Style) -> list[str]:
+    view = scenario_view(english(), sweep)
+    marks = (((_OWN_MARK, BOLD) if row.own else (" ", "")) for row in sweep.rows)
+    head = _title(sweep.name, sweep.title, style)
+    return [
+        head,
+        *_table(view.settings, marks, f"{_OWN_MARK} as the model is", style),
+        *_notes(view.notes, style),
+    ]
+
+
+def _title(name: str, title: str, style: Style) -> str:
+    return _INDENT + style.paint(visible(name), BOLD) + (f"  {visible(title)}" if title else "")
+
+
+def _plot_remarks(report: ScenarioReport) -> Iterator[str]:
+    """Say what a page says in its plot."""
+    if report.figure:
+        yield f"It measures {report.figure}."
+    if report.velocity_floor > report.floor:
+        yield f"Velocities are known to {plain_text(power(report.velocity_floor, 1))}."
+
+
+def _table(
+    grid: Grid, marks: Iterable[tuple[str, str]], legend: str, style: Style
+) -> Iterator[str]:
+    """Write the table of settings, or of values."""
+    yield ""
+    if not grid.rows:
+        yield f"{2 * _INDENT}no setting was measured"
+        return
+    _, *lines = grid_lines(grid, style, tuple(marks))
+    for line in (*lines, style.paint(legend, FAINT)):
+        yield f"{2 * _INDENT}{line}".rstrip()
+
+
+def _mark(row: WorkPrecisionRow) -> tuple[str, str]:
+    code = BOLD if row.own else RED if row.status in ("diverged", "reset") else ""
+    code = code or (YELLOW if row.status != "ok" else GREEN if row.front else "")
+    return (_OWN_MARK if row.own else " ") + (_FRONT_MARK if row.front else " "), code
+
+
+def _notes(notes: Sequence[str], style: Style) -> list[str]:
+    """Write why runs were lost."""
+    return ["" for _ in notes[:1]] + [
+        line for note in notes for line in style.wrap(note, 2 * _INDENT, YELLOW)
+    ]

@@ -30,7 +30,7 @@ from coursebuild.core.run.machine import one_processor
 from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.features.bench.commands.runs import CannotMeasureError
+from coursebuild.features.bench.commands.measurement import CannotMeasureError
 from coursebuild.numerics.engine import silent
 from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.pruning.comparison import watch

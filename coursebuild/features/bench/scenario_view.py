@@ -13,7 +13,7 @@ from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.pages.strings import Strings
-from coursebuild.features.bench.figures import (
+from coursebuild.features.bench.grids import (
     FigurePart,
     Grid,
     NamedRow,
