@@ -79,6 +79,9 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         DisagreementError: its two references differ by more than they may.
     """
     first, second = problem.reference, _second_reference(problem)
+    model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
+    drivers = problem.search and driving_force(model, problem.scenario)
+    notes = (problem.note, f"energy is not judged: {drivers}" if drivers else "")
     reference = ReferenceLine(first.kind, first.source, second.source, *astuple(floor(problem)))
     runs = {
         integrator: [measure(problem, integrator, h) for h in problem.timesteps]
@@ -89,7 +92,7 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         title=problem.title,
         case=problem.case,
         machine=machine,
-        note=_note(problem),
+        note="; ".join(note for note in notes if note),
         reference=reference,
         boundaries=boundaries(problem),
         figures=tuple(
@@ -120,13 +123,6 @@ def _costs(
         StepCost(name, line.nanoseconds.scale(1e-9 / count))
         for name, count, line in zip(names, counts, timings, strict=True)
     )
-
-
-def _note(problem: Problem) -> str:
-    model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
-    drivers = problem.search and driving_force(model, problem.scenario)
-    parts = (problem.note, f"energy is not judged: {drivers}" if drivers else "")
-    return "; ".join(part for part in parts if part)
 
 
 def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorLine:

@@ -56,7 +56,6 @@ from coursebuild.numerics.reports.scene_report import (
     FLOORS,
     MeasuredSetting,
     OrderRow,
-    RowVerdict,
     ScenarioReport,
     StableRow,
     WorkPrecisionRow,
@@ -113,8 +112,15 @@ def measure_scenario(
     Raises:
         SceneError: the scenario does not fit the model, or diverges at every timestep.
     """
-    basis = _prepare(model, scene, quick, tell)
-    pilot = basis.pilot
+    tell(f"{scene.name}: a first run")
+    pilot = run_pilot(model, scene)
+    tell(f"{scene.name}: the reference")
+    cones = find_references(model, pilot, quick=quick)
+    baseline = own_setting(model, pilot)
+    reference = cones[baseline.cone].reference
+    conserved = find_conserved(model, pilot, reference)
+    late_energy = mean_late_energy(model, pilot, reference)
+    basis = Basis(model, pilot, baseline, cones, *conserved, late_energy)
     measurements = []
     for setting in settings(model, pilot, quick=quick):
         tell(f"{scene.name}: {setting_text(setting)}")
@@ -129,29 +135,6 @@ def measure_scenario(
     judgement = verdict(rows, [noticeable for _, noticeable in measurements])
     if not any(row.own and row.status == "ok" for row in rows):  # nothing to compare costs with
         rows = tuple(replace(row, cost=None) for row in rows)
-    return _report(basis, rows, largest, judgement)
-
-
-def _prepare(model: Any, scene: Scene, quick: bool, tell: Callable[[str], None]) -> Basis:
-    """Make the first run and the references."""
-    tell(f"{scene.name}: a first run")
-    pilot = run_pilot(model, scene)
-    tell(f"{scene.name}: the reference")
-    cones = find_references(model, pilot, quick=quick)
-    baseline = own_setting(model, pilot)
-    reference = cones[baseline.cone].reference
-    conserved = find_conserved(model, pilot, reference)
-    late_energy = mean_late_energy(model, pilot, reference)
-    return Basis(model, pilot, baseline, cones, *conserved, late_energy)
-
-
-def _report(
-    basis: Basis,
-    rows: tuple[WorkPrecisionRow, ...],
-    largest: tuple[StableRow, ...],
-    judgement: RowVerdict,
-) -> ScenarioReport:
-    pilot, reference, scene = basis.pilot, basis.reference, basis.pilot.scene
     return ScenarioReport(
         name=scene.name,
         title=scene.title,
@@ -168,7 +151,7 @@ def _report(
         horizons=None if pilot.lyapunov is None else pilot.horizons,
         smooth=pilot.smooth,
         notes=_notes(basis, largest),
-        figure=quantity_name(basis.model, scene),
+        figure=quantity_name(model, scene),
         rows=rows,
         orders=_fit_orders(basis, rows) if pilot.smooth else (),
         stable=largest,
@@ -280,7 +263,10 @@ def _measure_setting(
         penetration=run.penetration,
     )
     if not run.judgement.ok:
-        return replace(row, growth=_growth(basis, setting)), None
+        variant = with_setting(model, setting)
+        growth = run_trial(pilot.setup, variant, pilot.setup.scenario.duration).growth
+        has_grown = math.isfinite(growth) and growth > 1
+        return replace(row, growth=growth if has_grown else None), None
     return _with_errors(basis, row, run)
 
 
@@ -315,13 +301,6 @@ def _mean_energy(run: Run, horizon: float, expected: float | None) -> float | No
     if expected is None or len(energies) < 2 or not np.isfinite(energies).all():
         return None
     return float(energies.mean()) / expected - 1
-
-
-def _growth(basis: Basis, setting: MeasuredSetting) -> float | None:
-    """The factor by which velocities grew in a step; `None` where they did not."""
-    pilot, model = basis.pilot, with_setting(basis.model, setting)
-    growth = run_trial(pilot.setup, model, pilot.setup.scenario.duration).growth
-    return growth if math.isfinite(growth) and growth > 1 else None
 
 
 def _quantity_error(

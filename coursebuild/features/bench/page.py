@@ -10,6 +10,7 @@ the page shows the command that measures it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup, escape
@@ -60,7 +61,11 @@ class BenchView(Struct, frozen=True):
 def bench_view(library: Library, place: urls.Place, bench: Bench) -> BenchView:
     """Find the report that a block on a page shows, and make what the page shows of it."""
     scene: SceneReport | None = library.reports.scenes.get(bench.model)
-    report = None if scene is None else _find_report(scene, bench)
+    reports: Sequence[ScenarioReport | SweepReport] = ()
+    if scene is not None:
+        reports = scene.scenarios if bench.sweep is None else scene.sweeps
+    name = bench.scenario if bench.sweep is None else bench.sweep
+    report = next((report for report in reports if name in (None, report.name)), None)
     anchor = "measured"
     if isinstance(report, SweepReport):
         anchor = scenario_anchor(f"sweep-{report.name}")
@@ -84,12 +89,6 @@ def bench_view(library: Library, place: urls.Place, bench: Bench) -> BenchView:
         folded_table=scenario.settings if has_fold else None,
         machine=machine_text(library.words, scene.machine),
     )
-
-
-def _find_report(scene: SceneReport, bench: Bench) -> ScenarioReport | SweepReport | None:
-    if bench.sweep is not None:
-        return next((sweep for sweep in scene.sweeps if sweep.name == bench.sweep), None)
-    return next((s for s in scene.scenarios if bench.scenario in (None, s.name)), None)
 
 
 def draw_bench(page: PageContext, block: Bench) -> Markup:

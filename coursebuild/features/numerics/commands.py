@@ -203,18 +203,17 @@ def _select_problems(names: tuple[str, ...]) -> list[str]:
 
 def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
     """The reports as text, with a blank line between cases."""
-    return "\n".join(_case(report, style) for report in reports)
-
-
-def _case(report: CaseReport, style: Style) -> str:
-    view = case_view(english(), urls.Place(urls.NUMERICS), report)
-    number = f"case {report.case}: " if report.case else ""
-    lines = [style.paint(report.name, BOLD) + f"  {number}{report.title}"]
-    for text in (*view.sentences, *view.notes):
-        lines += style.wrap(plain_text(text), "  ")
-    for block in (*(grid_lines(grid, style) for grid in view.grids), _errors(report)):
-        lines += ["", *(f"  {line}".rstrip() for line in block)] if block else []
-    return "\n".join(lines) + "\n"
+    texts = []
+    for report in reports:
+        view = case_view(english(), urls.Place(urls.NUMERICS), report)
+        number = f"case {report.case}: " if report.case else ""
+        lines = [style.paint(report.name, BOLD) + f"  {number}{report.title}"]
+        for text in (*view.sentences, *view.notes):
+            lines += style.wrap(plain_text(text), "  ")
+        for block in (*(grid_lines(grid, style) for grid in view.grids), _errors(report)):
+            lines += ["", *(f"  {line}".rstrip() for line in block)] if block else []
+        texts.append("\n".join(lines) + "\n")
+    return "\n".join(texts)
 
 
 def _errors(report: CaseReport) -> list[str]:

@@ -145,7 +145,10 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
     model = "" if report.case else report.name.rpartition("/")[0]
     label = words("numerics.orders", title=report.title)
     orders = orders_table(words, label, report.orders, merge=True)
-    grids = (_boundaries(words, report), _figures(words, report), orders)
+    rows = [(line.integrator, _boundary(words, line)) for line in report.boundaries]
+    label = f"{report.title}: {stable_title(words, report.boundaries[0])}" if rows else ""
+    boundaries = integrator_table(words, label, _BOUNDARY, rows, merge=True)
+    grids = (boundaries, _figures(words, report), orders)
     quantities = case_quantities(report)
     name = urls.encode(report.name)
     return CaseView(
@@ -179,12 +182,6 @@ def _describe(words: Strings, report: CaseReport, quantities: Sequence[Quantity]
         yield words("numerics.out_of_reach")
     if report.note:
         yield sentence(report.note)
-
-
-def _boundaries(words: Strings, report: CaseReport) -> Grid | None:
-    rows = [(line.integrator, _boundary(words, line)) for line in report.boundaries]
-    label = f"{report.title}: {stable_title(words, report.boundaries[0])}" if rows else ""
-    return integrator_table(words, label, _BOUNDARY, rows, merge=True)
 
 
 def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:

@@ -271,14 +271,23 @@ def _scene(scene: SceneReport, style: Style) -> str:
     for scenario in scene.scenarios:
         lines += ["", *_scenario(scenario, style)]
     for sweep in scene.sweeps:
-        lines += ["", *_sweep(sweep, style)]
+        view = scenario_view(english(), sweep)
+        marks = (((_OWN_MARK, BOLD) if row.own else (" ", "")) for row in sweep.rows)
+        lines += ["", _title(sweep.name, sweep.title, style)]
+        lines += _table(view.settings, marks, f"{_OWN_MARK} as the model is", style)
+        lines += _notes(view.notes, style)
     return "\n".join(lines) + "\n"
 
 
 def _scenario(report: ScenarioReport, style: Style) -> list[str]:
     view = scenario_view(english(), report)
     lines = [_title(report.name, report.title, style)]
-    for text in (*map(plain_text, view.description), *_plot_remarks(report), *report.notes):
+    texts = [plain_text(text) for text in view.description]
+    if report.figure:  # a page says this and the next in its plot
+        texts.append(f"It measures {report.figure}.")
+    if report.velocity_floor > report.floor:
+        texts.append(f"Velocities are known to {plain_text(power(report.velocity_floor, 1))}.")
+    for text in (*texts, *report.notes):
         lines += style.wrap(text, 2 * _INDENT)
     legend = f"{_OWN_MARK} the scene's own   {_FRONT_MARK} on the Pareto front"
     lines += _table(view.settings, map(_mark, report.rows), legend, style)
@@ -291,27 +300,8 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
     return [*lines, *_notes(view.notes, style)]
 
 
-def _sweep(sweep: SweepReport, style: Style) -> list[str]:
-    view = scenario_view(english(), sweep)
-    marks = (((_OWN_MARK, BOLD) if row.own else (" ", "")) for row in sweep.rows)
-    head = _title(sweep.name, sweep.title, style)
-    return [
-        head,
-        *_table(view.settings, marks, f"{_OWN_MARK} as the model is", style),
-        *_notes(view.notes, style),
-    ]
-
-
 def _title(name: str, title: str, style: Style) -> str:
     return _INDENT + style.paint(visible(name), BOLD) + (f"  {visible(title)}" if title else "")
-
-
-def _plot_remarks(report: ScenarioReport) -> Iterator[str]:
-    """Say what a page says in its plot."""
-    if report.figure:
-        yield f"It measures {report.figure}."
-    if report.velocity_floor > report.floor:
-        yield f"Velocities are known to {plain_text(power(report.velocity_floor, 1))}."
 
 
 def _table(

@@ -45,7 +45,6 @@ from coursebuild.numerics.reports.diet_report import (
     DietReport,
     Finding,
     Saving,
-    TextEdit,
     name_list,
 )
 from coursebuild.numerics.reports.records import DIET, ReportFailure
@@ -318,24 +317,19 @@ def _finding(finding: Finding, style: Style) -> list[str]:
     if finding.kept:
         return [*lines, *style.wrap(f"kept: {finding.kept}", "    ")]
     for edit in finding.edits[:_EDITS]:
-        lines += _edit(edit, style)
+        lines.append(f"    {visible(edit.path)}:{edit.line}:{edit.column}")
+        for mark, text, colour in (("-", edit.old, RED), ("+", edit.new, GREEN)):
+            text_lines = [line for line in text.splitlines() if line.strip()]
+            for line in text_lines[:_LINES]:
+                lines.append("    " + style.paint(f"{mark} {visible(line.strip())}", colour))
+            if len(text_lines) > _LINES:
+                lines.append(f"    {mark} … {plural(len(text_lines) - _LINES, 'more line')}")
     if len(finding.edits) > _EDITS:
         lines.append(f"    … and {len(finding.edits) - _EDITS} more changes")
     if finding.doubt:
         lines += style.wrap(f"no fault, as {finding.doubt}", "    ")
     elif finding.unfixed and finding.is_fault:
         lines += style.wrap(f"not for --fix: {finding.unfixed}", "    ")
-    return lines
-
-
-def _edit(edit: TextEdit, style: Style) -> list[str]:
-    lines = [f"    {visible(edit.path)}:{edit.line}:{edit.column}"]
-    for mark, text, colour in (("-", edit.old, RED), ("+", edit.new, GREEN)):
-        text_lines = [line for line in text.splitlines() if line.strip()]
-        for line in text_lines[:_LINES]:
-            lines.append("    " + style.paint(f"{mark} {visible(line.strip())}", colour))
-        if len(text_lines) > _LINES:
-            lines.append(f"    {mark} … {plural(len(text_lines) - _LINES, 'more line')}")
     return lines
 
 

@@ -32,7 +32,7 @@ from coursebuild.core.pages.strings import Strings
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.core.values import fingerprint
 from coursebuild.features.bench.grids import Grid
-from coursebuild.numerics.reports.departures import Departure, RecordCheck
+from coursebuild.numerics.reports.departures import RecordCheck
 from coursebuild.numerics.reports.records import ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.report.terminal import (
@@ -108,24 +108,20 @@ def _format_check(check: RecordCheck, style: Style) -> str:
     lines = [f"{style.paint(visible(check.name), BOLD)}  {verdict}"]
     lines += ["  " + style.paint(visible(remark), YELLOW) for remark in check.remarks]
     for place in dict.fromkeys(departure.where for departure in check.departures):
-        head, *rows = _departure_table([d for d in check.departures if d.where == place])
+        departures = [d for d in check.departures if d.where == place]
+        head, *rows = table(
+            [
+                Column(
+                    name,
+                    tuple(getattr(departure, name) for departure in departures),
+                    left=name not in ("recorded", "measured"),
+                )
+                for name in ("setting", "figure", "recorded", "measured", "band")
+            ]
+        )
         lines += ["", "  " + style.paint(visible(place), BOLD), "    " + style.paint(head, FAINT)]
         lines += [f"    {row}" for row in rows]
     return "\n".join(lines) + "\n"
-
-
-def _departure_table(departures: Sequence[Departure]) -> list[str]:
-    names = ("setting", "figure", "recorded", "measured", "band")
-    return table(
-        [
-            Column(
-                name,
-                tuple(getattr(departure, name) for departure in departures),
-                left=name not in ("recorded", "measured"),
-            )
-            for name in names
-        ]
-    )
 
 
 def add_report_options(parser: argparse.ArgumentParser) -> None:

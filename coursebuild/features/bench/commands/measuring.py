@@ -32,7 +32,7 @@ from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.measurement import CannotMeasureError
 from coursebuild.numerics.engine import silent
-from coursebuild.numerics.problem import Array, Scenario
+from coursebuild.numerics.problem import Array
 from coursebuild.numerics.pruning.comparison import watch
 from coursebuild.numerics.pruning.reachability import possible_pairs
 from coursebuild.numerics.reports.case_report import exact_file
@@ -182,6 +182,7 @@ def add_card(
         EffectError: an engine cannot be loaded.
     """
     from coursebuild.core.run.mjcf import existing_files
+    from coursebuild.features.lab.engines.speed import real_time_factor
 
     source = scene.model.source
     with silent():  # MuJoCo would write its warnings into the working directory
@@ -191,6 +192,11 @@ def add_card(
             pair for scenario in scenarios for pair in watch(model, scenario).touching_pairs
         }
     files = (root / path for path in existing_files(root, source.path, source.text))
+    first = scenarios[0].scenario
+    key, run = (
+        None if first.keyframe < 0 else first.keyframe,
+        (first.duration, scene.facts.timestep),
+    )
     card = SceneCard(
         bodies=int(model.nbody) - 1,
         geoms=int(model.ngeom),
@@ -199,17 +205,6 @@ def add_card(
         touched=len(touching_pairs),
         mjcf=len(source.text.encode()) + sum(path.stat().st_size for path in files),
         mjb=int(mujoco.mj_sizeModel(model)),
-        browser=_browser_speed(root, scene, scenarios[0].scenario, seconds),
+        browser=real_time_factor(root, source, key, run, seconds),
     )
     return replace(report, card=card)
-
-
-def _browser_speed(
-    root: Path, scene: CourseScene, scenario: Scenario, seconds: float
-) -> float | None:
-    """Measure simulated time over the time that it takes in a browser; `None` if it fails."""
-    from coursebuild.features.lab.engines.speed import real_time_factor
-
-    key = None if scenario.keyframe < 0 else scenario.keyframe
-    run = scenario.duration, scene.facts.timestep
-    return real_time_factor(root, scene.model.source, key, run, seconds)
