@@ -225,7 +225,6 @@ def _combine(
 
 
 def _gap(model: Any, states: EngineStates, second_states: EngineStates) -> Sizes:
-    """The largest difference of two motions."""
     return largest_errors(errors(motion_of(model, states), motion_of(model, second_states)))
 
 

@@ -199,7 +199,6 @@ def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
 
 
 def _figures(words: Strings, report: CaseReport) -> Grid | None:
-    """Quantities that are known."""
     named_rows: list[NamedRow] = []
     parts: list[FigurePart] = []
     for name in dict.fromkeys(line.name for line in report.figures):

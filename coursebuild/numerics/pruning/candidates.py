@@ -287,7 +287,12 @@ def far_bodies(
     used_names |= {
         name.rstrip("0123456789") for name in used_names
     }  # what is repeated has a number
-    ranks = dict.fromkeys(_moving_trees(model, runs), 3)
+    ranks: dict[int, int] = {}
+    for case in (run.scene.scenario for run in runs):
+        velocity = np.array(case.qvel)
+        if not case.qvel and case.keyframe >= 0:
+            velocity = model.key_qvel[case.keyframe]
+        ranks |= dict.fromkeys(model.dof_treeid[np.flatnonzero(velocity)].tolist(), 3)
     roots: dict[Element, list[int]] = {}
     for element, ids in text.things("body"):
         names = {inner.get("name") for inner in element.walk()} - {None, ""}
@@ -334,17 +339,6 @@ def _pairs_and_sensors_of(text: ModelText, body: Element) -> list[Element]:
             attribute.value in names for attribute in element.attributes if attribute.name != "name"
         )
     ]
-
-
-def _moving_trees(model: Any, runs: Collection[WatchedRun]) -> set[int]:
-    """The trees that a scenario sets in motion."""
-    trees: set[int] = set()
-    for case in (run.scene.scenario for run in runs):
-        velocity = np.array(case.qvel)
-        if not case.qvel and case.keyframe >= 0:
-            velocity = model.key_qvel[case.keyframe]
-        trees |= set(model.dof_treeid[np.flatnonzero(velocity)].tolist())
-    return trees
 
 
 _SETTINGS = (

@@ -5,7 +5,7 @@ Entry points: `PruningTrials`, which makes a `PrunedModel`; `largest_subset(item
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -29,7 +29,6 @@ from coursebuild.numerics.pruning.comparison import (
 from coursebuild.numerics.pruning.model_text import ModelText, model_bytes
 from coursebuild.numerics.pruning.readers import difference
 from coursebuild.numerics.pruning.xml_edits import (
-    Element,
     ModelEdit,
     drop_attribute,
     drop_numbers,
@@ -188,16 +187,10 @@ def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, .
     edits = [edit for item in items for edit in item.edits]
     edits += remove_elements([*elements, *find_emptied(drops, edits)])
     edits += [drop_attribute(*drop) for drop in drops]
-    edits += _keyframes(text, index, set(nodes))
-    return merge_edits(edits), index
-
-
-def _keyframes(
-    text: ModelText, index: IndexMap, removed_elements: Collection[Element]
-) -> Iterator[ModelEdit]:
-    """Remove the numbers of removed coordinates from keyframes, which list one for each."""
-    for name, size in KEY_SIZES.items():
+    removed = set(nodes)
+    for name, size in KEY_SIZES.items():  # keyframes list a number for each coordinate
         lost = set(range(getattr(text.model, size))).difference(index[size].tolist())
         for key in text.elements:
-            if key.tag == "key" and key not in removed_elements:
-                yield from drop_numbers(key, name, lost)
+            if key.tag == "key" and key not in removed:
+                edits += drop_numbers(key, name, lost)
+    return merge_edits(edits), index

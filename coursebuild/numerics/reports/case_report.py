@@ -161,17 +161,16 @@ def _course_case(report: SceneReport, scenario: ScenarioReport) -> CaseReport:
         machine=report.machine,
         note="; ".join(scenario.notes),
         reference=ReferenceLine(scenario.reference, scenario.source, scenario.second, *floors),
-        boundaries=tuple(_boundary(row) for row in scenario.stable),
+        boundaries=tuple(
+            BoundaryLine(
+                **asdict(row), theory=None, formula="", difference=None, beyond="", growth=None
+            )
+            for row in scenario.stable
+        ),
         figures=(),
         orders=scenario.orders,
         errors=tuple(_error_line(row) for row in rows),
         costs=tuple(StepCost(name, seconds) for name, seconds in steps.items()),
-    )
-
-
-def _boundary(row: StableRow) -> BoundaryLine:
-    return BoundaryLine(
-        **asdict(row), theory=None, formula="", difference=None, beyond="", growth=None
     )
 
 

@@ -89,7 +89,7 @@ def line_look(number: int) -> str:
     return f'stroke="{colour(number)}" stroke-width="1.7" stroke-linejoin="round"{dashes}'
 
 
-def mark(number: int, x: float, y: float, size: float) -> str:
+def outline(number: int, x: float, y: float, size: float) -> str:
     """The path of a mark: circle, square, diamond, triangles up and down, pentagon, hexagon.
 
     All of about the same area; `size` is the radius of the circle.
@@ -121,7 +121,7 @@ def symbols(number: int, marks: Iterable[str]) -> str:
 def symbol(number: int, x: float, y: float, size: float, *, full: bool, title: str = "") -> str:
     """The mark of a run, among `symbols`; `full` where it is on the front."""
     look = "" if full else f' fill="{PAPER}"'
-    return f'<path d="{mark(number, x, y, size)}"{look}>{_title(title)}</path>'
+    return f'<path d="{outline(number, x, y, size)}"{look}>{_title(title)}</path>'
 
 
 def _title(text: str) -> str:
@@ -148,25 +148,23 @@ def key(entries: Iterable[Entry], left: float, top: float, width: float) -> tupl
         entry_width = 30 + text_width(text, TICK_SIZE) + 10
         if x > left and x + entry_width > width:
             x, y = left, y + ROW
-        parts += _key_mark(entry, x + 14, y - 4)
+        middle, level = x + 14, y - 4
+        if entry.number is not None:
+            parts.append(path(f"M{middle - 13:.1f} {level:.1f}h26", line_look(entry.number)))
+            mark = symbol(entry.number, middle, level, MARK, full=True)
+            parts.append(symbols(entry.number, [mark]))
+        elif entry.kind == "own":
+            parts.append(ring(middle, level, 6))
+        elif entry.kind == "lost":
+            parts.append(cross(middle, level, INK))
+        else:
+            full = INK if entry.kind == "front" else PAPER
+            look = f'fill="{full}" stroke="{INK}" stroke-width="1.5"'
+            d = outline(0, middle, level, SMALL if entry.kind == "other" else MARK)
+            parts.append(area(d, look))
         parts.append(label(x + 30, y, text, FINE))
         x += entry_width
     return "".join(parts), y + 6
-
-
-def _key_mark(entry: Entry, x: float, y: float) -> Iterator[str]:
-    """The mark that stands before an entry of the key."""
-    if entry.number is not None:
-        yield path(f"M{x - 13:.1f} {y:.1f}h26", line_look(entry.number))
-        yield symbols(entry.number, [symbol(entry.number, x, y, MARK, full=True)])
-    elif entry.kind == "own":
-        yield ring(x, y, 6)
-    elif entry.kind == "lost":
-        yield cross(x, y, INK)
-    else:
-        full = INK if entry.kind == "front" else PAPER
-        look = f'fill="{full}" stroke="{INK}" stroke-width="1.5"'
-        yield area(mark(0, x, y, SMALL if entry.kind == "other" else MARK), look)
 
 
 def svg(body: str, size: tuple[float, float], name: str, texts: tuple[str, str]) -> str:
@@ -292,7 +290,18 @@ def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
             d = "M" + "L".join(f"{right:.1f} {down:.1f}" for right, down in places)
             yield path(d, line_look(line.number))
     for line in chart.lines:
-        yield from _marks(line, x, y)
+        paint, bars, marks = colour(line.number), "", []
+        for point in sorted(line.points, key=lambda point: point.small):
+            right, down = _place(point, x, y)
+            if point.y is None:
+                yield cross(right, down, paint, point.title)
+                continue
+            if point.x.high > point.x.low:
+                bars += bar(x(point.x.low), x(point.x.high), down)
+            size = SMALL if point.small else MARK
+            marks.append(symbol(line.number, right, down, size, full=point.full, title=point.title))
+        yield path(bars, f'stroke="{paint}"') if bars else ""
+        yield symbols(line.number, marks)
         yield from (ring(*_place(point, x, y), RING) for point in line.points if point.ringed)
     if not chart.marks:
         yield from _names(chart, x, y)
@@ -318,22 +327,6 @@ def _place(point: Point, x: Scale, y: Scale) -> tuple[float, float]:
     return x(point.x.value), y.end - 6 if point.y is None else y(point.y)
 
 
-def _marks(line: Line, x: Scale, y: Scale) -> Iterator[str]:
-    """The runs of a line with their intervals."""
-    paint, bars, marks = colour(line.number), "", []
-    for point in sorted(line.points, key=lambda point: point.small):
-        right, down = _place(point, x, y)
-        if point.y is None:
-            yield cross(right, down, paint, point.title)
-            continue
-        if point.x.high > point.x.low:
-            bars += bar(x(point.x.low), x(point.x.high), down)
-        size = SMALL if point.small else MARK
-        marks.append(symbol(line.number, right, down, size, full=point.full, title=point.title))
-    yield path(bars, f'stroke="{paint}"') if bars else ""
-    yield symbols(line.number, marks)
-
-
 def _names(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
     """The names at the right, in the order in which the lines end, without overlap."""
     lines = [line for line in chart.lines if line.visible_points]
@@ -349,7 +342,6 @@ def _names(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
 
 
 def _grid(x: Scale, y: Scale, titles: tuple[str, str]) -> tuple[list[str], list[str]]:
-    """Lines of the grid, and the texts of the axes."""
     lines = [f"M{x.start:.1f} {at:.1f}H{x.end:.1f}" for at in _decades(y)]
     texts: list[str] = []
     for at, text in _ticks_y(y):

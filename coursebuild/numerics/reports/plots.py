@@ -117,7 +117,6 @@ def _line(
     timed: Sequence[WorkPrecisionRow],
     name: str,
 ) -> Line:
-    """The rows of an integrator."""
     baseline = report.own_setting
     points = []
     rows = [row for row in report.rows if row.setting.integrator == name]
@@ -165,7 +164,6 @@ def _marks(report: ScenarioReport, lines: Sequence[Line]) -> Iterator[Entry]:
 
 
 def _describe(report: ScenarioReport, quantity: Quantity, lines: Sequence[Line]) -> Iterator[str]:
-    """Describe the plot in sentences."""
     for line in lines:
         if line.visible_points:
             errors = _range([point.y or 0.0 for point in line.visible_points], 2, "{1} to {0}")
@@ -192,7 +190,6 @@ def _range(values: Sequence[float], digits: int, words: str) -> str:
 def _point_title(
     report: ScenarioReport, row: WorkPrecisionRow, error: float | None, *, timed: bool
 ) -> Iterator[str]:
-    """The parts of a point's tooltip."""
     yield setting_text(row.setting)
     if error is None:
         yield "; ".join((status_text(row.status), *row.reasons))
@@ -249,7 +246,6 @@ def case_svg(report: CaseReport, quantity: Quantity, name: str) -> str:
 
 
 def _case_points(report: CaseReport, quantity: Quantity, integrator: str) -> Iterator[Point]:
-    """The runs of an integrator as points; those without an error have no place in the plot."""
     for run in report.errors:
         cost = report.cost(run)
         if run.integrator != integrator or cost is None:
@@ -348,7 +344,6 @@ def _panel(
 def _group(
     rows: Sequence[SweepRow], figure: str, scale: Scale, top: float, number: int, names: float
 ) -> Iterator[str]:
-    """The values of a parameter."""
     places = [(figure_interval(row, figure), top + ROW * n) for n, row in enumerate(rows)]
     for (start, y), (end, end_y) in pairwise(places):
         if start is not None and end is not None:
@@ -369,7 +364,6 @@ def _group(
 
 
 def _describe_sweep(sweep: SweepReport, figures: Sequence[str]) -> str:
-    """Describe the plot for readers who cannot see it."""
     return " ".join(
         f"{row.parameter} {row.value}: "
         + ", ".join(f"{FIGURES[figure]} {cell(row, figure) or row.status}" for figure in figures)

@@ -307,7 +307,6 @@ def _title(name: str, title: str, style: Style) -> str:
 def _table(
     grid: Grid, marks: Iterable[tuple[str, str]], legend: str, style: Style
 ) -> Iterator[str]:
-    """Write the table of settings, or of values."""
     yield ""
     if not grid.rows:
         yield f"{2 * _INDENT}no setting was measured"
@@ -324,7 +323,6 @@ def _mark(row: WorkPrecisionRow) -> tuple[str, str]:
 
 
 def _notes(notes: Sequence[str], style: Style) -> list[str]:
-    """Write why runs were lost."""
     return ["" for _ in notes[:1]] + [
         line for note in notes for line in style.wrap(note, 2 * _INDENT, YELLOW)
     ]

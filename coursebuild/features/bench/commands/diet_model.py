@@ -102,7 +102,6 @@ def _block_readers(course: Course, model: str) -> Iterator[Reader]:
 
 
 def _code_readers(root: Path, files: CourseFiles, modules: set[str]) -> Iterator[Reader]:
-    """Yield the course's files of code."""
     for path in files.files:
         if path.endswith(_CODE):
             try:
