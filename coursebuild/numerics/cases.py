@@ -22,14 +22,6 @@ from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import DeclaredScenario
 from coursebuild.numerics.costs import Clock, scenario_job, time_jobs
 from coursebuild.numerics.detector import driving_force
-from coursebuild.numerics.engine import (
-    EngineStates,
-    compile_model,
-    initial_data,
-    motion_of,
-    refsafe_active,
-    simulate,
-)
 from coursebuild.numerics.integrate import forward_motion
 from coursebuild.numerics.measure import (
     energy_drift,
@@ -61,6 +53,14 @@ from coursebuild.numerics.reports.case_report import (
 )
 from coursebuild.numerics.reports.scene_report import Errors, OrderRow
 from coursebuild.numerics.scene import Scene, SceneError
+from coursebuild.numerics.simulation import (
+    EngineStates,
+    compile_model,
+    initial_data,
+    motion_of,
+    refsafe_active,
+    simulate,
+)
 from coursebuild.numerics.stability import boundaries
 from mjcourse.spatial import quat_conj, quat_mul
 

@@ -30,12 +30,12 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import STATE, full_state, initial_data, silent
 from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, RowVerdict, WorkPrecisionRow
-from coursebuild.numerics.reports.wording import setting_text
+from coursebuild.numerics.reports.shown_errors import setting_text
 from coursebuild.numerics.scene import Scene
+from coursebuild.numerics.simulation import STATE, full_state, initial_data, silent
 from coursebuild.numerics.stability import apply, with_setting
 
 Clock: TypeAlias = Callable[[], int]

@@ -35,7 +35,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from coursebuild.numerics.engine import (
+from coursebuild.numerics.pilot import position_distances
+from coursebuild.numerics.problem import Array, Integrator, Motion, Scenario, Setup
+from coursebuild.numerics.simulation import (
     EngineStates,
     compile_model,
     coordinates,
@@ -44,8 +46,6 @@ from coursebuild.numerics.engine import (
     simulate,
     with_integrator,
 )
-from coursebuild.numerics.pilot import position_distances
-from coursebuild.numerics.problem import Array, Integrator, Motion, Scenario, Setup
 
 State = NDArray[Any]
 """(d,) float64, or objects of `Decimal`."""

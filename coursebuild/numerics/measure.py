@@ -26,10 +26,10 @@ from typing import Any, TypeAlias
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.engine import EngineStates, initial_data
 from coursebuild.numerics.problem import Array, Motion, Reference, Sizes
 from coursebuild.numerics.reports.scene_report import FLOORS, Errors, FittedOrder, OrderRow
 from coursebuild.numerics.scene import Scene
+from coursebuild.numerics.simulation import EngineStates, initial_data
 from mjcourse.spatial import angular_distance
 
 _LOWEST, _HIGHEST = 100.0, 0.1

@@ -21,7 +21,7 @@ from msgspec.structs import astuple
 from numpy.typing import NDArray
 
 from coursebuild.core.model.scenarios import is_multiple
-from coursebuild.numerics.reports.wording import INTEGRATORS
+from coursebuild.numerics.reports.shown_errors import INTEGRATORS
 
 Array: TypeAlias = NDArray[np.float64]
 

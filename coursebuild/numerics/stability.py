@@ -31,15 +31,6 @@ from msgspec import Struct
 from msgspec.structs import asdict, replace
 
 from coursebuild.numerics.detector import Peaks, RunStatus, driving_force, judge
-from coursebuild.numerics.engine import (
-    advance_watching,
-    compile_model,
-    initial_data,
-    integrator_of,
-    set_integrator,
-    simulate,
-    with_integrator,
-)
 from coursebuild.numerics.pilot import Pilot
 from coursebuild.numerics.problem import (
     STANDARD,
@@ -51,8 +42,17 @@ from coursebuild.numerics.problem import (
 )
 from coursebuild.numerics.reports.case_report import BoundaryLine
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, StableRow
-from coursebuild.numerics.reports.wording import FEWEST_STEPS
+from coursebuild.numerics.reports.shown_errors import FEWEST_STEPS
 from coursebuild.numerics.scene import thickness
+from coursebuild.numerics.simulation import (
+    advance_watching,
+    compile_model,
+    initial_data,
+    integrator_of,
+    set_integrator,
+    simulate,
+    with_integrator,
+)
 
 _REACH = 10.0
 """The grid is tried down to this part of the largest stable timestep."""

@@ -24,15 +24,6 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import DeclaredSweep, SweepValue, Variation
 from coursebuild.numerics.costs import Clock, Job, scenario_job, time_jobs
-from coursebuild.numerics.engine import (
-    EngineStates,
-    advance,
-    initial_data,
-    integrator_of,
-    silent,
-    simulate,
-    with_integrator,
-)
 from coursebuild.numerics.measure import (
     Pair,
     contact_speeds,
@@ -45,6 +36,15 @@ from coursebuild.numerics.problem import Scenario, Setup
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import SweepReport, SweepRow
 from coursebuild.numerics.scene import Scene, SceneError, thickness
+from coursebuild.numerics.simulation import (
+    EngineStates,
+    advance,
+    initial_data,
+    integrator_of,
+    silent,
+    simulate,
+    with_integrator,
+)
 
 THREADS = "threads"
 _PARAMETER = re.compile(r"(?P<kind>[a-z]+)(:(?P<name>.+))?\.(?P<field>\w+)(\[(?P<at>\d+)\])?")

@@ -4,7 +4,7 @@ Entry point: `measure_scenario(model, scene, quick=…, clock=…, tell=…)`.
 
 1. A first run in small steps shows what acts in a scenario and how long its motion can be
    predicted (`pilot`).
-2. The reference is computed twice, in two ways (`references`).
+2. The reference is computed twice, in two ways (`known_motion`).
 3. Every setting is run, judged and compared, then timed beside the model's own (`costs`). The
    error of a lost run is not given; no other is below ten floors of the reference. Errors count to
    the horizon, and what should be conserved is watched to the end. Errors are also given as a
@@ -25,13 +25,12 @@ from msgspec.structs import asdict, replace
 
 from coursebuild.numerics.costs import Clock, costs, front, verdict
 from coursebuild.numerics.detector import driving_force
-from coursebuild.numerics.engine import (
-    EngineStates,
-    Run,
-    motion_of,
-    refsafe_active,
-    refsafe_from,
-    simulate,
+from coursebuild.numerics.known_motion import (
+    Cone,
+    KnownMotion,
+    find_conserved,
+    find_references,
+    mean_late_energy,
 )
 from coursebuild.numerics.measure import (
     energy_drift,
@@ -45,13 +44,6 @@ from coursebuild.numerics.measure import (
 )
 from coursebuild.numerics.pilot import Pilot, run_pilot
 from coursebuild.numerics.problem import STANDARD, Sizes
-from coursebuild.numerics.references import (
-    Cone,
-    KnownMotion,
-    find_conserved,
-    find_references,
-    mean_late_energy,
-)
 from coursebuild.numerics.reports.scene_report import (
     FLOORS,
     MeasuredSetting,
@@ -60,8 +52,16 @@ from coursebuild.numerics.reports.scene_report import (
     StableRow,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.wording import setting_text
+from coursebuild.numerics.reports.shown_errors import setting_text
 from coursebuild.numerics.scene import Scene, thickness
+from coursebuild.numerics.simulation import (
+    EngineStates,
+    Run,
+    motion_of,
+    refsafe_active,
+    refsafe_from,
+    simulate,
+)
 from coursebuild.numerics.stability import (
     own_setting,
     run_trial,

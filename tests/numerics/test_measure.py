@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from coursebuild.numerics.cases import measure, orders
 from coursebuild.numerics.measure import errors, fit_order
 from coursebuild.numerics.problem import STANDARD, Integrator, Motion, Sizes
-from coursebuild.numerics.problems import all_problems, impact, linked_bodies, scales
+from coursebuild.numerics.problems import all_problems, extremes, impact, linked_bodies
 from coursebuild.numerics.reports.case_report import ErrorLine
 
 FIRST = tuple(integrator for integrator in STANDARD if integrator is not Integrator.RK4)
@@ -169,7 +169,7 @@ def test_figures_are_those_of_theory_or_known_to_be_others() -> None:
             mismatches.append((name, check.name, integrator, check.measure(integrator), expected))
     assert mismatches == []
     with pytest.raises(ValueError, match=r"A \+ B >= C"):
-        mujoco.MjModel.from_xml_string(scales.ROUNDED_PLATE)
+        mujoco.MjModel.from_xml_string(extremes.ROUNDED_PLATE)
 
 
 @pytest.mark.site

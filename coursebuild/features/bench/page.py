@@ -104,7 +104,7 @@ def draw_bench(page: PageContext, block: Bench) -> Markup:
 
 def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
     """Write the report without its plot, and what the plot shows."""
-    from coursebuild.numerics.reports.plots import work_precision
+    from coursebuild.numerics.reports.report_plots import work_precision
 
     view = _view(writer.page, block)
     html = writer.page.template("bench/bench.html", bench=view, plots=())

@@ -39,7 +39,7 @@ from coursebuild.numerics.reports.scene_report import (
     cell,
     shown_figures,
 )
-from coursebuild.numerics.reports.wording import (
+from coursebuild.numerics.reports.shown_errors import (
     FEWEST_STEPS,
     Quantity,
     interval_text,
@@ -284,7 +284,7 @@ def _sweep_view(words: Strings, sweep: SweepReport, anchor: str) -> ScenarioView
 
 def plots(name: str, report: ScenarioReport | SweepReport) -> tuple[Markup, ...]:
     """Draw a plot for wide and for narrow screens; `name` is unique on the page."""
-    from coursebuild.numerics.reports.plots import (
+    from coursebuild.numerics.reports.report_plots import (
         plot_svg,  # late: few pages need it
         sweep_svg,
     )

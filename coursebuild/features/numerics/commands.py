@@ -41,9 +41,9 @@ from coursebuild.features.bench.commands.measurement import (
 from coursebuild.features.numerics.page import case_view
 from coursebuild.numerics.reports.case_report import CaseReport, ErrorLine
 from coursebuild.numerics.reports.departures import RecordCheck, case_departures
-from coursebuild.numerics.reports.plots import case_quantities
 from coursebuild.numerics.reports.records import STABILITY, ReportFailure
-from coursebuild.numerics.reports.wording import seconds_text, status_text
+from coursebuild.numerics.reports.report_plots import case_quantities
+from coursebuild.numerics.reports.shown_errors import seconds_text, status_text
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.shown_reports import read_record
 from coursebuild.report.terminal import BOLD, Column, Style, table

@@ -42,10 +42,15 @@ from coursebuild.numerics.reports.case_report import (
     FigureLine,
     course_cases,
 )
-from coursebuild.numerics.reports.plots import case_quantities, case_svg
 from coursebuild.numerics.reports.records import STABILITY
+from coursebuild.numerics.reports.report_plots import case_quantities, case_svg
 from coursebuild.numerics.reports.scene_report import SceneReport
-from coursebuild.numerics.reports.wording import INTEGRATORS, Quantity, seconds_text, status_text
+from coursebuild.numerics.reports.shown_errors import (
+    INTEGRATORS,
+    Quantity,
+    seconds_text,
+    status_text,
+)
 
 _RIGHT = 1e-3
 """m or rad: the error at which costs are compared."""

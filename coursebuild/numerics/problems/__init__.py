@@ -10,10 +10,10 @@ from functools import cache
 from coursebuild.numerics.problem import Problem
 from coursebuild.numerics.problems import (
     contacts,
+    extremes,
     impact,
     linked_bodies,
     oscillators,
-    scales,
     tops,
     tumbling_box,
 )
@@ -29,6 +29,6 @@ def all_problems() -> dict[str, Problem]:
         *impact.problems(),
         *linked_bodies.problems(),
         *oscillators.problems(),
-        *scales.problems(),
+        *extremes.problems(),
     )
     return {problem.name: problem for problem in sorted(problems, key=lambda problem: problem.case)}

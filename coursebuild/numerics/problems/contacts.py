@@ -25,7 +25,6 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import compile_model, run_steps
 from coursebuild.numerics.problem import (
     Array,
     Integrator,
@@ -39,6 +38,7 @@ from coursebuild.numerics.problem import (
     model_text,
     motion_without_attitude,
 )
+from coursebuild.numerics.simulation import compile_model, run_steps
 from mjcourse.spatial import axis_angle_to_quat
 
 Cone = Literal["pyramidal", "elliptic"]

@@ -29,7 +29,6 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import run_steps
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
     NO_CONTACT,
@@ -46,6 +45,7 @@ from coursebuild.numerics.problem import (
     model_text,
     motion_without_attitude,
 )
+from coursebuild.numerics.simulation import run_steps
 
 _STEP = 0.01
 _THROW_SCENARIO = Scenario(1.0, 0.1, qvel=(3.0, 0.0, 4.0, 0.0, 0.0, 0.0))

@@ -27,7 +27,6 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import advance, compile_model, initial_data, simulate
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.measure import reference_motion
 from coursebuild.numerics.problem import (
@@ -44,6 +43,7 @@ from coursebuild.numerics.problem import (
     model_text,
     motion_without_attitude,
 )
+from coursebuild.numerics.simulation import advance, compile_model, initial_data, simulate
 from mjcourse.spatial import quat_conj, quat_mul, quat_to_mat
 
 

@@ -19,7 +19,6 @@ import math
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.engine import run_steps
 from coursebuild.numerics.integrate import cumulative_integral
 from coursebuild.numerics.problem import (
     NO_CONTACT,
@@ -37,6 +36,7 @@ from coursebuild.numerics.problem import (
     turning_at_rest,
 )
 from coursebuild.numerics.problems.oscillators import rk4_factor
+from coursebuild.numerics.simulation import run_steps
 from mjcourse.spatial import axis_angle_to_quat, quat_mul
 
 NEVER_STABLE = "Euler is stable at no timestep: what is measured is where that shows"

@@ -15,7 +15,6 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import advance, compile_model, initial_data, run_steps
 from coursebuild.numerics.integrate import cumulative_integral
 from coursebuild.numerics.problem import (
     NO_CONTACT,
@@ -32,6 +31,7 @@ from coursebuild.numerics.problem import (
     turning_at_rest,
 )
 from coursebuild.numerics.problems.tops import NEVER_STABLE
+from coursebuild.numerics.simulation import advance, compile_model, initial_data, run_steps
 from mjcourse.spatial import mat_to_quat
 
 SPIN = 6.0

@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 
 from coursebuild.core.model.scenarios import Declarations, DeclaredScenario
 from coursebuild.numerics.detector import Peaks, RunJudgement, judge, update_peaks
-from coursebuild.numerics.engine import STATE, advance, full_state, initial_data
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.scene import Scene, scenes, thickness
+from coursebuild.numerics.simulation import STATE, advance, full_state, initial_data
 
 Places: TypeAlias = NDArray[np.int64]
 IndexMap: TypeAlias = Mapping[str, Places]

@@ -14,7 +14,6 @@ import numpy as np
 from msgspec import Struct
 
 from coursebuild.numerics.costs import Clock, Timing, scenario_job, time_jobs
-from coursebuild.numerics.engine import STATE, advance, full_state, initial_data, silent
 from coursebuild.numerics.pruning.candidates import Item
 from coursebuild.numerics.pruning.comparison import (
     KEY_SIZES,
@@ -38,6 +37,7 @@ from coursebuild.numerics.pruning.xml_edits import (
 )
 from coursebuild.numerics.reports.diet_report import Saving
 from coursebuild.numerics.scene import Scene
+from coursebuild.numerics.simulation import STATE, advance, full_state, initial_data, silent
 
 _T = TypeVar("_T")
 _DRAWS = 2

@@ -2,8 +2,8 @@
 
 `scene_report`: speed against error of a model, and its parameters at other values; `case_report`:
 the hard cases; `diet_report`: what a model can be without. `records`: reports as files;
-`departures`: how two differ; `wording`: which errors are shown, and texts; `plots`: charts. Nothing
-here measures.
+`departures`: how two differ; `shown_errors`: which errors are shown, and texts; `report_plots`:
+charts. Nothing here measures.
 """
 
 from __future__ import annotations

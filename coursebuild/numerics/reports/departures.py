@@ -28,7 +28,7 @@ from coursebuild.numerics.reports.scene_report import (
     StableRow,
     SweepReport,
 )
-from coursebuild.numerics.reports.wording import seconds_text, setting_text, status_text
+from coursebuild.numerics.reports.shown_errors import seconds_text, setting_text, status_text
 
 _STABLE = 0.01
 """Relative band of a largest stable timestep: a bisection ends where its bounds are near."""

@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 
 from coursebuild.core.model.scenarios import BenchTable, DeclaredScenario
-from coursebuild.numerics.engine import initial_data
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.comparison import (
     IndexMap,
@@ -20,6 +19,7 @@ from coursebuild.numerics.pruning.comparison import (
     transfer,
 )
 from coursebuild.numerics.scene import Scene
+from coursebuild.numerics.simulation import initial_data
 from support.surveys import NO_DECLARATIONS, parse_declared
 
 DOUBLE_PENDULUM = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/>

@@ -39,7 +39,6 @@ from coursebuild.features.bench.commands.measurement import (
     run_measurement,
     write_records,
 )
-from coursebuild.numerics.engine import silent
 from coursebuild.numerics.pruning.survey import Survey
 from coursebuild.numerics.reports.diet_report import (
     DietReport,
@@ -48,6 +47,7 @@ from coursebuild.numerics.reports.diet_report import (
     name_list,
 )
 from coursebuild.numerics.reports.records import DIET, ReportFailure
+from coursebuild.numerics.simulation import silent
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes

@@ -31,7 +31,6 @@ from coursebuild.core.run.runner import ScriptServer
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.measurement import CannotMeasureError
-from coursebuild.numerics.engine import silent
 from coursebuild.numerics.problem import Array
 from coursebuild.numerics.pruning.comparison import watch
 from coursebuild.numerics.pruning.reachability import possible_pairs
@@ -44,6 +43,7 @@ from coursebuild.numerics.reports.scene_report import (
 )
 from coursebuild.numerics.scene import EXACT_SCRIPT, ExactMotion, SceneError, scenes
 from coursebuild.numerics.scene import Scene as PhysicsScene
+from coursebuild.numerics.simulation import silent
 from coursebuild.numerics.sweep import measure_sweep
 from coursebuild.numerics.work_precision import measure_scenario
 from coursebuild.pipeline.scenes import CourseScene

@@ -11,7 +11,6 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.engine import run_steps
 from coursebuild.numerics.problem import (
     NO_CONTACT,
     NO_GRAVITY,
@@ -28,6 +27,7 @@ from coursebuild.numerics.problem import (
     motion_without_attitude,
 )
 from coursebuild.numerics.problems.tops import FreeTop, free_body, spinning, top_reference
+from coursebuild.numerics.simulation import run_steps
 
 FAR, CRAWL = 1e9, 1e-3
 """m and m/s."""

@@ -10,9 +10,9 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
+from coursebuild.numerics.known_motion import KnownMotion, find_reference
 from coursebuild.numerics.pilot import run_pilot
 from coursebuild.numerics.problems import all_problems
-from coursebuild.numerics.references import KnownMotion, find_reference
 from coursebuild.numerics.scene import SceneError, scenes
 from support.surveys import NO_DECLARATIONS, parse_declared
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.engine import compile_model, refsafe_active, simulate
 from coursebuild.numerics.problem import Integrator
 from coursebuild.numerics.problems import all_problems
+from coursebuild.numerics.simulation import compile_model, refsafe_active, simulate
 
 
 def test_measuring_does_not_disturb_the_run() -> None:

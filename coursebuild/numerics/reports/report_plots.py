@@ -61,7 +61,7 @@ from coursebuild.numerics.reports.scene_report import (
     figure_interval,
     shown_figures,
 )
-from coursebuild.numerics.reports.wording import (
+from coursebuild.numerics.reports.shown_errors import (
     INTEGRATORS,
     Quantity,
     interval_text,

@@ -32,15 +32,6 @@ from msgspec.structs import replace
 from coursebuild.core.model.scenarios import DeclaredScenario
 from coursebuild.core.text.source import Span
 from coursebuild.numerics.cases import closed_motion, floor
-from coursebuild.numerics.engine import (
-    EngineStates,
-    initial_data,
-    invariants,
-    motion_of,
-    simulate,
-    states_of,
-    with_integrator,
-)
 from coursebuild.numerics.integrate import (
     Method,
     NoConvergenceError,
@@ -63,6 +54,15 @@ from coursebuild.numerics.pilot import Pilot, position_distances
 from coursebuild.numerics.problem import ROUNDING, Integrator, Setup, Sizes
 from coursebuild.numerics.reports.scene_report import FLOORS
 from coursebuild.numerics.scene import ExactMotion, SceneError
+from coursebuild.numerics.simulation import (
+    EngineStates,
+    initial_data,
+    invariants,
+    motion_of,
+    simulate,
+    states_of,
+    with_integrator,
+)
 from coursebuild.numerics.stability import CONES
 
 EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000

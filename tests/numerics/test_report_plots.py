@@ -13,9 +13,9 @@ from msgspec.structs import replace
 
 from coursebuild.core.drawing.marks import text_width
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.plots import plot_svg, work_precision
+from coursebuild.numerics.reports.report_plots import plot_svg, work_precision
 from coursebuild.numerics.reports.scene_report import ScenarioReport
-from coursebuild.numerics.reports.wording import main_quantity, quantities
+from coursebuild.numerics.reports.shown_errors import main_quantity, quantities
 from support.bench_reports import diverged_row, row, scenario, swing
 
 PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")
