@@ -187,10 +187,10 @@ def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, .
     edits = [edit for item in items for edit in item.edits]
     edits += remove_elements([*elements, *find_emptied(drops, edits)])
     edits += [drop_attribute(*drop) for drop in drops]
-    removed = set(nodes)
+    node_set = set(nodes)
     for name, size in KEY_SIZES.items():  # keyframes list a number for each coordinate
         lost = set(range(getattr(text.model, size))).difference(index[size].tolist())
         for key in text.elements:
-            if key.tag == "key" and key not in removed:
+            if key.tag == "key" and key not in node_set:
                 edits += drop_numbers(key, name, lost)
     return merge_edits(edits), index

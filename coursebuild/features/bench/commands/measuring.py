@@ -193,10 +193,8 @@ def add_card(
         }
     files = (root / path for path in existing_files(root, source.path, source.text))
     first = scenarios[0].scenario
-    key, run = (
-        None if first.keyframe < 0 else first.keyframe,
-        (first.duration, scene.facts.timestep),
-    )
+    key = None if first.keyframe < 0 else first.keyframe
+    run = first.duration, scene.facts.timestep
     card = SceneCard(
         bodies=int(model.nbody) - 1,
         geoms=int(model.ngeom),
