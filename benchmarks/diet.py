@@ -14,8 +14,8 @@ import tempfile
 from pathlib import Path
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.features.bench.commands.diet.run import diet
-from coursebuild.numerics.reports.diet import DietReport
+from coursebuild.features.bench.commands.diet import diet
+from coursebuild.numerics.reports.diet_report import DietReport
 from coursebuild.pipeline.options import Options
 
 

@@ -27,7 +27,7 @@ from coursebuild.core.checks.formulas import course_formulas
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course
-from coursebuild.core.model.results import Formula, MathError, Results
+from coursebuild.core.model.results import Formula, MathError, Reports, Results
 from coursebuild.core.model.summary import without_prose
 from coursebuild.core.pages import folding
 from coursebuild.core.pages.assets import Assets
@@ -42,7 +42,6 @@ from coursebuild.core.syntax import script
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.values import encode
 from coursebuild.features.language_server.commands.diagnosis import current_diagnostics
-from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options

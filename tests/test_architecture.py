@@ -19,12 +19,12 @@ ROOT = PACKAGE.parent
 LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"core.text", "core.drawing"}),
     frozenset({"core.model"}),
-    frozenset({"numerics"}),
     frozenset({"core.features", "core.values"}),
     frozenset({"core.registry"}),
     frozenset({"core.syntax", "core.checks", "core.scripts", "core.pages", "core.files"}),
     frozenset({"report", "core.engine"}),
     frozenset({"core.run"}),
+    frozenset({"numerics"}),
     frozenset({"features"}),
     frozenset({"pipeline"}),
     frozenset({"preview"}),

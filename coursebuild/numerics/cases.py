@@ -20,16 +20,9 @@ from msgspec.structs import asdict, astuple
 
 from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import DeclaredScenario
+from coursebuild.numerics.costs import Clock, scenario_job, time_jobs
 from coursebuild.numerics.detector import driving_force
-from coursebuild.numerics.engine import (
-    EngineStates,
-    compile_model,
-    initial_data,
-    motion_of,
-    refsafe_active,
-    simulate,
-)
-from coursebuild.numerics.forward import forward_motion
+from coursebuild.numerics.integrate import forward_motion
 from coursebuild.numerics.measure import (
     energy_drift,
     errors,
@@ -51,17 +44,24 @@ from coursebuild.numerics.problem import (
     Sizes,
 )
 from coursebuild.numerics.problems import all_problems
-from coursebuild.numerics.reports.bench import Errors, OrderRow
-from coursebuild.numerics.reports.cases import (
+from coursebuild.numerics.reports.case_report import (
     CaseReport,
     ErrorLine,
     FigureLine,
     ReferenceLine,
     StepCost,
 )
+from coursebuild.numerics.reports.scene_report import Errors, OrderRow
 from coursebuild.numerics.scene import Scene, SceneError
+from coursebuild.numerics.simulation import (
+    EngineStates,
+    compile_model,
+    initial_data,
+    motion_of,
+    refsafe_active,
+    simulate,
+)
 from coursebuild.numerics.stability import boundaries
-from coursebuild.numerics.timing import Clock, scenario_job, time_jobs
 from mjcourse.spatial import quat_conj, quat_mul
 
 _ENGINE = SecondReference("MuJoCo’s accelerations over the MJCF, DOP853", forward_motion)
@@ -79,6 +79,9 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         DisagreementError: its two references differ by more than they may.
     """
     first, second = problem.reference, _second_reference(problem)
+    model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
+    drivers = problem.search and driving_force(model, problem.scenario)
+    notes = (problem.note, f"energy is not judged: {drivers}" if drivers else "")
     reference = ReferenceLine(first.kind, first.source, second.source, *astuple(floor(problem)))
     runs = {
         integrator: [measure(problem, integrator, h) for h in problem.timesteps]
@@ -89,7 +92,7 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         title=problem.title,
         case=problem.case,
         machine=machine,
-        note=_note(problem),
+        note="; ".join(note for note in notes if note),
         reference=reference,
         boundaries=boundaries(problem),
         figures=tuple(
@@ -120,13 +123,6 @@ def _costs(
         StepCost(name, line.nanoseconds.scale(1e-9 / count))
         for name, count, line in zip(names, counts, timings, strict=True)
     )
-
-
-def _note(problem: Problem) -> str:
-    model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
-    drivers = problem.search and driving_force(model, problem.scenario)
-    parts = (problem.note, f"energy is not judged: {drivers}" if drivers else "")
-    return "; ".join(part for part in parts if part)
 
 
 def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorLine:

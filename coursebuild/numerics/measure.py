@@ -1,6 +1,8 @@
-"""The errors of a motion against its reference, the orders that they show, and drifts.
+"""The errors of a motion against its reference, the orders that they show, drifts, and contacts.
 
-Entry points: `errors`, `largest_errors`, `fit_orders`; `energy_drift`, `momentum_drift`.
+Entry points: `errors`, `largest_errors`, `fit_orders`; `energy_drift`, `momentum_drift`; from the
+states of a scene `visible_error(model, scene, states, exact)`, `find_sticks` and `measure_slip`;
+`quantity_name`, `quantity_values`, of what a scenario declares to be measured.
 
 1. Errors of position, attitude and velocity stand apart, each at its largest and at the end: RK4 is
    of fourth order in velocity and of second in attitude.
@@ -8,6 +10,10 @@ Entry points: `errors`, `largest_errors`, `fit_orders`; `energy_drift`, `momentu
 3. An order is the slope where the error is over a hundred floors and under 0.1: nearer to the floor
    rounding is measured, beyond 0.1 the asymptotic law does not hold yet. It is given only where
    those errors lie on a line, in a logarithmic plot.
+4. In the reference, two geoms stick to each other between two samples where a point in which they
+   touch hardly moves along the surface, at both of them. A body that rolls sticks too.
+5. In another run the speed of that point along the surface, added up over the same time, is creep:
+   by the solver, by soft contact, or by the timestep.
 """
 
 from __future__ import annotations
@@ -15,11 +21,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any, TypeAlias
 
+import mujoco
 import numpy as np
 
 from coursebuild.numerics.problem import Array, Motion, Reference, Sizes
-from coursebuild.numerics.reports.bench import FLOORS, Errors, FittedOrder, OrderRow
+from coursebuild.numerics.reports.scene_report import FLOORS, Errors, FittedOrder, OrderRow
+from coursebuild.numerics.scene import Scene
+from coursebuild.numerics.simulation import EngineStates, initial_data
 from mjcourse.spatial import angular_distance
 
 _LOWEST, _HIGHEST = 100.0, 0.1
@@ -148,3 +158,171 @@ def momentum_drift(momentum: Array) -> float | None:
     if not np.isfinite(momentum).all() or scale == 0:
         return None
     return float(np.max(np.linalg.norm(momentum - momentum[0], axis=1)) / scale)
+
+
+def visible_error(model: Any, scene: Scene, states: EngineStates, exact: EngineStates) -> float:
+    """The largest displacement or turn of a body in a picture, where 1 is just visible."""
+    place, turn = _picture(model, states)
+    exact_place, exact_turn = _picture(model, exact)
+    displacement = float(np.linalg.norm(place - exact_place, axis=2).max(initial=0.0))
+    angle = float(angular_distance(exact_turn, turn).max(initial=0.0))
+    length = scene.bench.visible * max(float(model.stat.extent), 1e-15)
+    return max(displacement / length, angle / math.radians(scene.bench.visible_angle))
+
+
+def _picture(model: Any, states: EngineStates) -> tuple[Array, Array]:
+    """Places (n, b + g, 3) of bodies and geoms that can move, and attitudes (n, b, 4) of bodies."""
+    data = mujoco.MjData(model)
+    bodies = np.flatnonzero(model.body_weldid != 0)
+    geoms = np.flatnonzero(model.body_weldid[model.geom_bodyid] != 0)
+    places = np.empty((len(states.times), len(bodies) + len(geoms), 3))
+    turns = np.empty((len(states.times), len(bodies), 4))
+    for index, qpos in enumerate(states.qpos):
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        places[index, : len(bodies)] = data.xpos[bodies]
+        places[index, len(bodies) :] = data.geom_xpos[geoms]
+        turns[index] = data.xquat[bodies]
+    return places, turns
+
+
+def quantity_name(model: Any, scene: Scene) -> str:
+    """The declared quantity of a scenario, with its unit in brackets; empty without one."""
+    quantity = scene.declaration.observable
+    if quantity is None:
+        return ""
+    if quantity.kind != "sensor":
+        return f"place of the {quantity.kind} {quantity.name} [m]"
+    kind = mujoco.mjtSensor(int(model.sensor(quantity.name).type[0]))
+    unit = _UNITS.get(kind.name.removeprefix("mjSENS_"), "")
+    return f"sensor {quantity.name}" + (f" [{unit}]" if unit else "")
+
+
+_UNITS = {
+    "TOUCH": "N",
+    "ACCELEROMETER": "m/s²",
+    "VELOCIMETER": "m/s",
+    "GYRO": "rad/s",
+    "FORCE": "N",
+    "TORQUE": "N m",
+    "RANGEFINDER": "m",
+    "TENDONPOS": "m",
+    "TENDONVEL": "m/s",
+    "BALLANGVEL": "rad/s",
+    "FRAMEPOS": "m",
+    "FRAMELINVEL": "m/s",
+    "FRAMEANGVEL": "rad/s",
+    "FRAMELINACC": "m/s²",
+    "FRAMEANGACC": "rad/s²",
+    "SUBTREECOM": "m",
+    "SUBTREELINVEL": "m/s",
+    "SUBTREEANGMOM": "kg m²/s",
+    "E_POTENTIAL": "J",
+    "E_KINETIC": "J",
+}
+"""The units of sensors, except where the unit depends on the joint."""
+
+
+def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
+    """The declared quantity of a scenario at every sample: (n, d)."""
+    quantity = scene.declaration.observable
+    assert quantity is not None
+    data = initial_data(scene.scenario, model)
+    values = []
+    commands = scene.scenario.commands(scene.scenario.sample)
+    rows = zip(states.qpos, states.qvel, states.act, commands, strict=False)
+    for qpos, qvel, act, command in rows:
+        data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
+        if command:
+            data.ctrl[:] = command
+        mujoco.mj_forward(model, data)
+        match quantity.kind:
+            case "body":
+                values.append(data.body(quantity.name).xpos.copy())
+            case "site":
+                values.append(data.site(quantity.name).xpos.copy())
+            case _:
+                values.append(data.sensor(quantity.name).data.copy())
+    return np.array(values)
+
+
+Pair: TypeAlias = tuple[int, int]
+"""Two geoms, by number."""
+Sticks: TypeAlias = tuple[frozenset[Pair], ...]
+"""The pairs that stick in every interval between two samples, the first one before any sample."""
+
+_SLOW = 0.01
+"""A point that sticks moves slower than this part of the speed of a fall through the model's
+extent."""
+_MIN_SLOW_SPEED = 1e-3
+"""m/s, where nothing falls."""
+
+
+def find_sticks(model: Any, scene: Scene, states: EngineStates) -> Sticks:
+    """The pairs of geoms that stick in a motion, from sample to sample."""
+    fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * float(model.stat.extent))
+    slow_pairs = [
+        frozenset(
+            pair for pair, speed in speeds.items() if speed < max(_SLOW * fall, _MIN_SLOW_SPEED)
+        )
+        for speeds in surface_speeds(model, scene, states)
+    ]
+    return tuple(slow_pairs[max(0, i - 1)] & slow_pairs[i] for i in range(len(slow_pairs)))
+
+
+def measure_slip(model: Any, scene: Scene, states: EngineStates, sticks: Sticks) -> float:
+    """The largest creep, m, of a pair that sticks in the reference."""
+    total: dict[Pair, float] = {}
+    before = 0.0
+    for time, speeds, pairs in zip(
+        states.times.tolist(), surface_speeds(model, scene, states), sticks, strict=False
+    ):
+        for pair in pairs:
+            total[pair] = total.get(pair, 0.0) + speeds.get(pair, 0.0) * (time - before)
+        before = time
+    return max(total.values(), default=0.0)
+
+
+def surface_speeds(model: Any, scene: Scene, states: EngineStates) -> list[dict[Pair, float]]:
+    """At every sample the least speed along the surface, m/s, of pairs of geoms that touch."""
+    data = initial_data(scene.scenario, model)
+    least_speeds = []
+    for qpos, qvel, act in zip(states.qpos, states.qvel, states.act, strict=True):
+        data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        least: dict[Pair, float] = {}
+        for contact in touching_contacts(data):
+            if contact.dim >= 3:  # with friction
+                pair = (int(contact.geom[0]), int(contact.geom[1]))
+                _, speed = contact_speeds(model, data, contact)
+                least[pair] = min(speed, least.get(pair, math.inf))
+        least_speeds.append(least)
+    return least_speeds
+
+
+def touching_contacts(data: Any) -> list[Any]:
+    """Contacts of geoms that touch; not those of a flex, or where only the margins do."""
+    return [
+        contact
+        for contact in data.contact[: data.ncon]
+        if min(contact.geom) >= 0 and contact.dist <= 0
+    ]
+
+
+def contact_speeds(model: Any, data: Any, contact: Any) -> tuple[float, float]:
+    """The speeds (m/s) with which two geoms part, and slide along each other, at a contact."""
+    first, second = (int(geom) for geom in contact.geom)
+    relative = _velocity(model, data, second, contact.pos)
+    relative = relative - _velocity(model, data, first, contact.pos)
+    normal = contact.frame[:3]
+    parting_speed = float(normal @ relative)
+    return parting_speed, float(np.linalg.norm(relative - normal * parting_speed))
+
+
+def _velocity(model: Any, data: Any, geom: int, point: Array) -> Array:
+    """The velocity (3,) of a geom's material at a point of the world, m/s."""
+    twist = np.zeros(6)
+    mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, geom, twist, 0)
+    velocity: Array = twist[3:] + np.cross(twist[:3], point - data.geom_xpos[geom])
+    return velocity

@@ -21,9 +21,9 @@ import numpy as np
 from msgspec import Struct
 
 from coursebuild.numerics.detector import Peaks, driving_force, update_peaks
-from coursebuild.numerics.engine import advance, initial_data, integrator_of, with_integrator
 from coursebuild.numerics.problem import ROOM, Array, Scenario, Setup
 from coursebuild.numerics.scene import Scene, SceneError
+from coursebuild.numerics.simulation import advance, initial_data, integrator_of, with_integrator
 
 NUDGE = 1e-10
 """How far a twin's beginning is off: rad, or relative to the model's extent; velocities per s."""

@@ -1,7 +1,7 @@
 """The definition of a hard case: a model, a scenario in it, and the exact motion.
 
 Entry points: `Problem`, `Scenario`, `Reference`, `SecondReference`, `Motion`, `ScalarCheck`,
-`Integrator`; `Setup`, what a run needs beside the model.
+`Integrator`; `Setup`, what a run needs beside the model; `model_text`, its MJCF.
 
 A number that a motion depends on is written twice: in the MJCF and the scenario, and in the formula
 or the equations of the first reference. If only one of them is changed, the references disagree,
@@ -21,7 +21,7 @@ from msgspec.structs import astuple
 from numpy.typing import NDArray
 
 from coursebuild.core.model.scenarios import is_multiple
-from coursebuild.numerics.reports.text import INTEGRATORS
+from coursebuild.numerics.reports.shown_errors import INTEGRATORS
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -257,3 +257,34 @@ class Problem(Setup, frozen=True, kw_only=True):
     """Whether the angular momentum about the centre of mass does not change."""
     note: str = ""
     """A remark for reading the figures."""
+
+
+NO_CONTACT = '<flag contact="disable"/>'
+NO_GRAVITY = 'gravity="0 0 0"'
+
+
+def model_text(world: str, option: str = "", inner: str = "", rest: str = "") -> str:
+    """MJCF of what is in the world, of attributes and elements of `option`, and of other sections.
+
+    It says neither timestep nor integrator.
+    """
+    return (
+        f"<mujoco>\n  <option {option}>{inner}</option>\n"
+        f"  <worldbody>\n{world}\n  </worldbody>\n{rest}</mujoco>\n"
+    )
+
+
+def divisions(sample: float, *parts: int) -> tuple[float, ...]:
+    """Timesteps that divide a sample, s."""
+    return tuple(sample / n for n in parts)
+
+
+def motion_without_attitude(times: Array, position: Array, velocity: Array) -> Motion:
+    """A motion of slides and hinges, with positions (n, p) and velocities (n, v)."""
+    return Motion(times, position, np.empty((len(times), 0, 4)), velocity)
+
+
+def turning_at_rest(times: Array, attitude: Array, omega: Array) -> Motion:
+    """A motion of a free body whose centre rests: attitude (n, 4) and rad/s (n, 3)."""
+    still = np.zeros((len(times), 3))
+    return Motion(times, still, attitude[:, None], np.concatenate([still, omega], axis=1))

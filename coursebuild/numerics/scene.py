@@ -129,13 +129,18 @@ def thickness(model: Any) -> Array:
 def _scene(
     model: Any, declaration: DeclaredScenario, bench: BenchTable, steps: Sequence[float]
 ) -> Scene:
-    step = float(model.opt.timestep)
+    step, keyframe = float(model.opt.timestep), declaration.keyframe
+    if isinstance(keyframe, str):
+        keyframe = int(model.key(keyframe).id)
+    qpos = np.array(declaration.qpos)
+    if qpos.size:  # an author need not compute quaternions of length 1
+        mujoco.mj_normalizeQuat(model, qpos)
     scenario = replace(
         _scenario_times(step, declaration),
-        qpos=_normalize_quaternions(model, declaration.qpos),
+        qpos=tuple(qpos.tolist()),
         qvel=declaration.qvel,
         controls=declaration.controls,
-        keyframe=_keyframe(model, declaration.keyframe),
+        keyframe=-1 if keyframe is None else keyframe,
     )
     for timestep in declaration.timesteps:
         if not is_multiple(scenario.sample, timestep):
@@ -153,21 +158,6 @@ def _scene(
     return Scene(declaration.name, title, scenario, ladder, step, bench, declaration)
 
 
-def _keyframe(model: Any, keyframe: str | int | None) -> int:
-    if isinstance(keyframe, str):
-        return int(model.key(keyframe).id)
-    return -1 if keyframe is None else keyframe
-
-
-def _normalize_quaternions(model: Any, qpos: tuple[float, ...]) -> tuple[float, ...]:
-    """Positions with quaternions of length 1, which an author need not compute."""
-    if not qpos:
-        return ()
-    normalized = np.array(qpos)
-    mujoco.mj_normalizeQuat(model, normalized)
-    return tuple(normalized.tolist())
-
-
 def _scenario_times(step: float, declaration: DeclaredScenario) -> Scenario:
     """The times of a scenario, as whole numbers of the model's timestep.
 
@@ -176,9 +166,13 @@ def _scenario_times(step: float, declaration: DeclaredScenario) -> Scenario:
     """
     duration, sample, hold = declaration.duration, declaration.sample, declaration.hold
     lengths = (("duration", duration), ("sample", sample), ("hold", hold))
-    whole = {
-        name: _whole_steps(length, step, name) for name, length in lengths if length is not None
-    }
+    whole: dict[str, int] = {}
+    for name, length in lengths:
+        if length is not None and not is_multiple(length, step):
+            message = f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)"
+            raise SceneError(message)
+        if length is not None:
+            whole[name] = round(length / step)
     hold_steps, sample_steps = whole.get("hold"), whole.get("sample")
     count = len(declaration.controls)
     last = hold_steps * count if hold_steps is not None and count > 1 else 0
@@ -204,14 +198,6 @@ def _decimal(seconds: float) -> float:
     """A product of decimal fractions as the decimal fraction that it is meant to be."""
     rounded = float(f"{seconds:.12g}")
     return rounded if abs(rounded - seconds) <= 1e-15 * seconds else seconds
-
-
-def _whole_steps(length: float, step: float, name: str) -> int:
-    if not is_multiple(length, step):
-        raise SceneError(
-            f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)"
-        )
-    return round(length / step)
 
 
 def _sample_steps(basis: int, total: int) -> int:

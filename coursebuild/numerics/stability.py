@@ -1,7 +1,8 @@
-"""The largest stable timestep for each integrator, and how fast a run grows beyond.
+"""The largest stable timestep for each integrator, how a run grows beyond, and other settings.
 
-Entry points: `boundaries(problem)`, of a hard case; `scan(attempt, search)`, `run_trial(setup,
-model, span)` and `stable_row`, for any scene; `with_energy_bound(problem)`.
+Entry points: `boundaries(problem)`, of a hard case; `stable_rows(model, pilot)`, of a scene;
+`with_energy_bound(problem)`; `settings(model, pilot)`, which are measured in a scene,
+`own_setting`, `apply`.
 
 1. Stable is what stays within what can be over a simulated time that is the same for all timesteps,
    by the judgement that every run gets: finite, within bounds, and where nothing drives the motion,
@@ -11,6 +12,10 @@ model, span)` and `stable_row`, for any scene; `with_energy_bound(problem)`.
    were tried are stable: a grid, even in the logarithm, down to a tenth of it; a bisection at its
    end; then others just below, which lie the closer the nearer they are. Where one of these is
    lost, the search goes on below it.
+3. A setting is what can be chosen without changing the scene: every integrator at every timestep;
+   where a solver runs, also other solvers and fewer iterations; where something touches, also the
+   other cone. These vary one at a time about the model's own: the full product would take hours and
+   say little more.
 """
 
 from __future__ import annotations
@@ -26,7 +31,7 @@ from msgspec import Struct
 from msgspec.structs import asdict, replace
 
 from coursebuild.numerics.detector import Peaks, RunStatus, driving_force, judge
-from coursebuild.numerics.engine import advance_watching, compile_model, initial_data, simulate
+from coursebuild.numerics.pilot import Pilot
 from coursebuild.numerics.problem import (
     STANDARD,
     Array,
@@ -35,8 +40,19 @@ from coursebuild.numerics.problem import (
     Problem,
     Setup,
 )
-from coursebuild.numerics.reports.bench import StableRow
-from coursebuild.numerics.reports.cases import BoundaryLine
+from coursebuild.numerics.reports.case_report import BoundaryLine
+from coursebuild.numerics.reports.scene_report import MeasuredSetting, StableRow
+from coursebuild.numerics.reports.shown_errors import FEWEST_STEPS
+from coursebuild.numerics.scene import thickness
+from coursebuild.numerics.simulation import (
+    advance_watching,
+    compile_model,
+    initial_data,
+    integrator_of,
+    set_integrator,
+    simulate,
+    with_integrator,
+)
 
 _REACH = 10.0
 """The grid is tried down to this part of the largest stable timestep."""
@@ -240,3 +256,90 @@ def _growth(sizes: list[tuple[int, float]]) -> float:
     if not 0 < small < math.inf or not 0 < large < math.inf:
         return math.nan
     return float((large / small) ** (1 / (after - before)))
+
+
+_SOLVERS = {
+    "PGS": int(mujoco.mjtSolver.mjSOL_PGS),
+    "CG": int(mujoco.mjtSolver.mjSOL_CG),
+    "Newton": int(mujoco.mjtSolver.mjSOL_NEWTON),
+}
+CONES = {
+    "pyramidal": int(mujoco.mjtCone.mjCONE_PYRAMIDAL),
+    "elliptic": int(mujoco.mjtCone.mjCONE_ELLIPTIC),
+}
+_ITERATIONS, _QUICK_ITERATIONS = (1, 2, 4, 10, 30), (1, 4)
+_SEARCH = (0.25, 64.0)
+"""The multiples of the model's timestep between which the largest stable one is searched for."""
+
+
+def own_setting(model: Any, pilot: Pilot) -> MeasuredSetting:
+    """The setting that the model has."""
+    return MeasuredSetting(
+        integrator=integrator_of(model).value,
+        timestep=pilot.scene.timestep,
+        solver=_name(_SOLVERS, int(model.opt.solver)) if pilot.constrained else "",
+        iterations=int(model.opt.iterations) if pilot.constrained else 0,
+        cone=_name(CONES, int(model.opt.cone)) if pilot.contact else "",
+    )
+
+
+def _name(names: dict[str, int], number: int) -> str:
+    return next(name for name, value in names.items() if value == number)
+
+
+def settings(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[MeasuredSetting, ...]:
+    """All settings to measure, each once, the model's own among them."""
+    baseline = own_setting(model, pilot)
+    variants = [
+        replace(baseline, integrator=integrator.value, timestep=step)
+        for integrator in STANDARD
+        for step in reversed(pilot.scene.timesteps)
+    ]
+    if pilot.contact:
+        variants += [replace(baseline, cone=cone) for cone in CONES]
+    if pilot.constrained:
+        variants += [replace(baseline, solver=solver) for solver in _SOLVERS]
+        counts = _QUICK_ITERATIONS if quick else _ITERATIONS
+        variants += [replace(baseline, iterations=n) for n in counts if n < baseline.iterations]
+    return tuple(dict.fromkeys(variants))
+
+
+def apply(model: Any, setting: MeasuredSetting) -> None:
+    """Give a `mjModel` a setting; what is empty in it stays as it is."""
+    set_integrator(model, Integrator(setting.integrator), setting.timestep)
+    if setting.solver:
+        model.opt.solver = _SOLVERS[setting.solver]
+        model.opt.iterations = setting.iterations
+    if setting.cone:
+        model.opt.cone = CONES[setting.cone]
+
+
+def with_setting(model: Any, setting: MeasuredSetting) -> Any:
+    """A copy of a `mjModel` with a setting, and automatic reset off."""
+    variant = with_integrator(model, Integrator(setting.integrator), setting.timestep)
+    apply(variant, setting)
+    return variant
+
+
+def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[StableRow, ...]:
+    """The largest stable timestep of every integrator, over the scenario.
+
+    They are searched for as those of the hard cases. No timestep is tried of which the scenario
+    has fewer than 20: so few steps would say nothing.
+    """
+    duration = pilot.scene.scenario.duration
+    low, high = (part * pilot.scene.timestep for part in _SEARCH)
+    search = (max(low, duration / MOST_STEPS), min(high, duration / FEWEST_STEPS))
+    if search[1] <= search[0]:
+        return ()
+    half_thickness = thickness(model)
+
+    def row(integrator: Integrator) -> StableRow:
+        def attempt(step: float) -> StabilityTrial:
+            return run_trial(
+                pilot.setup, with_integrator(model, integrator, step), duration, half_thickness
+            )
+
+        return stable_row(integrator, scan(attempt, search, quick=quick), pilot.setup, duration)
+
+    return tuple(map(row, STANDARD))

@@ -23,16 +23,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import DeclaredSweep, SweepValue, Variation
-from coursebuild.numerics.engine import (
-    EngineStates,
-    advance,
-    initial_data,
-    integrator_of,
-    silent,
-    simulate,
-    with_integrator,
-)
-from coursebuild.numerics.observe import (
+from coursebuild.numerics.costs import Clock, Job, scenario_job, time_jobs
+from coursebuild.numerics.measure import (
     Pair,
     contact_speeds,
     quantity_name,
@@ -42,9 +34,17 @@ from coursebuild.numerics.observe import (
 )
 from coursebuild.numerics.problem import Scenario, Setup
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.sweep import SweepReport, SweepRow
+from coursebuild.numerics.reports.scene_report import SweepReport, SweepRow
 from coursebuild.numerics.scene import Scene, SceneError, thickness
-from coursebuild.numerics.timing import Clock, Job, scenario_job, time_jobs
+from coursebuild.numerics.simulation import (
+    EngineStates,
+    advance,
+    initial_data,
+    integrator_of,
+    silent,
+    simulate,
+    with_integrator,
+)
 
 THREADS = "threads"
 _PARAMETER = re.compile(r"(?P<kind>[a-z]+)(:(?P<name>.+))?\.(?P<field>\w+)(\[(?P<at>\d+)\])?")
@@ -125,7 +125,17 @@ def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], l
         old = getattr(element, field)
         before.append(np.array(old, copy=True))
         try:
-            _set_field(element, field, at, value, relative=part.relative)
+            new: Any = value
+            if isinstance(value, str):
+                members = _ENUMS[field].__members__
+                numbers = {name.partition("_")[2].lower(): m for name, m in members.items()}
+                new = int(numbers[value.lower()])
+            if at is not None:
+                old[int(at)] = old[int(at)] * new if part.relative else new
+            elif isinstance(old, np.ndarray):
+                old[:] = old * new if part.relative else new
+            else:
+                setattr(element, field, type(old)(old * new if part.relative else new))
         except (TypeError, ValueError, KeyError, IndexError):
             message = f"`{part.parameter}` cannot be {_value_text(value)}"
             raise SceneError(message, part.span) from None
@@ -134,23 +144,6 @@ def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], l
             message = f"`{part.parameter}` is not given in the MJCF, so that it has no share"
             raise SceneError(message, part.span)
     return before, after
-
-
-def _set_field(
-    element: Any, field: str, at: str | None, value: SweepValue, *, relative: bool
-) -> None:
-    old = getattr(element, field)
-    if isinstance(value, str):
-        members = _ENUMS[field].__members__
-        value = int(
-            {name.partition("_")[2].lower(): m for name, m in members.items()}[value.lower()]
-        )
-    if at is not None:
-        old[int(at)] = old[int(at)] * value if relative else value
-    elif isinstance(old, np.ndarray):
-        old[:] = old * value if relative else value
-    else:
-        setattr(element, field, type(old)(old * value if relative else value))
 
 
 def _value_text(value: SweepValue) -> str:

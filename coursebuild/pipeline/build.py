@@ -23,8 +23,8 @@ from coursebuild.report import Report
 
 if TYPE_CHECKING:
     from coursebuild.core.model import Course
+    from coursebuild.core.model.results import Reports
     from coursebuild.core.text.diagnostics import Diagnostic
-    from coursebuild.numerics.reports import Reports
     from coursebuild.pipeline.site import Site
 
 MakeSite: TypeAlias = "Callable[[Course, Results, Documents, Options, Reports], Site]"

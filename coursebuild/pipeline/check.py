@@ -14,10 +14,10 @@ from msgspec.structs import replace
 
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
+from coursebuild.core.model.results import Reports
 from coursebuild.core.registry import feature_trials, unproven
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.judge import depends_on, judge
 from coursebuild.pipeline.load import load

@@ -28,7 +28,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Course, Document
-from coursebuild.core.model.results import Results, SiteFile
+from coursebuild.core.model.results import Reports, Results, SiteFile
 from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import PageContext
@@ -36,7 +36,6 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.registry import find_exporter
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.build import prepare
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import MAP

@@ -27,10 +27,9 @@ from coursebuild.core.model import (
     document_blocks,
     walk_inlines,
 )
-from coursebuild.core.model.results import Results
+from coursebuild.core.model.results import Reports, Results
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.values import fingerprint
-from coursebuild.numerics.reports import Reports
 
 _WITHOUT_PLACES: dict[type, Callable[[Any], object]] = {
     Span: lambda span: None,

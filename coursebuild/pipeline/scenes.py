@@ -37,7 +37,7 @@ from coursebuild.core.text.diagnostics import (
     nearest,
     sort_diagnostics,
 )
-from coursebuild.numerics.reports.cases import exact_file
+from coursebuild.numerics.reports.case_report import exact_file
 from coursebuild.pipeline.options import UsageError
 
 

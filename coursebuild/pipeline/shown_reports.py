@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING, TypeVar
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model import Course, Declarations, MjcfModel
+from coursebuild.core.model.results import Reports
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source
-from coursebuild.numerics.reports import Reports
 
 if TYPE_CHECKING:  # a course without reports needs none of it
-    from coursebuild.numerics.reports.bench import SceneReport
-    from coursebuild.numerics.reports.cases import CaseReport
-    from coursebuild.numerics.reports.diet import DietReport
+    from coursebuild.numerics.reports.case_report import CaseReport
+    from coursebuild.numerics.reports.diet_report import DietReport
     from coursebuild.numerics.reports.records import ReportFailure, ReportKind
+    from coursebuild.numerics.reports.scene_report import SceneReport
 
     _Scene = TypeVar("_Scene", SceneReport, DietReport)
 

@@ -31,7 +31,14 @@ from coursebuild.core.model import (
     document_blocks,
     document_inlines,
 )
-from coursebuild.core.model.results import CachedFile, FileList, OutputFile, Results, SiteFile
+from coursebuild.core.model.results import (
+    CachedFile,
+    FileList,
+    OutputFile,
+    Reports,
+    Results,
+    SiteFile,
+)
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.added_files import SiteContext, added_files
 from coursebuild.core.pages.assets import Assets
@@ -44,7 +51,6 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.html import find_address
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Source, Span
-from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.downloads import Downloads
 from coursebuild.pipeline.options import Options

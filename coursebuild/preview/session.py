@@ -26,7 +26,7 @@ from coursebuild.core.features import PublishedTrials
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Course, Document, Lesson, Owner, Page
-from coursebuild.core.model.results import Outcome, Results, ScriptJob, ScriptRun
+from coursebuild.core.model.results import Outcome, Reports, Results, ScriptJob, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
@@ -37,7 +37,6 @@ from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.scripts.source_parts import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
-from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import MAP, Code, load
 from coursebuild.pipeline.options import Options

@@ -8,15 +8,15 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import BenchTable
-from coursebuild.numerics.reports.bench import (
+from coursebuild.numerics.reports.case_report import BoundaryLine, FigureLine
+from coursebuild.numerics.reports.departures import Departure, case_departures, scene_departures
+from coursebuild.numerics.reports.scene_report import (
     FittedOrder,
     OrderRow,
     ScenarioReport,
     StableRow,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.cases import BoundaryLine, FigureLine
-from coursebuild.numerics.reports.departures import Departure, case_departures, scene_departures
 from support.bench_reports import (
     FIRST,
     MACHINE,

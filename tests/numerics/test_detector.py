@@ -12,9 +12,9 @@ from msgspec.structs import replace
 
 from coursebuild.numerics.cases import measure
 from coursebuild.numerics.detector import Peaks, RunStatus, driving_force, judge
-from coursebuild.numerics.engine import advance, compile_model, simulate
 from coursebuild.numerics.problem import Integrator, Scenario, Setup
 from coursebuild.numerics.problems import all_problems
+from coursebuild.numerics.simulation import advance, compile_model, simulate
 from coursebuild.numerics.stability import attempt
 
 SPRING = """

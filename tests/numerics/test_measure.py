@@ -14,8 +14,8 @@ from msgspec.structs import replace
 from coursebuild.numerics.cases import measure, orders
 from coursebuild.numerics.measure import errors, fit_order
 from coursebuild.numerics.problem import STANDARD, Integrator, Motion, Sizes
-from coursebuild.numerics.problems import all_problems, double_pendulum, impact, scales
-from coursebuild.numerics.reports.cases import ErrorLine
+from coursebuild.numerics.problems import all_problems, extremes, impact, linked_bodies
+from coursebuild.numerics.reports.case_report import ErrorLine
 
 FIRST = tuple(integrator for integrator in STANDARD if integrator is not Integrator.RK4)
 
@@ -169,7 +169,7 @@ def test_figures_are_those_of_theory_or_known_to_be_others() -> None:
             mismatches.append((name, check.name, integrator, check.measure(integrator), expected))
     assert mismatches == []
     with pytest.raises(ValueError, match=r"A \+ B >= C"):
-        mujoco.MjModel.from_xml_string(scales.ROUNDED_PLATE)
+        mujoco.MjModel.from_xml_string(extremes.ROUNDED_PLATE)
 
 
 @pytest.mark.site
@@ -185,7 +185,7 @@ def test_restitution_comes_to_one_with_more_steps_in_a_contact() -> None:
 @pytest.mark.slow
 def test_the_horizon_of_the_double_pendulum() -> None:
     euler, rk4 = (
-        double_pendulum.horizons(integrator) for integrator in (Integrator.EULER, Integrator.RK4)
+        linked_bodies.horizons(integrator) for integrator in (Integrator.EULER, Integrator.RK4)
     )
     assert 2.0 < min(euler) <= max(euler) < 2.5
     # From 1.5e-11 after a second to 0.1: growth by 1.4 to 2.4 per second, as of so short a time.

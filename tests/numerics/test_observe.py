@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from coursebuild.numerics.engine import EngineStates
-from coursebuild.numerics.observe import find_sticks, measure_slip
+from coursebuild.numerics.measure import find_sticks, measure_slip
 from coursebuild.numerics.scene import Scene, scenes
+from coursebuild.numerics.simulation import EngineStates
 from support.surveys import NO_DECLARATIONS
 
 BALL = """\

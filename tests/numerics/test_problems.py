@@ -11,9 +11,9 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.numerics.cases import DisagreementError, floor
-from coursebuild.numerics.engine import compile_model
 from coursebuild.numerics.problem import Integrator, Problem
 from coursebuild.numerics.problems import all_problems
+from coursebuild.numerics.simulation import compile_model
 
 OFF = 1 + 1e-6
 DIRECTIONS = ("axis", "zaxis", "condim", "iterations")

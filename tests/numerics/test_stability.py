@@ -13,7 +13,7 @@ from coursebuild.numerics.detector import RunStatus
 from coursebuild.numerics.problem import Integrator, Scenario, Setup
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.problems.oscillators import rk4_factor, rk4_limit
-from coursebuild.numerics.reports.bench import StableRow
+from coursebuild.numerics.reports.scene_report import StableRow
 from coursebuild.numerics.stability import (
     StabilityTrial,
     attempt,

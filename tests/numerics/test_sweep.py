@@ -12,8 +12,8 @@ from msgspec.structs import replace
 from coursebuild.core.model.scenarios import BenchTable
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.departures import scene_departures
-from coursebuild.numerics.reports.sweep import SweepReport, SweepRow, shown_figures
-from coursebuild.numerics.reports.sweep_plot import sweep_svg
+from coursebuild.numerics.reports.report_plots import sweep_svg
+from coursebuild.numerics.reports.scene_report import SweepReport, SweepRow, shown_figures
 from coursebuild.numerics.scene import SceneError, scenes
 from coursebuild.numerics.sweep import measure_sweep
 from support.bench_reports import scene

@@ -13,8 +13,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import Declarations
 from coursebuild.core.run.script_environment import engine_version
-from coursebuild.numerics.reports.bench import SceneReport
 from coursebuild.numerics.reports.records import BENCH, DIET, STABILITY
+from coursebuild.numerics.reports.scene_report import SceneReport
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.scenes import scene_digest
 from support.edited_course import drawn_pages

@@ -7,7 +7,7 @@ from typing import Any
 
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.bench import (
+from coursebuild.numerics.reports.scene_report import (
     FittedOrder,
     MeasuredSetting,
     OrderRow,

@@ -7,9 +7,9 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from coursebuild.numerics.bench import measure_scenario
-from coursebuild.numerics.reports.bench import ScenarioReport, WorkPrecisionRow
+from coursebuild.numerics.reports.scene_report import ScenarioReport, WorkPrecisionRow
 from coursebuild.numerics.scene import scenes
+from coursebuild.numerics.work_precision import measure_scenario
 from support.surveys import parse_declared
 
 MODELS = Path(__file__).parents[2] / "models"

@@ -8,9 +8,9 @@ from typing import Any
 
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.features.bench.commands.bench.measuring import CompiledScene
-from coursebuild.features.bench.commands.runs import CannotMeasureError
-from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
+from coursebuild.features.bench.commands.measurement import CannotMeasureError
+from coursebuild.features.bench.commands.measuring import CompiledScene
+from coursebuild.numerics.reports.scene_report import ScenarioReport, SceneReport
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene
 from support.bench_reports import swing

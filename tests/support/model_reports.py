@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from coursebuild.numerics.reports import Interval, Reports
-from coursebuild.numerics.reports.bench import OrderRow, SceneCard, SceneReport
-from coursebuild.numerics.reports.cases import (
+from coursebuild.core.model.results import Reports
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.case_report import (
     BoundaryLine,
     CaseReport,
     ErrorLine,
@@ -14,7 +14,7 @@ from coursebuild.numerics.reports.cases import (
     ReferenceLine,
     StepCost,
 )
-from coursebuild.numerics.reports.diet import (
+from coursebuild.numerics.reports.diet_report import (
     MEASURED_LABEL,
     PROVED_LABEL,
     DietReport,
@@ -23,6 +23,7 @@ from coursebuild.numerics.reports.diet import (
     ModelPlace,
     Saving,
 )
+from coursebuild.numerics.reports.scene_report import OrderRow, SceneCard, SceneReport
 from support.bench_reports import FIRST, MACHINE, awkward, swing
 from support.bench_reports import row as row
 from support.bench_reports import scenario as scenario

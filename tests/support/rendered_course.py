@@ -28,6 +28,7 @@ from coursebuild.core.model.results import (
     Formula,
     ModelFacts,
     Outcome,
+    Reports,
     Results,
     ScriptRun,
     Verdict,
@@ -39,7 +40,6 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.urls import Place, lesson_path
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.text.source import Source
-from coursebuild.numerics.reports import Reports
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.site import SiteMaker

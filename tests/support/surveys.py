@@ -9,12 +9,12 @@ import mujoco
 from coursebuild.core.model.scenarios import Declarations, Keep
 from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.source import Source
-from coursebuild.numerics.pruning.compare import pruning_scenes
+from coursebuild.numerics.costs import Clock
+from coursebuild.numerics.pruning.comparison import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelText, open_model
 from coursebuild.numerics.pruning.readers import read_code
 from coursebuild.numerics.pruning.survey import Survey, Surveyor
-from coursebuild.numerics.reports.diet import Finding
-from coursebuild.numerics.timing import Clock
+from coursebuild.numerics.reports.diet_report import Finding
 from support.bench_reports import MACHINE
 
 PATH = "models/a.xml"

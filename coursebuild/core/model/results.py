@@ -7,10 +7,10 @@ and those that read them do not import each other.
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterable
-from typing import Annotated, Literal, TypeAlias
+from collections.abc import Callable, Iterable, Mapping
+from typing import Annotated, Any, Literal, TypeAlias
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, field
 
 from coursebuild.core.model import Comparison, Limits, Recording
 from coursebuild.core.text.source import Span
@@ -365,6 +365,19 @@ class Results(Struct, frozen=True):
     engine: str
     """Version of MuJoCo that ran the scripts."""
     trials: tuple[TrialResult, ...] = ()
+
+
+class Reports(Struct, frozen=True):
+    """The recorded reports that fit the present state of a course, for the features that show them.
+
+    What a report holds is between these features and the code that measures.
+    """
+
+    scenes: Mapping[str, Any] = field(default_factory=dict)
+    """By the model's name, as `diets`."""
+    diets: Mapping[str, Any] = field(default_factory=dict)
+    cases: tuple[Any, ...] = ()
+    """Of hard cases, which belong to no model."""
 
 
 class Machine(Struct, frozen=True, forbid_unknown_fields=True):

@@ -39,13 +39,12 @@ from coursebuild.core.model import (
     find_inlines,
     resolve,
 )
-from coursebuild.core.model.results import ModelFacts, Results, ScriptRun, Verdict
+from coursebuild.core.model.results import ModelFacts, Reports, Results, ScriptRun, Verdict
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets, strings_for
 from coursebuild.core.pages.renderer import Renderer, known_mathml
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.registry import feature_trials, page_kinds, publish_trials, summarize
-from coursebuild.numerics.reports import Reports
 
 Value = TypeVar("Value")
 

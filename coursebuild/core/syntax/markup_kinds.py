@@ -142,7 +142,7 @@ FOREIGN = {
         r"^(?-i:In|Out) ?\[\d*\]:|^@@ -\d+(?:,\d+)? \+\d+(?:,\d+)? @@"
         r"|^(?:import|export)\b[^\n\0]* from ['\"][^'\"\n\0]+['\"];?$",
         "it belongs to a program or to what shows one",
-        "leave it out, or put it into backticks if readers are to see it",
+        "leave it out, or put it into backticks if readers should see it",
     ),
     "emoji": MarkupKind(
         r"(?<![\w:])(?-i::[a-z][a-z0-9]+(?:_[a-z0-9]+)*:)(?![\w:\0])",

@@ -8,15 +8,16 @@ shows a scenario as the page of the model does. `commands` measures and records.
 from __future__ import annotations
 
 from coursebuild.core.features import Command, Feature, FenceKind, ModelPart
-from coursebuild.features.bench.checks import check_benches, check_keyframes
-from coursebuild.features.bench.model import Bench
-from coursebuild.features.bench.model_page import (
+from coursebuild.features.bench.model import Bench, check_benches, check_keyframes, parse_bench
+from coursebuild.features.bench.page import (
+    bench_markdown,
+    bench_view,
+    draw_bench,
     draw_measurements,
+    index_bench,
     measurement_facts,
     measurements_view,
 )
-from coursebuild.features.bench.page import bench_markdown, bench_view, draw_bench, index_bench
-from coursebuild.features.bench.parse import parse_bench
 
 KIND = FenceKind(
     name="bench",

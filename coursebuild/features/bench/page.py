@@ -1,34 +1,46 @@
-"""A recorded report in a text: the plot of a scenario, its tables, and where it was measured.
+"""Recorded reports as pages show them: on the page of a model, and in a text.
 
-Entry points: `bench_view`, the values that a page needs; `draw_bench`, `bench_markdown`,
+Entry points: `measurements_view(library, place, model)`, `draw_measurements`, `measurement_facts`;
+of a block `bench_view`, the values that a page needs, `draw_bench`, `bench_markdown`,
 `index_bench`.
 
-The block shows the same as the page of the model. If no report fits the course, it says so, with
-the command that makes one.
+A block shows the same as the page of the model. For what is missing, or does not fit the course,
+the page shows the command that measures it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model import find_blocks, scenario_anchor
+from coursebuild.core.model import MjcfModel, find_blocks, scenario_anchor
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import escape_marks, guard_lines
-from coursebuild.features.bench.figures import Grid, machine_text
+from coursebuild.core.pages.renderer import Renderer
+from coursebuild.core.pages.strings import Strings
+from coursebuild.features.bench.grids import (
+    Grid,
+    factor,
+    machine_text,
+    power,
+    sentence,
+    size,
+    unbroken,
+)
 from coursebuild.features.bench.model import Bench, declared_scenarios
-from coursebuild.features.bench.scenarios import ScenarioView, plots, scenario_view
-from coursebuild.numerics.reports.bench import ScenarioReport, SceneReport
-from coursebuild.numerics.reports.records import BENCH
-from coursebuild.numerics.reports.sweep import SweepReport
+from coursebuild.features.bench.scenario_view import ScenarioView, plots, scenario_view
+from coursebuild.numerics.reports.diet_report import DietReport, Finding, Saving
+from coursebuild.numerics.reports.records import BENCH, DIET
+from coursebuild.numerics.reports.scene_report import ScenarioReport, SceneReport, SweepReport
 
 if TYPE_CHECKING:
     from coursebuild.core.features import IndexReader, MarkdownWriter
     from coursebuild.core.pages.context import PageContext
-    from coursebuild.core.pages.library import Library
 
 
 class BenchView(Struct, frozen=True):
@@ -48,8 +60,12 @@ class BenchView(Struct, frozen=True):
 
 def bench_view(library: Library, place: urls.Place, bench: Bench) -> BenchView:
     """Find the report that a block on a page shows, and make what the page shows of it."""
-    scene = library.reports.scenes.get(bench.model)
-    report = None if scene is None else _find_report(scene, bench)
+    scene: SceneReport | None = library.reports.scenes.get(bench.model)
+    reports: Sequence[ScenarioReport | SweepReport] = ()
+    if scene is not None:
+        reports = scene.scenarios if bench.sweep is None else scene.sweeps
+    name = bench.scenario if bench.sweep is None else bench.sweep
+    report = next((report for report in reports if name in (None, report.name)), None)
     anchor = "measured"
     if isinstance(report, SweepReport):
         anchor = scenario_anchor(f"sweep-{report.name}")
@@ -75,12 +91,6 @@ def bench_view(library: Library, place: urls.Place, bench: Bench) -> BenchView:
     )
 
 
-def _find_report(scene: SceneReport, bench: Bench) -> ScenarioReport | SweepReport | None:
-    if bench.sweep is not None:
-        return next((sweep for sweep in scene.sweeps if sweep.name == bench.sweep), None)
-    return next((s for s in scene.scenarios if bench.scenario in (None, s.name)), None)
-
-
 def draw_bench(page: PageContext, block: Bench) -> Markup:
     """Draw the report, with its plot for wide and for narrow screens."""
     view = _view(page, block)
@@ -94,7 +104,7 @@ def draw_bench(page: PageContext, block: Bench) -> Markup:
 
 def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
     """Write the report without its plot, and what the plot shows."""
-    from coursebuild.numerics.reports.plot import work_precision
+    from coursebuild.numerics.reports.report_plots import work_precision
 
     view = _view(writer.page, block)
     html = writer.page.template("bench/bench.html", bench=view, plots=())
@@ -120,3 +130,143 @@ def _view(page: PageContext, block: Bench) -> BenchView:
     view = page.inputs.blocks[block.span.start]
     assert isinstance(view, BenchView)
     return view
+
+
+class FindingView(Struct, frozen=True):
+    """A finding of the diet, and its texts in the page's language."""
+
+    finding: Finding
+    message: str
+    label: str
+    saving: str
+
+
+class DietView(Struct, frozen=True):
+    """What the model could do without."""
+
+    summary: str
+    findings: tuple[FindingView, ...]
+    machine: str
+    file: str
+    """The address of the report."""
+
+
+class MeasurementsView(Struct, frozen=True):
+    """All measurements of a model."""
+
+    scenarios: tuple[ScenarioView, ...]
+    unmeasured: tuple[tuple[str, str], ...]
+    """Id and title of scenarios that are declared and not measured."""
+    machine: str
+    """Machine and versions; empty if nothing was measured."""
+    command: str
+    """The command that measures it, again or for the first time."""
+    file: str
+    """The address of the report; empty if there is none."""
+    diet: DietView | None
+    diet_command: str
+    numerics: str
+    """The address of the hard cases; empty if there are none."""
+    sweeps: tuple[ScenarioView, ...]
+
+
+def measurements_view(library: Library, place: urls.Place, model: MjcfModel) -> MeasurementsView:
+    """Make what the page of a model shows of its reports."""
+    words, name = library.words, model.name
+    scene: SceneReport | None = library.reports.scenes.get(name)
+    diet: DietReport | None = library.reports.diets.get(name)
+    scenarios = () if scene is None else scene.scenarios
+    sweeps = () if scene is None else scene.sweeps
+    titles = declared_scenarios(library.course, name)
+    anchors = {scenario: scenario_anchor(scenario) for scenario in titles}
+    return MeasurementsView(
+        scenarios=tuple(
+            scenario_view(words, scenario, anchors.get(scenario.name, f"_scenario-{n}"))
+            for n, scenario in enumerate(scenarios, 1)
+        ),
+        unmeasured=tuple(
+            (anchors[scenario], title)
+            for scenario, title in titles.items()
+            if scenario not in {report.name for report in scenarios}
+        ),
+        machine="" if scene is None else machine_text(words, scene.machine),
+        command=BENCH.command(name),
+        file="" if scene is None else place.href(urls.file_path(BENCH.path(name))),
+        diet=None if diet is None else _diet(words, place, diet),
+        diet_command=DIET.command(name),
+        numerics=place.href(urls.NUMERICS) if library.reports.cases else "",
+        sweeps=tuple(
+            scenario_view(words, sweep, scenario_anchor(f"sweep-{sweep.name}")) for sweep in sweeps
+        ),
+    )
+
+
+def draw_measurements(renderer: Renderer, view: MeasurementsView) -> Markup:
+    """Draw the part of the page."""
+    scenario_plots = [
+        plots(f"_plot-{n}", scenario.report) for n, scenario in enumerate(view.scenarios, 1)
+    ]
+    sweep_plots = [plots(f"_sweep-{n}", sweep.report) for n, sweep in enumerate(view.sweeps, 1)]
+    return renderer.render(
+        "bench/measurements.html", measurements=view, plots=scenario_plots + sweep_plots
+    )
+
+
+def measurement_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, str], ...]:
+    """Say what the model is made of, and how fast it runs, as pairs of words."""
+    words = library.words
+    scene: SceneReport | None = library.reports.scenes.get(model.name)
+    missing = words("measured.not")
+
+    def speed(times: float | None) -> str:
+        return missing if times is None else words("measured.times", factor=factor(times))
+
+    native = browser = None
+    if scene is not None and scene.scenarios:
+        native = next((row.realtime for row in scene.scenarios[0].rows if row.own), None)
+    text = size(len(model.source.text.encode()))
+    facts = {"possible": missing, "touched": missing, "mjcf_file": text}
+    if scene is not None and (card := scene.card) is not None:
+        browser = card.browser
+        facts = {"possible": str(card.possible), "touched": str(card.touched)}
+        facts |= {"mjcf": size(card.mjcf), "mjb": size(card.mjb)}
+    facts |= {"native": speed(native), "browser": speed(browser)}
+    return tuple((words(f"measured.{name}"), fact) for name, fact in facts.items())
+
+
+def _diet(words: Strings, place: urls.Place, diet: DietReport) -> DietView:
+    count = sum(finding.is_fault for finding in diet.findings)
+    summary = words("measured.diet_open", n=count) if count else words("measured.slim")
+    failures = [
+        f"{scenario.name}: {'; '.join(scenario.reasons)}"
+        for scenario in diet.scenarios
+        if scenario.status != "ok"
+    ]
+    if failures:
+        summary += " " + words("measured.diet_lost", scenarios="; ".join(failures))
+    return DietView(
+        summary,
+        tuple(_finding(words, finding) for finding in diet.findings),
+        machine_text(words, diet.machine),
+        place.href(urls.file_path(DIET.path(diet.model))),
+    )
+
+
+def _finding(words: Strings, finding: Finding) -> FindingView:
+    label = escape(finding.label)
+    if finding.difference:
+        label += Markup(" ({})").format(unbroken(power(finding.difference, 2)))
+    saving = _saving(words, finding.saving)
+    return FindingView(finding, sentence(finding.message), label, saving)
+
+
+def _saving(words: Strings, saving: Saving) -> str:
+    parts = []
+    if saving.time is not None:
+        text = words("measured.saves_time", factor=f"{saving.time:.3g}")
+        parts.append(text if saving.certain else words("measured.saves_none"))
+    if saving.memory:
+        parts.append(words("measured.saves_memory", size=size(saving.memory)))
+    if saving.text:
+        parts.append(words("measured.saves_text", size=size(saving.text)))
+    return ", ".join(parts)

@@ -6,7 +6,7 @@ Entry points: `numerics_values(library)`; `case_view`, of one case.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from operator import attrgetter
 
@@ -16,7 +16,7 @@ from msgspec import Struct
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.strings import Strings
-from coursebuild.features.bench.figures import (
+from coursebuild.features.bench.grids import (
     FigurePart,
     Grid,
     NamedRow,
@@ -27,7 +27,7 @@ from coursebuild.features.bench.figures import (
     power,
     sentence,
 )
-from coursebuild.features.bench.scenarios import (
+from coursebuild.features.bench.scenario_view import (
     STABLE,
     integrator_table,
     lost_runs,
@@ -36,15 +36,21 @@ from coursebuild.features.bench.scenarios import (
     stable_cells,
     stable_title,
 )
-from coursebuild.numerics.reports.cases import (
+from coursebuild.numerics.reports.case_report import (
     BoundaryLine,
     CaseReport,
     FigureLine,
     course_cases,
 )
-from coursebuild.numerics.reports.plot import case_quantities, case_svg
 from coursebuild.numerics.reports.records import STABILITY
-from coursebuild.numerics.reports.text import INTEGRATORS, Quantity, seconds_text, status_text
+from coursebuild.numerics.reports.report_plots import case_quantities, case_svg
+from coursebuild.numerics.reports.scene_report import SceneReport
+from coursebuild.numerics.reports.shown_errors import (
+    INTEGRATORS,
+    Quantity,
+    seconds_text,
+    status_text,
+)
 
 _RIGHT = 1e-3
 """m or rad: the error at which costs are compared."""
@@ -90,9 +96,12 @@ class CaseGroup(Struct, frozen=True):
 def numerics_values(library: Library) -> dict[str, object]:
     """The values for the template of the page."""
     words, place = library.words, urls.Place(urls.NUMERICS)
-    scenes = library.reports.scenes
+    scenes: Mapping[str, SceneReport] = library.reports.scenes
     course_reports = [report for name in sorted(scenes) for report in course_cases(scenes[name])]
-    cases = [*sorted(library.reports.cases, key=attrgetter("case")), *course_reports]
+    cases: list[CaseReport] = [
+        *sorted(library.reports.cases, key=attrgetter("case")),
+        *course_reports,
+    ]
     return {
         "groups": tuple(
             _group(words, place, number, tuple(group))
@@ -141,7 +150,10 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
     model = "" if report.case else report.name.rpartition("/")[0]
     label = words("numerics.orders", title=report.title)
     orders = orders_table(words, label, report.orders, merge=True)
-    grids = (_boundaries(words, report), _figures(words, report), orders)
+    rows = [(line.integrator, _boundary(words, line)) for line in report.boundaries]
+    label = f"{report.title}: {stable_title(words, report.boundaries[0])}" if rows else ""
+    boundaries = integrator_table(words, label, _BOUNDARY, rows, merge=True)
+    grids = (boundaries, _figures(words, report), orders)
     quantities = case_quantities(report)
     name = urls.encode(report.name)
     return CaseView(
@@ -177,12 +189,6 @@ def _describe(words: Strings, report: CaseReport, quantities: Sequence[Quantity]
         yield sentence(report.note)
 
 
-def _boundaries(words: Strings, report: CaseReport) -> Grid | None:
-    rows = [(line.integrator, _boundary(words, line)) for line in report.boundaries]
-    label = f"{report.title}: {stable_title(words, report.boundaries[0])}" if rows else ""
-    return integrator_table(words, label, _BOUNDARY, rows, merge=True)
-
-
 def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
     theory = seconds_text(line.theory, _DIGITS) if line.theory else ""
     if line.formula and not line.theory:
@@ -198,7 +204,6 @@ def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
 
 
 def _figures(words: Strings, report: CaseReport) -> Grid | None:
-    """Quantities that are known."""
     named_rows: list[NamedRow] = []
     parts: list[FigurePart] = []
     for name in dict.fromkeys(line.name for line in report.figures):

@@ -1,4 +1,4 @@
-"""The hard cases, one module each.
+"""The hard cases, those of a kind in a module.
 
 Entry point: `all_problems()`.
 """
@@ -9,15 +9,11 @@ from functools import cache
 
 from coursebuild.numerics.problem import Problem
 from coursebuild.numerics.problems import (
-    chains,
-    double_pendulum,
+    contacts,
+    extremes,
     impact,
-    incline,
+    linked_bodies,
     oscillators,
-    pendulum,
-    projectile,
-    scales,
-    stack,
     tops,
     tumbling_box,
 )
@@ -28,15 +24,11 @@ def all_problems() -> dict[str, Problem]:
     """Every hard case by its name, in the order of their numbers."""
     problems = (
         tumbling_box.problem(),
-        *pendulum.problems(),
         *tops.problems(),
-        projectile.problem(),
-        *incline.problems(),
+        *contacts.problems(),
         *impact.problems(),
-        *stack.problems(),
-        double_pendulum.problem(),
-        *chains.problems(),
+        *linked_bodies.problems(),
         *oscillators.problems(),
-        *scales.problems(),
+        *extremes.problems(),
     )
     return {problem.name: problem for problem in sorted(problems, key=lambda problem: problem.case)}

@@ -1,6 +1,9 @@
-"""Case 8: an elastic impact, and Newton's cradle, with gaps and with two balls that touch.
+"""Cases 4 and 8: a stone that is thrown, an elastic impact, and Newton's cradle.
 
 Entry point: `problems()`.
+
+The stone flies without air; the semi-implicit method is wrong by exactly g T h/2. The cradle has
+gaps, or two balls that touch.
 
 With direct `solref` (stiffness, damping) and constant impedance a contact of two bodies without
 friction is an oscillator of frequency √stiffness in their distance: without damping the bodies
@@ -11,9 +14,10 @@ for the active contacts means (A + R) f = a_ref with A = J M⁻¹ Jᵀ, R = diag
 a_ref = −k d r for violations r. The first ball does not come to rest, and the middle one moves. A
 contact that opens while the other one is loaded still pushes: 0.13 % of the energy is lost with it.
 
-Sources: MuJoCo documentation, Modeling, Solver parameters, and Computation, Constraint model; for
-balls that touch F. Herrmann, M. Seitz, How does the ball-chain work?, American Journal of Physics
-50 (1982) 977.
+Sources: for the stone, with v ← v + gh before x ← x + vh, x after n steps is
+x₀ + v₀nh + gh²n(n + 1)/2; MuJoCo documentation, Modeling, Solver parameters, and Computation,
+Constraint model; for balls that touch F. Herrmann, M. Seitz, How does the ball-chain work?,
+American Journal of Physics 50 (1982) 977.
 """
 
 from __future__ import annotations
@@ -27,6 +31,8 @@ from msgspec.structs import replace
 
 from coursebuild.numerics.integrate import State, bulirsch_stoer
 from coursebuild.numerics.problem import (
+    NO_CONTACT,
+    NO_GRAVITY,
     Array,
     Integrator,
     Motion,
@@ -35,14 +41,67 @@ from coursebuild.numerics.problem import (
     ScalarCheck,
     Scenario,
     Sizes,
-)
-from coursebuild.numerics.problems.common import (
-    NO_GRAVITY,
     divisions,
     model_text,
     motion_without_attitude,
-    run_steps,
 )
+from coursebuild.numerics.simulation import run_steps
+
+_STEP = 0.01
+_THROW_SCENARIO = Scenario(1.0, 0.1, qvel=(3.0, 0.0, 4.0, 0.0, 0.0, 0.0))
+
+_STONE = '    <body><freejoint/><geom size="0.05" mass="1"/></body>'
+THROWN_STONE = model_text(_STONE, 'gravity="0 0 -9.81"', NO_CONTACT)
+
+
+class Parabola(Struct, frozen=True):
+    """x = v₀t + gt²/2, thrown from the origin."""
+
+    launch: tuple[float, float, float]
+    gravity: float
+
+    def motion(self, times: Array) -> Motion:
+        """The motion at the times (n,) s."""
+        t = times[:, None]
+        launch, fall = np.array(self.launch), np.array([0.0, 0.0, -self.gravity])
+        upright = np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0]), (len(times), 1, 4))
+        velocity = np.concatenate([launch + fall * t, np.zeros((len(times), 3))], axis=1)
+        return Motion(times, launch * t + fall * t**2 / 2, upright, velocity)
+
+
+PARABOLA = Parabola((3.0, 0.0, 4.0), 9.81)
+
+
+def fall_error(integrator: Integrator) -> float:
+    """Error of the height after a second at 10 ms, m: simulated less exact."""
+    data = run_steps(THROWN_STONE, _THROW_SCENARIO, integrator, _STEP, round(1.0 / _STEP))
+    return float(data.qpos[2] - PARABOLA.motion(np.ones(1)).position[0, 2])
+
+
+def exact_error(integrator: Integrator) -> float:
+    """The error in theory: −gTh/2 where velocities are stepped first, nothing with RK4."""
+    return 0.0 if integrator is Integrator.RK4 else -PARABOLA.gravity * 1.0 * _STEP / 2
+
+
+def _throw_problem() -> Problem:
+    return Problem(
+        name="projectile",
+        title="Projectile",
+        case=4,
+        mjcf=THROWN_STONE,
+        scenario=_THROW_SCENARIO,
+        position_bound=100.0,
+        velocity_bound=100.0,
+        reference=Reference("closed", "x = v₀t + gt²/2", PARABOLA),
+        timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160),
+        energy_conserved=True,
+        checks=(
+            ScalarCheck(
+                "error of the height after 1 s at 10 ms", "m", exact_error, fall_error, "−gTh/2"
+            ),
+        ),
+    )
+
 
 GAP, SPEED, CONTACT = 0.05, 1.0, math.pi / 1000
 """m, m/s, and how long a contact lasts, s."""
@@ -194,8 +253,8 @@ def last_velocity(
 
 
 def problems() -> tuple[Problem, ...]:
-    """The impact and the cradles."""
-    return _impact_problem(), _cradle_problem(), _touching_problem()
+    """The throw, the impact and the cradles."""
+    return _throw_problem(), _impact_problem(), _cradle_problem(), _touching_problem()
 
 
 def _impact_problem() -> Problem:

@@ -1,30 +1,40 @@
-"""Cases 5, 6 and 12: linear oscillators, whose largest stable timesteps are known.
+"""Cases 2, 5, 6 and 12: pendulums with a closed form, and linear oscillators with a known limit.
 
-Entry point: `problems()`: a damped spring, a servo, and a soft equality constraint.
+Entry point: `problems()`: a pendulum, a damped spring, a servo, and a soft equality constraint;
+`Swing` is the closed form of the first.
 
-1. *Damped spring.* Joint damping is implicit, unless `eulerdamp` is off.
-2. *Stiff servo*: a spring and damper that a `position` actuator makes. Its `kv` is not joint
+1. *Pendulum*, let go at 90° and at 179°, as a hinge, as a ball joint and held by `connect`. The
+   last one's error is that of the soft constraint: it does not go away with the timestep.
+2. *Damped spring.* Joint damping is implicit, unless `eulerdamp` is off.
+3. *Stiff servo*: a spring and damper that a `position` actuator makes. Its `kv` is not joint
    damping: Euler takes it at the beginning of the step, and so is stable to a smaller timestep.
-3. *Soft equality.* With constant impedance d a constraint's acceleration is a = −d (b v + k d r),
+4. *Soft equality.* With constant impedance d a constraint's acceleration is a = −d (b v + k d r),
    where b = 2/(d · timeconst), k = 1/(d² timeconst² dampratio²) and r is the violation: an
    oscillator with ω = 1/(timeconst · dampratio) and ζ = dampratio. All integrators but `discrete`
    compute it from the state at the beginning of the step, the implicit ones too. `refsafe` would
    raise the time constant to two timesteps and so hide the limit behind another model; it is off.
 
-Sources: for the semi-implicit method E. Hairer, C. Lubich, G. Wanner, Geometric Numerical
-Integration, I.3; for the polynomial of the classical Runge–Kutta method E. Hairer, G. Wanner,
-Solving Ordinary Differential Equations II, IV.2; MuJoCo documentation, Constraint model.
+Sources: Abramowitz & Stegun, 17.1 and 16.1; L. D. Landau, E. M. Lifshitz, Mechanics, § 11:
+sin(θ/2) = k cd(ω₀t | k²) for a pendulum let go at rest, k = sin(θ₀/2); for the semi-implicit method
+E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, I.3; for the polynomial of the
+classical Runge–Kutta method E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.2;
+MuJoCo documentation, Constraint model.
 """
 
 from __future__ import annotations
 
 import cmath
 import math
+from typing import Literal
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
+from coursebuild.numerics.integrate import forward_motion
 from coursebuild.numerics.problem import (
+    NO_CONTACT,
+    NO_GRAVITY,
     Array,
     Integrator,
     Limit,
@@ -32,14 +42,13 @@ from coursebuild.numerics.problem import (
     Problem,
     Reference,
     Scenario,
-)
-from coursebuild.numerics.problems.common import (
-    NO_CONTACT,
-    NO_GRAVITY,
+    SecondReference,
     divisions,
     model_text,
     motion_without_attitude,
+    turning_at_rest,
 )
+from mjcourse.spatial import axis_angle_to_quat
 
 START = (1.0,), (5.0,)
 """m and m/s: from rest the semi-implicit method would seem to be of second order in velocity."""
@@ -53,15 +62,6 @@ _DAMPING = {0.0: "0", 0.1: "2", 1.0: "20", 10.0: "200"}
 _KV = {0.1: "20", 1.0: "200", 10.0: "2000"}
 _SOLREF = {0.1: "0.2 0.1", 1.0: "0.02 1"}
 """What makes the damping ratio in the models, by that ratio."""
-
-
-def problems() -> tuple[Problem, ...]:
-    """Each oscillator with some damping ratios."""
-    return (
-        *map(_spring_problem, _DAMPING),
-        *map(_servo_problem, _KV),
-        *map(_equality_problem, _SOLREF),
-    )
 
 
 class Oscillation(Struct, frozen=True):
@@ -232,3 +232,126 @@ _SLIDE = '<joint name="slide" type="slide" axis="1 0 0"/>'
 def _ball(joint: str) -> str:
     """1 kg on a joint."""
     return f'    <body>{joint}<geom size="0.1" mass="1"/></body>'
+
+
+Kind = Literal["hinge", "ball", "connect"]
+_AXIS = np.array([0.0, 1.0, 0.0])
+_JOINTS = {
+    "hinge": '<joint type="hinge" axis="0 1 0"/>',
+    "ball": '<joint type="ball"/>',
+    "connect": "<freejoint/>",
+}
+_PIVOT = '  <equality><connect body1="bob" anchor="0 0 0"/></equality>\n'
+_STARTS = {
+    90: ((1.5707963267948966,), (0.7071067811865476, 0.0, 0.7071067811865475, 0.0)),
+    179: ((3.12413936106985,), (0.00872653549837393, 0.0, 0.9999619230641713, 0.0)),
+}
+"""By degrees, the angle of the hinge in rad, and the quaternion of the ball."""
+
+
+def mjcf(kind: Kind) -> str:
+    """A bob below a pivot at the origin; turns are about y."""
+    inertial = '<inertial pos="0 0 -1" mass="1" diaginertia="0.01 0.01 0.01"/>'
+    return model_text(
+        f'    <body name="bob">{_JOINTS[kind]}{inertial}</body>',
+        'gravity="0 0 -9.81"',
+        NO_CONTACT,
+        _PIVOT if kind == "connect" else "",
+    )
+
+
+class Swing(Struct, frozen=True):
+    """The swing of a pendulum that is let go at rest."""
+
+    kind: Kind
+    begin: float
+    """rad, between 0 and π."""
+    gravity: float = 9.81
+    length: float = 1.0
+    """m, from the pivot to the centre of mass."""
+    mass: float = 1.0
+    inertia: float = 0.01
+    """About the centre of mass, kg m²."""
+
+    @property
+    def rate(self) -> float:
+        """Of small swings, rad/s."""
+        moment = self.inertia + self.mass * self.length**2
+        return math.sqrt(self.mass * self.gravity * self.length / moment)
+
+    def motion(self, times: Array) -> Motion:
+        """The motion at the times (n,) s."""
+        from scipy.special import ellipj
+
+        k, k1 = math.sin(self.begin / 2), math.cos(self.begin / 2)
+        sn, cn, dn, _ = ellipj(self.rate * times, k * k)
+        # The cosine beside the sine: near the top the sine alone would lose half of the digits.
+        angle = 2 * np.arctan2(k * cn / dn, k1 / dn)
+        return _as_motion(self.kind, times, angle, -2 * k * self.rate * k1 * sn / dn)
+
+
+def _as_motion(kind: Kind, times: Array, angle: Array, rate: Array) -> Motion:
+    """The motion of an angle (n,) rad with its rate (n,) rad/s."""
+    if kind == "hinge":
+        return motion_without_attitude(times, angle[:, None], rate[:, None])
+    attitude = axis_angle_to_quat(_AXIS, angle)[:, None]
+    turning = rate[:, None] * _AXIS
+    if kind == "ball":
+        return Motion(times, np.empty((len(times), 0)), attitude, turning)
+    return turning_at_rest(times, attitude[:, 0], turning)
+
+
+def _held_motion(text: str, scenario: Scenario, times: Array) -> Motion:
+    """The motion of the free body if its soft pivot were rigid."""
+    ball = text.replace(_PIVOT, "").replace(_JOINTS["connect"], _JOINTS["ball"])
+    motion = forward_motion(ball, replace(scenario, qpos=scenario.qpos[3:]), times)
+    return turning_at_rest(times, motion.attitude[:, 0], motion.velocity)
+
+
+RIGID_PIVOT = SecondReference("MuJoCo’s accelerations with a ball joint, DOP853", _held_motion)
+
+
+def problems() -> tuple[Problem, ...]:
+    """Each pendulum from each angle, each oscillator with some damping ratios."""
+    kinds: tuple[Kind, ...] = ("hinge", "ball", "connect")
+    return (
+        *(_pendulum_problem(kind, degrees) for kind in kinds for degrees in (90, 179)),
+        *map(_spring_problem, _DAMPING),
+        *map(_servo_problem, _KV),
+        *map(_equality_problem, _SOLREF),
+    )
+
+
+def _pendulum_problem(kind: Kind, degrees: int) -> Problem:
+    angle, quaternion = _STARTS[degrees]
+    start = {"hinge": angle, "ball": quaternion, "connect": (0.0, 0.0, 0.0, *quaternion)}[kind]
+    source = "Jacobi's elliptic functions, Landau & Lifshitz, Mechanics, § 11"
+    return Problem(
+        name=f"pendulum-{kind}-{degrees}",
+        title=f"Pendulum from {degrees}°, {_SUSPENSIONS[kind]}",
+        case=2,
+        mjcf=mjcf(kind),
+        scenario=Scenario(4.0, 0.1, start),
+        position_bound=math.pi,
+        velocity_bound=8.0,
+        reference=Reference("closed", source, Swing(kind, math.radians(degrees))),
+        second=RIGID_PIVOT if kind == "connect" else None,
+        timesteps=divisions(0.1, 5, 10, 20, 40, 80, 160),
+        search=None if kind == "connect" else (1e-3, 3.0),
+        span=500.0,
+        smooth=kind != "connect",
+        energy_conserved=True,
+        note=_NOTES[kind],
+    )
+
+
+_SUSPENSIONS = {
+    "hinge": "a hinge",
+    "ball": "a ball joint",
+    "connect": "a free body held by connect",
+}
+_NOTES = {
+    "hinge": "let go at rest it never goes round: beyond the boundary it does",
+    "ball": "let go at rest it never goes round: beyond the boundary it does",
+    "connect": "the error is that of the soft constraint, and does not go away with the timestep",
+}

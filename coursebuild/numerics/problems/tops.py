@@ -21,6 +21,8 @@ from msgspec import Struct
 
 from coursebuild.numerics.integrate import cumulative_integral
 from coursebuild.numerics.problem import (
+    NO_CONTACT,
+    NO_GRAVITY,
     Array,
     Integrator,
     Limit,
@@ -29,16 +31,12 @@ from coursebuild.numerics.problem import (
     Reference,
     ScalarCheck,
     Scenario,
-)
-from coursebuild.numerics.problems.common import (
-    NO_CONTACT,
-    NO_GRAVITY,
     divisions,
     model_text,
-    run_steps,
     turning_at_rest,
 )
 from coursebuild.numerics.problems.oscillators import rk4_factor
+from coursebuild.numerics.simulation import run_steps
 from mjcourse.spatial import axis_angle_to_quat, quat_mul
 
 NEVER_STABLE = "Euler is stable at no timestep: what is measured is where that shows"

@@ -15,9 +15,10 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.numerics.engine import advance, compile_model, initial_data
 from coursebuild.numerics.integrate import cumulative_integral
 from coursebuild.numerics.problem import (
+    NO_CONTACT,
+    NO_GRAVITY,
     Array,
     Integrator,
     Motion,
@@ -25,16 +26,12 @@ from coursebuild.numerics.problem import (
     Reference,
     ScalarCheck,
     Scenario,
-)
-from coursebuild.numerics.problems.common import (
-    NO_CONTACT,
-    NO_GRAVITY,
     divisions,
     model_text,
-    run_steps,
     turning_at_rest,
 )
 from coursebuild.numerics.problems.tops import NEVER_STABLE
+from coursebuild.numerics.simulation import advance, compile_model, initial_data, run_steps
 from mjcourse.spatial import mat_to_quat
 
 SPIN = 6.0

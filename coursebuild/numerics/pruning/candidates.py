@@ -22,12 +22,17 @@ import numpy as np
 from msgspec import Struct
 
 from coursebuild.numerics.problem import Scenario
-from coursebuild.numerics.pruning.compare import WatchedRun
-from coursebuild.numerics.pruning.edits import ModelEdit, set_attributes, set_option
-from coursebuild.numerics.pruning.markup import Element, place_of
+from coursebuild.numerics.pruning.comparison import WatchedRun
 from coursebuild.numerics.pruning.model_text import ModelText, section_of, thing_kind
 from coursebuild.numerics.pruning.reachability import Pair, find_separate, iterate_pairs
-from coursebuild.numerics.reports.diet import name_list
+from coursebuild.numerics.pruning.xml_edits import (
+    Element,
+    ModelEdit,
+    place_of,
+    set_attributes,
+    set_option,
+)
+from coursebuild.numerics.reports.diet_report import name_list
 
 MOST_PAIRS = 100_000
 """With so many pairs of geoms no contact is examined."""
@@ -282,7 +287,12 @@ def far_bodies(
     used_names |= {
         name.rstrip("0123456789") for name in used_names
     }  # what is repeated has a number
-    ranks = dict.fromkeys(_moving_trees(model, runs), 3)
+    ranks: dict[int, int] = {}
+    for case in (run.scene.scenario for run in runs):
+        velocity = np.array(case.qvel)
+        if not case.qvel and case.keyframe >= 0:
+            velocity = model.key_qvel[case.keyframe]
+        ranks |= dict.fromkeys(model.dof_treeid[np.flatnonzero(velocity)].tolist(), 3)
     roots: dict[Element, list[int]] = {}
     for element, ids in text.things("body"):
         names = {inner.get("name") for inner in element.walk()} - {None, ""}
@@ -329,17 +339,6 @@ def _pairs_and_sensors_of(text: ModelText, body: Element) -> list[Element]:
             attribute.value in names for attribute in element.attributes if attribute.name != "name"
         )
     ]
-
-
-def _moving_trees(model: Any, runs: Collection[WatchedRun]) -> set[int]:
-    """The trees that a scenario sets in motion."""
-    trees: set[int] = set()
-    for case in (run.scene.scenario for run in runs):
-        velocity = np.array(case.qvel)
-        if not case.qvel and case.keyframe >= 0:
-            velocity = model.key_qvel[case.keyframe]
-        trees |= set(model.dof_treeid[np.flatnonzero(velocity)].tolist())
-    return trees
 
 
 _SETTINGS = (

@@ -20,8 +20,15 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.pruning.edits import ModelEdit, apply_edits, set_attributes
-from coursebuild.numerics.pruning.markup import Element, Markup, parse_markup, splice
+from coursebuild.numerics.pruning.xml_edits import (
+    Element,
+    Markup,
+    ModelEdit,
+    apply_edits,
+    parse_markup,
+    set_attributes,
+    splice,
+)
 
 _DEEPEST = 32
 

@@ -56,7 +56,7 @@ def iterate_pairs(model: Any) -> Iterator[Pair]:
     if flags & int(disabling):
         return
     for first, second in zip(model.pair_geom1, model.pair_geom2, strict=True):
-        yield _sort_pair(int(first), int(second))
+        yield min(int(first), int(second)), max(int(first), int(second))
     parents = not flags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
     excluded = {int(weld_a) for weld_a in model.exclude_signature}
     weld = model.body_weldid
@@ -84,10 +84,6 @@ def iterate_pairs(model: Any) -> Iterator[Pair]:
             if (low << 16) + high in excluded or (high << 16) + low in excluded:
                 continue
             yield a, b
-
-
-def _sort_pair(a: int, b: int) -> Pair:
-    return (a, b) if a < b else (b, a)
 
 
 class Shell(Struct, frozen=True, eq=False):

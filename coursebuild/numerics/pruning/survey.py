@@ -25,6 +25,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import Keep
+from coursebuild.numerics.costs import Clock
 from coursebuild.numerics.pruning.candidates import (
     KINDS,
     Item,
@@ -35,15 +36,13 @@ from coursebuild.numerics.pruning.candidates import (
     unreachable_contacts,
     unread_elements,
 )
-from coursebuild.numerics.pruning.compare import TOLERANCE, MotionComparison, WatchedRun, watch
-from coursebuild.numerics.pruning.differences import difference, unrelated_fields
-from coursebuild.numerics.pruning.edits import ModelEdit, merge_edits
-from coursebuild.numerics.pruning.markup import place_of
+from coursebuild.numerics.pruning.comparison import TOLERANCE, MotionComparison, WatchedRun, watch
 from coursebuild.numerics.pruning.model_text import ModelText
 from coursebuild.numerics.pruning.reachability import PREMISES
-from coursebuild.numerics.pruning.readers import Reader
+from coursebuild.numerics.pruning.readers import Reader, difference, unrelated_fields
 from coursebuild.numerics.pruning.trials import PrunedModel, PruningTrials, largest_subset
-from coursebuild.numerics.reports.diet import (
+from coursebuild.numerics.pruning.xml_edits import ModelEdit, merge_edits, place_of
+from coursebuild.numerics.reports.diet_report import (
     MEASURED_LABEL,
     PROVED_LABEL,
     DietReport,
@@ -56,7 +55,6 @@ from coursebuild.numerics.reports.diet import (
     TextEdit,
 )
 from coursebuild.numerics.scene import Scene
-from coursebuild.numerics.timing import Clock
 
 MIN_SPEEDUP = 1.05
 """The speedup from which on a finding that is not proved is worth a word."""

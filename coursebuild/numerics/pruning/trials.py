@@ -5,7 +5,7 @@ Entry points: `PruningTrials`, which makes a `PrunedModel`; `largest_subset(item
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -13,11 +13,21 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.engine import STATE, advance, full_state, initial_data, silent
+from coursebuild.numerics.costs import Clock, Timing, scenario_job, time_jobs
 from coursebuild.numerics.pruning.candidates import Item
-from coursebuild.numerics.pruning.compare import MotionComparison, compare, without_reset
-from coursebuild.numerics.pruning.differences import difference
-from coursebuild.numerics.pruning.edits import (
+from coursebuild.numerics.pruning.comparison import (
+    KEY_SIZES,
+    IndexMap,
+    MotionComparison,
+    compare,
+    fits,
+    index_map,
+    transfer,
+    without_reset,
+)
+from coursebuild.numerics.pruning.model_text import ModelText, model_bytes
+from coursebuild.numerics.pruning.readers import difference
+from coursebuild.numerics.pruning.xml_edits import (
     ModelEdit,
     drop_attribute,
     drop_numbers,
@@ -25,12 +35,9 @@ from coursebuild.numerics.pruning.edits import (
     merge_edits,
     remove_elements,
 )
-from coursebuild.numerics.pruning.index_map import KEY_SIZES, IndexMap, fits, index_map, transfer
-from coursebuild.numerics.pruning.markup import Element
-from coursebuild.numerics.pruning.model_text import ModelText, model_bytes
-from coursebuild.numerics.reports.diet import Saving
+from coursebuild.numerics.reports.diet_report import Saving
 from coursebuild.numerics.scene import Scene
-from coursebuild.numerics.timing import Clock, Timing, scenario_job, time_jobs
+from coursebuild.numerics.simulation import STATE, advance, full_state, initial_data, silent
 
 _T = TypeVar("_T")
 _DRAWS = 2
@@ -180,16 +187,10 @@ def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, .
     edits = [edit for item in items for edit in item.edits]
     edits += remove_elements([*elements, *find_emptied(drops, edits)])
     edits += [drop_attribute(*drop) for drop in drops]
-    edits += _keyframes(text, index, set(nodes))
-    return merge_edits(edits), index
-
-
-def _keyframes(
-    text: ModelText, index: IndexMap, removed_elements: Collection[Element]
-) -> Iterator[ModelEdit]:
-    """Remove the numbers of removed coordinates from keyframes, which list one for each."""
-    for name, size in KEY_SIZES.items():
+    node_set = set(nodes)
+    for name, size in KEY_SIZES.items():  # keyframes list a number for each coordinate
         lost = set(range(getattr(text.model, size))).difference(index[size].tolist())
         for key in text.elements:
-            if key.tag == "key" and key not in removed_elements:
-                yield from drop_numbers(key, name, lost)
+            if key.tag == "key" and key not in node_set:
+                edits += drop_numbers(key, name, lost)
+    return merge_edits(edits), index

@@ -18,17 +18,17 @@ from typing import TypeAlias
 from msgspec import Struct
 
 from coursebuild.core.model.scenarios import BenchTable
-from coursebuild.numerics.reports.bench import (
+from coursebuild.numerics.reports.case_report import CaseReport, FigureLine
+from coursebuild.numerics.reports.scene_report import (
     FLOORS,
     MeasuredRun,
     OrderRow,
     ScenarioReport,
     SceneReport,
     StableRow,
+    SweepReport,
 )
-from coursebuild.numerics.reports.cases import CaseReport, FigureLine
-from coursebuild.numerics.reports.sweep import SweepReport
-from coursebuild.numerics.reports.text import seconds_text, setting_text, status_text
+from coursebuild.numerics.reports.shown_errors import seconds_text, setting_text, status_text
 
 _STABLE = 0.01
 """Relative band of a largest stable timestep: a bisection ends where its bounds are near."""

@@ -21,9 +21,9 @@ from typing import Any, Generic, TypeVar
 import msgspec
 from msgspec import Struct
 
-from coursebuild.numerics.reports.bench import SceneReport
-from coursebuild.numerics.reports.cases import CaseReport
-from coursebuild.numerics.reports.diet import DietReport
+from coursebuild.numerics.reports.case_report import CaseReport
+from coursebuild.numerics.reports.diet_report import DietReport
+from coursebuild.numerics.reports.scene_report import SceneReport
 
 FOLDER = "content/reports"
 FORM = 2

@@ -12,15 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coursebuild.features.bench.commands.bench.text import bench_text
+from coursebuild.features.bench.commands.bench import bench_text
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
     format_checks,
     measurement_json,
 )
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.bench import RowVerdict
 from coursebuild.numerics.reports.departures import Departure, RecordCheck
+from coursebuild.numerics.reports.scene_report import RowVerdict
 from coursebuild.report import Style
 from coursebuild.report.text import Column, cells, table
 from support.bench_reports import awkward, row, scenario, scene

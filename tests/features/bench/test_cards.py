@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.run.script_environment import machine
-from coursebuild.features.bench.commands.bench.measuring import add_card
-from coursebuild.numerics.reports.bench import SceneReport
+from coursebuild.features.bench.commands.measuring import add_card
+from coursebuild.numerics.reports.scene_report import SceneReport
 from coursebuild.pipeline.scenes import find_scenes
 
 pytestmark = pytest.mark.site

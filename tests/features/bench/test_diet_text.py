@@ -6,8 +6,8 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from coursebuild.features.bench.commands.diet.text import diet_text
-from coursebuild.numerics.reports.diet import (
+from coursebuild.features.bench.commands.diet import diet_text
+from coursebuild.numerics.reports.diet_report import (
     DietScenario,
     ModelPlace,
     RejectedTrial,

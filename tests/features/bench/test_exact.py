@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.features.bench.commands.bench.measuring import compile_scene, run_scenario
-from coursebuild.features.bench.commands.runs import CannotMeasureError
-from coursebuild.numerics.reports.bench import ScenarioReport
+from coursebuild.features.bench.commands.measurement import CannotMeasureError
+from coursebuild.features.bench.commands.measuring import compile_scene, run_scenario
+from coursebuild.numerics.reports.scene_report import ScenarioReport
 from coursebuild.pipeline.scenes import find_scenes
 from support.measured_course import write
 

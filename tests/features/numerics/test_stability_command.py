@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.cli import main
-from coursebuild.numerics.problems import all_problems, projectile
+from coursebuild.numerics.problems import all_problems, impact
 from coursebuild.numerics.reports.records import STABILITY
 
 pytestmark = pytest.mark.site
@@ -83,8 +83,8 @@ def test_references_that_differ_are_an_error_and_nothing_is_recorded(
     course: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As of a constant that somebody mistyped: here the stone is thrown 1e-6 too fast."""
-    thrown = replace(projectile.PARABOLA, launch=(3.000003, 0.0, 4.0))
-    monkeypatch.setattr(projectile, "PARABOLA", thrown)
+    thrown = replace(impact.PARABOLA, launch=(3.000003, 0.0, 4.0))
+    monkeypatch.setattr(impact, "PARABOLA", thrown)
     all_problems.cache_clear()
     try:
         for arguments in (["--record"], ["--format", "json"]):

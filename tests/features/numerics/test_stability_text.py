@@ -6,7 +6,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from coursebuild.features.numerics.commands.text import stability_text
+from coursebuild.features.numerics.commands import stability_text
 from coursebuild.report import Style
 from support.fixture_cases import check_text
 from support.model_reports import case

@@ -11,7 +11,7 @@ import pytest
 
 from coursebuild.numerics.pruning.model_text import ModelTextError
 from coursebuild.numerics.pruning.survey import Survey
-from coursebuild.numerics.reports.diet import PROVED_LABEL
+from coursebuild.numerics.reports.diet_report import PROVED_LABEL
 from support.surveys import PATH, findings_by_kind, fixed_text, names, open_files, run_survey
 
 pytestmark = pytest.mark.site

@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from coursebuild.numerics.reports.diet import MEASURED_LABEL, PROVED_LABEL
+from coursebuild.numerics.reports.diet_report import MEASURED_LABEL, PROVED_LABEL
 from support.surveys import PENDULUM, field, findings_by_kind, fixed_text, names, run_survey, scene
 
 

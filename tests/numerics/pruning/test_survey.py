@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from coursebuild.numerics.reports.diet import PROVED_LABEL
+from coursebuild.numerics.reports.diet_report import PROVED_LABEL
 from support.surveys import (
     PATH,
     PENDULUM,

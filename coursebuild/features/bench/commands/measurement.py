@@ -1,19 +1,40 @@
-"""The result of `bench`, `stability` and `diet`, and what they print besides their reports.
+"""How `bench`, `stability` and `diet` measure, and what they print and record.
 
-Entry points: `Measurement`, `measurement_text`, `measurement_json`; `format_checks`,
-`failure_text`.
+Entry points: `add_report_options`, `run_measurement`, of their arguments; `MeasuringRun`, which
+makes a `Measurement`, `CannotMeasureError`, `write_records`; `measurement_text`,
+`measurement_json`, `failure_text`, `format_checks`; for what pages show of reports `english`,
+`plain_text`, `grid_lines`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Generic, TypeVar
+import argparse
+import functools
+import re
+import sys
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Generic, TypeVar
 
+from markupsafe import Markup
 from msgspec import Struct
+from msgspec.structs import replace
 
-from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.numerics.reports.departures import Departure, RecordCheck
+from coursebuild.cli.arguments import options_of, style_of
+from coursebuild.cli.output import CLEAN, FAILURE, write
+from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.files.locks import project_lock
+from coursebuild.core.files.resources import template_texts
+from coursebuild.core.files.write import resolve_inside, write_atomic
+from coursebuild.core.pages.assets import strings_for
+from coursebuild.core.pages.strings import Strings
+from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
+from coursebuild.core.values import fingerprint
+from coursebuild.features.bench.grids import Grid
+from coursebuild.numerics.reports.departures import RecordCheck
 from coursebuild.numerics.reports.records import ReportFailure
+from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.report.text import (
     BOLD,
     FAINT,
@@ -28,6 +49,7 @@ from coursebuild.report.text import (
 )
 from coursebuild.report.values import json_text, plural
 
+_A = TypeVar("_A")
 _T = TypeVar("_T")
 
 
@@ -86,21 +108,219 @@ def _format_check(check: RecordCheck, style: Style) -> str:
     lines = [f"{style.paint(visible(check.name), BOLD)}  {verdict}"]
     lines += ["  " + style.paint(visible(remark), YELLOW) for remark in check.remarks]
     for place in dict.fromkeys(departure.where for departure in check.departures):
-        head, *rows = _departure_table([d for d in check.departures if d.where == place])
+        departures = [d for d in check.departures if d.where == place]
+        head, *rows = table(
+            [
+                Column(
+                    name,
+                    tuple(getattr(departure, name) for departure in departures),
+                    left=name not in ("recorded", "measured"),
+                )
+                for name in ("setting", "figure", "recorded", "measured", "band")
+            ]
+        )
         lines += ["", "  " + style.paint(visible(place), BOLD), "    " + style.paint(head, FAINT)]
         lines += [f"    {row}" for row in rows]
     return "\n".join(lines) + "\n"
 
 
-def _departure_table(departures: Sequence[Departure]) -> list[str]:
-    names = ("setting", "figure", "recorded", "measured", "band")
-    return table(
-        [
-            Column(
-                name,
-                tuple(getattr(departure, name) for departure in departures),
-                left=name not in ("recorded", "measured"),
-            )
-            for name in names
-        ]
+def add_report_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options for reports in the course's folder."""
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument(
+        "--record", action="store_true", help="write what was measured to content/reports/"
     )
+    group.add_argument(
+        "--check",
+        action="store_true",
+        help="measure again, and fail if a figure has changed; times are never compared",
+    )
+
+
+def run_measurement(
+    arguments: argparse.Namespace,
+    measure: Callable[[Options], Measurement[Any]],
+    text: Callable[[Sequence[Any], Style], str],
+    json: Callable[[Measurement[Any]], str],
+    *,
+    empty: str = "",
+) -> int:
+    """Measure with the options that the arguments give, print it, and return the exit status.
+
+    `text` is of the reports, `json` of the whole; `empty` is for no text at all.
+    """
+    options = options_of(arguments)
+    try:
+        measurement = measure(options)
+    finally:
+        options.store.close()
+    status = CLEAN if measurement.ok else FAILURE
+    if arguments.format == "json":
+        return write(json(measurement), status)
+    style = style_of(sys.stdout)
+    reports = text(measurement.reports, style)
+    return write(measurement_text(reports, measurement, style) or empty, status)
+
+
+class CannotMeasureError(Exception):
+    """A model cannot be measured, or looked at; the diagnostic says why."""
+
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic.message)
+        self.diagnostic = diagnostic
+
+
+class MeasuringRun:
+    """Measures one thing after the other, or takes the result from the store.
+
+    Only one run of a course measures at a time, since two would disturb each other's times; the
+    second finds what the first has measured.
+    """
+
+    stage, success = "measuring", "measured"
+    """Words of the progress display: for the stage, and for a thing that was measured."""
+
+    def __init__(
+        self, options: Options, diagnostics: Iterable[Diagnostic] = (), *, use_store: bool = True
+    ) -> None:
+        self.options = options
+        self.use_store = use_store
+        """Whether results are taken from the store, and put into it."""
+        self.diagnostics = list(diagnostics)
+        self.failures: list[ReportFailure] = []
+        self.remarks: list[str] = []
+        self.progress = options.progress
+        options.store.listen(self.progress.say)
+
+    def measure_each(
+        self, things: Sequence[_A], measure: Callable[[_A], _T | None]
+    ) -> Measurement[_T]:
+        """Measure each thing, and collect the reports."""
+        reports: list[_T | None] = []
+        if things:
+            with self.progress.stage(self.stage, len(things)):
+                reports = [measure(thing) for thing in things]
+        return Measurement(
+            tuple(report for report in reports if report is not None),
+            sort_diagnostics(self.diagnostics),
+            failures=tuple(self.failures),
+            remarks=tuple(self.remarks),
+        )
+
+    def load_or_measure(
+        self,
+        name: str,
+        kind: str,
+        parts: tuple[object, ...],
+        report_type: type[_T],
+        measure: Callable[[], _T | None],
+    ) -> _T | None:
+        """Load the report on a thing by all that it depends on, or measure the thing now."""
+        report = self.load(kind, parts, report_type)
+        if report is None:
+            with project_lock(self.options.root, self.progress.say, name="bench-lock"):
+                # The run that held the lock may have measured it.
+                report = self.load(kind, parts, report_type)
+                if report is None:
+                    self.progress.start(name)
+                    start = time.monotonic()
+                    try:
+                        report = measure()
+                    except CannotMeasureError as error:
+                        self.diagnostics.append(error.diagnostic)
+                    verdict = f"not {self.success}" if report is None else self.success
+                    self.progress.finish(name, verdict, time.monotonic() - start)
+                    if report is not None:
+                        self.save(kind, parts, report)
+                    return report
+        self.progress.skip()
+        return report
+
+    def load(self, kind: str, parts: tuple[object, ...], report_type: type[_T]) -> _T | None:
+        """Load the stored report that depends on these parts, if there is one."""
+        if not self.use_store:
+            return None
+        return self.options.store.get_value(kind, fingerprint(parts), report_type)
+
+    def save(self, kind: str, parts: tuple[object, ...], value: object) -> None:
+        """Store a report under the parts on which it depends."""
+        if self.use_store:
+            self.options.store.put_value(kind, fingerprint(parts), value)
+
+
+def forbid_quick(option: str, *, quick: bool) -> None:
+    """Forbid `--quick` with an option for full measurements.
+
+    Raises:
+        UsageError: `quick` is set.
+    """
+    if quick:
+        raise UsageError(f"{option} takes no --quick: what is recorded is measured in full")
+
+
+def write_records(
+    root: Path, measurement: Measurement[_T], records: Iterable[tuple[str, bytes]]
+) -> Measurement[_T]:
+    """Write reports, given as (path, bytes), and add what was done to the measurement."""
+    outcomes = [_write_record(root, path, data) for path, data in records]
+    return replace(
+        measurement,
+        failures=tuple(outcome for outcome in outcomes if isinstance(outcome, ReportFailure)),
+        remarks=tuple(outcome for outcome in outcomes if isinstance(outcome, str)),
+    )
+
+
+def _write_record(root: Path, path: str, data: bytes) -> str | ReportFailure:
+    """Write a report, and say what was done, or why it cannot be done."""
+    try:
+        target = resolve_inside(root, path)
+        before = target.read_bytes() if target.exists() else None
+        if before == data:
+            return f"{path} is as it was"
+        write_atomic(root, path, data, expected=before)
+    except EffectError as error:
+        return ReportFailure(error.message, error.help)
+    except OSError as error:
+        return ReportFailure(f"{path} cannot be written: {reason(error)}")
+    return f"wrote {path}"
+
+
+_SUPERSCRIPTS = str.maketrans("-\u22120123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+@functools.cache
+def english() -> Strings:
+    """Return the words of English pages."""
+    return strings_for(template_texts(), "en")
+
+
+def plain_text(text: str) -> str:
+    """Remove the markup of a sentence or a cell."""
+    if not isinstance(text, Markup):
+        return text
+    html = re.sub("<sup>(.*?)</sup>", lambda match: match[1].translate(_SUPERSCRIPTS), str(text))
+    return Markup(html).striptags()
+
+
+def grid_lines(grid: Grid, style: Style, marks: Sequence[tuple[str, str]] = ()) -> list[str]:
+    """Write a table of numbers under its label, not wider than the terminal.
+
+    `marks` holds what stands before each row, and the row's colour. Without marks, remarks stand
+    below, each with its row's name.
+    """
+    columns = [Column("", tuple(mark for mark, _ in marks), left=True)] if marks else []
+    for n, (title, *cells) in enumerate(zip(grid.head, *grid.rows, strict=True)):
+        if not n or n not in grid.left:
+            rank = 0 if not n else 2 if n in grid.minor else 1
+            columns.append(Column(title, tuple(map(plain_text, cells)), rank, left=not n))
+    head, *rows = table(columns, max(style.width, 60) - 4)
+    if marks:
+        rows = [style.paint(row, code) for row, (_, code) in zip(rows, marks, strict=True)]
+    lines = [style.paint(visible(grid.label), FAINT), style.paint(head, FAINT)]
+    for part, numbered_rows in grid.bodies:
+        lines += [] if part is None else [style.paint(visible(part.title), FAINT)]
+        lines += [rows[number] for number, _ in numbered_rows]
+    if marks:
+        return lines
+    remarks = ((row[0], row[n]) for row in grid.rows for n in grid.left[1:])
+    return [*lines, *(f"{visible(name)}: {text}" for name, text in remarks if text)]

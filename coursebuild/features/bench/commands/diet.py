@@ -1,0 +1,345 @@
+"""`coursebuild diet`: what models of the course hold that their scenarios do not need.
+
+Entry points: `diet(options, names, …)`; `diet_text(reports, style)`; `diet_values(reports)`, for
+JSON.
+
+1. Names mean models. One that does not compile is reported, and the others are looked at.
+2. A part that code of the course may notice is not proved superfluous, and a part without which
+   scripts or labs have another output is no finding. A part that is to stay stands in
+   `models/NAME.toml` with its reason.
+3. Reports are stored by all that they depend on, as those of `bench`.
+4. `fix` takes out what is proved, again and again, as what only a removed part needed may go as
+   well. A file that was edited meanwhile is left as it is.
+5. A finding is shown with its label, what it saves, its place, and the change itself; what was
+   tried and is needed stands on one line.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from msgspec.structs import replace
+
+from coursebuild.cli.arguments import add_cache, add_format, add_quiet
+from coursebuild.core.engine.tool import code_digest
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.read import read_course
+from coursebuild.core.run.script_environment import machine
+from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.features.bench.commands.diet_model import DietModel, Reruns
+from coursebuild.features.bench.commands.measurement import (
+    Measurement,
+    MeasuringRun,
+    forbid_quick,
+    measurement_json,
+    run_measurement,
+    write_records,
+)
+from coursebuild.numerics.pruning.survey import Survey
+from coursebuild.numerics.reports.diet_report import (
+    DietReport,
+    Finding,
+    Saving,
+    name_list,
+)
+from coursebuild.numerics.reports.records import DIET, ReportFailure
+from coursebuild.numerics.simulation import silent
+from coursebuild.pipeline.load import load
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.scenes import CourseScene, find_scenes
+from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
+from coursebuild.report.values import plain, plural
+
+_T = TypeVar("_T")
+_CODE = (
+    "coursebuild/numerics",
+    "coursebuild/features/bench/commands/diet_model.py",
+    "mjcourse/spatial",
+)
+EXAMPLES = """\
+examples:
+  coursebuild diet pendulum              what it could be without
+  coursebuild diet --fix                 take out what changes nothing
+"""
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_quiet(parser)
+    parser.add_argument(
+        "models", nargs="*", metavar="MODEL", help="a file of models/ (default: all)"
+    )
+    writes = parser.add_mutually_exclusive_group()
+    writes.add_argument(
+        "--fix", action="store_true", help="change what leaves every bit of the motion as it is"
+    )
+    writes.add_argument(
+        "--record", action="store_true", help="write what was found to content/reports/"
+    )
+    parser.add_argument("--quick", action="store_true", help="short runs, rough times")
+    add_format(parser, "text", "json")
+    add_cache(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Look at models, and mend them or record what was found."""
+    settings = {name: getattr(arguments, name) for name in ("quick", "fix", "record")}
+    names = tuple(arguments.models)
+    quiet = arguments.quiet and arguments.format == "text"
+
+    def measure(options: Options) -> Measurement[DietReport]:
+        measurement = diet(options, names, **settings)
+        if not quiet:
+            return measurement
+        if measurement.ok:
+            return Measurement(())
+        return replace(measurement, reports=tuple(r for r in measurement.reports if not r.ok))
+
+    empty = "" if quiet else "there is no model to look at\n"
+    return run_measurement(
+        arguments,
+        measure,
+        diet_text,
+        lambda measurement: measurement_json(diet_values(measurement.reports), measurement),
+        empty=empty,
+    )
+
+
+def diet(
+    options: Options,
+    names: tuple[str, ...] = (),
+    *,
+    quick: bool = False,
+    fix: bool = False,
+    record: bool = False,
+) -> Measurement[DietReport]:
+    """Look at the models that the names mean; without names, at all.
+
+    `fix`: what is proved is taken out, and the reports are about the rest. `record`: each report
+    is also written into the course.
+
+    Raises:
+        UsageError: no model is called so, or only a part is to be recorded.
+    """
+    if record:
+        forbid_quick("--record", quick=quick)
+    scenes = find_scenes(options.root, names)
+    run = _DietRun(options, scenes.diagnostics, quick=quick, fix=fix)
+    measurement = run.measure_each(scenes.value, run.look_at)
+    if not record:
+        return measurement
+    records = ((DIET.path(report.model), DIET.encode(report)) for report in measurement.reports)
+    return write_records(options.root, measurement, records)
+
+
+def _file_state(file: Path) -> tuple[int, int]:
+    """Return what changes when a file is edited."""
+    status = file.stat()
+    return status.st_size, status.st_mtime_ns
+
+
+class _DietRun(MeasuringRun):
+    """Looks at models one after the other."""
+
+    stage, success = "looking at models", "looked at"
+
+    def __init__(
+        self, options: Options, diagnostics: Sequence[Diagnostic], *, quick: bool, fix: bool
+    ) -> None:
+        super().__init__(options, diagnostics)
+        self.quick = quick
+        self.fix = fix
+        self.files = read_course(options.root).value
+        self.course = load(options.root).value
+        self.machine = machine()
+        self.code = code_digest(*_CODE)
+
+    def look_at(self, scene: CourseScene) -> DietReport | None:
+        """Report on a model; `None` if it cannot be looked at, or cannot be changed."""
+        model = DietModel(self.options.root, self.files, self.course, scene)
+        return self.load_or_measure(
+            scene.name, "diet", self._parts(model), DietReport, lambda: self._report(model)
+        )
+
+    def _report(self, model: DietModel) -> DietReport | None:
+        with silent():  # MuJoCo would write its warnings into the working directory
+            report = self._fix(model) if self.fix else self._survey(model).report
+        return None if report is None else replace(report, digest=model.digest())
+
+    def _survey(self, model: DietModel) -> Survey:
+        tell, rerun = partial(self.progress.describe, model.scene.name), None
+        if not self.quick and self.course is not None:
+            rerun = Reruns(self.options, self.course, model.scene).first_difference
+        return model.survey(self.machine, quick=self.quick, tell=tell, rerun=rerun)
+
+    def _fix(self, model: DietModel) -> DietReport | None:
+        """Change the model and look again until nothing is left to change.
+
+        `None` if a change could not be written, which is reported as a failure.
+        """
+        kinds: dict[str, dict[str, None]] = {}
+        survey = self._survey(model)
+        while survey.edits:
+            try:
+                model.write(survey)
+            except EffectError as error:
+                self.failures.append(ReportFailure(error.message, error.help))
+                return None
+            for finding in survey.report.findings:
+                for edit in finding.edits if finding.fixable else ():
+                    kinds.setdefault(edit.path, {})[finding.kind] = None
+            survey = self._survey(model)
+        self.remarks += [f"changed {path}: {', '.join(kinds[path])}" for path in sorted(kinds)]
+        return survey.report
+
+    def _parts(self, model: DietModel) -> tuple[object, ...]:
+        """Return all that a report depends on; first the digest of the model."""
+        scene = model.scene
+        parts: list[object] = [scene.digest, scene.name, self.quick, self.code, self.machine]
+        for keep in scene.declarations.keep:
+            place = keep.finding_span
+            parts.append((keep.finding, keep.reason, place.line, place.column))
+        parts += model.locked.items()
+        if model.readers and self.course is not None:
+            parts += [(d.source.path, d.source.text) for d in self.course.documents]
+            parts += [(path, _file_state(self.options.root / path)) for path in self.files.files]
+        return tuple(parts)
+
+    def load(self, kind: str, parts: tuple[object, ...], report_type: type[_T]) -> _T | None:
+        """Load the stored report, unless this run is to fix something in it."""
+        report = super().load(kind, parts, report_type)
+        if self.fix and isinstance(report, DietReport) and any(f.fixable for f in report.findings):
+            return None
+        return report
+
+    def save(self, kind: str, parts: tuple[object, ...], value: object) -> None:
+        """Store a report, unless this run or somebody else has changed the files meanwhile."""
+        if isinstance(value, DietReport) and value.digest == parts[0]:
+            super().save(kind, parts, value)
+
+
+_EDITS = 6
+"""The most changes that are shown of a finding."""
+_LINES = 6
+"""The most lines that are shown of a change."""
+_FOOTNOTE = (
+    "integrator and timestep are judged against a reference, not against the model as it is: "
+    "see `coursebuild bench`"
+)
+
+
+def diet_values(reports: Sequence[DietReport]) -> dict[str, object]:
+    """Return the reports as plain values, each with whether nothing is left to be done."""
+    return {"models": [plain(report) | {"ok": report.ok} for report in reports]}
+
+
+def diet_text(reports: Sequence[DietReport], style: Style) -> str:
+    """Write every model with its findings, and a blank line between; empty without models."""
+    if not reports:
+        return ""
+    footnote = "".join(line + "\n" for line in style.wrap(_FOOTNOTE, "", FAINT))
+    return "\n".join([*(_model(report, style) for report in reports), footnote])
+
+
+def _model(report: DietReport, style: Style) -> str:
+    head = style.paint(visible(report.model), BOLD)
+    if report.quick:
+        head += "  " + style.paint("quick: short runs, rough times", YELLOW)
+    lines = [head]
+    names = [scenario.name for scenario in report.scenarios if scenario.status == "ok"]
+    lines += style.wrap(f"in {name_list(names)}" if names else "in no scenario", "  ")
+    for scenario in report.scenarios:
+        if scenario.status != "ok":
+            status = f"{scenario.status}: {'; '.join(scenario.reasons)}"
+            text = f"scenario {scenario.name}: {status}; nothing is claimed from it"
+            lines += style.wrap(text, "  ", RED)
+    for finding in report.findings:
+        lines += ["", *_finding(finding, style)]
+    for entry in report.stale:
+        place = f"{entry.path}:{entry.line}:{entry.column}"
+        text = f"`{entry.finding}` keeps nothing any more: take the entry out ({place})"
+        lines += ["", *style.wrap(text, "  ", RED)]
+    lines += ["", *_summary(report, style)]
+    return "\n".join(lines) + "\n"
+
+
+def _summary(report: DietReport, style: Style) -> list[str]:
+    findings = [finding for finding in report.findings if finding.is_fault]
+    fixable = [finding for finding in findings if finding.fixable]
+    lines: list[str] = []
+    if not report.ok:
+        text = plural(len(findings), "finding") + " not explained"
+        if fixable:
+            text += f", {len(fixable)} of them for `coursebuild diet {report.model} --fix`"
+        lines += style.wrap(text, "  ", RED)
+        lines += style.wrap(_how_to_keep(report, findings), "  ", FAINT)
+    else:
+        lines.append("  " + style.paint("nothing in it is in vain", GREEN))
+    if report.slim is not None and len(findings) > 1:
+        lines += style.wrap(f"without all of them: {_saving(report.slim)}", "  ")
+    if report.fixed is not None and len(fixable) > 1 and len(fixable) < len(findings):
+        lines += style.wrap(f"after --fix: {_saving(report.fixed)}", "  ")
+    kinds_by_reason: dict[str, list[str]] = {}
+    for attempt in report.tried:
+        kinds_by_reason.setdefault(attempt.reason, []).append(attempt.kind)
+    for reason, kinds in kinds_by_reason.items():
+        outcome = f"not found, because {reason}" if reason else "tried and needed"
+        lines += style.wrap(f"{outcome}: {name_list(list(dict.fromkeys(kinds)))}", "  ", FAINT)
+    return lines
+
+
+def _how_to_keep(report: DietReport, findings: Sequence[Finding]) -> str:
+    """Say how to keep the first of the findings."""
+    if not findings:
+        return ""
+    first = findings[0]
+    name = first.places[0].name if len(first.places) == 1 else ""
+    key = f"{first.kind} {name}".strip()
+    quote = "'" if '"' in key else '"'
+    place = f"what is wanted has its reason in models/{report.model}.toml: [[keep]]"
+    return f"{place} finding = {quote}{key}{quote}, reason = …"
+
+
+def _finding(finding: Finding, style: Style) -> list[str]:
+    colour = FAINT if finding.kept else RED if finding.is_fault else YELLOW
+    lines = style.wrap(f"{finding.kind}: {finding.message}", "  ")
+    lines[0] = lines[0].replace(finding.kind, style.paint(finding.kind, colour), 1)
+    label = finding.label
+    if finding.difference:
+        label += f" ({finding.difference:.1e})"
+    lines += style.wrap(f"{label}; {_saving(finding.saving)}", "    ")
+    if finding.proof:
+        lines += style.wrap(f"because {finding.proof}", "    ")
+    if finding.kept:
+        return [*lines, *style.wrap(f"kept: {finding.kept}", "    ")]
+    for edit in finding.edits[:_EDITS]:
+        lines.append(f"    {visible(edit.path)}:{edit.line}:{edit.column}")
+        for mark, text, colour in (("-", edit.old, RED), ("+", edit.new, GREEN)):
+            text_lines = [line for line in text.splitlines() if line.strip()]
+            for line in text_lines[:_LINES]:
+                lines.append("    " + style.paint(f"{mark} {visible(line.strip())}", colour))
+            if len(text_lines) > _LINES:
+                lines.append(f"    {mark} … {plural(len(text_lines) - _LINES, 'more line')}")
+    if len(finding.edits) > _EDITS:
+        lines.append(f"    … and {len(finding.edits) - _EDITS} more changes")
+    if finding.doubt:
+        lines += style.wrap(f"no fault, as {finding.doubt}", "    ")
+    elif finding.unfixed and finding.is_fault:
+        lines += style.wrap(f"not for --fix: {finding.unfixed}", "    ")
+    return lines
+
+
+def _saving(saving: Saving) -> str:
+    parts = []
+    if saving.time is not None:
+        speed = f"×{saving.time:.3g} as fast" if saving.certain else "no measurable time"
+        parts.append(speed)
+    for count, place in ((saving.memory, "memory"), (saving.text, "text")):
+        if count:
+            fewer = "fewer" if count > 0 else "more"
+            parts.append(f"{abs(count):,} bytes of {place} {fewer}")
+    return ", ".join(parts) or "saves nothing that is measured"

@@ -1,0 +1,321 @@
+"""A model of the course as the diet sees it: its files, who reads it, and what is to be kept.
+
+Entry points: `DietModel`; `readers_of(course, root, files, scene)`; `Reruns`, which runs scripts
+and labs.
+
+1. Every script of the course that may use the model is a reader; so is every file of code, as
+   scripts and labs may use it. A lab draws its model, so it may use all of it, except what code
+   asks for by name or number. Observables that are declared for a model read it too.
+2. Scripts and labs run in a copy of the course with the changed files, and their output is compared
+   with that in the course itself. The files that they read show which of them use the model.
+3. A file that another model uses too, or that is not in `models/`, is not changed.
+4. Changed files are read again, compiled and compared with the model that was run; only then are
+   they written, all of them or none.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import mujoco
+from msgspec.structs import replace
+
+from coursebuild.core.engine.memo import Memo
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.locks import temporary_folder
+from coursebuild.core.files.read import CourseFiles, read_bytes
+from coursebuild.core.files.write import FileChange, change_files
+from coursebuild.core.model import Course, FeatureBlock, MjcfModel, find_blocks
+from coursebuild.core.model.results import Machine
+from coursebuild.core.run.mjcf import TEXT_PATH, model_files
+from coursebuild.core.scripts.extract import extract
+from coursebuild.core.text.diagnostics import diagnose
+from coursebuild.core.text.source import Source
+from coursebuild.features.bench.commands.measurement import CannotMeasureError
+from coursebuild.features.bench.commands.measuring import report_errors
+from coursebuild.features.lab.model import Lab
+from coursebuild.numerics.pruning.comparison import pruning_scenes
+from coursebuild.numerics.pruning.model_text import ModelTextError, model_bytes, open_model
+from coursebuild.numerics.pruning.readers import VIEWS, Reader, read_code
+from coursebuild.numerics.pruning.survey import Rerun, Survey, Surveyor
+from coursebuild.numerics.pruning.xml_edits import MarkupError
+from coursebuild.pipeline.load import load
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.scenes import CourseScene, scene_digest
+from coursebuild.pipeline.verify import verify
+
+_CODE = (".py", ".js", ".mjs", ".ts")
+_NOT_DRAWN = frozenset(("Sensor", "Actuator", "Keyframe", "Numeric", "Tuple"))
+"""Kinds that the picture of a lab does not show."""
+_COPIED_FOLDERS = ("content", "models")
+
+
+def readers_of(
+    course: Course | None, root: Path, files: CourseFiles, scene: CourseScene
+) -> tuple[Reader, ...]:
+    """List everything in the course that may use a model."""
+    if course is None:
+        return (Reader("content/course.toml", opaque="the course cannot be read"),)
+    modules = {Path(path).stem for path in files.files if path.endswith(".py")}
+    scripts = [
+        read_code(script.path, script.text, modules)
+        for script in extract(course).value
+        if _may_use(script.text, scene.name)
+    ]
+    blocks = list(_block_readers(course, scene.name))
+    if not scripts and not blocks:
+        return ()
+    return (*scripts, *blocks, *_code_readers(root, files, modules))
+
+
+def _may_use(text: str, model: str) -> bool:
+    """Whether a script names a model, or may compute the name or text of one."""
+    name = model.rpartition("/")[2]
+    literals = re.findall(r"\bmodel_path\(\s*(?:\"[^\"]*\"|'[^']*')\s*\)", text)
+    uses = len(re.findall(r"\bmodel_path\b", re.sub(r"(?m)^.*\bimport\b.*$", "", text)))
+    loader = re.search(r"from_(xml|binary)_path|from_file|from_string|\.xml\b", text)
+    return name in text or uses != len(literals) or (not literals and loader is not None)
+
+
+def _block_readers(course: Course, model: str) -> Iterator[Reader]:
+    """Yield the labs and other blocks that show a model."""
+    for document in course.documents:
+        for block in find_blocks(document, FeatureBlock):
+            if model not in block.models():
+                continue
+            place = f"{block.span.path}:{block.span.line}"
+            kinds = frozenset(VIEWS.values()) - _NOT_DRAWN
+            if not isinstance(block, Lab):
+                yield Reader(place, kinds=kinds)
+                continue
+            code = read_code(place, "\n".join(piece.text for _, piece in block.code))
+            names = frozenset(re.findall(r"\"((?:[^\"\\]|\\.)*)\"", block.config))
+            if re.search(r"\"key(frame)?\"\s*:\s*\d", block.config):
+                kinds |= {"Keyframe"}
+            yield replace(code, names=code.names | names, kinds=code.kinds | kinds)
+
+
+def _code_readers(root: Path, files: CourseFiles, modules: set[str]) -> Iterator[Reader]:
+    for path in files.files:
+        if path.endswith(_CODE):
+            try:
+                text = read_bytes(root, path).decode("utf-8", "replace")
+            except EffectError:
+                yield Reader(path, opaque="it cannot be read")
+            else:
+                yield read_code(path, text, modules)
+
+
+class Reruns:
+    """Runs the users of a model, in the course and in copies of it."""
+
+    def __init__(self, options: Options, course: Course, scene: CourseScene) -> None:
+        self.options = replace(options, progress=Progress(quiet=True))
+        self.course = course
+        self.scene = scene
+        self._original_outputs: dict[str, object] | None = None
+        self._documents: frozenset[str] = frozenset()
+
+    def first_difference(self, files: Mapping[str, bytes]) -> str:
+        """Name a user whose output changes with these files; empty if none does."""
+        if self._original_outputs is None:
+            self._original_outputs = self._run_users()
+        original_outputs = self._original_outputs
+        if not original_outputs:
+            return ""
+        with temporary_folder() as folder:
+            root = Path(folder).resolve()
+            self._copy_course(root)
+            for path, data in files.items():
+                (root / path).write_bytes(data)
+            course = load(root).value
+            if course is None:
+                return "the course"
+            options = replace(self.options, root=root, store=Memo(root))
+            outputs = self._run(course, options, self._documents)
+        changes = (name for name in original_outputs if outputs.get(name) != original_outputs[name])
+        return next(changes, "")
+
+    def _run_users(self) -> dict[str, object]:
+        """Run the users of the model in the course, and return their outputs by name."""
+        source = self.scene.model.source
+        model_paths = {source.path, *model_files(self.options.root, source.path, source.text)}
+        results = verify(self.course, self.options).results
+        paths = {
+            run.path
+            for run in results.runs
+            if run.trace is not None and not model_paths.isdisjoint(run.trace.files)
+        }
+        showing_documents = {
+            document.source.path
+            for document in self.course.documents
+            for block in find_blocks(document, FeatureBlock)
+            if self.scene.name in block.models()
+        }
+        labs = [trial for trial in results.trials if trial.span.path in showing_documents]
+        self._documents = frozenset(
+            script.document for script in extract(self.course).value if script.path in paths
+        ) | {trial.span.path for trial in labs}
+        if not self._documents:
+            return {}
+        outputs = self._run(self.course, self.options, self._documents)
+        names = paths | {trial.line.name for trial in labs}
+        return {name: output for name, output in outputs.items() if name in names}
+
+    def _run(
+        self, course: Course, options: Options, documents: frozenset[str]
+    ) -> dict[str, object]:
+        """Run documents, and return what scripts print and labs record."""
+        results = verify(course, options, documents, static=True).results
+        outputs: dict[str, object] = {
+            run.path: (run.outcome, run.status, run.stdout, run.figures) for run in results.runs
+        }
+        for trial in results.trials:
+            output = trial.output
+            record = getattr(output, "record", None), getattr(output, "picture", None)
+            outputs[trial.line.name] = (trial.line.status, trial.line.tried, record)
+        return outputs
+
+    def _copy_course(self, root: Path) -> None:
+        """Copy the course to another folder, and link what no change concerns."""
+        for entry in sorted(self.options.root.iterdir()):
+            if entry.name in _COPIED_FOLDERS and entry.is_dir():
+                shutil.copytree(entry, root / entry.name)
+            elif entry.name not in ("examples", "public") and not entry.name.startswith("."):
+                (root / entry.name).symlink_to(entry)
+
+
+_TEXT = Path(TEXT_PATH).name
+"""No file has this name: MuJoCo reads the text in its place."""
+
+
+class DietModel:
+    """A model of the course, its files and its readers."""
+
+    def __init__(
+        self, root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
+    ) -> None:
+        self.root = root
+        self.scene = scene
+        self.path = scene.model.source.path
+        self.keeps = {" ".join(keep.finding.split()): keep for keep in scene.declarations.keep}
+        self.locked = _find_locked_files(root, files, self.path, scene.model.source.text)
+        self.readers = _find_readers(root, files, course, scene)
+        self._files: dict[str, bytes | None] = {}
+
+    def read(self, path: str) -> bytes | None:
+        """Return the bytes of a file as first read; `None` if it cannot be read."""
+        if path not in self._files:
+            try:
+                is_file = (self.root / path).is_file()
+                self._files[path] = read_bytes(self.root, path) if is_file else None
+            except EffectError:
+                self._files[path] = None
+        return self._files[path]
+
+    def compile(self, text: bytes) -> Any:
+        """Compile a text as if it stood in the model's place."""
+        place = str((self.root / self.path).parent / _TEXT)
+        try:
+            return mujoco.MjModel.from_xml_path(place, assets={place: text})
+        except (ValueError, mujoco.FatalError) as error:
+            message = str(error).replace(f"{self.root}/", "").replace(_TEXT, Path(self.path).name)
+            raise ValueError(message) from None
+
+    def survey(
+        self, machine: Machine, *, quick: bool, tell: Callable[[str], None], rerun: Rerun | None
+    ) -> Survey:
+        """Try every change; `rerun` says which of the course's scripts and labs then differ.
+
+        Raises:
+            CannotMeasureError: the model cannot be looked at.
+        """
+        scene, declarations = self.scene, self.scene.declarations
+        failure = "the diet cannot look at the model `{}`"
+        with report_errors(scene, failure, ModelTextError, ValueError):
+            try:
+                text = open_model(self.path, self.read, self.compile)
+            except MarkupError as error:
+                message = f"{error.path}:{error.line}:{error.column} is no XML: {error.message}"
+                help = "MuJoCo reads it all the same; other tools do not"
+                place = scene.model.source.span(0, 0)
+                diagnostic = diagnose("model-error", place, message, help=help)
+                raise CannotMeasureError(diagnostic) from None
+            return Surveyor(
+                model=scene.name,
+                digest=scene.digest,
+                machine=machine,
+                text=text,
+                scenes=pruning_scenes(text.model, declarations, quick=quick),
+                readers=self.readers,
+                keeps=self.keeps,
+                locked=self.locked,
+                has_commands=any(scenario.controls for scenario in declarations.scenarios),
+                clock=time.thread_time_ns,
+                quick=quick,
+                tell=tell,
+                rerun=rerun,
+            ).survey()
+
+    def write(self, survey: Survey) -> None:
+        """Write the changes that were found; all of them, or none.
+
+        Raises:
+            EffectError: a file cannot be written, or somebody changed it.
+            CannotMeasureError: the files would make another model than the one that was run.
+        """
+        new_files = survey.text.files(survey.edits)
+
+        def read(path: str) -> bytes | None:
+            return new_files.get(path) or self.read(path)
+
+        new_model = open_model(self.path, read, self.compile, check=False).model
+        if model_bytes(new_model) != model_bytes(survey.text.compile(survey.edits)):
+            message = f"the changed model `{self.scene.name}` is not the one that was run"
+            place = self.scene.model.source.span(0, 0)
+            raise CannotMeasureError(diagnose("model-error", place, message))
+        changes = [FileChange(path, self.read(path), data) for path, data in new_files.items()]
+        change_files(self.root, sorted(changes, key=lambda change: change.path))
+        self._files.clear()
+
+    def digest(self) -> str:
+        """Return the digest of the model as it is on the disk now."""
+        text = (self.read(self.path) or b"").decode("utf-8")
+        model = MjcfModel(self.scene.name, Source(self.path, text))
+        return scene_digest(self.root, model, self.scene.declarations)
+
+
+def _find_locked_files(root: Path, files: CourseFiles, path: str, text: str) -> Mapping[str, str]:
+    """Map the files of the model that must not be changed to the reason."""
+    parts = model_files(root, path, text)
+    reasons = {
+        part: f"{part} is not in models/"
+        for part in parts
+        if not (part.startswith("models/") and part.endswith(".xml"))
+    }
+    own_files = {path, *parts}
+    for model in files.models:
+        user = model.source.path
+        if user not in own_files:
+            for part in sorted(own_files.intersection(model_files(root, user, model.source.text))):
+                reasons.setdefault(part, f"{user} uses {part} too")
+    return reasons
+
+
+def _find_readers(
+    root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
+) -> tuple[Reader, ...]:
+    """List everything in the course that may read a model, its observables included."""
+    readers = list(readers_of(course, root, files, scene))
+    scenarios = scene.declarations.scenarios
+    names = frozenset(s.observable.name for s in scenarios if s.observable is not None)
+    fields = {"energy"} if any("energy" in (s.conserved or ()) for s in scenarios) else set()
+    if names or fields:
+        readers.append(Reader(scene.declarations.source.path, names=names, words=frozenset(fields)))
+    return tuple(readers)

@@ -1,0 +1,208 @@
+"""Measures the scenarios of a scene, with its compiled model and a clock.
+
+Entry points: `compile_scene(root, scene)`, `run_scenario(compiled, …)`, `run_sweep`;
+`add_card(root, scene, report)`, what a model is made of and how fast the browser's engine runs it.
+
+1. The clock is the processor time of this thread: it stands still while others run.
+2. MuJoCo's warnings are not printed: it would also write them into the working directory, which is
+   the author's.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import mujoco
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.core.model.results import ScriptJob
+from coursebuild.core.model.scenarios import DeclaredSweep
+from coursebuild.core.run.script_environment import one_processor
+from coursebuild.core.run.script_server import ScriptServer
+from coursebuild.core.text.diagnostics import diagnose
+from coursebuild.core.text.source import Source
+from coursebuild.features.bench.commands.measurement import CannotMeasureError
+from coursebuild.numerics.problem import Array
+from coursebuild.numerics.pruning.comparison import watch
+from coursebuild.numerics.pruning.reachability import possible_pairs
+from coursebuild.numerics.reports.case_report import exact_file
+from coursebuild.numerics.reports.scene_report import (
+    ScenarioReport,
+    SceneCard,
+    SceneReport,
+    SweepReport,
+)
+from coursebuild.numerics.scene import EXACT_SCRIPT, ExactMotion, SceneError, scenes
+from coursebuild.numerics.scene import Scene as PhysicsScene
+from coursebuild.numerics.simulation import silent
+from coursebuild.numerics.sweep import measure_sweep
+from coursebuild.numerics.work_precision import measure_scenario
+from coursebuild.pipeline.scenes import CourseScene
+
+_SECONDS = 20.0
+"""Limit of a run, in seconds of processor time."""
+
+
+class CompiledScene(Struct, frozen=True):
+    """A scene, compiled in this process."""
+
+    scene: CourseScene
+    model: Any
+    """An `mjModel`."""
+    scenarios: tuple[PhysicsScene, ...]
+    spec: Any = None
+    """Its `mjSpec`, from which it can be compiled with other parameters."""
+
+
+def compile_scene(root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
+    """Compile a scene, and work out its scenarios.
+
+    Raises:
+        CannotMeasureError: this is not possible.
+    """
+    with report_errors(scene):
+        model = _compile_model(root, scene)
+        exact = _exact_motion(root, scene)
+        scenarios = scenes(model, scene.declarations, quick=quick)
+        scenarios = tuple(replace(scenario, exact=exact) for scenario in scenarios)
+        spec = mujoco.MjSpec.from_file(str(root / scene.model.source.path))
+        return CompiledScene(scene, model, scenarios, spec)
+
+
+def run_scenario(
+    compiled_scene: CompiledScene,
+    number: int,
+    *,
+    quick: bool,
+    timed: bool,
+    tell: Callable[[str], None],
+) -> ScenarioReport:
+    """Measure a scenario, given by its number.
+
+    Raises:
+        CannotMeasureError: this is not possible.
+    """
+    clock = time.thread_time_ns if timed else None
+    with report_errors(compiled_scene.scene), one_processor():
+        scenario = compiled_scene.scenarios[number]
+        return measure_scenario(compiled_scene.model, scenario, quick=quick, clock=clock, tell=tell)
+
+
+def run_sweep(
+    compiled_scene: CompiledScene,
+    sweep: DeclaredSweep,
+    *,
+    quick: bool,
+    timed: bool,
+    tell: Callable[[str], None],
+) -> SweepReport:
+    """Measure a sweep that the course declares.
+
+    Raises:
+        CannotMeasureError: this is not possible.
+    """
+    tell(sweep.name)
+    clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
+    scenarios = (s for s in compiled_scene.scenarios if sweep.scenario in (None, s.name))
+    with report_errors(compiled_scene.scene):
+        return measure_sweep(compiled_scene.spec, next(scenarios), sweep, clocks, quick=quick)
+
+
+@contextmanager
+def report_errors(
+    scene: CourseScene, failure: str = "the model `{}` cannot be measured", *errors: type[Exception]
+) -> Iterator[None]:
+    """Turn errors into diagnostics at their places, and silence MuJoCo's warnings.
+
+    `failure` says what is not possible because of one of `errors`, or of what MuJoCo refuses to
+    run, such as a model that asks for less memory than it needs.
+
+    Raises:
+        CannotMeasureError: there was one.
+    """
+    try:
+        with silent():
+            yield
+    except SceneError as error:
+        place = error.span or scene.declarations.source.span(0, 0)
+        diagnostic = diagnose("scenario-model", place, error.message, help=error.help)
+        raise CannotMeasureError(diagnostic) from None
+    except (mujoco.FatalError, *errors) as error:
+        message = f"{failure.format(scene.name)}: {' '.join(str(error).split())}"
+        place = scene.model.source.span(0, 0)
+        raise CannotMeasureError(diagnose("model-error", place, message)) from None
+
+
+def _compile_model(root: Path, scene: CourseScene) -> Any:
+    path = str(root / scene.model.source.path)
+    return mujoco.MjModel.from_xml_path(path, assets={path: scene.model.source.text.encode()})
+
+
+def _exact_motion(root: Path, scene: CourseScene) -> ExactMotion | None:
+    """Return the exact motion, if the course has code for it, which runs in a child."""
+    path = exact_file(scene.name)
+    if not (root / path).is_file():
+        return None
+    span = Source(path, "").span(0, 0)
+
+    def states(times: Array, qpos: Array, qvel: Array) -> tuple[Array, Array | None]:
+        request = {"times": times.tolist(), "qpos": qpos.tolist(), "qvel": qvel.tolist()}
+        script = os.path.relpath(EXACT_SCRIPT, root)
+        job = ScriptJob(script, (path, json.dumps(request)), _SECONDS, ())
+        with ScriptServer() as server:
+            (run,) = server.run(root, (job,), parallel=1)
+        try:
+            rows = msgspec.json.decode(run.stdout, type=list[list[list[float]]])
+            parts = [np.array(part) for part in zip(*rows, strict=True)]
+        except (msgspec.DecodeError, ValueError):
+            last = run.stderr.strip().splitlines()[-1:] or [run.outcome.value]
+            message = f"`{path}` says no motion: {last[0]}"
+            help = "it defines `motion(time, qpos, qvel)`, which gives the positions at a time in s"
+            raise SceneError(message, span, help) from None
+        return parts[0], parts[1] if len(parts) > 1 else None
+
+    return ExactMotion(span, states)
+
+
+def add_card(
+    root: Path, scene: CourseScene, report: SceneReport, seconds: float = _SECONDS
+) -> SceneReport:
+    """Add the model's card to its report; a run in the browser's engine may take `seconds`.
+
+    Raises:
+        EffectError: an engine cannot be loaded.
+    """
+    from coursebuild.core.run.mjcf import existing_files
+    from coursebuild.features.lab.engines.speed import real_time_factor
+
+    source = scene.model.source
+    with silent():  # MuJoCo would write its warnings into the working directory
+        model = _compile_model(root, scene)
+        scenarios = scenes(model, scene.declarations)
+        touching_pairs = {
+            pair for scenario in scenarios for pair in watch(model, scenario).touching_pairs
+        }
+    files = (root / path for path in existing_files(root, source.path, source.text))
+    first = scenarios[0].scenario
+    key = None if first.keyframe < 0 else first.keyframe
+    run = first.duration, scene.facts.timestep
+    card = SceneCard(
+        bodies=int(model.nbody) - 1,
+        geoms=int(model.ngeom),
+        freedom=int(model.nv),
+        possible=len(possible_pairs(model)),
+        touched=len(touching_pairs),
+        mjcf=len(source.text.encode()) + sum(path.stat().st_size for path in files),
+        mjb=int(mujoco.mj_sizeModel(model)),
+        browser=real_time_factor(root, source, key, run, seconds),
+    )
+    return replace(report, card=card)

@@ -1,0 +1,298 @@
+"""The report on a scenario as pages show it: the page of a model, and a lesson's `bench`.
+
+Entry points: `scenario_view(words, report, anchor)`, `plots`; `orders_table`, and
+`integrator_table`, of what else is known of integrators; `stable_title`, `stable_cells` and
+`stable_again`, for largest stable timesteps; `lost_runs`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from markupsafe import Markup
+from msgspec import Struct
+
+from coursebuild.core.pages.strings import Strings
+from coursebuild.features.bench.grids import (
+    FigurePart,
+    Grid,
+    NamedRow,
+    bounded,
+    factor,
+    grid,
+    merge_rows,
+    percent,
+    phrase,
+    power,
+    sentence,
+)
+from coursebuild.numerics.reports.scene_report import (
+    FIGURES,
+    FittedOrder,
+    MeasuredRun,
+    OrderRow,
+    ScenarioReport,
+    StableRow,
+    SweepReport,
+    SweepRow,
+    WorkPrecisionRow,
+    cell,
+    shown_figures,
+)
+from coursebuild.numerics.reports.shown_errors import (
+    FEWEST_STEPS,
+    Quantity,
+    interval_text,
+    is_cut_short,
+    quantities,
+    seconds_text,
+    setting_text,
+    solving_parts,
+    status_text,
+)
+
+_QUANTITIES = {
+    "seen": "measured.seen",
+    "position": "measured.position",
+    "attitude": "measured.attitude",
+    "velocity": "measured.velocity",
+}
+_ORDERS = {
+    "position": "measured.order_position",
+    "attitude": "measured.order_attitude",
+    "velocity": "measured.order_velocity",
+}
+"""Fitted orders, with the keys of their titles."""
+
+
+class ScenarioView(Struct, frozen=True):
+    """The view of a scenario, or of a sweep."""
+
+    anchor: str
+    """Its id on the page."""
+    title: str
+    settings: Grid
+    """The table of settings; of a sweep, of its parameters."""
+    notes: tuple[str, ...]
+    """Remarks on runs that failed, or whose model was changed."""
+    report: ScenarioReport | SweepReport
+    """The report, for its plot."""
+    description: tuple[str, ...] = ()
+    """Sentences: how long it lasts, and with what it was compared."""
+    verdict: str = ""
+    orders: Grid | None = None
+    stable: Grid | None = None
+
+
+def scenario_view(
+    words: Strings, report: ScenarioReport | SweepReport, anchor: str = ""
+) -> ScenarioView:
+    """Make the view of a scenario or a sweep; `anchor` is its id on the page, if it has one."""
+    if isinstance(report, SweepReport):
+        return _sweep_view(words, report, anchor)
+    return ScenarioView(
+        anchor=anchor,
+        title=report.title or report.name,
+        description=tuple(_describe(words, report)),
+        verdict=sentence(report.verdict.text),
+        settings=_settings_table(words, report),
+        notes=tuple(_notes(words, report)),
+        orders=orders_table(words, words("measured.orders"), report.orders),
+        stable=_stability_table(words, report),
+        report=report,
+    )
+
+
+def _describe(words: Strings, report: ScenarioReport) -> list[str]:
+    sentences: list[str] = [words("measured.duration", time=seconds_text(report.duration))]
+    if report.horizon < report.duration:
+        sentences.append(words("measured.horizon", time=seconds_text(report.horizon)))
+        if report.lyapunov is not None and report.horizons is not None:
+            first, last = map(seconds_text, report.horizons)
+            rate = power(report.lyapunov)
+            sentences.append(phrase(words, "measured.chaotic", first=first, last=last, rate=rate))
+    if report.hold:
+        sentences.append(words("measured.hold", time=seconds_text(report.hold)))
+    parts = [] if report.own_setting is None else solving_parts(report.own_setting)
+    if parts:
+        sentences.append(words("measured.usual", setting=", ".join(parts)))
+    reference, floor = f"measured.reference_{report.reference}", power(report.floor, 1)
+    sentences.append(phrase(words, reference, source=report.source, floor=floor))
+    if report.second:
+        sentences.append(words("measured.second", source=report.second))
+    if report.agreement is not None:
+        sentences.append(phrase(words, "measured.agreement", difference=power(report.agreement, 2)))
+    return sentences
+
+
+def _settings_table(words: Strings, report: ScenarioReport) -> Grid:
+    rows = report.rows
+
+    def error_column(quantity: Quantity) -> tuple[str, list[str]]:
+        errors: list[str] = [bounded(quantity.value_of(row), quantity.least) for row in rows]
+        key = _QUANTITIES.get(quantity.name)
+        return quantity.label if key is None else words(key), errors
+
+    remarks, speed, time = map(words, ("measured.remark", "measured.realtime", "measured.seconds"))
+    columns: list[tuple[str, list[str]]] = [
+        (
+            words("measured.setting"),
+            [setting_text(row.setting, report.own_setting) for row in rows],
+        ),
+        (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
+        (speed, [factor(row.realtime) for row in rows]),
+        (time, ["" if r.seconds is None else seconds_text(r.seconds.value, 3) for r in rows]),
+        *(error_column(quantity) for quantity in quantities(report) if quantity.is_resolved(rows)),
+        (words("measured.energy"), [percent(row.energy_drift) for row in rows]),
+        (words("measured.momentum"), [power(row.momentum_drift, 2) for row in rows]),
+        (words("measured.depth"), [power(row.penetration or None, 2) for row in rows]),
+        (words("measured.slip"), [power(row.slip, 2) for row in rows]),
+        (words("measured.model_error"), [power(row.model_error, 2) for row in rows]),
+        (remarks, [_remark(words, report, row) for row in rows]),
+    ]
+    own_rows = tuple(n for n, row in enumerate(rows) if row.own)
+    label = words("measured.settings", title=report.title or report.name)
+    return grid(label, columns, words=(remarks,), minor=(speed, time), highlights=own_rows)
+
+
+def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> str:
+    parts = [words("measured.own")] if row.own else []
+    if row.status != "ok":
+        parts.append(status_text(row.status))
+    if row.refsafe:
+        parts.append("refsafe")
+    if row.front:
+        parts.append(words("measured.front"))
+    elif row.dominated_by is not None:
+        better = report.rows[row.dominated_by].setting
+        parts.append(words("measured.better", setting=setting_text(better, row.setting)))
+    return "; ".join(parts)
+
+
+def _notes(words: Strings, report: ScenarioReport) -> list[str]:
+    """Say why runs were lost, and in which MuJoCo changed the model."""
+    notes = lost_runs((setting_text(row.setting, report.own_setting), row) for row in report.rows)
+    softened_settings = [
+        setting_text(row.setting, report.own_setting) for row in report.rows if row.refsafe
+    ]
+    if softened_settings:
+        notes.append(words("measured.refsafe", settings="; ".join(softened_settings)))
+    return notes
+
+
+def lost_runs(runs: Iterable[tuple[str, MeasuredRun | SweepRow]]) -> list[str]:
+    """Say why runs were lost; runs with the same reasons stand together."""
+    names_by_reasons: dict[tuple[str, ...], list[str]] = {}
+    for name, run in runs:
+        if run.status != "ok":
+            reasons = (status_text(run.status), *run.reasons)
+            names_by_reasons.setdefault(reasons, []).append(name)
+    groups = names_by_reasons.items()
+    return [f"{'; '.join(names)}: {'; '.join(reasons)}." for reasons, names in groups]
+
+
+def orders_table(
+    words: Strings, label: str, orders: Iterable[OrderRow], *, merge: bool = False
+) -> Grid | None:
+    """Make a table of fitted orders; `None` if there are none."""
+    rows = []
+    for row in orders:
+        fits: list[FittedOrder | None] = [getattr(row, name) for name in _ORDERS]
+        if row.has_orders:
+            rows.append((row.integrator, tuple("" if fit is None else fit.text for fit in fits)))
+    return integrator_table(words, label, tuple(_ORDERS.values()), rows, merge=merge)
+
+
+def integrator_table(
+    words: Strings,
+    label: str,
+    titles: Sequence[str],
+    rows: Sequence[NamedRow],
+    *,
+    merge: bool = False,
+    parts: tuple[FigurePart, ...] = (),
+) -> Grid | None:
+    """Make a table of integrators; `None` without rows.
+
+    `titles`: keys of the columns' titles; `merge`: integrators with the same cells share a row.
+    """
+    if not rows:
+        return None
+    rows = merge_rows(rows) if merge else rows
+    columns = [(words("measured.integrator"), [name for name, _ in rows])]
+    columns += [(words(key), [cells[n] for _, cells in rows]) for n, key in enumerate(titles)]
+    return grid(label, columns, words=(words("measured.remark"),), parts=parts)
+
+
+def _stability_table(words: Strings, report: ScenarioReport) -> Grid | None:
+    short = is_cut_short(report)
+
+    def remark(row: StableRow) -> str:
+        if row.largest is None and short:
+            return words("measured.stable_short", steps=FEWEST_STEPS)
+        return stable_again(words, row)
+
+    rows = [(row.integrator, (*stable_cells(words, row), remark(row))) for row in report.stable]
+    label = stable_title(words, report.stable[0]) if rows else ""
+    return integrator_table(words, label, (*STABLE, "measured.remark"), rows)
+
+
+STABLE = ("measured.largest", "measured.steps", "measured.tried")
+"""Keys of the titles of `stable_cells`."""
+
+
+def stable_title(words: Strings, row: StableRow) -> str:
+    """Title a table of largest stable timesteps: it says which runs count as stable."""
+    time = seconds_text(row.duration)
+    if row.energy is None:
+        return words("measured.stable", time=time)
+    return words("measured.stable_energy", time=time, energy=f"{row.energy:.3g}")
+
+
+def stable_cells(words: Strings, row: StableRow) -> tuple[str, str, str]:
+    """Write a largest stable timestep, the steps of a run with it, and the search for it."""
+    low, high = (seconds_text(float(f"{step:.3g}")) for step in row.searched)
+    largest = words("measured.stable_all", time=high)
+    if row.largest == 0:
+        largest = words("measured.stable_none", time=low)
+    elif row.largest is not None:
+        largest = seconds_text(row.largest)
+    search = words("measured.tried_from", count=row.tried, time=low) if row.tried else ""
+    return largest, str(row.steps), search
+
+
+def stable_again(words: Strings, row: StableRow) -> str:
+    """Say where larger timesteps are stable again; empty if none is."""
+    if row.islands is None:
+        return ""
+    first, last = (seconds_text(float(f"{step:.3g}")) for step in row.islands)
+    return words("measured.islands", first=first, last=last)
+
+
+def _sweep_view(words: Strings, sweep: SweepReport, anchor: str) -> ScenarioView:
+    columns = [
+        (words("measured.parameter"), [row.parameter for row in sweep.rows]),
+        (words("measured.value"), [row.value for row in sweep.rows]),
+        *((name, [cell(row, key) for row in sweep.rows]) for key, name in FIGURES.items()),
+    ]
+    minor = tuple(name for key, name in FIGURES.items() if key not in shown_figures(sweep))
+    own_rows = tuple(n for n, row in enumerate(sweep.rows) if row.own)
+    notes = lost_runs((f"{row.parameter} {row.value}", row) for row in sweep.rows)
+    table = grid(sweep.title, columns, minor=minor, highlights=own_rows)
+    return ScenarioView(anchor, sweep.title, table, tuple(notes), sweep)
+
+
+def plots(name: str, report: ScenarioReport | SweepReport) -> tuple[Markup, ...]:
+    """Draw a plot for wide and for narrow screens; `name` is unique on the page."""
+    from coursebuild.numerics.reports.report_plots import (
+        plot_svg,  # late: few pages need it
+        sweep_svg,
+    )
+
+    svgs = (
+        sweep_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")
+        if isinstance(report, SweepReport)
+        else plot_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")
+        for kind in ("wide", "narrow")
+    )
+    return tuple(Markup(svg) for svg in svgs if svg)

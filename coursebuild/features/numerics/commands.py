@@ -1,0 +1,235 @@
+"""`coursebuild stability`: MuJoCo on hard cases, beside what theory says.
+
+Entry points: `stability(options, names)`, `check_stability`; `stability_text`, what the page of a
+case says, and the errors of its plots.
+
+1. A name means a problem, or a family of them (`damped-spring` is all of its damping ratios).
+2. Measurements are cached by the machine, its versions and the code that measures. `--check`
+   measures again.
+3. All problems are recorded in one file. Where some are named, recording them leaves the others as
+   they are, and checking them ignores the others.
+4. Where the two references of a case are further apart than they may be, it is an error, and
+   nothing is recorded.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from msgspec.structs import replace
+
+from coursebuild.cli.arguments import add_cache, add_format, add_quiet
+from coursebuild.core.engine.tool import code_digest
+from coursebuild.core.pages import urls
+from coursebuild.core.run.script_environment import engine_version, machine, one_processor
+from coursebuild.core.text.diagnostics import nearest
+from coursebuild.features.bench.commands.measurement import (
+    Measurement,
+    MeasuringRun,
+    add_report_options,
+    english,
+    grid_lines,
+    measurement_json,
+    plain_text,
+    run_measurement,
+    write_records,
+)
+from coursebuild.features.numerics.page import case_view
+from coursebuild.numerics.reports.case_report import CaseReport, ErrorLine
+from coursebuild.numerics.reports.departures import RecordCheck, case_departures
+from coursebuild.numerics.reports.records import STABILITY, ReportFailure
+from coursebuild.numerics.reports.report_plots import case_quantities
+from coursebuild.numerics.reports.shown_errors import seconds_text, status_text
+from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.shown_reports import read_record
+from coursebuild.report.text import BOLD, Column, Style, table
+from coursebuild.report.values import json_text
+
+_CODE = ("coursebuild/numerics", "mjcourse/spatial")
+"""The code that measurements depend on."""
+EXAMPLES = """\
+examples:
+  coursebuild stability impact           one family of hard cases
+"""
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_quiet(parser)
+    parser.add_argument(
+        "problems",
+        nargs="*",
+        metavar="PROBLEM",
+        help="a hard case, or a family of them (default: all)",
+    )
+    add_format(parser, "text", "json")
+    add_report_options(parser)
+    add_cache(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, or check by measuring again."""
+    names = tuple(arguments.problems)
+
+    def measure(options: Options) -> Measurement[Any]:
+        if arguments.check:
+            return check_stability(options, names)
+        return stability(options, names, record=arguments.record)
+
+    def as_json(measurement: Measurement[Any]) -> str:
+        if measurement.ok and not (arguments.record or arguments.check):
+            return json_text(measurement.reports)
+        return measurement_json({"cases": measurement.reports}, measurement)
+
+    return run_measurement(
+        arguments,
+        measure,
+        lambda reports, style: "" if arguments.check else stability_text(reports, style),
+        as_json,
+    )
+
+
+def stability(
+    options: Options, names: tuple[str, ...] = (), *, record: bool = False
+) -> Measurement[CaseReport]:
+    """Measure the cases of these names, or all without names.
+
+    `record`: also write the measurements into the course.
+
+    Raises:
+        UsageError: no case is called so.
+    """
+    measurement = _CaseRun(options).all(_select_problems(names))
+    if record and not measurement.failures:
+        measurement = _record(options, measurement, whole=not names)
+    return measurement
+
+
+def _record(
+    options: Options, measurement: Measurement[CaseReport], *, whole: bool
+) -> Measurement[CaseReport]:
+    unchanged: list[CaseReport] = []
+    if not whole and (options.root / STABILITY.path()).exists():
+        old = read_record(options.root, STABILITY)
+        if isinstance(old, ReportFailure):
+            return replace(measurement, failures=(old,))
+        new = {case.name for case in measurement.reports}
+        unchanged = [case for case in old if case.name in _problem_names() and case.name not in new]
+    cases = sorted([*unchanged, *measurement.reports], key=lambda case: (case.case, case.name))
+    records = [(STABILITY.path(), STABILITY.encode(tuple(cases)))]
+    return write_records(options.root, measurement, records)
+
+
+def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
+    """Measure again, and compare with the record; without a record nothing is measured.
+
+    Raises:
+        UsageError: no case is called so.
+    """
+    problems = _select_problems(names)
+    recorded = read_record(options.root, STABILITY)
+    if isinstance(recorded, ReportFailure):
+        return Measurement((), failures=(recorded,))
+    measurement = _CaseRun(options, use_store=False).all(problems)
+    new = {case.name for case in measurement.reports}
+    old = [case for case in recorded if not names or case.name in new]
+    engine = engine_version()
+    other_engines = sorted({case.machine.engine for case in old} - {engine})
+    remarks = tuple(
+        f"recorded with MuJoCo {engine_then}, measured with {engine}"
+        for engine_then in other_engines
+    )
+    departures = case_departures(old, measurement.reports)
+    return replace(
+        measurement, checked=(RecordCheck("stability", STABILITY.path(), departures, remarks),)
+    )
+
+
+class _CaseRun(MeasuringRun):
+    """Measures hard cases one after the other."""
+
+    def all(self, problems: list[str]) -> Measurement[CaseReport]:
+        """Measure the problems of these names."""
+        self.here, self.code = machine(pinned=True), code_digest(*_CODE)
+        with one_processor():
+            return self.measure_each(problems, self._measure_once)
+
+    def _measure_once(self, name: str) -> CaseReport | None:
+        parts = (name, self.code, self.here)
+        return self.load_or_measure(
+            name, "stability", parts, CaseReport, lambda: self._measure(name)
+        )
+
+    def _measure(self, name: str) -> CaseReport | None:
+        from coursebuild.numerics.cases import DisagreementError, measure_case
+        from coursebuild.numerics.problems import all_problems
+
+        try:
+            return measure_case(all_problems()[name], self.here, time.thread_time_ns)
+        except DisagreementError as error:
+            help = "neither can be told to be right: no error against them means anything"
+            self.failures.append(ReportFailure(str(error), help))
+            return None
+
+
+def _problem_names() -> tuple[str, ...]:
+    from coursebuild.numerics.problems import all_problems
+
+    return tuple(all_problems())
+
+
+def _select_problems(names: tuple[str, ...]) -> list[str]:
+    """The names of all problems that these names mean; of all problems without names."""
+    problem_names = _problem_names()
+    selection = set() if names else set(problem_names)
+    for name in names:
+        matches = {
+            problem
+            for problem in problem_names
+            if problem == name or problem.startswith(f"{name}-")
+        }
+        if not matches:
+            suggestion = nearest(name, problem_names)
+            all_of_them = "known: " + ", ".join(problem_names)
+            help = all_of_them if suggestion is None else f"did you mean `{suggestion}`?"
+            raise UsageError(f"no hard case is called `{name}`", help=help)
+        selection |= matches
+    return [problem for problem in problem_names if problem in selection]
+
+
+def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
+    """The reports as text, with a blank line between cases."""
+    texts = []
+    for report in reports:
+        view = case_view(english(), urls.Place(urls.NUMERICS), report)
+        number = f"case {report.case}: " if report.case else ""
+        lines = [style.paint(report.name, BOLD) + f"  {number}{report.title}"]
+        for text in (*view.sentences, *view.notes):
+            lines += style.wrap(plain_text(text), "  ")
+        for block in (*(grid_lines(grid, style) for grid in view.grids), _errors(report)):
+            lines += ["", *(f"  {line}".rstrip() for line in block)] if block else []
+        texts.append("\n".join(lines) + "\n")
+    return "\n".join(texts)
+
+
+def _errors(report: CaseReport) -> list[str]:
+    """The largest error of each run, by timestep and integrator."""
+    quantity = next(iter(case_quantities(report)), None)
+    if quantity is None:
+        return []
+    runs = {(line.timestep, line.integrator): line for line in report.errors}
+    steps = sorted({step for step, _ in runs}, reverse=True)
+
+    def cell(run: ErrorLine | None) -> str:
+        error = None if run is None else quantity.value_of(run)
+        if run is None or error is None:
+            return "" if run is None else status_text(run.status)
+        return f"<{quantity.least:.1e}" if error <= quantity.least * (1 + 1e-9) else f"{error:.2e}"
+
+    columns = [Column(quantity.label, tuple(seconds_text(h, 4) for h in steps), left=True)]
+    for name in dict.fromkeys(name for _, name in runs):
+        columns.append(Column(name, tuple(cell(runs.get((step, name))) for step in steps)))
+    return table(columns)

@@ -1,0 +1,317 @@
+"""What settings cost, which of them are worth it, and what that says of the scene's own.
+
+Entry points: `time_jobs(jobs, baseline, clock)`; `costs(model, scene, settings, …)`, of settings of
+a scene; `scenario_job(model, scenarios, timestep)`, a model's whole scenarios as a job;
+`front(rows)`, rows that know whether they are on the front; `verdict(rows, noticeable)`.
+
+1. A job is a scenario from its beginning to its end, so that each setting is timed on its own
+   states; what takes little time is repeated.
+2. A round makes every job once, forwards and backwards in turn: what slows the machine for a while
+   slows all.
+3. Of the times of each job the lowest tenth counts: it forgets those that were disturbed, and does
+   not hang on a single lucky one. Intervals come from rounds drawn again at random (bootstrap).
+4. Rounds go on until all ratios are known well enough, or the time for them is over.
+5. A setting is dominated where another costs no more and errs no more, and is clearly better in one
+   of the two. Costs whose intervals meet do not differ, nor do those within 3 % or errors within
+   5 %.
+
+The clock is an argument: processor time of the thread serves best, since it stands still while
+others run.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Sequence
+from typing import Any, TypeAlias
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.numerics.problem import Array, Scenario
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.scene_report import MeasuredSetting, RowVerdict, WorkPrecisionRow
+from coursebuild.numerics.reports.shown_errors import setting_text
+from coursebuild.numerics.scene import Scene
+from coursebuild.numerics.simulation import STATE, full_state, initial_data, silent
+from coursebuild.numerics.stability import apply, with_setting
+
+Clock: TypeAlias = Callable[[], int]
+"""Time so far, in ns."""
+Job: TypeAlias = Callable[[], None]
+"""Does what is timed, always the same amount."""
+
+MIN_ROUNDS, MAX_ROUNDS = 8, 60
+"""Rounds."""
+_BUDGET, _QUICK_BUDGET = 20e9, 2e9
+"""ns after which no round begins that is not among the fewest."""
+_TARGET_WIDTH = 0.01
+"""Relative half width of the widest interval at which rounds end."""
+_SHORTEST = 1_000_000
+"""ns that a job takes at least."""
+_DRAWS = 200
+"""Times that rounds are drawn again, for an interval."""
+
+
+class Timing(Struct, frozen=True):
+    """The time of a job."""
+
+    nanoseconds: Interval
+    ratio: Interval
+    """Its time over that of the baseline."""
+
+    @property
+    def certain(self) -> bool:
+        """Whether the ratio differs from 1 by more than the measurement's uncertainty."""
+        differs = not self.ratio.low <= 1.0 <= self.ratio.high
+        return differs and abs(self.ratio.value - 1.0) > 0.03
+
+
+def time_jobs(
+    jobs: Sequence[Job], baseline: int, clock: Clock, *, quick: bool = False
+) -> tuple[Timing, ...]:
+    """Time jobs, of which number `baseline` is what the others are compared with."""
+    times = np.zeros((MAX_ROUNDS, len(jobs)))
+    budget, began = _QUICK_BUDGET if quick else _BUDGET, clock()
+    gc_was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        repeats = [_count_repeats(job, clock) for job in jobs]
+        for turn in range(MAX_ROUNDS):
+            order = range(len(jobs))
+            for index in order if turn % 2 else reversed(order):
+                times[turn, index] = _time_job(jobs[index], repeats[index], clock)
+            if turn + 1 < MIN_ROUNDS:
+                continue
+            timings = _timings(times[: turn + 1] / repeats, baseline)
+            widest = max((timing.ratio.half_width for timing in timings), default=0.0)
+            if widest <= _TARGET_WIDTH or clock() - began > budget:
+                break
+    finally:
+        if gc_was_enabled:
+            gc.enable()
+    return timings
+
+
+def _count_repeats(job: Job, clock: Clock) -> int:
+    """How often a job must be repeated to take long enough; caches are warm afterwards."""
+    times = 1
+    while _time_job(job, times, clock) < _SHORTEST and times < 1 << 12:
+        times *= 2
+    return times
+
+
+def _time_job(job: Job, times: int, clock: Clock) -> int:
+    before = clock()
+    for _ in range(times):
+        job()
+    return clock() - before
+
+
+def _timings(times: Array, baseline: int) -> tuple[Timing, ...]:
+    """The timings of jobs, from the times (n, jobs) of n rounds."""
+    count = len(times)
+    resamples = np.random.default_rng(0).integers(count, size=(_DRAWS, count))
+    lowest = np.quantile(times, 0.1, axis=0)
+    redrawn = np.quantile(times[resamples], 0.1, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios, redrawn_ratios = (
+            lowest / lowest[baseline],
+            redrawn / redrawn[:, baseline : baseline + 1],
+        )
+    return tuple(
+        Timing(_interval(lowest[n], redrawn[:, n]), _interval(ratios[n], redrawn_ratios[:, n]))
+        for n in range(times.shape[1])
+    )
+
+
+def _interval(value: float, redrawn: Array) -> Interval:
+    low, high = np.quantile(redrawn, (0.025, 0.975)).tolist()
+    return Interval(float(value), min(low, float(value)), max(high, float(value)))
+
+
+def costs(
+    model: Any,
+    scene: Scene,
+    settings: Sequence[MeasuredSetting],
+    baseline: int,
+    clock: Clock,
+    *,
+    quick: bool = False,
+) -> tuple[Timing, ...]:
+    """The costs of a scenario under some settings, relative to number `baseline` of them."""
+    variant = with_setting(model, settings[baseline])
+
+    def job(setting: MeasuredSetting) -> Job:
+        run = scenario_job(variant, [scene.scenario], setting.timestep)
+
+        def work() -> None:
+            apply(variant, setting)
+            run()
+
+        return work
+
+    with silent():
+        return time_jobs([job(setting) for setting in settings], baseline, clock, quick=quick)
+
+
+def scenario_job(
+    model: Any,
+    scenarios: Sequence[Scenario],
+    timestep: float,
+    *,
+    states: Sequence[Array] | None = None,
+    actuators: Sequence[int] | None = None,
+) -> Job:
+    """A job that runs scenarios.
+
+    `states`: full ones to begin in, else those of the scenarios; `actuators`: those commanded, else
+    all.
+    """
+    data, commanded = mujoco.MjData(model), slice(None) if actuators is None else list(actuators)
+    if states is None:
+        states = [full_state(model, initial_data(scenario, model)) for scenario in scenarios]
+    runs = []
+    for scenario, state in zip(scenarios, states, strict=True):
+        parts = [
+            (np.array(command)[commanded] if command else None, round((end - begin) / timestep))
+            for begin, end, command in scenario.holds()
+        ]
+        runs.append((state, parts))
+
+    def job() -> None:
+        for state, parts in runs:
+            mujoco.mj_setState(model, data, state, STATE)
+            for command, steps in parts:
+                if command is not None:
+                    data.ctrl[:] = command
+                mujoco.mj_step(model, data, steps)
+
+    return job
+
+
+COST_SLACK, ERROR_SLACK = 0.03, 0.05
+"""Relative: costs repeat to a few per cent only."""
+Rows: TypeAlias = Sequence[WorkPrecisionRow]
+
+
+class FrontPoint(Struct, frozen=True):
+    """The place of a setting in the plot."""
+
+    cost: Interval
+    error: float
+
+    def beats(self, rival: FrontPoint) -> bool:
+        """Whether this is clearly better in one respect, and no worse in the other."""
+        is_more_accurate = self.error * (1 + ERROR_SLACK) < rival.error
+        is_no_worse = self.error <= rival.error * (1 + ERROR_SLACK)
+        return (self.is_cheaper(rival) and is_no_worse) or (
+            is_more_accurate and not rival.is_cheaper(self)
+        )
+
+    def is_cheaper(self, rival: FrontPoint) -> bool:
+        """Whether this costs less, beyond what timing can tell."""
+        is_separate = self.cost.high < rival.cost.low
+        return is_separate and self.cost.value * (1 + COST_SLACK) < rival.cost.value
+
+
+def _place(row: WorkPrecisionRow) -> FrontPoint | None:
+    """The cost and error of a setting; `None` where it was lost, or not timed."""
+    if row.cost is None or row.seen is None:
+        return None
+    return FrontPoint(row.cost, row.seen if row.figure is None else row.figure[0])
+
+
+def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:
+    """Rows that say whether they are on the front, and otherwise which row dominates them."""
+    places = {n: place for n, row in enumerate(rows) if (place := _place(row)) is not None}
+    better = {
+        n: [m for m, rival in places.items() if rival.beats(own_place)]
+        for n, own_place in places.items()
+    }
+
+    def worth(n: int) -> tuple[float, int]:
+        return places[n].cost.value * places[n].error, n
+
+    placed_rows = []
+    for n, row in enumerate(rows):
+        rivals = better.get(n, [])
+        best = min([m for m in rivals if not better[m]] or rivals, key=worth, default=None)
+        placed_rows.append(replace(row, front=n in better and not rivals, dominated_by=best))
+    return tuple(placed_rows)
+
+
+def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
+    """The verdict on the scene's own setting.
+
+    `noticeable`: whether a learner sees the error of a row; `None` where that is not known.
+    """
+    own_index = next(number for number, row in enumerate(rows) if row.own)
+    row, is_noticeable = rows[own_index], noticeable[own_index]
+    if row.reasons:
+        return _verdict_of_lost(rows, row)
+    error = None if is_noticeable is None else row.seen
+    own_place, remark = _place(row), _describe_error(error)
+    if own_place is None:
+        text = "nothing was timed, so that no setting can be called better"
+        return RowVerdict(False, None, None, None, is_noticeable, text + remark)
+    if error is not None and error >= 1:
+        remark += _cheapest_unseen(
+            rows,
+            own_place.cost.value,
+            hopeless=all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None),
+        )
+    if row.dominated_by is None:
+        text = "no other setting is cheaper without being less accurate"
+        return RowVerdict(True, None, None, None, is_noticeable, text + remark)
+    better = rows[row.dominated_by]
+    better_place = _place(better)
+    assert better_place is not None
+    ratios = (
+        better_place.cost.value / own_place.cost.value,
+        better_place.error / own_place.error if own_place.error else 1.0,
+    )
+    text = f"{setting_text(better.setting)} is {_describe_ratios(*ratios)}"
+    return RowVerdict(False, row.dominated_by, *ratios, is_noticeable, text + remark)
+
+
+def _cheapest_unseen(rows: Rows, own_cost: float, *, hopeless: bool) -> str:
+    """The cheapest setting with an error that no learner notices, in words."""
+    unseen = [row for row in rows if row.seen is not None and row.seen < 1 and row.cost is not None]
+    if not unseen:
+        return ", and that of every other setting too" if hopeless else ""
+    cost, least = min((row.cost.value, n) for n, row in enumerate(unseen) if row.cost)
+    name, times = setting_text(unseen[least].setting), f"{cost / own_cost:.2g} times its cost"
+    return f"; the cheapest without one that is seen is {name}, at {times}"
+
+
+def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow) -> RowVerdict:
+    """The verdict on a scene that does not run under its own setting: the best that does."""
+    text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
+    text += "; ".join(row.reasons)
+    candidates = [
+        (p.error, p.cost.value, n) for n, r in enumerate(rows) if r.front and (p := _place(r))
+    ]
+    better = min(candidates)[2] if candidates else None
+    if better is not None:
+        text += f"; {setting_text(rows[better].setting)} is the most accurate that does"
+    return RowVerdict(False, better, None, None, None, text)
+
+
+def _describe_ratios(cost: float, error: float) -> str:
+    cheap = f"takes {cost:.2g} of the time" if cost < 1 / 1.005 else "takes no more time"
+    if error < 1 / (1 + ERROR_SLACK):
+        exact = f"errs {1 / error:.2g} times less" if 1 / error < 1e4 else "errs far less"
+    else:
+        exact = "errs no more"
+    return f"better: it {cheap} and {exact}"
+
+
+def _describe_error(error: float | None) -> str:
+    if error is None:
+        return "; whether a learner would notice its error is not known"
+    if error >= 1:
+        return f"; a learner would notice its error, which is {error:.2g} times what can be seen"
+    return f"; a learner would not notice its error, which is {error:.2g} of what can be seen"

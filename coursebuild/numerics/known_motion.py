@@ -1,0 +1,340 @@
+"""The references that a scene's motion is measured against, and how well they are known.
+
+Entry points: `find_reference(model, pilot)`, the reference of a scene; `find_references(model,
+pilot)`, by cone where something touches; `find_conserved(…)`, `mean_late_energy(…)`.
+
+1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; DOP853 does it
+   again. Their difference bounds the error of the reference. Both take the same accelerations, so
+   the engine in ever smaller steps must tend to the same motion.
+2. A closed form that the scenario names, or that the course has, comes first, and that integration
+   second. Where the two are far apart the formula is not this scene's.
+3. Where accelerations jump, the engine tends elsewhere, or the scene is too stiff for an
+   integration in reasonable time, only the engine itself is left: in small steps, and again in
+   steps twice as long under another integrator. This reference is called `self`.
+4. A motion counts only as long as it is known: where two integrations part, the horizon ends.
+5. Errors under a cone are those of the timestep and the solver: they are measured against what the
+   engine tends to under that cone in small steps. What remains then is the model's own error:
+   against the closed form where the scenario names one, else of a pyramid against the cone that it
+   stands for.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.core.model.scenarios import DeclaredScenario
+from coursebuild.core.text.source import Span
+from coursebuild.numerics.cases import closed_motion, floor
+from coursebuild.numerics.integrate import (
+    Method,
+    NoConvergenceError,
+    bulirsch_stoer,
+    dop853,
+    forward_states,
+    tends_to,
+)
+from coursebuild.numerics.measure import (
+    Sticks,
+    energy_drift,
+    energy_scale,
+    errors,
+    find_sticks,
+    largest_errors,
+    momentum_drift,
+    visible_error,
+)
+from coursebuild.numerics.pilot import Pilot, position_distances
+from coursebuild.numerics.problem import ROUNDING, Integrator, Setup, Sizes
+from coursebuild.numerics.reports.scene_report import FLOORS
+from coursebuild.numerics.scene import ExactMotion, SceneError
+from coursebuild.numerics.simulation import (
+    EngineStates,
+    initial_data,
+    invariants,
+    motion_of,
+    simulate,
+    states_of,
+    with_integrator,
+)
+from coursebuild.numerics.stability import CONES
+
+EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
+"""Accelerations that a reference may take."""
+FINER, QUICK_FINER = 16, 8
+"""How many times shorter the steps of a `self` reference are than the shortest measured."""
+PARTING_DISTANCE = 0.01
+"""The difference from which on two runs of the engine are no reference: rad, or relative to the
+extent."""
+FOREIGN = 1e-3
+"""The difference from which on a closed form is that of another scene, in the same units."""
+CONSERVED = 1e-8
+"""The relative change, over the reference, below which a quantity counts as conserved."""
+_STEP = 1e-6
+"""s, of the model whose accelerations are integrated: `refsafe` softens nothing then."""
+_TENDS_ELSEWHERE = "the engine in small steps tends elsewhere"
+
+
+class KnownMotion(Struct, frozen=True):
+    """The reference of a scene, from the first sample to the horizon."""
+
+    kind: str
+    """`closed`, `ode` or `self`."""
+    source: str
+    states: EngineStates
+    second_states: EngineStates
+    """The same motion by the second reference."""
+    floor: Sizes
+    """How far it may be off."""
+    second: str
+    """The source of the second reference."""
+    agreement: float
+    """The largest difference of the two, in m, rad, m/s and rad/s."""
+    horizon: float
+    """s."""
+    note: str = ""
+    """Why there is no better reference; empty where this is the best kind."""
+
+
+def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMotion:
+    """The reference of a scene.
+
+    Raises:
+        SceneError: the scenario names a closed form that is not this scene's.
+    """
+    declaration = pilot.scene.declaration
+    reference, note = None, ""
+    if pilot.smooth and declaration.reference != "self":
+        try:
+            reference = _integrate(model, pilot, quick)
+        except NoConvergenceError as error:
+            note = f"no integration: {error}"
+        if reference is not None and not _engine_agrees(model, pilot, reference):
+            reference, note = None, f"no integration: {_TENDS_ELSEWHERE}"
+            if declaration.reference == "ode":
+                raise _no_integration(_TENDS_ELSEWHERE, declaration)
+    elif declaration.reference == "ode":
+        raise _no_integration(f"there is {' and '.join(pilot.jumps)}", declaration)
+    if reference is None:
+        reference = replace(self_reference(model, pilot, quick=quick), note=note)
+    if declaration.closed_form:
+        problem, motion = closed_motion(model, pilot.scene, declaration, reference.states.times)
+        states = states_of(model, motion, reference.states)
+        subject = f"the closed form of `{declaration.closed_form}`"
+        place, source = declaration.place("reference"), problem.reference.source
+        return _with_closed_form(model, reference, states, source, floor(problem), subject, place)
+    exact = None if declaration.reference else pilot.scene.exact
+    if exact is None:
+        return reference
+    states, source = _exact_states(model, pilot, exact, reference), exact.span.path
+    return _with_closed_form(model, reference, states, source, ROUNDING, f"`{source}`", exact.span)
+
+
+def _exact_states(
+    model: Any, pilot: Pilot, exact: ExactMotion, second: KnownMotion
+) -> EngineStates:
+    """The course's exact motion; where it gives no velocities, with those of the second one."""
+    data, states = initial_data(pilot.scene.scenario, model), second.states
+    qpos, qvel = exact.states(states.times, data.qpos.copy(), data.qvel.copy())
+    course_states = replace(states, qpos=qpos, qvel=states.qvel if qvel is None else qvel)
+    if (course_states.qpos.shape, course_states.qvel.shape) != (
+        states.qpos.shape,
+        states.qvel.shape,
+    ):
+        message = f"`{exact.span.path}` gives other numbers of coordinates than the model has"
+        raise SceneError(message, exact.span, "they are those of `qpos`, and perhaps of `qvel`")
+    return course_states
+
+
+def _no_integration(reason: str, declaration: DeclaredScenario) -> SceneError:
+    message = f"no integration can be the reference: {reason}"
+    help = "leave `reference` out: the engine itself in small steps is the reference then"
+    return SceneError(message, declaration.place("reference"), help)
+
+
+def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:
+    """Integrate the engine's accelerations by two methods."""
+    times = pilot.setup.scenario.times
+    times = times[times <= pilot.horizon * (1 + 1e-9)]
+    variant = with_integrator(model, Integrator.EULER, _STEP)
+    variant.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    variant.opt.iterations, variant.opt.tolerance = max(100, int(variant.opt.iterations)), 0.0
+    variant.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
+    variant.actuator_actearly[:] = 0  # it looks ahead by a timestep, which tends to nothing
+    most = QUICK_EVALUATIONS if quick else EVALUATIONS
+
+    def run(method: Method) -> EngineStates:
+        return forward_states(variant, pilot.scene.scenario, times, method, evaluations=most)
+
+    states = run(partial(bulirsch_stoer, tolerance=1e-13))
+    source = "Bulirsch–Stoer over mj_forward"
+    second_states, second = run(dop853), "DOP853 over mj_forward"
+    return _combine(model, "ode", source, states, second, second_states)
+
+
+def _engine_agrees(model: Any, pilot: Pilot, reference: KnownMotion) -> bool:
+    setup = _with_duration(pilot.setup, float(reference.states.times[-1]))
+    return tends_to(model, setup, reference.states, min(pilot.scene.timesteps), PARTING_DISTANCE)
+
+
+def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMotion:
+    """Run the engine in small steps, and in steps twice as long under another integrator."""
+    step = min(pilot.scene.timesteps) / (QUICK_FINER if quick else FINER)
+    runs = []
+    for integrator, length in ((Integrator.IMPLICITFAST, step), (Integrator.EULER, 2 * step)):
+        fine = with_integrator(model, integrator, length)
+        fine.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        fine.opt.iterations = max(100, int(fine.opt.iterations))
+        fine.opt.tolerance = min(1e-10, float(fine.opt.tolerance))
+        run = simulate(_with_duration(pilot.setup, pilot.horizon), fine)
+        if not np.isfinite(run.states.qpos).all():
+            raise SceneError(f"it diverges even at {step:g} s a step")
+        runs.append(run.states)
+    parted = np.flatnonzero(
+        position_distances(model, runs[0].qpos, runs[1].qpos) > PARTING_DISTANCE
+    )
+    good = max(1, int(parted[0])) if parted.size else len(runs[0].times)
+    states, second_states = (motion.head(good) for motion in runs)
+    source = f"the engine itself: implicitfast at {step:g} s, Newton's solver"
+    second = f"the same under Euler at {2 * step:g} s"
+    return _combine(model, "self", source, states, second, second_states)
+
+
+def _with_duration(setup: Setup, duration: float) -> Setup:
+    """The same with another duration (s), a multiple of the sample."""
+    return replace(setup, scenario=replace(setup.scenario, duration=duration))
+
+
+def _combine(
+    model: Any,
+    kind: str,
+    source: str,
+    states: EngineStates,
+    second: str,
+    second_states: EngineStates,
+) -> KnownMotion:
+    gap, horizon = _gap(model, states, second_states), float(states.times[-1])
+    floor = gap.at_least(ROUNDING)
+    return KnownMotion(kind, source, states, second_states, floor, second, gap.largest, horizon)
+
+
+def _gap(model: Any, states: EngineStates, second_states: EngineStates) -> Sizes:
+    return largest_errors(errors(motion_of(model, states), motion_of(model, second_states)))
+
+
+def _with_closed_form(
+    model: Any,
+    second: KnownMotion,
+    states: EngineStates,
+    source: str,
+    least: Sizes,
+    subject: str,
+    place: Span,
+) -> KnownMotion:
+    """Put a closed form first, and what was integrated second."""
+    gap = _gap(model, states, second.states)
+    distance = float(position_distances(model, states.qpos, second.states.qpos).max(initial=0.0))
+    floor = least
+    if second.kind == "ode":
+        if not distance <= FOREIGN:
+            message = f"{subject} is not this scene's motion"
+            help = f"the two are {distance:.2g} apart (rad, or relative to the extent)"
+            raise SceneError(message, place, help)
+        floor = least.at_least(gap)
+    return replace(
+        second,
+        kind="closed",
+        source=source,
+        states=states,
+        second_states=second.states,
+        floor=floor,
+        second=second.source,
+        agreement=gap.largest,
+        note="",
+    )
+
+
+class Cone(Struct, frozen=True):
+    """The reference for errors under a cone."""
+
+    reference: KnownMotion
+    model_error: float | None
+    """What remains of the error however small the timestep, m or rad."""
+    visible_model_error: float
+    """The same as a visible error; 0 where the errors contain it already."""
+    sticks: Sticks | None = None
+    """What sticks in the reference; `None` where nothing touches."""
+
+
+def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[str, Cone]:
+    """The references of a scene by cone; under "" where nothing touches."""
+    reference, scene = find_reference(model, pilot, quick=quick), pilot.scene
+    if not pilot.contact:
+        return {"": Cone(reference, None, 0.0)}
+    limits = {}
+    for cone, number in CONES.items():
+        variant = with_integrator(model, Integrator.EULER, scene.timestep)
+        variant.opt.cone = number
+        limits[cone] = self_reference(variant, pilot, quick=quick)
+    cones = {}
+    for cone, limit in limits.items():
+        truth = reference if reference.kind == "closed" else limits["elliptic"]
+        sticks = find_sticks(model, scene, limit.states)
+        if cone == "elliptic" and truth is limit:
+            cones[cone] = Cone(limit, None, 0.0, sticks)
+            continue
+        count = min(len(limit.states.times), len(truth.states.times))
+        limit_states, true_states = limit.states.head(count), truth.states.head(count)
+        gap = _gap(model, limit_states, true_states).place
+        least = FLOORS * max(limit.floor.place, truth.floor.place)
+        if truth is reference:
+            cones[cone] = Cone(reference, max(gap, least), 0.0, sticks)
+        else:
+            visible = visible_error(model, scene, limit_states, true_states) if gap > least else 0.0
+            cones[cone] = Cone(limit, max(gap, least), visible, sticks)
+    return cones
+
+
+def find_conserved(model: Any, pilot: Pilot, reference: KnownMotion) -> tuple[float | None, bool]:
+    """What the author says is conserved, or else what the reference conserves.
+
+    Returns:
+        The scale for changes of energy, J, or `None` where energy is not conserved; whether the
+        angular momentum about the centre of mass is.
+    """
+    scenario = pilot.scene.scenario
+    conserved = pilot.scene.declaration.conserved
+    data, scratch = initial_data(scenario, model), initial_data(scenario, model)
+    states = [
+        (data.qpos, data.qvel),
+        *zip(reference.states.qpos, reference.states.qvel, strict=True),
+    ]
+    table = np.array([invariants(model, scratch, qpos, qvel) for qpos, qvel in states])
+    energies, momenta = table[:, :2], table[:, 2:]
+    scale = energy_scale(energies)
+    if conserved is not None:
+        energy = "energy" in conserved and scale > 0
+        return scale if energy else None, "angular-momentum" in conserved
+    if not pilot.smooth or reference.kind == "self":
+        return None, False
+    drifts = energy_drift(energies), momentum_drift(momenta)
+    is_conserved = [drift is not None and abs(drift) < CONSERVED for drift in drifts]
+    return scale if is_conserved[0] else None, is_conserved[1]
+
+
+def mean_late_energy(model: Any, pilot: Pilot, reference: KnownMotion) -> float | None:
+    """Mean kinetic energy after the horizon, J, in small steps; `None` where that is the end."""
+    scenario = pilot.scene.scenario
+    if reference.horizon > scenario.duration - scenario.sample * 1.5:
+        return None
+    integrator = Integrator.RK4 if pilot.smooth else Integrator.IMPLICITFAST
+    fine = with_integrator(model, integrator, min(pilot.scene.timesteps) / 2)
+    run = simulate(pilot.setup, fine)
+    mean = float(run.energy[1:][run.states.times > reference.horizon * (1 + 1e-9), 1].mean())
+    return mean if math.isfinite(mean) and mean > 0 else None

@@ -1,0 +1,179 @@
+"""The report on a hard case.
+
+Entry points: `CaseReport`; `course_cases(report)`, the hard cases of a course's own: scenarios of
+models whose exact motion stands in `exact_file`.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+from msgspec.structs import asdict
+
+from coursebuild.core.model.results import Machine
+from coursebuild.numerics.reports import Interval, Record
+from coursebuild.numerics.reports.scene_report import (
+    MeasuredRun,
+    OrderRow,
+    ScenarioReport,
+    SceneReport,
+    StableRow,
+    WorkPrecisionRow,
+)
+
+
+class BoundaryLine(StableRow, frozen=True):
+    """The largest stable timestep of an integrator, compared with theory."""
+
+    theory: float | None
+    """s, as `largest`; `None` also where there is no theory and so no formula."""
+    formula: str
+    """Where the theory comes from; empty where there is none."""
+    difference: float | None
+    """Measured against theory, relative."""
+    beyond: str
+    """The status of the run with the shortest unstable timestep that was tried."""
+    growth: float | None
+    """The factor by which velocities grew in a step of that run, where they stayed finite."""
+
+
+class FigureLine(Record, frozen=True):
+    """A quantity that was measured and is known."""
+
+    name: str
+    unit: str
+    integrator: str
+    measured: float | None
+    """`None` where it is not finite."""
+    exact: float | None
+    """`None` where theory does not say it."""
+    source: str
+    spread: tuple[float, float] | None = None
+    """Of an ensemble, the range of its middle eight tenths; `measured` is the median then."""
+
+
+class StepCost(Record, frozen=True):
+    """The time of a step of an integrator."""
+
+    integrator: str
+    seconds: Interval
+    """Processor time on the machine of the report."""
+
+
+class ErrorLine(MeasuredRun, frozen=True):
+    """An integrator at a timestep."""
+
+    integrator: str
+    timestep: float
+    """s."""
+
+
+class ReferenceLine(Record, frozen=True):
+    """The reference that errors were measured against."""
+
+    kind: str
+    """`closed` or `ode`."""
+    source: str
+    second: str
+    """The source of the second reference."""
+    position: float
+    """How far the two references are apart, m or rad; the motion is known no better."""
+    attitude: float
+    """rad."""
+    velocity: float
+    """m/s or rad/s."""
+
+
+class CaseReport(Record, frozen=True):
+    """Everything that was measured on a hard case."""
+
+    name: str
+    title: str
+    case: int
+    """Its number on the list of hard cases; 0 for one of the course's own."""
+    machine: Machine
+    note: str
+    reference: ReferenceLine
+    boundaries: tuple[BoundaryLine, ...]
+    figures: tuple[FigureLine, ...]
+    orders: tuple[OrderRow, ...]
+    errors: tuple[ErrorLine, ...]
+    costs: tuple[StepCost, ...]
+
+    def cost(self, line: ErrorLine) -> Interval | None:
+        """Processor time for a simulated second, s; `None` where the integrator was not timed."""
+        step_costs = (cost.seconds for cost in self.costs if cost.integrator == line.integrator)
+        step = next(step_costs, None)
+        return None if step is None else step.scale(1 / line.timestep)
+
+    def cost_to(self, integrator: str, error: float) -> float | None:
+        """The same for the timestep with a given error, m or rad; `None` where no run is as good.
+
+        Between two runs the cost follows a power of the error. Beyond the longest timestep nothing
+        is extrapolated.
+        """
+        runs = sorted(
+            (cost.value, max(pair[0] for pair in places))
+            for line in self.errors
+            if line.integrator == integrator and (cost := self.cost(line)) is not None
+            if (places := [pair for pair in (line.position, line.attitude) if pair is not None])
+        )
+        if runs and runs[0][1] <= error:
+            return runs[0][0]
+        for (low_cost, high_error), (high_cost, low_error) in pairwise(runs):
+            if low_error <= error < high_error:
+                part = math.log(high_error / error) / math.log(high_error / low_error)
+                return float(low_cost * (high_cost / low_cost) ** part)
+        return None
+
+
+def exact_file(model: str) -> str:
+    """The file in which a course may give the exact motion of a model."""
+    return f"models/{model}.exact.py"
+
+
+def course_cases(report: SceneReport) -> tuple[CaseReport, ...]:
+    """The scenarios of a model whose exact motion the course gives."""
+    exact_scenarios = (
+        scenario for scenario in report.scenarios if scenario.source == exact_file(report.model)
+    )
+    return tuple(_course_case(report, scenario) for scenario in exact_scenarios)
+
+
+def _course_case(report: SceneReport, scenario: ScenarioReport) -> CaseReport:
+    baseline = scenario.own_setting
+    rows = [
+        row
+        for row in scenario.rows
+        if baseline and row.setting.solver_settings == baseline.solver_settings
+    ]
+    steps = {
+        row.setting.integrator: row.seconds.scale(row.setting.timestep)
+        for row in reversed(rows)
+        if row.seconds is not None
+    }
+    floors = scenario.floor, scenario.floor, scenario.velocity_floor
+    return CaseReport(
+        name=f"{report.model}/{scenario.name}",
+        title=f"{report.model}: {scenario.title or scenario.name}",
+        case=0,
+        machine=report.machine,
+        note="; ".join(scenario.notes),
+        reference=ReferenceLine(scenario.reference, scenario.source, scenario.second, *floors),
+        boundaries=tuple(
+            BoundaryLine(
+                **asdict(row), theory=None, formula="", difference=None, beyond="", growth=None
+            )
+            for row in scenario.stable
+        ),
+        figures=(),
+        orders=scenario.orders,
+        errors=tuple(_error_line(row) for row in rows),
+        costs=tuple(StepCost(name, seconds) for name, seconds in steps.items()),
+    )
+
+
+def _error_line(row: WorkPrecisionRow) -> ErrorLine:
+    fields = {name: getattr(row, name) for name in MeasuredRun.__struct_fields__}
+    return ErrorLine(integrator=row.setting.integrator, timestep=row.setting.timestep, **fields)

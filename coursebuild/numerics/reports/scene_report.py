@@ -1,0 +1,340 @@
+"""The report on a model: speed against error in each of its scenarios, and its sweeps.
+
+Entry points: `SceneReport`; of a sweep, where one parameter has other values, `SweepReport`,
+`shown_figures(sweep)`, `cell(row, figure)`, `figure_interval` and `FIGURES`.
+"""
+
+from __future__ import annotations
+
+from coursebuild.core.drawing.scales import tick_texts
+from coursebuild.core.model.results import Machine
+from coursebuild.numerics.reports import Interval, Record
+
+FIGURES = {
+    "change": "change (1: just visible)",
+    "figure": "change of what is measured",
+    "penetration": "depth (m)",
+    "slip": "slip (m)",
+    "restitution": "restitution",
+    "residual": "solver residual",
+    "iterations": "iterations a step",
+    "cost": "cost",
+    "throughput": "× real time",
+}
+"""The figures that are measured for every value, with their labels."""
+
+
+class SweepRow(Record, frozen=True):
+    """The model with one parameter at one value."""
+
+    parameter: str
+    """As the course names it, such as `geom.solref[0]`; `threads` is that of a rollout."""
+    value: str
+    own: bool
+    """Whether it is the value that the model has."""
+    status: str
+    """`ok`, `slow-growth`, `diverged` or `reset`, as of a setting."""
+    reasons: tuple[str, ...] = ()
+    change: float | None = None
+    """How far the motion is from that of the model as it is, in a picture: 1 is just visible."""
+    figure: float | None = None
+    """The same of what the scenario declares to be measured, in its unit."""
+    penetration: float | None = None
+    """Deepest contact, m."""
+    slip: float | None = None
+    """The longest way that two geoms slide on each other, m."""
+    restitution: float | None = None
+    """Of the hardest hit: speed apart over speed together, along the normal; 0 for what stays."""
+    residual: float | None = None
+    """Of the solver: the largest difference of forces, constraint or applied, between forward and
+    inverse dynamics, relative to the largest constraint force."""
+    iterations: float | None = None
+    """Of the solver, mean of all steps."""
+    cost: Interval | None = None
+    """Time for the scenario, relative to the model as it is."""
+    throughput: Interval | None = None
+    """Simulated time over wall time, of all that a rollout simulates at once."""
+
+
+class SweepReport(Record, frozen=True):
+    """All rows of a sweep."""
+
+    name: str
+    title: str
+    scenario: str
+    show: tuple[str, ...]
+    """The figures to show; empty: those that differ."""
+    rows: tuple[SweepRow, ...]
+
+
+def shown_figures(sweep: SweepReport) -> tuple[str, ...]:
+    """The figures that a reader is shown."""
+    if sweep.show:
+        return sweep.show
+    intervals = {name: [figure_interval(row, name) for row in sweep.rows] for name in FIGURES}
+    values = {
+        name: [interval.value for interval in row if interval] for name, row in intervals.items()
+    }
+    return tuple(name for name, row in values.items() if row and max(row) > 1.01 * min(row))
+
+
+def figure_interval(row: SweepRow, figure: str) -> Interval | None:
+    """A figure of a row; an interval without width where repeated runs give the same."""
+    value: float | Interval | None = getattr(row, figure)
+    return Interval(value, value, value) if isinstance(value, float) else value
+
+
+def cell(row: SweepRow, figure: str) -> str:
+    """A figure in three digits; with half its interval in per cent, where it has one."""
+    interval = figure_interval(row, figure)
+    if interval is None:
+        return ""
+    text = tick_texts([float(f"{interval.value:.3g}")])[0]
+    return f"{text} ± {100 * interval.half_width:.2g} %" if interval.high > interval.low else text
+
+
+FLOORS = 10.0
+"""Errors below this many floors of the reference are not given."""
+
+
+class MeasuredSetting(Record, frozen=True):
+    """What can be chosen without changing the scene."""
+
+    integrator: str
+    """As MJCF names it."""
+    timestep: float
+    """s."""
+    solver: str
+    """As MJCF names it; empty where nothing is constrained, so that no solver runs."""
+    iterations: int
+    """At most; 0 where no solver runs."""
+    cone: str
+    """As MJCF names it; empty where nothing can touch."""
+
+    @property
+    def solver_settings(self) -> tuple[str, int, str]:
+        """All but integrator and timestep."""
+        return self.solver, self.iterations, self.cone
+
+
+class Errors(Record, frozen=True):
+    """How far a motion is from its reference: at its largest over the horizon, and at its end.
+
+    `None` for what the motion does not have, and where the run was lost.
+    """
+
+    position: tuple[float, float] | None
+    """m or rad: Euclidean norm over coordinates."""
+    attitude: tuple[float, float] | None
+    """rad: the largest angle of any body."""
+    velocity: tuple[float, float] | None
+    """m/s or rad/s: Euclidean norm."""
+
+
+class MeasuredRun(Errors, frozen=True):
+    """One run against its reference."""
+
+    status: str
+    """`ok`, `slow-growth`, `diverged` or `reset`."""
+    reasons: tuple[str, ...]
+    """Why it is not `ok`."""
+    energy_drift: float | None
+    """Relative, with its sign; `None` where energy is not conserved."""
+    momentum_drift: float | None
+    """Relative; `None` where angular momentum is not conserved."""
+    penetration: float
+    """Deepest contact, m."""
+    refsafe: bool
+    """Whether constraints were softened because the timestep is long: it is another model."""
+
+
+class WorkPrecisionRow(MeasuredRun, frozen=True):
+    """One setting in one scenario."""
+
+    setting: MeasuredSetting
+    figure: tuple[float, float] | None
+    """Of what the scenario declares to be measured, in its unit; `None` where it declares none."""
+    slip: float | None
+    """Largest creep of a contact that sticks in the reference, m; `None` without contact."""
+    model_error: float | None
+    """What remains of the error however small the timestep, in the errors' unit (soft contact, a
+    pyramid for a cone): against the closed form; `None` where there is none."""
+    steps: int
+    cost: Interval | None
+    """Time for the scenario, relative to the scene's own setting; `None` where it was not timed."""
+    seconds: Interval | None
+    """Processor time for a simulated second on this machine, s; `None` where it was not timed."""
+    growth: float | None
+    """The factor by which velocities grew in a step; `None` where they did not."""
+    own: bool
+    """Whether it is the scene's own setting."""
+    front: bool
+    """Whether no other is both cheaper and more accurate, beyond what timing can tell."""
+    dominated_by: int | None
+    """The row (from 0) that is cheaper and no less accurate; `None` on the front, and for what was
+    lost or not timed."""
+    seen: float | None = None
+    """The largest displacement or turn of a body in a picture, where 1 is just visible. The front
+    is that of cost and the figure, or where none is declared, of cost and this."""
+    mean_energy: float | None = None
+    """Mean kinetic energy from the horizon to the end, relative to that of a run in small steps,
+    less 1; `None` where nothing is beyond the horizon."""
+
+    @property
+    def realtime(self) -> float | None:
+        """Simulated time over processor time."""
+        return 1 / self.seconds.value if self.seconds and self.seconds.value else None
+
+
+class FittedOrder(Record, frozen=True):
+    """The power of the timestep that errors are proportional to."""
+
+    value: float
+    uncertainty: float
+    """Half the width of the interval in which it lies in 95 % of cases."""
+    bend: float
+    """The largest difference of two slopes between neighbouring timesteps: 0 is a straight line."""
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return f"{self.value:.2f} ± {self.uncertainty:.2f}, bend {self.bend:.2f}"
+
+
+class OrderRow(Record, frozen=True):
+    """Orders of an integrator; `None` where errors are too few, or follow no one power."""
+
+    integrator: str
+    position: FittedOrder | None
+    attitude: FittedOrder | None
+    velocity: FittedOrder | None
+
+    @property
+    def has_orders(self) -> bool:
+        """Whether an order is known for any of the errors."""
+        return any(order is not None for order in (self.position, self.attitude, self.velocity))
+
+
+class StableRow(Record, frozen=True):
+    """The largest stable timestep of an integrator in a scenario."""
+
+    integrator: str
+    largest: float | None
+    """s: all that were tried up to it are stable. 0 where none is, `None` where all are."""
+    searched: tuple[float, float]
+    """The shortest and the longest timestep that was tried, s."""
+    islands: tuple[float, float] | None
+    """The shortest and longest stable timesteps beyond the largest, s; `None` where none is."""
+    duration: float
+    """Simulated time of each run, s."""
+    steps: int
+    """Of a run with the largest stable timestep; with the longest, or shortest, where all or none
+    is stable."""
+    tried: int
+    """How many timesteps up to the largest were tried."""
+    energy: float | None
+    """Most energy that a stable run may have, J; `None` where it is not judged."""
+
+    @property
+    def monotone(self) -> bool:
+        """Whether all timesteps that were tried beyond the largest are lost."""
+        return self.islands is None
+
+
+class RowVerdict(Record, frozen=True):
+    """Whether a scene's own setting is a good choice."""
+
+    on_front: bool
+    better: int | None
+    """The row that dominates it; `None` where none does."""
+    cost_ratio: float | None
+    """Cost of the better one, relative to the own."""
+    error_ratio: float | None
+    """Error of the better one, relative to the own."""
+    noticeable: bool | None
+    """Whether a learner would see the own setting's error; `None` where it is not known."""
+    text: str
+    """The same in a sentence or two."""
+
+
+class ScenarioReport(Record, frozen=True):
+    """Everything that was measured in a scenario."""
+
+    name: str
+    title: str
+    duration: float
+    """s."""
+    horizon: float
+    """s: how long errors of trajectories mean something; less than the duration in chaos."""
+    hold: float
+    """Seconds for which a command holds; 0 where nothing is commanded."""
+    reference: str
+    """`closed`, `ode` or `self`."""
+    source: str
+    """Where the reference comes from."""
+    floor: float
+    """How far the reference may be off in places and attitudes, m or rad; no error is given below
+    ten times as much. Velocities have a floor of their own."""
+    second: str
+    """The source of the second reference; empty where there is none."""
+    agreement: float | None
+    """The largest difference of the two."""
+    lyapunov: float | None
+    """Largest Lyapunov exponent, 1/s; `None` where the scenario is not chaotic."""
+    figure: str
+    """The declared quantity, with its unit in brackets; empty without one."""
+    rows: tuple[WorkPrecisionRow, ...]
+    orders: tuple[OrderRow, ...]
+    stable: tuple[StableRow, ...]
+    verdict: RowVerdict
+    velocity_floor: float = 0.0
+    """As `floor`, for velocities: around an impact they are known far worse than places."""
+    smooth: bool = True
+    """Whether accelerations are a smooth function of the state; else there are no orders."""
+    notes: tuple[str, ...] = ()
+    """Remarks for reading the figures."""
+    horizons: tuple[float, float] | None = None
+    """s: the shortest and the longest of runs whose beginnings were nudged in different ways;
+    `None` where the scenario is not chaotic."""
+
+    @property
+    def own_setting(self) -> MeasuredSetting | None:
+        """The scene's own setting; `None` where there are no rows."""
+        return next((row.setting for row in self.rows if row.own), None)
+
+
+class SceneCard(Record, frozen=True):
+    """The size of a model, and how fast the browser's engine runs it."""
+
+    bodies: int
+    """Without the world."""
+    geoms: int
+    freedom: int
+    """Degrees of freedom."""
+    possible: int
+    """Pairs of geoms between which MuJoCo looks for contact when they are near each other."""
+    touched: int
+    """Those that touched in any scenario, with the scene's own setting."""
+    mjcf: int
+    """Bytes of the MJCF with the files that it pulls in."""
+    mjb: int
+    """Bytes of the compiled model (an MJB file)."""
+    browser: float | None
+    """Simulated time over the time it takes in WebAssembly (V8), from where the first scenario
+    begins; `None` where it was not measured."""
+
+
+class SceneReport(Record, frozen=True):
+    """Everything that was measured on a model."""
+
+    model: str
+    """Its file below `models/`, without suffix, POSIX."""
+    digest: str
+    """The digest of what the figures depend on in the course: the MJCF, its files and scenarios."""
+    quick: bool
+    """Whether only a part was measured, and in less time."""
+    machine: Machine
+    scenarios: tuple[ScenarioReport, ...]
+    card: SceneCard | None = None
+    """`None` in a report that is about speed and error alone."""
+    sweeps: tuple[SweepReport, ...] = ()

@@ -1,0 +1,121 @@
+"""Which errors of reports are shown, and the texts of settings, times and statuses.
+
+Entry points: `quantities(report)`, `main_quantity`; `setting_text`, `seconds_text`, `status_text`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from msgspec import Struct
+
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.scene_report import (
+    FLOORS,
+    MeasuredRun,
+    MeasuredSetting,
+    ScenarioReport,
+)
+
+INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
+"""Integrators in the order in which they are shown, which also sets their colour and mark."""
+FEWEST_STEPS = 20
+"""Steps of a scenario at the longest timestep that is tried for stability."""
+
+
+class Quantity(Struct, frozen=True):
+    """An error that can be drawn."""
+
+    name: str
+    """The field of a row: `figure`, `seen`, `position`, `attitude` or `velocity`."""
+    label: str
+    """What it is, with its unit."""
+    least: float = 0.0
+    """The floor of the reference: smaller errors mean nothing."""
+
+    def value_of(self, row: MeasuredRun) -> float | None:
+        """The largest error of a row over the horizon; `None` where the row has none."""
+        error: tuple[float, float] | float | None = getattr(row, self.name)
+        value = error[0] if isinstance(error, tuple) else error
+        return None if value is None or not math.isfinite(value) else abs(value)
+
+    def is_resolved(self, rows: Iterable[MeasuredRun]) -> bool:
+        """Whether any of the rows has an error above the floor."""
+        errors = (self.value_of(row) for row in rows)
+        return any(error is not None and error > self.least * (1 + 1e-9) for error in errors)
+
+
+def quantities(report: ScenarioReport) -> tuple[Quantity, ...]:
+    """The errors that some row has, what the scenario declares to be measured first."""
+    candidates = (
+        Quantity("figure", report.figure or "figure"),
+        Quantity("seen", "what is seen (1: just visible)"),
+        Quantity("position", "position (m or rad)", FLOORS * report.floor),
+        Quantity("attitude", "attitude (rad)", FLOORS * report.floor),
+        Quantity("velocity", "velocity (m/s or rad/s)", FLOORS * report.velocity_floor),
+    )
+    return tuple(
+        quantity
+        for quantity in candidates
+        if any(quantity.value_of(row) is not None for row in report.rows)
+    )
+
+
+def main_quantity(report: ScenarioReport) -> Quantity | None:
+    """The error to show where only one is shown: the first that is resolved, else the first.
+
+    `None` where no row has an error.
+    """
+    present = quantities(report)
+    return next(
+        (quantity for quantity in present if quantity.is_resolved(report.rows)),
+        next(iter(present), None),
+    )
+
+
+def is_cut_short(report: ScenarioReport) -> bool:
+    """Whether the search for stable timesteps ended because of the scenario's duration."""
+    longest = report.duration / FEWEST_STEPS
+    return any(math.isclose(row.searched[1], longest, rel_tol=1e-9) for row in report.stable)
+
+
+def seconds_text(value: float, digits: int = 6) -> str:
+    """A short time with its unit."""
+    for size, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs")):
+        if value >= size * 0.9999995:
+            return f"{value / size:.{digits}g} {unit}"
+    return f"{value:.{digits}g} s"
+
+
+def interval_text(value: Interval) -> str:
+    """A figure in three digits with half the width of its interval, in per cent."""
+    share = 100 * value.half_width
+    return f"{value.value:.3g}" + (f" ± {share:.2g} %" if 0.05 <= share < math.inf else "")
+
+
+def setting_text(setting: MeasuredSetting, like: MeasuredSetting | None = None) -> str:
+    """A setting in words; solver, iterations and cone only where they differ from those of `like`.
+
+    Without `like` all of them are given.
+    """
+    parts = [f"{setting.integrator} at {seconds_text(setting.timestep)}"]
+    return ", ".join([*parts, *solving_parts(setting, like)])
+
+
+def solving_parts(setting: MeasuredSetting, like: MeasuredSetting | None = None) -> list[str]:
+    """Solver, iterations and cone of a setting in words; see `setting_text`."""
+    parts = []
+    if setting.solver and (like is None or setting.solver != like.solver):
+        parts.append(setting.solver)
+    if setting.iterations and (like is None or setting.iterations != like.iterations):
+        many = "iteration" if setting.iterations == 1 else "iterations"
+        parts.append(f"{setting.iterations} {many}")
+    if setting.cone and (like is None or setting.cone != like.cone):
+        parts.append(f"{setting.cone} cone")
+    return parts
+
+
+def status_text(status: str) -> str:
+    """How a run went, in words."""
+    return "grew" if status == "slow-growth" else status

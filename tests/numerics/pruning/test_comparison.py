@@ -1,0 +1,118 @@
+"""Two models side by side: the same bits, nearly the same, or not; and how their times compare."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from coursebuild.core.model.scenarios import BenchTable, DeclaredScenario
+from coursebuild.numerics.problem import Scenario
+from coursebuild.numerics.pruning.comparison import (
+    IndexMap,
+    compare,
+    fits,
+    index_map,
+    pruning_scenes,
+    transfer,
+)
+from coursebuild.numerics.scene import Scene
+from coursebuild.numerics.simulation import initial_data
+from support.surveys import NO_DECLARATIONS, parse_declared
+
+DOUBLE_PENDULUM = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/>
+  <body pos="1 0 0"><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0" mass="{mass!r}"/></body>
+  </body></worldbody><keyframe><key qpos="-1.4 .5"/></keyframe></mujoco>"""
+
+
+def scene_of(duration: float, keyframe: int = -1) -> Scene:
+    scenario = Scenario(duration, 0.002, keyframe=keyframe)
+    nobody = DeclaredScenario("go", span=NO_DECLARATIONS.source.span(0, 0))
+    return Scene("go", "go", scenario, (0.002,), 0.002, BenchTable(), nobody)
+
+
+CHAOS, SHORT = scene_of(15.0, 0), scene_of(1.0, 0)
+
+
+def double(mass: float = 1.0) -> Any:
+    return mujoco.MjModel.from_xml_string(DOUBLE_PENDULUM.format(mass=mass))
+
+
+def identity_map(model: Any) -> IndexMap:
+    return index_map(model, {})
+
+
+def test_chaos_is_no_difference() -> None:
+    """After 15 s the trajectories are far apart for that; within 50 ms they are one."""
+    base, variant = double(), double(1.0 + 1e-13)
+    comparison = compare(base, variant, identity_map(base), [CHAOS])
+    assert not comparison.identical and 0 < comparison.difference < 1e-11
+    ends = []
+    for model in (base, variant):
+        data = initial_data(CHAOS.scenario, model)
+        mujoco.mj_step(model, data, 7500)
+        ends.append(data.qpos.copy())
+    assert np.max(np.abs(ends[0] - ends[1])) > 1e5 * comparison.difference
+
+
+def test_a_changed_model_that_diverges_is_not_equal() -> None:
+    base, variant = double(), double()
+    variant.dof_damping[:] = -1e6
+    comparison = compare(base, variant, identity_map(base), [CHAOS])
+    assert not comparison.identical and math.isinf(comparison.difference)
+
+
+def test_contacts_count_though_nothing_moves() -> None:
+    """The block stays where it is to the bit, but another geom bears it."""
+    text = """<mujoco><option gravity="0 0 0"/><worldbody><geom name="{}" size=".1" pos="0 0 -.1"/>
+      <geom name="{}" size=".1" pos="0 0 -.1"/><body><freejoint/><geom size=".1" pos="0 0 .1"/>
+      </body></worldbody></mujoco>"""
+    base = mujoco.MjModel.from_xml_string(text.format("a", "b"))
+    variant = mujoco.MjModel.from_xml_string(text.format("a", "b"))
+    variant.geom_contype[0] = variant.geom_conaffinity[0] = 0
+    scene = scene_of(0.002)
+    assert compare(base, base, identity_map(base), [scene]).identical
+    comparison = compare(base, variant, identity_map(base), [scene])
+    assert not comparison.identical
+
+
+FULL = """<mujoco><worldbody><body name="m" mocap="true"/>
+  <body name="a"><freejoint/><geom size=".1"/>
+    <body><joint type="ball"/><geom size=".1"/></body></body>
+  <body name="b"><joint name="j"/><geom size=".1"/></body></worldbody>
+  <actuator><motor joint="j"/><general joint="j" dyntype="integrator"/></actuator></mujoco>"""
+
+
+def test_a_state_is_brought_over() -> None:
+    model, spec = mujoco.MjModel.from_xml_string(FULL), mujoco.MjSpec.from_string(FULL)
+    spec.delete(spec.body("a"))
+    variant = spec.compile()
+    left = index_map(model, {"body": {model.body("a").id}})
+    assert fits(left, model, variant)
+    data, variant_data = mujoco.MjData(model), mujoco.MjData(variant)
+    data.qpos[:], data.qvel[:] = range(12), range(10)
+    data.time, data.act[:], data.ctrl[:], data.mocap_pos[0] = 3.0, [1], [4, 5], 7
+    transfer(model, data, left, variant, variant_data)
+    assert (variant_data.time, variant_data.qpos.tolist(), variant_data.qvel.tolist()) == (
+        3.0,
+        [11.0],
+        [9.0],
+    )
+    assert (variant_data.act.tolist(), variant_data.ctrl.tolist()) == ([1], [4, 5])
+    assert variant_data.mocap_pos[0].tolist() == [7] * 3
+
+
+def test_scenarios_as_the_author_wrote_them() -> None:
+    text = """[[scenario]]\nname = "push"\nduration = 1\nsample = 0.1\nhold = 0.2
+controls = [[1], [2]]\nqvel = [0, 5]\n"""
+    mjcf = DOUBLE_PENDULUM.format(mass=1.0).replace('<joint axis="0 1 0"/>', '<joint name="j"/>', 1)
+    motor = "<actuator><motor joint='j'/></actuator></mujoco>"
+    model = mujoco.MjModel.from_xml_string(mjcf.replace("</mujoco>", motor))
+    (scene,) = pruning_scenes(model, parse_declared(text))
+    assert (scene.name, scene.scenario.qvel[-1]) == ("push", 5)
+    commands = [(step, command[0]) for step, command in enumerate(scene.scenario.commands(0.002))]
+    assert commands == [(step, 1 if step < 100 else 2) for step in range(500)]
+    (short,) = pruning_scenes(model, parse_declared(text), quick=True)
+    assert short.scenario.duration == 0.5

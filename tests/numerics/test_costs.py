@@ -1,0 +1,226 @@
+"""What settings cost, by a clock that does not tick by itself, and which are worth it."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import mujoco
+import pytest
+
+from coursebuild.numerics.costs import MIN_ROUNDS, FrontPoint, Job, costs, front, time_jobs, verdict
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.scene_report import MeasuredSetting, WorkPrecisionRow
+from coursebuild.numerics.scene import scenes
+from support.bench_reports import diverged_row, row
+from support.surveys import NO_DECLARATIONS
+
+
+class Machine:
+    """A machine whose time passes with its work, and with what else it does."""
+
+    def __init__(self, disturbed: Callable[[], float] = lambda: 1.0) -> None:
+        self.now = 0.0
+        self.disturbed = disturbed
+        self.done: list[float] = []
+        self.slowed: list[bool] = []
+
+    def clock(self) -> int:
+        return round(self.now)
+
+    def job(self, cost: float) -> Job:
+        def work() -> None:
+            factor = self.disturbed()
+            self.done.append(cost)
+            self.slowed.append(factor > 1.2)
+            self.now += cost * factor
+
+        return work
+
+
+class Neighbours:
+    """Others who come in bursts, for longer than a job, and slow everything; and slow drift."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = random.Random(seed)
+        self.left = 0
+        self.factor = self.drift = 1.0
+
+    def __call__(self) -> float:
+        if self.left == 0:
+            busy = self.random.random() < 0.4
+            self.left = self.random.randint(1, 25)
+            self.factor = self.random.uniform(1.3, 4.0) if busy else 1.0
+        self.left -= 1
+        self.drift *= 1.0001
+        jitter = abs(self.random.gauss(0.0, 0.01))
+        spike = 8.0 if self.random.random() < 0.03 else 1.0
+        return self.factor * self.drift * spike * (1 + jitter)
+
+
+def test_a_quiet_machine_is_asked_as_seldom_as_can_be() -> None:
+    machine = Machine()
+    timings = time_jobs([machine.job(c) for c in (2e6, 1e6, 5e6)], 1, machine.clock)
+    assert [timing.ratio for timing in timings] == [Interval(c, c, c) for c in (2.0, 1.0, 5.0)]
+    assert [timing.nanoseconds.value for timing in timings] == [2e6, 1e6, 5e6]
+    assert len(machine.done) == 3 * (MIN_ROUNDS + 1), "and once before, to warm up"
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_ratios_on_a_noisy_machine_lie_in_their_intervals(seed: int) -> None:
+    true = [0.1, 0.97, 1.0, 1.05, 3.0, 20.0]
+    inside = []
+    for half in (0, 1):
+        machine = Machine(Neighbours(2 * seed + half))
+        timings = time_jobs([machine.job(1e7 * c) for c in true], 2, machine.clock)
+        assert sum(machine.slowed) > 0.2 * len(machine.slowed), "there was noise"
+        for timing, cost in zip(timings, true, strict=True):
+            assert timing.ratio.value == pytest.approx(cost, rel=0.03)
+            assert timing.ratio.half_width < 0.1
+            inside.append(0.99 * timing.ratio.low <= cost <= 1.01 * timing.ratio.high)
+    assert sum(inside) >= 10
+
+
+def test_a_slow_model_is_not_timed_for_ever() -> None:
+    machine = Machine(Neighbours(3))
+    time_jobs([machine.job(c) for c in (2e9, 4e9)], 0, machine.clock)
+    assert len(machine.done) == 2 * (MIN_ROUNDS + 1)
+
+
+SPRING = """\
+<mujoco>
+  <option timestep="0.004"/>
+  <worldbody>
+    <body><joint type="slide" stiffness="10"/><geom size="0.1" mass="1"/></body>
+  </worldbody>
+  <keyframe><key qpos="0.2"/></keyframe>
+</mujoco>
+"""
+
+
+def test_costs_are_of_the_whole_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock that goes by what steps cost where the spring is: less and less, as it swings out."""
+    model = mujoco.MjModel.from_xml_string(SPRING)
+    (scene,) = scenes(model, NO_DECLARATIONS)
+    machine, real = Machine(), mujoco.mj_step
+    price = {mujoco.mjtIntegrator.mjINT_EULER: 300.0, mujoco.mjtIntegrator.mjINT_RK4: 1300.0}
+
+    def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int = 1) -> None:
+        machine.now += nstep * price[mujoco.mjtIntegrator(model.opt.integrator)]
+        real(model, data, nstep)
+        machine.now += 1e4 * abs(float(data.qpos[0]))
+
+    monkeypatch.setattr(mujoco, "mj_step", step)
+    settings = [MeasuredSetting(name, 0.004, "", 0, "") for name in ("RK4", "Euler")]
+    timings = costs(model, scene, settings, 1, machine.clock)
+    steps = round(scene.scenario.duration / 0.004)
+    ends = []
+    for integrator in (mujoco.mjtIntegrator.mjINT_RK4, mujoco.mjtIntegrator.mjINT_EULER):
+        model.opt.integrator = integrator
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        real(model, data, steps)
+        ends.append(steps * price[integrator] + 1e4 * abs(float(data.qpos[0])))
+    assert [timing.nanoseconds.value for timing in timings] == pytest.approx(ends, rel=1e-4), (
+        "its own end"
+    )
+    assert timings[0].ratio.value == pytest.approx(ends[0] / ends[1], rel=1e-4)
+
+
+Point = tuple[float, float] | None
+"""Cost and error; `None`: a run that was lost."""
+
+
+def rows_with_front(*points: Point) -> tuple[WorkPrecisionRow, ...]:
+    """Rows of which the first is the scene's own, Euler at 2 ms, and others are RK4 at 10 ms."""
+    rows = []
+    for n, point in enumerate(points):
+        is_own = {"own": True} if n == 0 else {}
+        name, timestep = ("Euler", 0.002) if n == 0 else ("RK4", 0.01)
+        if point is None:
+            rows.append(diverged_row(name, timestep, **is_own))
+        else:
+            rows.append(row(name, timestep, cost=point[0], seen=point[1], **is_own))
+    return front(rows)
+
+
+def are_on_front(*points: Point) -> list[bool]:
+    return [row.front for row in rows_with_front(*points)]
+
+
+def test_cheaper_and_more_accurate_is_better() -> None:
+    rows = rows_with_front((1, 1e-3), (0.5, 1e-5), (0.1, 0.3), (4, 1e-3), None)
+    assert [row.front for row in rows] == [False, True, True, False, False]
+    assert [row.dominated_by for row in rows] == [1, None, None, 1, None]
+    rows = rows_with_front((8, 8.0), (4, 4.0), (2, 2.0), (1, 1.0))
+    assert [row.dominated_by for row in rows] == [3, 3, 3, None], "it is on the front"
+
+
+def test_small_differences_are_none() -> None:
+    assert are_on_front((1, 1e-3), (1.02, 1e-3)) == [True, True]
+    assert are_on_front((1, 1e-3), (1.02, 1.04e-3)) == [True, True]
+    assert are_on_front((1, 1e-3), (1.2, 1e-3)) == [True, False]
+    assert are_on_front((1, 1e-3), (1, 1.06e-3)) == [True, False]
+    assert are_on_front((1, 1e-3), (0.98, 1.5e-3)) == [True, False], "its cost is no better"
+    assert are_on_front((1, 1e-3), (0.5, 1.04e-3)) == [False, True]
+
+
+def test_costs_that_timing_cannot_tell_apart_are_equal() -> None:
+    own_point = FrontPoint(Interval(1.0, 0.8, 1.2), 1e-3)
+    for high, is_cheaper in ((0.79, True), (0.8, False), (0.9, False)):
+        rival = FrontPoint(Interval(0.7, 0.6, high), 1e-3)
+        assert rival.is_cheaper(own_point) == rival.beats(own_point) == is_cheaper, high
+
+
+def test_errors_of_zero_and_nothing_at_all() -> None:
+    assert are_on_front((1, 0.0), (2, 0.0), (0.5, 1e-12)) == [True, False, True]
+    assert are_on_front() == []
+    assert are_on_front(None, None) == [False, False]
+
+
+OWN_BEST = "no other setting is cheaper without being less accurate"
+OWN_FAILS = "the scene does not run under its own setting, Euler at 2 ms: the state is not finite"
+ERROR_SEEN = "a learner would notice its error, which is 2.5 times what can be seen"
+
+
+@pytest.mark.parametrize(
+    ("points", "better", "text"),
+    [
+        (
+            ((1, 1e-3), (4, 1e-7)),
+            None,
+            f"{OWN_BEST}; a learner would not notice its error, which is 0.001 of what can be seen",
+        ),
+        (
+            ((1, 2.5), (0.94, 2.5e-6)),
+            1,
+            f"RK4 at 10 ms is better: it takes 0.94 of the time and errs far less; {ERROR_SEEN}; "
+            "the cheapest without one that is seen is RK4 at 10 ms, at 0.94 times its cost",
+        ),
+        (
+            ((1, 2.5), (2, 2.4)),
+            None,
+            f"{OWN_BEST}; {ERROR_SEEN}, and that of every other setting too",
+        ),
+        ((None, (1, 2.0)), 1, f"{OWN_FAILS}; RK4 at 10 ms is the most accurate that does"),
+        ((None, None), None, OWN_FAILS),
+    ],
+)
+def test_verdicts(points: tuple[Point, ...], better: int | None, text: str) -> None:
+    rows = rows_with_front(*points)
+    judgement = verdict(rows, [None if row.seen is None else row.seen >= 1 for row in rows])
+    assert (judgement.better, judgement.text) == (better, text)
+    assert judgement.on_front == (better is None and points[0] is not None)
+
+
+def test_a_verdict_where_an_error_is_not_known_or_nothing_was_timed() -> None:
+    judgement = verdict(rows_with_front((1, 2.0), (0.5, 2.0)), [None, None])
+    assert judgement.noticeable is None
+    assert judgement.text == (
+        "RK4 at 10 ms is better: it takes 0.5 of the time and errs no more; whether a learner "
+        "would notice its error is not known"
+    )
+    judgement = verdict(front([row(own=True, cost=None, seen=0.5)]), [False])
+    assert judgement.text.startswith(
+        "nothing was timed, so that no setting can be called better; a "
+    )

@@ -1,0 +1,199 @@
+"""The work–precision plot: every report gives a drawing in which everything is told apart."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from coursebuild.core.drawing.marks import text_width
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.report_plots import plot_svg, work_precision
+from coursebuild.numerics.reports.scene_report import ScenarioReport
+from coursebuild.numerics.reports.shown_errors import main_quantity, quantities
+from support.bench_reports import diverged_row, row, scenario, swing
+
+PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")
+
+
+def parse_plot(report: ScenarioReport, **options: Any) -> ElementTree.Element:
+    """The plot: well-formed, everything inside of it, and no two texts over each other."""
+    svg = plot_svg(report, name="p", **options)
+    root = ElementTree.fromstring(svg)
+    _, _, width, height = (float(x) for x in root.attrib["viewBox"].split())
+    boxes = []
+    for text in root.iter("text"):
+        assert text.text
+        if "x" not in text.attrib:
+            continue
+        x, y = float(text.attrib["x"]), float(text.attrib["y"])
+        wide = text_width(text.text, float(text.attrib.get("font-size", "12"))) * 0.85
+        left = x - {"end": wide, "middle": wide / 2}.get(text.attrib.get("text-anchor", ""), 0)
+        assert left >= -1 and left + wide <= width + 1, text.text
+        assert 0 <= y <= height, text.text
+        boxes.append((left, y - 8, left + wide, y, text.text))
+    for i, a in enumerate(boxes):
+        for b in boxes[i + 1 :]:
+            apart = a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
+            assert apart, (a, b)
+    for path in root.iter("path"):
+        for x, y in PLACE.findall(path.attrib["d"].split("a")[0].split("l")[0].split("h")[0]):
+            assert -1 <= float(x) <= width + 1
+            assert -1 <= float(y) <= height + 1
+    return root
+
+
+def titles(root: ElementTree.Element) -> list[str]:
+    return [title.text or "" for path in root.iter("path") for title in path.iter("title")]
+
+
+def texts(root: ElementTree.Element) -> list[str]:
+    return [text.text or "" for text in root.iter("text")]
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+def test_every_row_is_a_mark_that_says_what_it_is(narrow: bool) -> None:
+    report = swing()
+    root = parse_plot(report, narrow=narrow)
+    tooltips = titles(root)
+    assert len(tooltips) == len(report.rows)
+    assert (
+        "RK4 at 20 ms · error 0.00307 · cost 0.39 ± 1 % · 50 steps · on the Pareto front"
+        in tooltips
+    )
+    assert (
+        "Euler at 2 ms · error 0.0048 · cost 1 ± 1 % · 500 steps · the scene’s own setting · "
+        "RK4 at 20 ms is better" in tooltips
+    )
+    (lost_title,) = [title for title in tooltips if "diverged" in title]
+    assert lost_title == "Euler at 50 ms · diverged; the state is not finite · not timed · 20 steps"
+    (cross,) = (path for path in root.iter("path") if path.findtext("title") == lost_title)
+    assert cross.attrib["fill"] == "none" and "l" in cross.attrib["d"]
+    labels = texts(root)
+    assert "the scene’s own: Euler at 2 ms" in labels
+    assert "cost, relative to the scene’s own setting" in labels
+    assert "error: position (m or rad)" in labels
+    for name in ("Euler", "implicit", "RK4"):
+        assert name in labels
+
+
+def test_what_is_not_resolved_is_a_band() -> None:
+    rows = [row("RK4", h, position=(max(h**4, 1e-10),) * 2) for h in (0.1, 0.01, 0.001)]
+    for floor, expected in ((1e-11, True), (1e-16, False)):
+        labels = texts(parse_plot(scenario(rows, floor=floor)))
+        assert ("under 10⁻¹⁰: not resolved by the reference" in labels) is expected
+
+
+def test_from_where_on_an_error_is_visible() -> None:
+    for *errors, expected in ((30.0, 0.02, True), (5.0, 2.0, True), (1e5, 1e3, False)):
+        rows = [row("RK4", 0.01 / (n + 1), seen=error) for n, error in enumerate(errors)]
+        labels = texts(parse_plot(scenario(rows)))
+        assert ("just visible" in labels) is expected
+        assert "error: what is seen (1: just visible)" in labels
+
+
+def test_the_key_says_what_there_is_and_nothing_else() -> None:
+    labels = texts(parse_plot(swing()))
+    assert labels[-5:] == [
+        *("RK4", "on the Pareto front", "another is better"),
+        *("the scene’s own: Euler at 2 ms", "run lost"),
+    ]
+    assert texts(parse_plot(scenario([row(front=True)])))[-1] == "on the Pareto front"
+
+
+def test_the_own_setting_is_ringed_also_where_it_was_lost() -> None:
+    for report in (swing(), scenario([diverged_row(own=True), row("RK4", 0.01)])):
+        root = parse_plot(report)
+        first, *_ = root.iter("circle")
+        assert first.attrib["r"] == "8.5"
+        assert [text for text in texts(root) if text.startswith("the scene’s own: Euler at ")]
+
+
+def test_a_cost_has_a_bar_as_wide_as_its_interval() -> None:
+    wide = Interval(1.0, 0.5, 2.0)
+    root = parse_plot(scenario([replace(row(), cost=wide), row("RK4", 0.01), row("RK4", 1e-4)]))
+    paths = " ".join(path.attrib["d"] for path in root.iter("path"))
+    bars = re.findall(r"M([\d.]+) [\d.]+H([\d.]+)M\S+ [\d.]+v6M", paths)
+    widths = [float(end) - float(start) for start, end in bars]
+    assert len(bars) == 3 and widths[0] > 20 * max(widths[1:])
+
+
+def test_described_for_who_cannot_see_it() -> None:
+    root = parse_plot(swing())
+    assert root.attrib["role"] == "img"
+    assert root.attrib["aria-labelledby"] == "p-title p-text"
+    title, text = root.find("title"), root.find("desc")
+    assert title is not None and text is not None
+    assert title.attrib["id"] == "p-title" and text.attrib["id"] == "p-text"
+    assert title.text == "A pendulum swings: error of position (m or rad) against cost"
+    assert text.text == (
+        "Euler: errors 0.048 to 0.0024 at costs of 0.1 to 2. "
+        "implicit: errors 0.12 to 0.0024 at costs of 0.048 to 2.4. "
+        "RK4: errors 0.12 to 1.9e-08 at costs of 0.156 to 7.8. "
+        "Runs were lost under Euler. "
+        "The scene’s own setting is Euler at 2 ms. "
+        "RK4 at 20 ms costs 0.39 times as much and is 32 times as accurate. "
+        "No error below 1.0e-11 is given."
+    )
+
+
+def test_other_solvers_are_small_marks_without_a_line() -> None:
+    rows = [row("Euler", h, solver="Newton", iterations=100) for h in (0.004, 0.002)]
+    rows.append(row("Euler", 0.002, solver="CG", iterations=100, own=False))
+    rows[1] = replace(rows[1], own=True)
+    root = parse_plot(scenario(rows))
+    assert "other solver, iterations or cone" in texts(root)
+    lines = [p for p in root.iter("path") if p.attrib.get("stroke-width") == "1.7"]
+    assert lines[0].attrib["d"].count("L") == 1
+    small = [path for path in root.iter("path") if "a2.9" in path.attrib["d"]]
+    assert ["CG" in (title.text or "") for path in small for title in path.iter("title")] == [True]
+
+
+def test_steps_stand_in_for_times_that_are_not_there() -> None:
+    rows = [row("Euler", h, cost=None) for h in (0.01, 0.001)]
+    assert "steps" in texts(parse_plot(scenario(rows)))
+    rows = [row("Euler", 0.002, cost=1.0), row("Euler", 0.001, cost=None), row("RK4", 0.01, cost=3)]
+    chart = work_precision(scenario(rows))
+    assert chart is not None
+    assert [p.x.value for line in chart.lines for p in line.points] == [1.0, 2.0, 3.0]
+
+
+def test_which_error_is_shown() -> None:
+    still = [row(position=(1e-11, 1e-11), attitude=(1e-3, 1e-3))]
+    assert main_quantity(scenario(still)).name == "attitude"
+    report = scenario([row(figure=(1.0, 1.0))], figure="energy (J)")
+    assert [quantity.name for quantity in quantities(report)] == ["figure", "position", "velocity"]
+    assert main_quantity(report).label == "energy (J)"
+    assert "error: energy (J)" in texts(parse_plot(report))
+
+
+ERRORS = st.one_of(st.just(0.0), st.floats(1e-300, 1e300))
+STATUS = st.sampled_from(("ok", "ok", "ok", "diverged", "reset", "slow-growth"))
+
+
+@given(
+    rows=st.lists(
+        st.tuples(
+            st.sampled_from(("Euler", "implicit", "implicitfast", "RK4", "discrete")),
+            st.sampled_from((0.1, 0.01, 0.002, 0.0001)),
+            ERRORS,
+            st.one_of(st.none(), st.floats(1e-12, 1e12)),
+            STATUS,
+        ),
+        max_size=12,
+    ),
+    floor=st.sampled_from((0.0, 1e-15, 1e-3)),
+    narrow=st.booleans(),
+)
+def test_any_report_is_drawn(rows: Any, floor: float, narrow: bool) -> None:
+    report_rows = [
+        row(name, h, position=(e, e), velocity=None, cost=cost, status=status, own=n == 0)
+        for n, (name, h, e, cost, status) in enumerate(rows)
+    ]
+    svg = plot_svg(scenario(report_rows, floor=floor), name="p", narrow=narrow)
+    assert svg == "" or len(titles(ElementTree.fromstring(svg))) == len(report_rows)

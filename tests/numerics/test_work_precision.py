@@ -1,0 +1,254 @@
+"""Speed against error of models: errors, orders, drifts, statuses; commands, chaos, contact."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Any
+
+import mujoco
+import pytest
+
+from coursebuild.numerics.reports.scene_report import ScenarioReport
+from coursebuild.numerics.scene import SceneError, scenes
+from coursebuild.numerics.work_precision import measure_scenario
+from support.bench_runs import FAMILY, MODELS, measure, orders, row
+from support.surveys import NO_DECLARATIONS, parse_declared
+
+pytestmark = pytest.mark.site
+
+
+@functools.cache
+def of_box() -> ScenarioReport:
+    """The first flip of the tumbling box."""
+    text = (MODELS / "tumbling_box.toml").read_text(encoding="utf-8")
+    model = mujoco.MjModel.from_xml_path(str(MODELS / "tumbling_box.xml"))
+    scene = next(s for s in scenes(model, parse_declared(text)) if s.name == "first-flip")
+    return measure_scenario(model, scene, clock=None)
+
+
+def test_a_report_on_the_tumbling_box() -> None:
+    """Its references agree, no error lies below ten floors, what it conserves is found out."""
+    report = of_box()
+    assert report.reference == "closed"
+    assert report.agreement is not None and report.agreement < 1e-10
+    for line in report.rows:
+        assert line.attitude is not None and line.velocity is not None
+        assert min(line.attitude) >= 9.999 * max(report.floor, 1e-14)
+        assert min(line.velocity) >= 9.999 * report.velocity_floor
+        assert line.energy_drift is not None and line.momentum_drift is not None
+        assert (line.status, line.penetration, line.slip, line.refsafe) == ("ok", 0.0, None, False)
+    (own_row,) = (line for line in report.rows if line.own)
+    assert (own_row.setting.integrator, own_row.setting.timestep) == ("RK4", 0.002)
+    assert (own_row.setting.solver, own_row.setting.cone) == ("", ""), "nothing is solved"
+    assert report.verdict.noticeable is False
+    assert len({line.setting for line in report.rows}) == len(report.rows) == 35
+
+
+def test_orders_of_the_tumbling_box() -> None:
+    first = dict.fromkeys(FAMILY, 1.0)
+    assert orders(of_box(), "attitude") == pytest.approx({**first, "RK4": 2.0}, abs=0.05)
+    assert orders(of_box(), "velocity") == pytest.approx({**first, "RK4": 4.0}, abs=0.1)
+    assert orders(of_box(), "position") == {}, "its centre does not move"
+
+
+def test_an_error_that_can_be_seen() -> None:
+    coarse, fine = (row(of_box(), "Euler", h) for h in (0.004, 0.0005))
+    assert coarse.attitude is not None and coarse.seen is not None and fine.seen is not None
+    assert coarse.seen == pytest.approx(coarse.attitude[0] * 180 / 3.141592653589793)
+    assert coarse.seen > 1 > fine.seen
+
+
+STIFF = """\
+<mujoco>
+  <option timestep="{step}"/>
+  <worldbody>
+    <body>
+      <joint type="slide" stiffness="{stiffness}"/>
+      <geom size="0.1" mass="1" contype="0" conaffinity="0"/>
+    </body>
+  </worldbody>
+  <keyframe><key qpos="{start}"/></keyframe>
+</mujoco>
+"""
+
+FROM_KEYFRAME = '[[scenario]]\nname = "a"\nkeyframe = 0\nreference = "self"\n'
+"""The engine is its own reference: integrating the stiff spring takes ten times as long."""
+
+
+def stiff(step: float, start: float, stiffness: float = 1e5) -> Any:
+    text = STIFF.format(step=step, start=start, stiffness=stiffness)
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def test_a_scene_that_blows_up_under_its_own_setting() -> None:
+    """Without `autoreset="disable"` such a run ends where it began, with error 0."""
+    (report,) = measure(stiff(0.008, 0.01), FROM_KEYFRAME, quick=True)
+    (own_row,) = (line for line in report.rows if line.own)
+    assert own_row.status == "diverged"
+    assert "MuJoCo warned of bad accelerations" in own_row.reasons
+    assert (own_row.position, own_row.velocity, own_row.seen) == (None, None, None)
+    assert own_row.growth is None or own_row.growth > 1
+    assert not report.verdict.on_front
+    assert report.verdict.text.startswith(
+        "the scene does not run under its own setting, Euler at 8 ms: "
+    )
+    limits = {line.integrator: line.largest for line in report.stable}
+    for name in ("Euler", "implicit", "implicitfast"):
+        # Below 2/ω it swings within bounds, but just below with any multiple of its energy.
+        assert limits[name] == pytest.approx(2 * (10 / 11) ** 0.5 / 1e5**0.5, rel=0.05)
+    assert limits["discrete"] is None
+
+
+def test_a_scene_that_diverges_at_every_timestep_is_refused() -> None:
+    with pytest.raises(SceneError, match=r"it diverges within .* s even at 0\.25 s a step"):
+        measure(stiff(1.0, 0.01), quick=True)
+
+
+def test_times_are_of_the_clock() -> None:
+    """A clock that ticks evenly: whatever is timed takes the same, and nothing is uncertain."""
+    ticks = iter(range(0, 10**15, 2_000_000))
+    model = stiff(0.01, 0.1, 10)
+    (line,) = scenes(model, NO_DECLARATIONS, quick=True)
+    report = measure_scenario(model, line, quick=True, clock=lambda: next(ticks))
+    for line in report.rows:
+        assert line.cost is not None and line.seconds is not None and line.realtime is not None
+        assert line.cost.low == line.cost.value == line.cost.high > 0
+        assert line.seconds.value * line.realtime == pytest.approx(1.0)
+    assert [line.cost.value for line in report.rows if line.own and line.cost] == [1.0]
+    assert any(line.front for line in report.rows)
+
+
+SERVO = """\
+<mujoco>
+  <option timestep="0.002"/>
+  <worldbody>
+    <body>
+      <joint name="a" axis="0 1 0" damping="0.2"/>
+      <geom type="capsule" size="0.02" fromto="0 0 0 0.4 0 0"/>
+      <site name="tip" pos="0.4 0 0"/>
+    </body>
+  </worldbody>
+  <actuator><position joint="a" kp="20"/></actuator>
+</mujoco>
+"""
+SERVO_TOML = """\
+[[scenario]]
+name = "reach"
+controls = [[0.5], [-1]]
+hold = 0.3
+sample = 0.05
+measure = "site:tip"
+"""
+
+
+def test_commands_are_held_so_that_runge_kutta_keeps_its_order() -> None:
+    (report,) = measure(mujoco.MjModel.from_xml_string(SERVO), SERVO_TOML)
+    assert (report.reference, report.hold) == ("ode", 0.3)
+    assert orders(report, "position")["RK4"] == pytest.approx(4.0, abs=0.15)
+    assert report.figure == "place of the site tip [m]"
+    fine = row(report, "RK4", 0.001)
+    assert fine.figure is not None and fine.position is not None
+    assert 0.1 * fine.position[0] < fine.figure[0] < fine.position[0]
+
+
+DOUBLE_PENDULUM = """\
+<mujoco>
+  <option timestep="0.005" integrator="RK4"><flag contact="disable"/></option>
+  <worldbody>
+    <body>
+      <joint axis="0 1 0"/>
+      <geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.3"/>
+      <body pos="0 0 -0.3">
+        <joint axis="0 1 0"/>
+        <geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.3"/>
+      </body>
+    </body>
+  </worldbody>
+  <keyframe><key qpos="2.5 0.5"/></keyframe>
+</mujoco>
+"""
+
+
+def test_chaos_has_a_horizon_and_then_statistics() -> None:
+    (report,) = measure(
+        mujoco.MjModel.from_xml_string(DOUBLE_PENDULUM),
+        '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 9\nsample = 0.04\n',
+        quick=True,
+    )
+    assert report.lyapunov is not None and report.horizons is not None
+    assert report.reference == "ode", "beyond the horizon nothing is compared with the engine"
+    first, last = report.horizons
+    assert report.horizon == first < last <= 9, "eight nudges part at different times"
+    growth = math.log(0.1 / 1e-10)  # from the nudge to where nothing is in common
+    assert first / 1.5 < growth / report.lyapunov < 1.5 * last
+    assert any("errors count until" in note for note in report.notes)
+    own_row = next(line for line in report.rows if line.own)
+    assert own_row.mean_energy is not None
+    assert own_row.energy_drift is not None
+
+
+BLOCK = """\
+<mujoco>
+  <option timestep="0.002" gravity="2 0 -9.6"/>
+  <worldbody>
+    <geom type="plane" size="5 5 1"/>
+    <body pos="0 0 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_a_block_that_sticks_creeps_alike_in_each_measurement() -> None:
+    model = mujoco.MjModel.from_xml_string(BLOCK)
+    before = (model.opt.timestep, model.opt.integrator, model.opt.cone, model.opt.disableflags)
+    short = '[[scenario]]\nname = "a"\nduration = 0.48\nsample = 0.016\n'
+    (report,), repeated = (measure(model, short, quick=True) for _ in range(2))
+    opt = model.opt
+    assert (opt.timestep, opt.integrator, opt.cone, opt.disableflags) == before
+    assert repeated == (report,)
+    assert (report.reference, report.smooth, report.orders) == ("self", False, ())
+    assert report.notes == (
+        "errors follow no power of the timestep, because of contact",
+        "beyond 0.01 s refsafe softens constraints: stable, but another model",
+    )
+    settings = [line.setting for line in report.rows]
+    assert {line.cone for line in settings} == {"pyramidal", "elliptic"}
+    assert {line.solver for line in settings} == {"PGS", "CG", "Newton"}
+    assert len({line.iterations for line in settings}) == 3
+    creep = {line.setting.cone: line.slip for line in report.rows}
+    assert creep["pyramidal"] and creep["elliptic"]
+    assert 1e-4 < creep["elliptic"] < creep["pyramidal"] < 1e-3
+    errors = {line.setting.cone: line.model_error for line in report.rows}
+    assert errors["elliptic"] is None
+    assert all(e is None or e >= 10 * report.floor > 0 for e in errors.values())
+    assert errors["pyramidal"] == pytest.approx(creep["pyramidal"] - creep["elliptic"], rel=0.2)
+    assert {line.energy_drift for line in report.rows} == {None}
+
+
+def test_the_error_of_a_pyramid_is_among_what_is_seen() -> None:
+    mjcf = """\
+    <mujoco>
+      <option timestep="0.004" gravity="3 3 -9"/>
+      <worldbody>
+        <geom type="plane" size="50 50 1" friction="0.3"/>
+        <body pos="0 0 0.1">
+          <freejoint/><geom type="box" size="0.2 0.2 0.1" mass="1" friction="0.3"/>
+        </body>
+      </worldbody>
+    </mujoco>
+    """
+    (report,) = measure(mujoco.MjModel.from_xml_string(mjcf), quick=True)
+    own_row = next(line for line in report.rows if line.own)
+    slope, time = 3 * 2**0.5, 2.0
+    exact = (slope - 0.3 * 9 / 2**0.5 - (slope - 0.3 * 9)) * time**2 / 2  # half is enough
+    assert own_row.model_error == pytest.approx(exact, rel=0.02)
+    assert own_row.seen is not None and own_row.seen > 10
+    (round_one,) = (
+        line
+        for line in report.rows
+        if (line.setting.integrator, line.setting.timestep, line.setting.cone)
+        == ("Euler", 0.004, "elliptic")
+    )
+    assert round_one.seen is not None and round_one.seen < own_row.seen / 5
+    assert report.verdict.noticeable is True
