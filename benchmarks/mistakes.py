@@ -19,6 +19,7 @@ changed. A change ends in one of these ways:
 from __future__ import annotations
 
 import argparse
+import multiprocessing
 import random
 import re
 import shutil
@@ -278,7 +279,9 @@ def run(
         (kind, seed, number) for number in range(share_of_kind) for seed in seeds for kind in kinds
     ]
     with tempfile.TemporaryDirectory(prefix="mistakes-", ignore_cleanup_errors=True) as top:
-        pool = ProcessPoolExecutor(jobs, initializer=_prepare, initargs=(course, Path(top)))
+        # Not forked: V8 may run in this process already.
+        context = multiprocessing.get_context("spawn")
+        pool = ProcessPoolExecutor(jobs, context, _prepare, (course, Path(top)))
         try:
             for outcome in pool.map(_check, *zip(*tasks, strict=True), chunksize=1):
                 if outcome is not None:

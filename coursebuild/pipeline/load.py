@@ -329,8 +329,8 @@ class _Loader:
                 if closest is not None:
                     help = f"is it `{closest}`, which the map does not name?"
                     del unlisted[closest]
-                elif other := next(self.root.glob(f"{lesson.path.removesuffix('.md')}.*"), None):
-                    help = f"is it `{other.name}`? the file of a lesson ends with `.md`"
+                elif misnamed := next(self.root.glob(f"{lesson.path.removesuffix('.md')}.*"), None):
+                    help = f"is it `{misnamed.name}`? the file of a lesson ends with `.md`"
                 message = f"there is no file {lesson.path}"
                 self._report("lesson-missing", lesson.span, message, help)
         for source in unlisted.values():

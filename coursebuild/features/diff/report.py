@@ -219,8 +219,8 @@ def _describe_lab_change(before: LabState, now: LabState) -> str:
         values = [json.dumps(lab.data.get(name), ensure_ascii=False) for lab in (before, now)]
         if values[0] != values[1]:
             is_short = max(map(len, values)) <= _SHORT
-            shown = f" {' → '.join(map(code_span, values))}" if is_short else ""
-            parts.append(code_span(name) + shown)
+            values_text = f" {' → '.join(map(code_span, values))}" if is_short else ""
+            parts.append(code_span(name) + values_text)
     if before.text != now.text and not parts:
         parts.append("its text")
     models = _changes(before.models, now.models)

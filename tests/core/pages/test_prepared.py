@@ -12,7 +12,7 @@ from typing import Any
 import brotli
 import pytest
 
-from coursebuild.core.files.resources import FOLDER, assets_dir, prepared_file, template_texts
+from coursebuild.core.files.resources import PREPARED, assets_dir, prepared_file, template_texts
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.assets import SCRIPTS, Assets, page_script
 from coursebuild.core.pages.compressed import compressed_files
@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[3]
 
 def test_nothing_else_is_there() -> None:
     """If not, run `python site/bundle.py`."""
-    folder = assets_dir() / FOLDER
+    folder = assets_dir() / PREPARED
     files = {*json.loads((folder / "fonts.json").read_bytes()).values()}
     files |= {*json.loads((folder / "copies.json").read_bytes()).values()}
     files |= {"fonts.json", "fonts.txt", "copies.json", compiled_name(template_texts())}
@@ -44,7 +44,7 @@ def test_the_fonts_that_most_courses_need_are_cut(assets: Assets) -> None:
 def test_copies_are_up_to_date() -> None:
     """If not, run `python site/bundle.py`."""
     copies = runpy.run_path(str(ROOT / "site" / "prepare_copies.py"))["compress"](assets_dir())
-    folder = assets_dir() / FOLDER
+    folder = assets_dir() / PREPARED
     assert copies == {name: (folder / name).read_bytes() for name in copies}
 
 
@@ -75,5 +75,5 @@ def test_templates_are_up_to_date(tmp_path: Path) -> None:
     compile_templates(texts, tmp_path)
     name = compiled_name(texts)
     modules = {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()}
-    bundled = (assets_dir() / FOLDER / name).glob("*.py")
+    bundled = (assets_dir() / PREPARED / name).glob("*.py")
     assert {path.name: path.read_bytes() for path in bundled} == modules
