@@ -249,7 +249,7 @@ def test_import_killed_at_any_call_is_completed_by_the_same_command(
     lesson, states = "new/content/lessons/1.1-one.md", set()
     for place, left in trials.deaths():
         assert left["new/mine.txt"] == b"Mine.", place
-        had_printed = b"Output:" in left.get(lesson, b"")
+        had_printed = b"```output" in left.get(lesson, b"")
         states.add((lesson in left, had_printed))
         assert trials.run() == 0, (place, mortals.output)
         assert remarks(mortals) == report, place

@@ -42,7 +42,7 @@ def test_a_map_or_model_that_is_too_long_is_told_and_not_read(make: Make) -> Non
     folder.write(MAP, folder.text(MAP) + "# and more\n" * 100_000)
     result = folder.main("check")
     assert result.status == 1
-    assert "course.toml has 1_100_" in result.out and "and may have 1_000_000" in result.out
+    assert "course.toml has 1_100_" in result.out and "the limit is 1_000_000" in result.out
     assert "make more courses of it" in result.out
 
 

@@ -331,7 +331,7 @@ def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> No
         assert b"Scratch" in preview.get("/a/b/")[2]
     for bad_origin in ("example.org", "https://a;script-src *", "*"):
         result = folder.main("serve", "--embed", bad_origin)
-        assert (result.status, "is no origin" in result.err) == (2, True)
+        assert (result.status, "is not an origin" in result.err) == (2, True)
 
 
 def test_other_machines_need_the_token_of_the_link(make: Make) -> None:

@@ -14,7 +14,11 @@ from msgspec import NODEFAULT, Struct
 from msgspec.structs import fields, replace
 
 from coursebuild.core.model import Document
+from coursebuild.core.model.results import Reports
 from coursebuild.core.text.source import Excerpt, Source, Span
+from coursebuild.numerics.reports.case_report import CaseReport
+from coursebuild.numerics.reports.diet_report import DietReport
+from coursebuild.numerics.reports.scene_report import SceneReport
 
 SOURCE = Source("a/place.md", "A text.\n")
 OPAQUE = (Document, Excerpt, Source, Span)
@@ -58,6 +62,9 @@ def _hints(kind: type[Struct]) -> dict[str, Any]:
     """The types of the fields of a struct, also of those that its module imports for types only."""
     names = {struct.__name__: struct for struct in _subclasses(Struct)}
     hints = get_type_hints(kind, localns=names)
+    if kind is Reports:  # the core does not say what reports are
+        hints |= {"scenes": Mapping[str, SceneReport], "diets": Mapping[str, DietReport]}
+        hints["cases"] = tuple[CaseReport, ...]
     return {name: hints[name] for name in kind.__struct_fields__}
 
 

@@ -79,8 +79,8 @@ def test_new_lesson_is_checked_and_built_as_it_is(make: Make) -> None:
 
 REFUSED_COMMANDS = [
     ("lesson 1.1 T", "there is a lesson 1.1 already: Lesson one"),
-    ("lesson 7.1 T", "the map has no level for `7.1`; known: `1`"),
-    ("lesson ../x T", "the map has no level for `../x`; known: `1`"),
+    ("lesson 7.1 T", "the map has no level for `7.1`; add it as a [[level]]; known: `1`"),
+    ("lesson ../x T", "the map has no level for `../x`; add it as a [[level]]; known: `1`"),
     ("lesson 1 T", f"{MAP} cannot have a lesson 1: "),
     ("lesson 1./../x T", f"{MAP} cannot have a lesson 1./../x: "),
     ("lesson 1.3 T --slug A/b", f"{MAP} cannot have a lesson 1.3: "),
