@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from msgspec import Struct
 
 from coursebuild.core.features import Feature, Mathml
-from coursebuild.core.model import Course, Document, block_formulas, document_blocks
+from coursebuild.core.model import Course, Document, find_formulas
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
@@ -38,7 +38,7 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
     symbols: list[tuple[str, str]] = []
     identities: list[Excerpt] = []
     diagnostics: list[Diagnostic] = []
-    for formula in (f for block in document_blocks(document) for f in block_formulas(block)):
+    for _, formula in find_formulas(document):
         tex = formula.tex
         for comparison in check_arithmetic(tex.text):
             span, message = tex.span(comparison.start, comparison.end), comparison.message
