@@ -17,6 +17,7 @@ import re
 from collections.abc import Iterator
 from decimal import Decimal
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any, Literal
 
 from msgspec import Struct
@@ -64,30 +65,27 @@ def check_arithmetic(tex: str) -> tuple[FormulaComparison, ...]:
 
 
 def _check_chain(statement: Statement) -> Iterator[FormulaComparison]:
-    sides = _without_common_unit(statement.sides)
-    for left, right, relation in zip(sides, sides[1:], statement.relations, strict=False):
+    pairs = [*zip(pairwise(statement.sides), statement.relations, strict=False)]
+    if not any(left.is_numeric and right.is_numeric for (left, right), _ in pairs):
+        return
+    strip = _strip_unit if _has_common_unit(statement.sides) else lambda expression: expression
+    for (left, right), relation in pairs:
         if not (left.is_numeric and right.is_numeric):
             continue
         try:
-            mistake = _find_mistake(left.get_expression(), right.get_expression(), relation)
+            terms = strip(left.get_expression()), strip(right.get_expression())
+            mistake = _find_mistake(*terms, relation)
         except NotUnderstood as error:
             mistake = FormulaComparison(error.kind, error.start, error.end, error.reason)
         yield mistake or FormulaComparison("holds", left.start, right.end)
 
 
-def _without_common_unit(sides: tuple[FormulaSide, ...]) -> tuple[FormulaSide, ...]:
-    """Remove the unit at the end of sides, if it is the only unit in all of them."""
+def _has_common_unit(sides: tuple[FormulaSide, ...]) -> bool:
+    """Whether sides end in the same unit, and there is no other in all of them."""
     expressions = [s.expression for s in sides if isinstance(s.expression, Expression)]
     parts = (part for expression in expressions for part in expression.walk())
     units = {part.text for part in parts if part.kind == "unit"}
-    if len(units) != 1 or any(e.has("unit") for e in map(_strip_unit, expressions)):
-        return sides
-    return tuple(
-        replace(s, expression=_strip_unit(s.expression))
-        if isinstance(s.expression, Expression)
-        else s
-        for s in sides
-    )
+    return len(units) == 1 and not any(_strip_unit(e).has("unit") for e in expressions)
 
 
 def _strip_unit(expression: Expression) -> Expression:
