@@ -87,19 +87,22 @@ _digest = ""
 _imports: frozenset[str] = frozenset()
 
 
+@functools.cache
 def features() -> tuple[Feature, ...]:
     """All features that the course can use, in the order of their names."""
     return _register((*installed_features(), *_of_course))
 
 
-def use_course_features(features: Iterable[Feature], digest: str, imports: frozenset[str]) -> None:
+def use_course_features(
+    course_features: Iterable[Feature], digest: str, imports: frozenset[str]
+) -> None:
     """Set the course's own features, a hash of their code, and the modules that it imports."""
     global _of_course, _digest, _imports
     for name in _names(_of_course, "rules"):
         RULES.pop(name, None)
-    _of_course, _digest = _register(map(_name_failures, features)), digest
+    _of_course, _digest = _register(map(_name_failures, course_features)), digest
     _imports = imports
-    for table in (_by_fence, _by_block, page_kinds):
+    for table in (features, _by_fence, _by_block, page_kinds):
         table.cache_clear()
 
 

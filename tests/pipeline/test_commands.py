@@ -111,7 +111,10 @@ WRONG_USAGE = [
         "check --timings x",
         "coursebuild: --timings says how `--shard` divides the work: it needs `--shard`\n",
     ),
-    ("check --cache-size much", "coursebuild: --cache-size: 'much' is no size: a whole number, "),
+    (
+        "check --cache-size much",
+        "coursebuild: --cache-size: 'much' is not a size: a whole number, ",
+    ),
     ("check --cache-size -1", "--cache-size"),
     ("check --cache gopher://x/y", "gopher"),
     ("check --cache=", "coursebuild: --cache names no place\n"),

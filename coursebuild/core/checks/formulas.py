@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 
-from coursebuild.core.model import Course, Document, block_formulas, document_blocks
+from coursebuild.core.model import Course, Document, find_formulas
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt
@@ -38,10 +38,9 @@ _INTERVAL = re.compile(r"[()\[\]][^()\[\]]*[,;][^()\[\]]*[()\[\]]|\\(?:left|righ
 
 def _formula_uses(document: Document) -> Iterator[tuple[Formula, Excerpt]]:
     """Every formula with its TeX in the text; empty ones were reported by the parser."""
-    for block in document_blocks(document):
-        for formula in block_formulas(block):
-            if formula.tex.text.strip():
-                yield Formula(formula.tex.text, formula.display), formula.tex
+    for _, formula in find_formulas(document):
+        if formula.tex.text.strip():
+            yield Formula(formula.tex.text, formula.display), formula.tex
 
 
 def course_formulas(course: Course) -> tuple[Formula, ...]:

@@ -15,10 +15,10 @@ from typing import NamedTuple
 from coursebuild.core.model.blocks import Document, FeatureBlock, Heading
 from coursebuild.core.model.inlines import Label
 from coursebuild.core.model.walk import (
-    block_formulas,
     child_blocks,
-    document_blocks,
+    computed_once,
     find_blocks,
+    find_formulas,
     walk_blocks,
 )
 from coursebuild.core.text.source import key_of
@@ -46,13 +46,16 @@ def feature_block_ids(document: Document) -> frozenset[int]:
 
 def display_formulas(document: Document) -> tuple[DisplayFormula, ...]:
     """The formulas of a document in the order of the text, footnotes last."""
+    return computed_once(document, "display_formulas", lambda: _find_display_formulas(document))
+
+
+def _find_display_formulas(document: Document) -> tuple[DisplayFormula, ...]:
     if "$$" not in document.source.text:
         return ()
     in_features = feature_block_ids(document)
     candidates = [
         (formula, isinstance(block, Heading) or id(block) in in_features)
-        for block in document_blocks(document)
-        for formula in block_formulas(block)
+        for block, formula in find_formulas(document)
         if formula.display
     ]
     used_ids = {formula.label.id for formula, _ in candidates if formula.label is not None}

@@ -1,8 +1,8 @@
 """Walking a document: every block and every inline in order.
 
-Entry points: `document_blocks`, `document_inlines`, and `find_blocks`, `find_inlines` for those of
-one type; `document_scripts`, `output_numbers`, `sibling_groups`; `walk_blocks`, `walk_inlines` and
-`block_formulas`; `is_blank`, `is_comment`.
+Entry points: `document_blocks`, `document_inlines`; `find_blocks`, `find_inlines` for those of one
+type; `find_formulas`; `document_scripts`, `output_numbers`, `sibling_groups`; `walk_blocks`,
+`walk_inlines` and `block_formulas`; `is_blank`, `is_comment`.
 """
 
 from __future__ import annotations
@@ -194,6 +194,16 @@ def block_formulas(block: Block) -> Iterator[Math | MathBlock]:
     for inline in walk_inlines(block_inlines(block)):
         if isinstance(inline, Math):
             yield inline
+
+
+def find_formulas(document: Document) -> tuple[tuple[Block, Math | MathBlock], ...]:
+    """The formulas of a document, each after the block that it is in."""
+
+    def walk() -> tuple[tuple[Block, Math | MathBlock], ...]:
+        blocks = document_blocks(document)
+        return tuple((block, formula) for block in blocks for formula in block_formulas(block))
+
+    return computed_once(document, "formulas", walk)
 
 
 def document_inlines(document: Document) -> Iterator[Inline]:

@@ -21,6 +21,7 @@ from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.model.theme import Theme, ThemeFile
 from coursebuild.core.pages import fonts, styles
 from coursebuild.core.pages.assets import SCRIPTS, Assets, hashed_name, page_script
+from coursebuild.core.pages.formulas import FORMULA
 from coursebuild.core.pages.frame import LOGO_HEIGHT, Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.theme import picture_size, theme_faces, theme_style
@@ -38,21 +39,23 @@ class PageFacts(Struct, frozen=True):
     """Styles taken out of its elements."""
 
 
-_FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
-_TAG = re.compile(r"<[^>]*+>")
+_TEXT = re.compile(">([^<]+)")
+_FOREIGN = re.compile(r"[^\x00-\x7f]")
 
 
 def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:
     """The characters outside ASCII of a page's text and of its formulas; see `PageFacts`."""
-    parts = _FORMULA.split(html)
+    parts = FORMULA.split(html)
     text, mathematics = _characters(parts[::2]), _characters(parts[1::2])
     return text, mathematics | {" "} if len(parts) > 1 else mathematics
 
 
 def _characters(parts: Iterable[str]) -> frozenset[str]:
     """The characters outside ASCII of the text of pieces of HTML."""
-    text = unescape(_TAG.sub("\n", "\n".join(parts)))
-    return frozenset(character for character in set(text) if not character.isascii())
+    html = ">" + "\n".join(parts)
+    texts = _TEXT.findall(html)
+    texts.append(html.rpartition(">")[2])  # with a tag that nothing ends
+    return frozenset(_FOREIGN.findall(unescape("\n".join(texts))))
 
 
 def common_characters(library: Library) -> frozenset[str]:

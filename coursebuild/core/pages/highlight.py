@@ -120,4 +120,4 @@ def _element(css: str, html: str) -> str:
     """Put each line into an element, without the white space around it."""
     if not css:
         return html
-    return _WITHOUT_OUTER_SPACE.sub(rf'<span class="{css}">\g<0></span>', html)
+    return _WITHOUT_OUTER_SPACE.sub(lambda line: f'<span class="{css}">{line[0]}</span>', html)

@@ -150,6 +150,8 @@ def _base(base_url: str) -> tuple[str, str]:
 
 def _target(path: str, url: str, base_url: str) -> Reference | None:
     """The target of an address; `None` for another site."""
+    if url.startswith("#") and url.isprintable():  # as most
+        return path, unquote(url.strip()[1:])
     folder, site_host = _base(base_url)
     try:
         parts = urlsplit(urljoin(_ORIGIN + folder + urls.encode(path), url.strip()))

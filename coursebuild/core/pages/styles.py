@@ -15,6 +15,8 @@ import re
 from collections.abc import Iterable
 from html import escape, unescape
 
+from coursebuild.core.pages.formulas import FORMULA
+
 _INSIDE = r"""(?:[^"'>]++|"[^"]*+(?:"|\Z)|'[^']*+(?:'|\Z))*+"""
 _PIECE = re.compile(
     r"<!--.*?(?:-->|\Z)"
@@ -29,7 +31,10 @@ _ATTRIBUTE = re.compile(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>
 
 
 def hoist_styles(html: str) -> tuple[str, frozenset[str]]:
-    """Replace `style` attributes by classes; return the page and the declarations."""
+    """Replace `style` attributes by classes; return the page and the declarations.
+
+    Most pages have some in their formulas only, and then nothing else is looked at.
+    """
     declarations: set[str] = set()
 
     def replace(piece: re.Match[str]) -> str:
@@ -40,7 +45,11 @@ def hoist_styles(html: str) -> tuple[str, frozenset[str]]:
             declarations.add(declaration)
         return tag
 
-    return _PIECE.sub(replace, html), frozenset(declarations)
+    parts = FORMULA.split(html)
+    if "style" in "".join(parts[::2]).lower():
+        return _PIECE.sub(replace, html), frozenset(declarations)
+    parts[1::2] = (_PIECE.sub(replace, f) if "style" in f.lower() else f for f in parts[1::2])
+    return "".join(parts), frozenset(declarations)
 
 
 @functools.lru_cache(maxsize=4096)

@@ -237,7 +237,7 @@ _SHOWS = re.compile(
 
 def _find_windows(code: Excerpt) -> Iterator[Diagnostic]:
     """Report the first picture that a script without figures shows and does not save."""
-    if "show" not in code.text and "display" not in code.text:
+    if not re.search("matplotlib|plotly|mediapy|IPython", code.text):
         return
     try:
         tree = ast.parse(code.text)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from msgspec import Struct
 
 from coursebuild.core.features import Feature, Mathml
-from coursebuild.core.model import Course, Document, block_formulas, document_blocks
+from coursebuild.core.model import Course, Document, find_formulas
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
@@ -36,7 +36,7 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
     identities: list[Excerpt] = []
     symbols, comparisons = read_symbols(document), check_formulas(document)
     diagnostics = list(symbols.diagnostics)
-    for formula in (f for block in document_blocks(document) for f in block_formulas(block)):
+    for _, formula in find_formulas(document):
         tex = formula.tex
         is_identity = formula.label is not None and formula.label.check is not None
         if is_identity:

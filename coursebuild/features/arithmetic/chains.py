@@ -75,13 +75,16 @@ def _check_formula(
 def _check_chain(
     statement: Statement, symbols: Mapping[str, SymbolQuantity], unit: str
 ) -> Iterator[FormulaComparison]:
-    bare = _without_common_unit(statement.sides)
+    has_common_unit: bool | None = None
     for i, relation in enumerate(statement.relations):
         left, right = statement.sides[i : i + 2]
         try:
             if left.is_numeric and right.is_numeric:
-                sides = bare[i].get_expression(), bare[i + 1].get_expression()
-                mistake = _find_mistake(*sides, relation)
+                if has_common_unit is None:
+                    has_common_unit = _has_common_unit(statement.sides)
+                terms = left.get_expression(), right.get_expression()
+                terms = (_strip_unit(terms[0]), _strip_unit(terms[1])) if has_common_unit else terms
+                mistake = _find_mistake(*terms, relation)
             elif symbols and relation != "?":
                 follows = unit if right is statement.sides[-1] else ""
                 mistake = SymbolComparison(statement, i, symbols, follows).find_mistake()
@@ -94,19 +97,12 @@ def _check_chain(
         yield mistake or FormulaComparison("holds", left.start, right.end)
 
 
-def _without_common_unit(sides: tuple[FormulaSide, ...]) -> tuple[FormulaSide, ...]:
-    """Remove the unit at the end of sides, if it is the only unit in all of them."""
+def _has_common_unit(sides: tuple[FormulaSide, ...]) -> bool:
+    """Whether sides end in the same unit, and there is no other in all of them."""
     expressions = [s.expression for s in sides if isinstance(s.expression, Expression)]
     parts = (part for expression in expressions for part in expression.walk())
     units = {part.text for part in parts if part.kind == "unit"}
-    if len(units) != 1 or any(e.has("unit") for e in map(_strip_unit, expressions)):
-        return sides
-    return tuple(
-        replace(s, expression=_strip_unit(s.expression))
-        if isinstance(s.expression, Expression)
-        else s
-        for s in sides
-    )
+    return len(units) == 1 and not any(_strip_unit(e).has("unit") for e in expressions)
 
 
 def _strip_unit(expression: Expression) -> Expression:

@@ -7,9 +7,9 @@ that is not understood holds the reason, and the other sides are read all the sa
 
 from __future__ import annotations
 
-import functools
 import re
 from collections.abc import Iterator
+from functools import cached_property, lru_cache
 
 from msgspec import Struct
 
@@ -24,6 +24,11 @@ _WORDS = re.compile(
     rf"|\\(?!(?:{'|'.join(GREEK - {'pi', 'infty'})})(?![A-Za-z]))[A-Za-z]+"
 )
 """Commands and words whose letters are no symbols."""
+_MAY_BE_NUMERIC = re.compile(r"[0-9e]|\\pi")
+"""A digit, or a part of one of `CONSTANTS`."""
+_SYMBOL = re.compile(r"(?<![\\A-Za-z])e*[A-DF-Za-df-z]")
+"""A letter that is a symbol, unless it stands in a word."""
+_MAY_HOLD_WORDS = re.compile(r"\\(?:math|text|operatorname|begin|underbrace|overbrace)")
 _RELATIONS = {
     **{sign: sign for sign in "=<>"},
     **dict.fromkeys((r"\approx", r"\simeq", "≈"), "≈"),
@@ -41,15 +46,36 @@ _OPENING = frozenset(("{", "(", "[", r"\{", r"\begin", r"\langle"))
 _CLOSING = frozenset(("}", ")", "]", r"\}", r"\end", r"\rangle"))
 
 
-class FormulaSide(Struct, frozen=True):
-    """One side of a relation, and its range in the TeX."""
+class FormulaSide(Struct, frozen=True, dict=True):
+    """One side of a relation. It is parsed when it is asked about, as most are not."""
 
+    tex: str
+    """The TeX of the whole formula."""
     start: int
     end: int
-    expression: Expression | NotUnderstood
 
-    is_numeric: bool
-    """Whether it has numbers and no symbols; a guess if it is not understood."""
+    @cached_property
+    def expression(self) -> Expression | NotUnderstood:
+        """What it says, or why it is not understood."""
+        try:
+            return read_expression(self.tex, self.start, self.end)
+        except NotUnderstood as reason:
+            return reason
+
+    @cached_property
+    def is_numeric(self) -> bool:
+        """Whether it has numbers and no symbols; a guess if it is not understood."""
+        text = self.tex[self.start : self.end]
+        if not _MAY_BE_NUMERIC.search(text):
+            return False
+        if _SYMBOL.search(text) and not _MAY_HOLD_WORDS.search(text):
+            return False
+        if isinstance(self.expression, NotUnderstood):
+            rest = _WORDS.sub("", text)
+            return re.search("[0-9]", rest) is not None and re.search("[A-Za-z]", rest) is None
+        parts = self.expression.walk()
+        has_symbol = any(part.kind == "symbol" and part.text not in CONSTANTS for part in parts)
+        return not has_symbol and not self.expression.has("derivative", "integral")
 
     def get_expression(self) -> Expression:
         """Return the expression.
@@ -69,7 +95,7 @@ class Statement(Struct, frozen=True):
     relations: tuple[str, ...]
 
 
-@functools.lru_cache(maxsize=256)
+@lru_cache(maxsize=256)
 def read_statements(tex: str) -> tuple[Statement, ...]:
     """Return the statements of a formula; none if it is too long."""
     return tuple(_read_statements(tex)) if len(tex) <= _MAX_LENGTH else ()
@@ -81,7 +107,7 @@ def _read_statements(tex: str) -> Iterator[Statement]:
     relations: list[str] = []
     for start, end, sign in _split_sides(tex):
         if SPACE.sub("", tex[start:end]).strip("."):
-            sides.append(_read_side(tex, start, end))
+            sides.append(FormulaSide(tex, start, end))
         if sign:
             relations.append(_RELATIONS[sign])
             continue
@@ -109,16 +135,3 @@ def _split_sides(tex: str) -> Iterator[tuple[int, int, str]]:
             yield start, token.start(), sign if sign in _RELATIONS else ""
             start = token.end()
     yield start, len(tex), ""
-
-
-def _read_side(tex: str, start: int, end: int) -> FormulaSide:
-    try:
-        expression = read_expression(tex, start, end)
-    except NotUnderstood as reason:
-        rest = _WORDS.sub("", tex[start:end])
-        is_numeric = re.search("[0-9]", rest) is not None and re.search("[A-Za-z]", rest) is None
-        return FormulaSide(start, end, reason, is_numeric)
-    symbols = (part.text for part in expression.walk() if part.kind == "symbol")
-    has_calculus = expression.has("derivative", "integral")
-    is_numeric = all(name in CONSTANTS for name in symbols) and not has_calculus
-    return FormulaSide(start, end, expression, is_numeric)

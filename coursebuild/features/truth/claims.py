@@ -282,6 +282,8 @@ def _is_address(link: model.Link) -> bool:
 
 
 def _is_claim(side: FormulaSide, tex: str) -> bool:
+    if not side.is_numeric and "." not in tex[side.start : side.end]:
+        return False
     if not isinstance(side.expression, Expression):
         return side.is_numeric or _DECIMAL.search(tex, side.start, side.end) is not None
     parts = tuple(side.expression.walk())
