@@ -18,10 +18,10 @@ from coursebuild.core.registry import feature_trials, unproven
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.numerics.reports import Reports
-from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.judge import depends_on, judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
+from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verification, verify
 from coursebuild.report import Report
@@ -48,8 +48,8 @@ def check(
     are moved a little. `truth`: list what nothing in the course proves.
     """
     with project_lock(options.root, options.progress.say):
-        with Documents(options) as documents:
-            checked_course = read_and_verify(options, documents, names, shard=shard)
+        with Reader(options) as reader:
+            checked_course = read_and_verify(options, reader, names, shard=shard)
         if isinstance(checked_course, Report):
             return checked_course
         course, verification = checked_course.course, checked_course.verification
@@ -111,7 +111,7 @@ class CheckedCourse(Struct, frozen=True):
 
 def read_and_verify(
     options: Options,
-    documents: Documents,
+    reader: Reader,
     names: tuple[str, ...] = (),
     *,
     static: bool = False,
@@ -123,9 +123,7 @@ def read_and_verify(
     `static`: with the static forms of labs, for pages.
     """
     began = time.monotonic()
-    parsed_course = load(
-        options.root, documents, code="run" if options.sandbox is None else "refuse"
-    )
+    parsed_course = load(options.root, reader, code="run" if options.sandbox is None else "refuse")
     course = parsed_course.value
     if course is None:
         return judge(None, parsed_course.diagnostics, began, strict=options.strict)

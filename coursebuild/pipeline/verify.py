@@ -8,7 +8,7 @@ Entry point: `verify(course, options, documents)`.
    has none.
 4. Features' trials, such as those of labs, are run while the scripts run.
 
-Documents may be summaries. Formulas are not checked here: see `pipeline.documents`.
+Documents may be summaries. Formulas are not checked here: see `pipeline.reader`.
 """
 
 from __future__ import annotations

@@ -39,10 +39,10 @@ from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.scripts.source_parts import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.numerics.reports import Reports
-from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import MAP, Code, load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.theme import template_diagnostic
 from coursebuild.pipeline.verify import Verification
@@ -92,9 +92,9 @@ class Session:
         self.all_due = True
         """Whether any script may print something new, since other files have changed."""
         quiet_options = replace(options, jobs=1, progress=Progress(quiet=True))
-        self._documents = Documents(quiet_options)
+        self._reader = Reader(quiet_options)
         self._reading_lock = threading.Lock()
-        """Held while documents are read: `Documents` has one text of each."""
+        """Held while documents are read: a `Reader` has one text of each."""
         self._assets = Assets(template_texts(), Bundle(), prepared_folder())
         self._diagnostics_by_file: dict[str, tuple[Diagnostic, ...]] = {}
         """The diagnostics of reading and checking, by file."""
@@ -108,7 +108,7 @@ class Session:
         self._second_outputs: dict[str, tuple[ScriptKey, str, str]] = {}
         """Of scripts that ran twice, by path: their key, the first output and the second."""
         self._trials = PublishedTrials()
-        self.files = Files(options, self._assets, self._documents, self._is_sound)
+        self.files = Files(options, self._assets, self._reader, self._is_sound)
         self._site = site
 
     def run_code(self) -> None:
@@ -119,8 +119,8 @@ class Session:
 
     def start(self) -> None:
         """Read the course on all cores, while this process has no threads and can be copied."""
-        with Documents(self.options) as documents:
-            self.read(documents)
+        with Reader(self.options) as reader:
+            self.read(reader)
         sys.setswitchinterval(_SWITCH)
         gc.freeze()  # what was read lives as long as the process: do not look through it again
         gc.set_threshold(_GARBAGE, 50, 50)
@@ -128,7 +128,7 @@ class Session:
     def close(self) -> None:
         """End what typesets formulas: with it running, the process may hang at its end."""
         with self.condition:
-            self._documents.close()
+            self._reader.close()
 
     # --- the state
 
@@ -237,7 +237,7 @@ class Session:
             (source,) = sources
             if source != owner.document.source or self._diagnostics_by_file.get(path):
                 callouts, lesson = self.library.course.callout_names, isinstance(owner, Lesson)
-                (parsed_document,) = self._documents.read_documents([(source, lesson)], callouts)
+                (parsed_document,) = self._reader.read_documents([(source, lesson)], callouts)
                 diagnostics = (*read.diagnostics, *parsed_document.diagnostics)
                 changed_owners.append((replace(owner, document=parsed_document.value), diagnostics))
         return changed_owners
@@ -254,16 +254,16 @@ class Session:
             self.notify(is_saved=True)
         self.read()
 
-    def read(self, documents: Documents | None = None, *, is_saved: bool = True) -> bool:
+    def read(self, reader: Reader | None = None, *, is_saved: bool = True) -> bool:
         """Read the whole course; return whether anything has changed.
 
         `is_saved`: see `edit`.
         """
-        documents = documents or self._documents
+        reader = reader or self._reader
         while True:
             edits = self.edits
             with self._reading_lock:
-                parsed_course = load(self.root, documents, self.open_texts, code=self.code)
+                parsed_course = load(self.root, reader, self.open_texts, code=self.code)
                 course = parsed_course.value
                 reports = Parsed(Reports()) if course is None else shown_reports(self.root, course)
                 with self.condition:
@@ -282,7 +282,7 @@ class Session:
             sources = read_sources(self.root, sorted(texts)).value
             if all(source.text == texts[source.path] for source in sources):
                 return self.course
-            return load(self.root, self._documents, code=self.code).value
+            return load(self.root, self._reader, code=self.code).value
 
     def _take_course(
         self, course: Course | None, diagnostics: Iterable[Diagnostic], reports: Reports
@@ -383,12 +383,12 @@ class Session:
                 urls.owner_path(o) for o in library.course.owners if o.path in broken_paths
             }
         try:
-            site = self.files.make(library, broken_pages, pause)
+            site, files = self.files.make(library, broken_pages, pause)
         except TemplateFailure as failure:
             self._take_template_failure(failure)
             return
         with self.condition:
-            self.files.serve(site)
+            self.files.serve(site, files)
             self.notify()
 
     # --- files

@@ -35,7 +35,7 @@ from coursebuild.features.language_server.commands.engine import describe_name
 from coursebuild.features.language_server.commands.fields import field_place
 from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.symbols.mathml import only_symbol, symbols
-from coursebuild.pipeline.reading import kept_formulas
+from coursebuild.pipeline.reader import kept_formulas
 
 _STRING = re.compile(r"""(["'])([^"'\s]+)\1""")
 
