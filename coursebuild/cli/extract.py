@@ -6,7 +6,7 @@ import argparse
 
 from coursebuild.cli.arguments import add_quiet, options_of
 from coursebuild.cli.output import print_report
-from coursebuild.pipeline.extract import extract
+from coursebuild.pipeline.update import extract
 
 EXAMPLES = """\
 examples:

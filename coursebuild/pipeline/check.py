@@ -22,6 +22,7 @@ from coursebuild.pipeline.judge import depends_on, judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.scripts import measure_sensitivity
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verification, verify
 from coursebuild.report import Report
@@ -63,10 +64,11 @@ def check(
         sensitivities: tuple[Sensitivity, ...] | None = None
         if sensitivity:
             from coursebuild.core.scripts.sensitivity import noise_warnings
-            from coursebuild.pipeline.sensitivity import measure
 
             runs, selected = verification.results.runs, checked_course.documents
-            sensitivities = measure(course, checked_course.options, runs, selected, halve=True)
+            sensitivities = measure_sensitivity(
+                course, checked_course.options, runs, selected, halve=True
+            )
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
         if shard is not None:
             remarks.append(_describe_part(shard, verification))

@@ -39,8 +39,8 @@ from coursebuild.core.scripts.diff import diff_rows
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
-from coursebuild.pipeline.figures import read_recorded
 from coursebuild.pipeline.judge import judge
+from coursebuild.pipeline.recordings import read_recorded
 from coursebuild.preview.session import Session
 from coursebuild.report import Report
 from coursebuild.report.text import location
