@@ -57,7 +57,10 @@ def check(
         if timings is not None:
             from coursebuild.pipeline.shards import write_timings
 
-            write_timings(timings, _seconds_by_name(verification), _names(course))
+            seconds = {s.path: s.seconds for s in verification.scripts if s.did_run}
+            seconds |= {lab.name: lab.seconds for lab in verification.labs if lab.tried}
+            names_of_course = [*(e.path for e in extract(course).value), *feature_trials(course)]
+            write_timings(timings, seconds, names_of_course)
         claims = unproven(course, verification.results.runs) if truth else ()
         diagnostics: list[Diagnostic] = []
         remarks = [claim for claim in claims if isinstance(claim, str)]
@@ -71,7 +74,10 @@ def check(
             )
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
         if shard is not None:
-            remarks.append(_describe_part(shard, verification))
+            scripts = plural(len(verification.scripts), "script")
+            labs = plural(len(verification.labs), "lab")
+            # Else a reader of the report could take this for the whole.
+            remarks.append(f"this was part {shard} of the work: {scripts} and {labs}")
         inventory = [claim for claim in claims if isinstance(claim, Diagnostic)]
         report = checked_course.report(diagnostics, inventory)
         return replace(report, remarks=tuple(remarks), sensitivity=sensitivities)
@@ -135,22 +141,3 @@ def read_and_verify(
     reports = shown_reports(options.root, course)
     diagnostics = (*parsed_course.diagnostics, *verification.diagnostics, *reports.diagnostics)
     return CheckedCourse(began, course, options, selected, verification, reports.value, diagnostics)
-
-
-def _describe_part(shard: Shard, verification: Verification) -> str:
-    """A remark that this was one part of the work, so that nobody takes it for the whole."""
-    scripts, labs = (
-        plural(len(verification.scripts), "script"),
-        plural(len(verification.labs), "lab"),
-    )
-    return f"this was part {shard} of the work: {scripts} and {labs}"
-
-
-def _seconds_by_name(verification: Verification) -> dict[str, float]:
-    """How long scripts and labs took, or took when they were last run."""
-    seconds = {s.path: s.seconds for s in verification.scripts if s.did_run}
-    return seconds | {lab.name: lab.seconds for lab in verification.labs if lab.tried}
-
-
-def _names(course: Course) -> list[str]:
-    return [*(e.path for e in extract(course).value), *feature_trials(course)]

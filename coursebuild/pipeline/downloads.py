@@ -52,15 +52,16 @@ class Downloads(Struct, frozen=True):
             CachedFile(archive.path, step_key("archive", archive.key), archive.pack)
             for archive in archives.values()
         )
-        files = (*_scripts_and_models(library), *_files(library, assets, root), *archive_files)
+        scripts = (
+            CachedFile(path, script.code.digest.hex(), script.code.text.encode)
+            for path, (script, _) in library.scripts.items()
+        )
+        models = (
+            OutputFile(urls.model_file_path(model.name), model.source.text.encode())
+            for model in library.course.models
+        )
+        files = (*scripts, *models, *_files(library, assets, root), *archive_files)
         return cls(files, archives, imports)
-
-
-def _scripts_and_models(library: Library) -> Iterator[SiteFile]:
-    for path, (script, _) in library.scripts.items():
-        yield CachedFile(path, script.code.digest.hex(), script.code.text.encode)
-    for model in library.course.models:
-        yield OutputFile(urls.model_file_path(model.name), model.source.text.encode())
 
 
 def _files(library: Library, assets: Assets, root: Path) -> Iterator[SiteFile]:

@@ -12,7 +12,6 @@ script had run now.
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import os
 import time
@@ -230,16 +229,15 @@ def check_drawings(course: Course, options: Options) -> Iterator[Diagnostic]:
     for path in course.files:
         if path.lower().endswith((".svg", ".svgz")):
             data = read_recorded(options.root, path) or b""
+
+            def find_fault(data: bytes = data) -> bytes:
+                drawing = read_svg(data)
+                return drawing.encode() if isinstance(drawing, str) else b""
+
             key = step_key("drawing", hashlib.sha256(data).hexdigest())
-            fault = options.store.get_or_create("drawings", key, functools.partial(_fault, data))
+            fault = options.store.get_or_create("drawings", key, find_fault)
             if fault:
                 message = f"`{path}` {fault.decode()}"
                 help = f'{SVG_HELP}, unless the map says `html = "trusted"`'
                 place = Source(path, "").span(0, 0)
                 yield diagnose("image-forbidden", place, message, help=help)
-
-
-def _fault(data: bytes) -> bytes:
-    """Why a drawing must not be published, in words; empty where it may."""
-    drawing = read_svg(data)
-    return drawing.encode() if isinstance(drawing, str) else b""

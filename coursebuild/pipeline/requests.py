@@ -158,7 +158,11 @@ _WITHOUT_PLACES: dict[type, Callable[[Any], object]] = {
 
 def document_fingerprint(document: Document) -> str:
     """The fingerprint of a document's summary, without what features note of it."""
-    html = tuple(_raw_html(document))
+    # Links are looked for in raw HTML, too, whose span alone has the text.
+    blocks = tuple(document_blocks(document))
+    inlines = (inline for block in blocks for inline in walk_inlines(block_inlines(block)))
+    html = [node.span.text for node in blocks if isinstance(node, HtmlBlock)]
+    html += [node.span.text for node in inlines if isinstance(node, RawInline)]
     return fingerprint(
         (document.blocks, document.footnotes, document.equations, html), _WITHOUT_PLACES
     )
@@ -167,16 +171,6 @@ def document_fingerprint(document: Document) -> str:
 def notes_fingerprint(notes: Mapping[str, Struct]) -> str:
     """The fingerprint of what features note of a document (`Feature.summary`)."""
     return fingerprint(dict(notes), _WITHOUT_PLACES)
-
-
-def _raw_html(document: Document) -> Iterator[str]:
-    """The raw HTML of a document, in which links are looked for: only its span has the text."""
-    for block in document_blocks(document):
-        if isinstance(block, HtmlBlock):
-            yield block.span.text
-        for inline in walk_inlines(block_inlines(block)):
-            if isinstance(inline, RawInline):
-                yield inline.span.text
 
 
 def course_fingerprint(course: Course, documents: Iterable[tuple[Document, str]]) -> str | None:

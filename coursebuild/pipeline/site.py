@@ -140,18 +140,22 @@ class Site:
         """Return the pages by site path, in order; draw those that are not stored."""
         known_pages: dict[str, _IndexEntry | None] = {}
         pending: deque[tuple[PageEntry, str, str]] = deque()
-        origin_of = self._origins()
+        library = self._library
+        results = results_fingerprint(library.results, library.reports)
+        bare, with_notes = self._reader.fingerprints(library.course)
 
         def missing() -> Iterator[PageRequest]:  # inputs are made while pages are drawn
             for page in pages:
-                path, text = page.path, text_of(page, self._library)
-                origin = origin_of(page, "" if text is None else text.key)
+                path, text = page.path, text_of(page, library)
+                course = with_notes if page.may_show_notes(library) else bare
+                text_key = "" if text is None else text.key
+                origin = "" if course is None else key_of(course, results, text_key)
                 last = last_pages.get(path)
                 key, request = self._last_good.get(path), None
                 if key is None and last is not None and origin and last.origin == origin:
                     key = last.key
                 if key is None:
-                    request = page_request(page, self._library)
+                    request = page_request(page, library)
                     key = request.key
                 if last is not None and (last.key, last.page) == (key, page):
                     record: PageRecord | None = last.record
@@ -163,25 +167,13 @@ class Site:
                 elif path not in self._last_good:  # else it is no longer in the store
                     known_pages[path] = None
                     pending.append((page, key, origin))
-                    yield request or page_request(page, self._library)
+                    yield request or page_request(page, library)
 
         for record in self._reader.draw(missing()):
             page, key, origin = pending.popleft()
             known_pages[page.path] = _IndexEntry(page, key, origin, record)
             self.drawn_paths.append(page.path)
         return {path: entry for path, entry in known_pages.items() if entry is not None}
-
-    def _origins(self) -> Callable[[PageEntry, str], str]:
-        """Return a function that hashes all that a page is made of: see `_IndexEntry.origin`."""
-        library = self._library
-        results = results_fingerprint(library.results, library.reports)
-        bare, with_notes = self._reader.fingerprints(library.course)
-
-        def origin(page: PageEntry, text_key: str) -> str:
-            course = with_notes if page.may_show_notes(library) else bare
-            return "" if course is None else key_of(course, results, text_key)
-
-        return origin
 
     def _load(self, path: str) -> DrawnPage:
         """Return a page of the site, from the store."""
@@ -221,7 +213,13 @@ class Site:
         """All files but that list, sorted by path."""
         course, trial_files = self._library.course, self._library.trials.files
         files: list[SiteFile] = [*self._shared_files[0], *trial_files]
-        files += compressed_files(files, self._keep_copy)
+
+        def keep(key: str, make: Callable[[], bytes]) -> bytes:
+            return prepared_file("copies", key) or self._store.get_or_create(
+                "compressed", key, make
+            )
+
+        files += compressed_files(files, keep)
         files += (*self._downloads.files, *self._added_files[0], *self._page_files())
         files.append(OutputFile(urls.ROBOTS, meta.robots(course)))
         if course.base_url:
@@ -253,10 +251,6 @@ class Site:
     def _added_files(self) -> tuple[list[SiteFile], FileList | None]:
         return added_files(self._context)
 
-    def _keep_copy(self, key: str, make: Callable[[], bytes]) -> bytes:
-        """A compressed copy: delivered with the tool, stored, or made now."""
-        return prepared_file("copies", key) or self._store.get_or_create("compressed", key, make)
-
     def _context(self, feature: str) -> SiteContext:
         """Return what a feature makes its files from."""
         return SiteContext(
@@ -279,11 +273,19 @@ class Site:
 
     @functools.cached_property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """What is wrong with the finished pages."""
-        diagnostics = tuple(self._repeated_ids())
+        """What is wrong with the finished pages: ids that stand there twice, broken links."""
+        diagnostics: list[Diagnostic] = []
+        for path, entry in self._pages.items():
+            for name, start, end in entry.record.repeated_ids:
+                document = entry.page.document(self._library)
+                source = Source(f"public/{path}", "") if document is None else document.source
+                message = f"the id `{name}` is already used on the finished page"
+                help = "give one of the two another id"
+                span = source.span(start, end)
+                diagnostics.append(diagnose("anchor-repeated", span, message, help=help))
         if self._has_all_pages and not self._are_links_sound():
-            diagnostics += tuple(broken_links(self._library.course, self.files))
-        return diagnostics
+            diagnostics += broken_links(self._library.course, self.files)
+        return tuple(diagnostics)
 
     def _are_links_sound(self) -> bool:
         """Whether all links of the pages lead to pages or other files of the site."""
@@ -296,16 +298,6 @@ class Site:
             else anchor in ("", "top") or has_anchor(ids[path], anchor)
             for path, anchor in links
         )
-
-    def _repeated_ids(self) -> Iterator[Diagnostic]:
-        """Report ids that several elements of a page have."""
-        for path, entry in self._pages.items():
-            for name, start, end in entry.record.repeated_ids:
-                document = entry.page.document(self._library)
-                source = Source(f"public/{path}", "") if document is None else document.source
-                message = f"the id `{name}` is already used on the finished page"
-                help = "give one of the two another id"
-                yield diagnose("anchor-repeated", source.span(start, end), message, help=help)
 
 
 def frame_page(page: DrawnPage, frame: PageFrame) -> bytes:

@@ -281,30 +281,26 @@ def changed_text(verb: str, source: Source, new: str) -> str:
 def extract(options: Options, *, adopt: bool = False) -> Report:
     """Extract; with `adopt` the lessons take over what was edited by hand in `examples/`."""
     with project_lock(options.root, options.progress.say):
-        return _extract(options, adopt=adopt)
-
-
-def _extract(options: Options, *, adopt: bool) -> Report:
-    began = time.monotonic()
-    parsed_course = load(options.root)
-    course = parsed_course.value
-    if course is None:
-        return judge(None, parsed_course.diagnostics, began)
-    extracted_scripts = extract_scripts(course, options)
-    remarks = _list_changes(extracted_scripts)
-    refusals: list[Diagnostic] = []
-    if adopt and extracted_scripts.files.blocked:
-        adoptions, refusals, files_read = _adopt(options, extracted_scripts)
-        if files_read:
-            parsed_course = load(options.root)
-            course = parsed_course.value or course
-            _write_as_extracted(options, course, files_read)
-            extracted_scripts = extract_scripts(course, options)
-        remarks += [*adoptions, *_list_changes(extracted_scripts)]
-    diagnostics = [*parsed_course.diagnostics, *extracted_scripts.diagnostics, *refusals]
-    if not remarks and all(not d.is_error for d in diagnostics):
-        remarks.append("every script is extracted already")
-    return judge(course, diagnostics, began, remarks=tuple(remarks))
+        began = time.monotonic()
+        parsed_course = load(options.root)
+        course = parsed_course.value
+        if course is None:
+            return judge(None, parsed_course.diagnostics, began)
+        extracted_scripts = extract_scripts(course, options)
+        remarks = _list_changes(extracted_scripts)
+        refusals: list[Diagnostic] = []
+        if adopt and extracted_scripts.files.blocked:
+            adoptions, refusals, files_read = _adopt(options, extracted_scripts)
+            if files_read:
+                parsed_course = load(options.root)
+                course = parsed_course.value or course
+                _write_as_extracted(options, course, files_read)
+                extracted_scripts = extract_scripts(course, options)
+            remarks += [*adoptions, *_list_changes(extracted_scripts)]
+        diagnostics = [*parsed_course.diagnostics, *extracted_scripts.diagnostics, *refusals]
+        if not remarks and all(not d.is_error for d in diagnostics):
+            remarks.append("every script is extracted already")
+        return judge(course, diagnostics, began, remarks=tuple(remarks))
 
 
 def _list_changes(extracted_scripts: ExtractedScripts) -> list[str]:

@@ -41,7 +41,7 @@ from coursebuild.numerics.pruning.edits import ModelEdit, merge_edits
 from coursebuild.numerics.pruning.markup import place_of
 from coursebuild.numerics.pruning.model_text import ModelText
 from coursebuild.numerics.pruning.reachability import PREMISES
-from coursebuild.numerics.pruning.readers import Reader
+from coursebuild.numerics.pruning.readers import ModelReader
 from coursebuild.numerics.pruning.trials import PrunedModel, PruningTrials, largest_subset
 from coursebuild.numerics.reports.diet import (
     MEASURED_LABEL,
@@ -90,7 +90,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     machine: Machine
     text: ModelText
     scenes: tuple[Scene, ...]
-    readers: tuple[Reader, ...]
+    readers: tuple[ModelReader, ...]
     """All code that uses the model, or may."""
     keeps: Mapping[str, Keep]
     """By the finding: `KIND`, or `KIND NAME`."""
@@ -217,7 +217,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
 
     def _find_noticing_reader(
         self, names: Collection[str], kinds: Collection[str], change: Collection[str]
-    ) -> Reader | None:
+    ) -> ModelReader | None:
         """The first reader that may notice that things are gone."""
         readers = (reader for reader in self.readers if reader.notices(names, kinds, change))
         return next(readers, None)

@@ -31,7 +31,7 @@ from coursebuild.features.bench.commands.runs import CannotMeasureError
 from coursebuild.numerics.pruning.compare import pruning_scenes
 from coursebuild.numerics.pruning.markup import MarkupError
 from coursebuild.numerics.pruning.model_text import ModelTextError, model_bytes, open_model
-from coursebuild.numerics.pruning.readers import Reader
+from coursebuild.numerics.pruning.readers import ModelReader
 from coursebuild.numerics.pruning.survey import Rerun, Survey, Surveyor
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
 
@@ -154,12 +154,14 @@ def _find_locked_files(root: Path, files: CourseFiles, path: str, text: str) -> 
 
 def _find_readers(
     root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
-) -> tuple[Reader, ...]:
+) -> tuple[ModelReader, ...]:
     """List everything in the course that may read a model, its observables included."""
     readers = list(readers_of(course, root, files, scene))
     scenarios = scene.declarations.scenarios
     names = frozenset(s.observable.name for s in scenarios if s.observable is not None)
     fields = {"energy"} if any("energy" in (s.conserved or ()) for s in scenarios) else set()
     if names or fields:
-        readers.append(Reader(scene.declarations.source.path, names=names, words=frozenset(fields)))
+        readers.append(
+            ModelReader(scene.declarations.source.path, names=names, words=frozenset(fields))
+        )
     return tuple(readers)

@@ -27,7 +27,7 @@ from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.scripts.extract import extract
 from coursebuild.features.lab.model import Lab
 from coursebuild.numerics.pruning.differences import VIEWS
-from coursebuild.numerics.pruning.readers import Reader, read_code
+from coursebuild.numerics.pruning.readers import ModelReader, read_code
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
@@ -42,10 +42,10 @@ _COPIED_FOLDERS = ("content", "models")
 
 def readers_of(
     course: Course | None, root: Path, files: CourseFiles, scene: CourseScene
-) -> tuple[Reader, ...]:
+) -> tuple[ModelReader, ...]:
     """List everything in the course that may use a model."""
     if course is None:
-        return (Reader("content/course.toml", opaque="the course cannot be read"),)
+        return (ModelReader("content/course.toml", opaque="the course cannot be read"),)
     modules = {Path(path).stem for path in files.files if path.endswith(".py")}
     scripts = [
         read_code(script.path, script.text, modules)
@@ -67,7 +67,7 @@ def _may_use(text: str, model: str) -> bool:
     return name in text or uses != len(literals) or (not literals and loader is not None)
 
 
-def _block_readers(course: Course, model: str) -> Iterator[Reader]:
+def _block_readers(course: Course, model: str) -> Iterator[ModelReader]:
     """Yield the labs and other blocks that show a model."""
     for document in course.documents:
         for block in find_blocks(document, FeatureBlock):
@@ -76,7 +76,7 @@ def _block_readers(course: Course, model: str) -> Iterator[Reader]:
             place = f"{block.span.path}:{block.span.line}"
             kinds = frozenset(VIEWS.values()) - _NOT_DRAWN
             if not isinstance(block, Lab):
-                yield Reader(place, kinds=kinds)
+                yield ModelReader(place, kinds=kinds)
                 continue
             code = read_code(place, "\n".join(piece.text for _, piece in block.code))
             names = frozenset(re.findall(r"\"((?:[^\"\\]|\\.)*)\"", block.config))
@@ -85,14 +85,14 @@ def _block_readers(course: Course, model: str) -> Iterator[Reader]:
             yield replace(code, names=code.names | names, kinds=code.kinds | kinds)
 
 
-def _code_readers(root: Path, files: CourseFiles, modules: set[str]) -> Iterator[Reader]:
+def _code_readers(root: Path, files: CourseFiles, modules: set[str]) -> Iterator[ModelReader]:
     """Yield the course's files of code."""
     for path in files.files:
         if path.endswith(_CODE):
             try:
                 text = read_bytes(root, path).decode("utf-8", "replace")
             except EffectError:
-                yield Reader(path, opaque="it cannot be read")
+                yield ModelReader(path, opaque="it cannot be read")
             else:
                 yield read_code(path, text, modules)
 
