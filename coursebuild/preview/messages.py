@@ -77,7 +77,7 @@ class Offer(Struct, frozen=True):
 
 def report_now(session: Session) -> Report:
     """Return everything that is wrong, as a report."""
-    return judge(session.course, session.diagnostics(), scripts=session.script_lines)
+    return judge(session.course, session.diagnostics(), scripts=session.runs.script_lines)
 
 
 def page_news(session: Session, path: str) -> str:
@@ -207,7 +207,7 @@ def _describe_drift(session: Session, library: Library, verdict: Verdict) -> dic
 def new_output(session: Session, library: Library, verdict: Verdict) -> Edit | Diagnostic | None:
     """Make the edit that `coursebuild update` would; `None` if the script ran only once so far."""
     run = library.runs[verdict.recording.script or ""]
-    second = session.second_output(run.path)
+    second = session.runs.second_output(run.path)
     if second is None:
         return None
     return update_body(verdict.recording, verdict.comparison, run.stdout, second)

@@ -4,7 +4,8 @@ Entry point: `Session`.
 
 1. `edit(paths)` takes saves of documents: only these are read and checked.
 2. `read()` reads everything, after other changes and to be sure.
-3. `take_results` takes the results of running the course, `make_site` makes all files of its site.
+3. `take_results` takes the results of running the course, which `runs` knows; `make_site` makes all
+   files of its site.
 4. `find(path)` returns a file.
 
 `condition` is the lock of everything here; whoever waits for news waits on it.
@@ -15,27 +16,22 @@ from __future__ import annotations
 import gc
 import sys
 import threading
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from typing import TypeAlias
+from collections.abc import Callable, Collection, Iterable, Mapping
 
 from msgspec.structs import replace
 
 from coursebuild.core.checks.course import check_document
 from coursebuild.core.checks.links import LinkTargets, link_targets
 from coursebuild.core.engine.prepared import prepared_folder
-from coursebuild.core.features import PublishedTrials
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.model import Course, Document, Lesson, Owner, Page
-from coursebuild.core.model.results import Outcome, Results, ScriptJob, ScriptRun
+from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.templates import TemplateFailure
 from coursebuild.core.registry import publish_trials
-from coursebuild.core.run.versions import engine_version, python_version
-from coursebuild.core.scripts.compare import verify as compare
-from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.scripts.source_parts import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.numerics.reports import Reports
@@ -47,10 +43,8 @@ from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.theme import template_diagnostic
 from coursebuild.pipeline.verify import Verification
 from coursebuild.preview.files import Files
-from coursebuild.report import ScriptLine
+from coursebuild.preview.run_history import RunHistory, ScriptKey
 
-ScriptKey: TypeAlias = tuple[str, ScriptJob]
-"""A script's text, and how it is run."""
 MAX_SINGLE_READS = 8
 """Documents saved at once that are read one by one; for more, the whole course is read."""
 _GARBAGE = 200_000
@@ -85,12 +79,7 @@ class Session:
         self._is_map_broken = False
         self.library: Library | None = None
         """The course with its results, for drawing; `None` before a map could be read."""
-        self.verified_course: Course | None = None
-        """The course that was run last."""
-        self.running_diagnostics: tuple[Diagnostic, ...] = ()
-        self.script_lines: tuple[ScriptLine, ...] = ()
-        self.all_due = True
-        """Whether any script may print something new, since other files have changed."""
+        self.runs = RunHistory()
         quiet_options = replace(options, jobs=1, progress=Progress(quiet=True))
         self._reader = Reader(quiet_options)
         self._reading_lock = threading.Lock()
@@ -101,13 +90,7 @@ class Session:
         self._template_diagnostics: tuple[Diagnostic, ...] = ()
         """The diagnostic of a template of the course that failed when a page was drawn."""
         self._targets: LinkTargets | None = None
-        self._results = Results((), (), (), (), python_version(), engine_version())
         self._reports = Reports()
-        self._runs: dict[str, tuple[ScriptKey, ScriptRun]] = {}
-        """The last run of each script, by path, with the key of the script that ran."""
-        self._second_outputs: dict[str, tuple[ScriptKey, str, str]] = {}
-        """Of scripts that ran twice, by path: their key, the first output and the second."""
-        self._trials = PublishedTrials()
         self.files = Files(options, self._assets, self._reader, self._is_sound)
         self._site = site
 
@@ -142,7 +125,7 @@ class Session:
         with self.condition:
             return (
                 *self.reading_diagnostics,
-                *self.running_diagnostics,
+                *self.runs.diagnostics,
                 *self._template_diagnostics,
             )
 
@@ -250,7 +233,7 @@ class Session:
     def take_other_saves(self) -> None:
         """Take saves of files other than documents."""
         with self.condition:
-            self.all_due = True
+            self.runs.is_all_due = True
             self.notify(is_saved=True)
         self.read()
 
@@ -304,11 +287,9 @@ class Session:
 
     def _show(self, course: Course) -> None:
         """Draw pages of this course from now on, with what is known of it."""
-        keys = script_keys(course)
-        runs = tuple(run for path, (key, run) in self._runs.items() if keys.get(path) == key)
-        results = replace(self._results, runs=runs, verdicts=compare(course, runs))
+        results, trials = self.runs.results(course), self.runs.trials
         self._template_diagnostics = ()
-        self.library = Library(course, results, self._assets, self._reports, self._trials)
+        self.library = Library(course, results, self._assets, self._reports, trials)
         self._targets = link_targets(course)
         if self._site:
             self.files.show(self.library)
@@ -317,15 +298,11 @@ class Session:
 
     def take_results(self, course: Course, verification: Verification) -> None:
         """Take the results of verifying a course."""
-        results, trials = verification.results, self._trials
-        if results.trials != self._results.trials:
+        results, trials = verification.results, self.runs.trials
+        if results.trials != self.runs.last_results.trials:
             trials = publish_trials(results, self._assets)
         with self.condition:
-            self.verified_course, self.running_diagnostics = course, verification.diagnostics
-            self.script_lines = verification.scripts
-            self._results, self._trials = results, trials
-            keys = script_keys(course)
-            self._runs = {run.path: (keys[run.path], run) for run in results.runs}
+            self.runs.take(course, verification, trials)
             if self.course is not None:
                 self._show(self.course)
             self.notify()
@@ -333,39 +310,10 @@ class Session:
     def take_run(self, script: ScriptKey, run: ScriptRun) -> None:
         """Take the result of one script, while others run."""
         with self.condition:
-            self._runs[run.path] = script, run
+            self.runs.take_run(script, run)
             if self.course is not None:
                 self._show(self.course)
             self.notify()
-
-    def drifted_scripts(self, runs: Sequence[ScriptRun]) -> set[str]:
-        """The paths of the scripts that did not print what is recorded."""
-        with self.condition:
-            verdicts = () if self.course is None else compare(self.course, runs)
-        return {v.recording.script or "" for v in verdicts if v.status == "drift"}
-
-    def known_runs(self, course: Course) -> dict[str, ScriptRun]:
-        """The runs of a course's scripts, by path; empty where a script has changed since."""
-        with self.condition:
-            are_same = script_keys(course) == {p: key for p, (key, _) in self._runs.items()}
-            return {path: run for path, (_, run) in self._runs.items()} if are_same else {}
-
-    def take_second_runs(self, runs: Iterable[ScriptRun]) -> None:
-        """Take the outputs of scripts that ran once more."""
-        with self.condition:
-            for run in runs:
-                key, first = self._runs[run.path]
-                printed = run.stdout if run.outcome is Outcome.OK else ""
-                self._second_outputs[run.path] = key, first.stdout, printed
-            self.notify()
-
-    def second_output(self, path: str) -> str | None:
-        """What a script printed when it ran once more, if its text has not changed since."""
-        if path not in self._runs or path not in self._second_outputs:
-            return None
-        key, run = self._runs[path]
-        key_then, first_output, second_output = self._second_outputs[path]
-        return second_output if (key_then, first_output) == (key, run.stdout) else None
 
     def make_site(self, pause: Callable[[], None]) -> None:
         """Make all files of the site, and serve them; `pause` is called between pages."""
@@ -420,12 +368,6 @@ class Session:
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
     """Whether there are errors among diagnostics."""
     return any(d.is_error for d in diagnostics)
-
-
-def script_keys(course: Course) -> dict[str, ScriptKey]:
-    """The keys of a course's scripts by path: scripts with the same key print the same."""
-    scripts = extract(course).value
-    return {job.path: (e.text, job) for e, job in zip(scripts, jobs(scripts), strict=True)}
 
 
 def _replace_owners(course: Course, new_owners: Iterable[Owner]) -> Course:
