@@ -6,8 +6,8 @@ as a `Report`.
 
 1. `options`, `progress`: what every command needs
 2. `check`: the stages that `check`, `build` and `export` share:
-   - `load`: disk → course. A `reader` parses only texts that were not parsed before, and draws their
-     pages later; `requests` is what it is asked and what it answers
+   - `load`: disk → course. A `reader` parses only texts that were not parsed before, and draws
+     their pages later; `requests` is what it is asked and what it answers
    - `verify`: course → results, with features' trials, such as those of labs. `scripts` runs
      scripts without a remembered result; `shards` leaves out the work of other machines
    - `judge`: diagnostics → report, and the files that it depends on
