@@ -25,7 +25,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.checks.formulas import course_formulas
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.files.resources import Bundle, template_texts
+from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Formula, MathError, Reports, Results
 from coursebuild.core.model.summary import without_prose
@@ -42,11 +42,11 @@ from coursebuild.core.syntax import script
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.values import encode
 from coursebuild.features.language_server.commands.diagnosis import current_diagnostics
-from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.scripts import extract_scripts, run
-from coursebuild.pipeline.site import site_files
+from coursebuild.pipeline.site import Site
 from coursebuild.pipeline.verify import verify
 from coursebuild.preview.rebuild import BackgroundRebuild
 from coursebuild.preview.session import Session
@@ -158,10 +158,12 @@ def measure_stages(course: Course, results: Results, root: Path, repeat: int) ->
     options = Options(root, 1, Memo(root))
 
     def make_files() -> None:
-        with Documents(options) as documents:
-            loaded_course = load(root, documents).value
+        with Reader(options) as reader:
+            loaded_course = load(root, reader).value
             assert loaded_course is not None
-            for file in site_files(loaded_course, results, documents, options, Reports()).files:
+            assets = Assets(template_texts(), Bundle(), prepared_folder())
+            library = Library(loaded_course, results, assets, Reports())
+            for file in Site(library, reader, options).files:
                 file.make()
 
     candidates: dict[str, Callable[[], object]] = {

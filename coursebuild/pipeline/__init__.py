@@ -6,12 +6,12 @@ as a `Report`.
 
 1. `options`, `progress`: what every command needs
 2. `check`: the stages that `check`, `build` and `export` share:
-   - `load`: disk → course. Its parser is `documents` (with `reading`, `fingerprints`), which parses
-     only texts that were not parsed before
+   - `load`: disk → course. A `reader` parses only texts that were not parsed before, and draws
+     their pages later; `requests` is what it is asked and what it answers
    - `verify`: course → results, with features' trials, such as those of labs. `scripts` runs
      scripts without a remembered result; `shards` leaves out the work of other machines
    - `judge`: diagnostics → report, and the files that it depends on
-3. `build`, with `site` (and `pages`): course and results → the files of a site
+3. `build`, with `site` and `downloads`: course and results → the files of a site, or of an export
 
 `coursebuild.preview` does the same in a process that goes on, and draws the open page first.
 """

@@ -38,10 +38,10 @@ from coursebuild.core.scripts.against import (
 )
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import failure_diagnostic
-from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.scripts import extract_scripts, run
 from coursebuild.pipeline.verify import compile_models
 from coursebuild.report.against import ComparisonReport, ModelLine, ScriptComparison
@@ -66,8 +66,8 @@ def compare_with_version(
     version = check_other_version(version)
     options.store.listen(options.progress.say)
     with project_lock(options.root, options.progress.say):
-        with Documents(replace(options, progress=Progress(quiet=True))) as parser:
-            parsed_course = load(options.root, parser)
+        with Reader(replace(options, progress=Progress(quiet=True))) as reader:
+            parsed_course = load(options.root, reader)
         course = parsed_course.value
         if course is not None and course.python is not None:
             raise UsageError(

@@ -18,10 +18,11 @@ from coursebuild.core.model.results import Reports
 from coursebuild.core.registry import feature_trials, unproven
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.judge import depends_on, judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
+from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.scripts import measure_sensitivity
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verification, verify
 from coursebuild.report import Report
@@ -48,28 +49,35 @@ def check(
     are moved a little. `truth`: list what nothing in the course proves.
     """
     with project_lock(options.root, options.progress.say):
-        with Documents(options) as documents:
-            checked_course = read_and_verify(options, documents, names, shard=shard)
+        with Reader(options) as reader:
+            checked_course = read_and_verify(options, reader, names, shard=shard)
         if isinstance(checked_course, Report):
             return checked_course
         course, verification = checked_course.course, checked_course.verification
         if timings is not None:
             from coursebuild.pipeline.shards import write_timings
 
-            write_timings(timings, _seconds_by_name(verification), _names(course))
+            seconds = {s.path: s.seconds for s in verification.scripts if s.did_run}
+            seconds |= {lab.name: lab.seconds for lab in verification.labs if lab.tried}
+            names_of_course = [*(e.path for e in extract(course).value), *feature_trials(course)]
+            write_timings(timings, seconds, names_of_course)
         claims = unproven(course, verification.results.runs) if truth else ()
         diagnostics: list[Diagnostic] = []
         remarks = [claim for claim in claims if isinstance(claim, str)]
         sensitivities: tuple[Sensitivity, ...] | None = None
         if sensitivity:
             from coursebuild.core.scripts.sensitivity import noise_warnings
-            from coursebuild.pipeline.sensitivity import measure
 
             runs, selected = verification.results.runs, checked_course.documents
-            sensitivities = measure(course, checked_course.options, runs, selected, halve=True)
+            sensitivities = measure_sensitivity(
+                course, checked_course.options, runs, selected, halve=True
+            )
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
         if shard is not None:
-            remarks.append(_describe_part(shard, verification))
+            scripts = plural(len(verification.scripts), "script")
+            labs = plural(len(verification.labs), "lab")
+            # Else a reader of the report could take this for the whole.
+            remarks.append(f"this was part {shard} of the work: {scripts} and {labs}")
         inventory = [claim for claim in claims if isinstance(claim, Diagnostic)]
         report = checked_course.report(diagnostics, inventory)
         return replace(report, remarks=tuple(remarks), sensitivity=sensitivities)
@@ -111,7 +119,7 @@ class CheckedCourse(Struct, frozen=True):
 
 def read_and_verify(
     options: Options,
-    documents: Documents,
+    reader: Reader,
     names: tuple[str, ...] = (),
     *,
     static: bool = False,
@@ -123,9 +131,7 @@ def read_and_verify(
     `static`: with the static forms of labs, for pages.
     """
     began = time.monotonic()
-    parsed_course = load(
-        options.root, documents, code="run" if options.sandbox is None else "refuse"
-    )
+    parsed_course = load(options.root, reader, code="run" if options.sandbox is None else "refuse")
     course = parsed_course.value
     if course is None:
         return judge(None, parsed_course.diagnostics, began, strict=options.strict)
@@ -135,22 +141,3 @@ def read_and_verify(
     reports = shown_reports(options.root, course)
     diagnostics = (*parsed_course.diagnostics, *verification.diagnostics, *reports.diagnostics)
     return CheckedCourse(began, course, options, selected, verification, reports.value, diagnostics)
-
-
-def _describe_part(shard: Shard, verification: Verification) -> str:
-    """A remark that this was one part of the work, so that nobody takes it for the whole."""
-    scripts, labs = (
-        plural(len(verification.scripts), "script"),
-        plural(len(verification.labs), "lab"),
-    )
-    return f"this was part {shard} of the work: {scripts} and {labs}"
-
-
-def _seconds_by_name(verification: Verification) -> dict[str, float]:
-    """How long scripts and labs took, or took when they were last run."""
-    seconds = {s.path: s.seconds for s in verification.scripts if s.did_run}
-    return seconds | {lab.name: lab.seconds for lab in verification.labs if lab.tried}
-
-
-def _names(course: Course) -> list[str]:
-    return [*(e.path for e in extract(course).value), *feature_trials(course)]

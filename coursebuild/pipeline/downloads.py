@@ -26,7 +26,7 @@ from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.library import Library
 from coursebuild.core.run.packages import distributions, module_files
 from coursebuild.core.run.script_environment import course_environment
-from coursebuild.pipeline.documents import Documents
+from coursebuild.pipeline.reader import Reader
 
 _DIGEST = hashlib.sha256().digest_size * 2
 
@@ -42,25 +42,26 @@ class Downloads(Struct, frozen=True):
 
     @classmethod
     def of(
-        cls, library: Library, assets: Assets, documents: Documents, root: Path, store: Memo
+        cls, library: Library, assets: Assets, reader: Reader, root: Path, store: Memo
     ) -> Downloads:
         """The downloads of a course whose documents were read."""
-        imports = _make_imports(library, documents)
+        imports = _make_imports(library, reader)
         surroundings = _find_surroundings(library, root, store, imports)
         archives = {archive.path: archive for archive in zips.make_archives(library, surroundings)}
         archive_files = (
             CachedFile(archive.path, step_key("archive", archive.key), archive.pack)
             for archive in archives.values()
         )
-        files = (*_scripts_and_models(library), *_files(library, assets, root), *archive_files)
+        scripts = (
+            CachedFile(path, script.code.digest.hex(), script.code.text.encode)
+            for path, (script, _) in library.scripts.items()
+        )
+        models = (
+            OutputFile(urls.model_file_path(model.name), model.source.text.encode())
+            for model in library.course.models
+        )
+        files = (*scripts, *models, *_files(library, assets, root), *archive_files)
         return cls(files, archives, imports)
-
-
-def _scripts_and_models(library: Library) -> Iterator[SiteFile]:
-    for path, (script, _) in library.scripts.items():
-        yield CachedFile(path, script.code.digest.hex(), script.code.text.encode)
-    for model in library.course.models:
-        yield OutputFile(urls.model_file_path(model.name), model.source.text.encode())
 
 
 def _files(library: Library, assets: Assets, root: Path) -> Iterator[SiteFile]:
@@ -107,9 +108,9 @@ def _find_surroundings(
     return replace(surroundings, packages=packages)
 
 
-def _make_imports(library: Library, documents: Documents) -> Callable[[str], frozenset[str]]:
+def _make_imports(library: Library, reader: Reader) -> Callable[[str], frozenset[str]]:
     """Make the function that returns a text's imports; those of scripts are known already."""
-    scripts, imports_by_path = library.scripts, documents.imports
+    scripts, imports_by_path = library.scripts, reader.imports
     imports_by_text = {
         scripts[path][0].code.text: imports_by_path[path]
         for path in scripts.keys() & imports_by_path

@@ -1,7 +1,7 @@
 """Disk → Course: read the map, the lessons, the pages and the models, and parse them.
 
-Entry points: `load(root)`; `load_course(root)`, for commands that need a course. A `Parser` parses
-the texts; `documents.Documents` is one that keeps what it parsed.
+Entry points: `load(root)`; `load_course(root)`, for commands that need a course. A `Reader` keeps
+what it reads, and returns summaries; without one documents come with their prose.
 
 1. Read everything (`core.files.read`), parse `content/course.toml`. Where the map is broken the
    lessons are parsed all the same, so that one run reports all mistakes.
@@ -12,9 +12,9 @@ the texts; `documents.Documents` is one that keeps what it parsed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from msgspec.structs import replace
 
@@ -45,6 +45,9 @@ from coursebuild.core.text.conflicts import find_conflict
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source, Span
 
+if TYPE_CHECKING:
+    from coursebuild.pipeline.reader import Reader
+
 Code: TypeAlias = Literal["run", "known", "none", "refuse"]
 """What becomes of a course's own features: they run; they do if they have run before; they are left
 out; the course is refused.
@@ -61,45 +64,9 @@ _TEXTS = tuple(
 """The ends of names of files in which a merge conflict is looked for."""
 
 
-class Parser:
-    """Parses texts and checks courses; keeps nothing."""
-
-    def read_documents(
-        self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str], words: Words
-    ) -> list[Parsed[Document]]:
-        """Return the documents that texts hold, and what is wrong in them.
-
-        Each text is given with whether it is a lesson.
-        """
-        from coursebuild.core.syntax.document import parse_document
-
-        return [
-            parse_document(source, callouts, lesson=lesson, words=words)
-            for source, lesson in sources
-        ]
-
-    def read_map(self, source: Source) -> Parsed[Course | None]:
-        """Return the course that a map describes, and what is wrong in it."""
-        from coursebuild.core.syntax.coursemap import parse_course_map
-
-        return parse_course_map(source)
-
-    def read_declarations(self, source: Source) -> Parsed[Declarations | None]:
-        """Return what a file beside a model declares, and what is wrong in it."""
-        from coursebuild.core.syntax.scenarios import parse_declarations
-
-        return parse_declarations(source)
-
-    def check(self, course: Course) -> tuple[Diagnostic, ...]:
-        """Return what is wrong with a course as a whole."""
-        from coursebuild.core.checks.course import check_course
-
-        return check_course(course)
-
-
 def load(
     root: Path,
-    parser: Parser | None = None,
+    reader: Reader | None = None,
     open_texts: Mapping[str, str] = {},
     *,
     code: Code = "run",
@@ -111,7 +78,7 @@ def load(
     Raises:
         EffectError: the course brings code that would run here, and `code` refuses it.
     """
-    loader = _Loader(root, Parser() if parser is None else parser, open_texts, code)
+    loader = _Loader(root, reader, open_texts, code)
     course = loader.load()
     loader.find_conflicts(course)
     return Parsed(course, tuple(loader.diagnostics))
@@ -123,7 +90,7 @@ def load_course(root: Path, *, code: Code = "known") -> Course:
     Raises:
         UsageError: its map cannot be used, or it brings code that its user has never run.
     """
-    loader = _Loader(root, Parser(), {}, code)
+    loader = _Loader(root, None, {}, code)
     course = loader.load()
     if course is None:
         raise UsageError("the course map cannot be read; `coursebuild check` says why")
@@ -139,19 +106,33 @@ class _Loader:
     """The state of one loading."""
 
     def __init__(
-        self, root: Path, parser: Parser, open_texts: Mapping[str, str], code: Code
+        self, root: Path, reader: Reader | None, open_texts: Mapping[str, str], code: Code
     ) -> None:
         read = read_course(root, open_texts)
         self.root = root
         self.open_texts = open_texts
         self.code = code
         self.has_unknown_code = False
-        self.parser = parser
         self.files = read.value
         self.store = Memo(root)
         self.unreadable = list(read.value.unreadable)
         """Files that cannot be read, or that are too long."""
         self.diagnostics = list(read.diagnostics)
+        if reader is not None:
+            self._read_map, self._read_declarations = reader.read_map, reader.read_declarations
+            self._read_documents, self._check = reader.read_documents, reader.check
+            return
+        from coursebuild.core.checks.course import check_course
+        from coursebuild.core.syntax.coursemap import parse_course_map
+        from coursebuild.core.syntax.document import parse_document
+        from coursebuild.core.syntax.scenarios import parse_declarations
+
+        self._read_map, self._read_declarations = parse_course_map, parse_declarations
+        self._check = check_course
+        self._read_documents = lambda sources, callouts, words: [
+            parse_document(source, callouts, lesson=lesson, words=words)
+            for source, lesson in sources
+        ]
 
     def load(self) -> Course | None:
         """Return the whole course, or `None` where there is no usable map."""
@@ -178,7 +159,7 @@ class _Loader:
         if course.python is None or (environment.value is not None and self.code == "run"):
             references = read_references(course, self.store, environment.value)
             course = replace(course, references=references)
-        self.diagnostics += self.parser.check(course)
+        self.diagnostics += self._check(course)
         self.diagnostics += environment.diagnostics
         if course.python is None or environment.value is not None:
             self.diagnostics += _check_engine(course, environment.value)
@@ -265,7 +246,7 @@ class _Loader:
     def _parse_map(self) -> Course | None:
         if self.files.map is None or not self._drop_long(MAP_TEXT, [self.files.map]):
             return None
-        parsed_map = self.parser.read_map(self.files.map)
+        parsed_map = self._read_map(self.files.map)
         self.diagnostics += parsed_map.diagnostics
         if parsed_map.value is not None:
             self._load_features(parsed_map.value)
@@ -299,7 +280,7 @@ class _Loader:
         names = {model.name for model in self.files.models}
         declarations: list[Declarations] = []
         for source in self.files.declarations:
-            parsed_file = self.parser.read_declarations(source)
+            parsed_file = self._read_declarations(source)
             self.diagnostics += parsed_file.diagnostics
             model_path = source.path.removesuffix(".toml") + ".xml"
             if model_path.removeprefix("models/").removesuffix(".xml") not in names:
@@ -386,7 +367,7 @@ class _Loader:
     ) -> dict[tuple[str, bool], Document]:
         """Parse texts; return the documents by path, and by whether they are lessons."""
         documents = {}
-        parsed_documents = self.parser.read_documents(sources, callouts, words)
+        parsed_documents = self._read_documents(sources, callouts, words)
         for (source, lesson), parsed_document in zip(sources, parsed_documents, strict=True):
             self.diagnostics += parsed_document.diagnostics
             documents[source.path, lesson] = parsed_document.value

@@ -105,7 +105,13 @@ def open_store(root: Path, location: str | None, size: str | None, *, fresh: boo
     option = "--cache-size"
     if size is None:
         option, size = "COURSEBUILD_CACHE_SIZE", os.environ.get("COURSEBUILD_CACHE_SIZE") or None
-    limit = SIZE if size is None else _parse_size(option, size)
+    limit = SIZE
+    if size is not None:
+        match = re.fullmatch(r"([0-9]{1,15})([KMGT]?)", size, re.IGNORECASE)
+        if match is None:
+            message = f"{option}: {size!r} is no size: a whole number, perhaps with K, M, G or T"
+            raise UsageError(message)
+        limit = int(match[1]) << (10 * " KMGT".index(match[2].upper() or " "))
     if location is None:
         location = os.environ.get("COURSEBUILD_CACHE") or None
     elif not location:
@@ -123,16 +129,6 @@ def open_store(root: Path, location: str | None, size: str | None, *, fresh: boo
     if store.set_aside not in ("", FOREIGN):
         Progress().say(f"warning: {FOLDER} {store.set_aside}; it is set aside")
     return store
-
-
-def _parse_size(option: str, text: str) -> int:
-    """Return a size in bytes."""
-    match = re.fullmatch(r"([0-9]{1,15})([KMGT]?)", text, re.IGNORECASE)
-    if match is None:
-        raise UsageError(
-            f"{option}: {text!r} is not a size: a whole number, perhaps with K, M, G or T"
-        )
-    return int(match[1]) << (10 * " KMGT".index(match[2].upper() or " "))
 
 
 def select(course: Course, names: tuple[str, ...], root: Path) -> frozenset[str] | None:

@@ -1,6 +1,7 @@
 """Writes the scripts of a course to `examples/`, and runs those that must run.
 
-Entry points: `extract_scripts`, `run`, `recorded_outputs`, `script_lines`.
+Entry points: `extract_scripts`, `run`, `recorded_outputs`, `script_lines`; `measure_sensitivity`,
+for `check --sensitivity` and `update`.
 
 A script that was edited by hand in `examples/` is reported and not run. Of the others, those run
 that have no remembered result which still holds, the longest first.
@@ -11,20 +12,23 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.files.errors import OutsideProjectError
 from coursebuild.core.files.examples import BlockedFile, ExamplesReport, Obstacle, write_examples
 from coursebuild.core.files.write import remove_leftovers
 from coursebuild.core.model import Course, Recording, find_blocks
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
+from coursebuild.core.model.sensitivity import HALVED_RUN, RUNS, Sensitivity
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.memory import Memory, longest_first
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
 from coursebuild.core.scripts.failures import is_lost
 from coursebuild.core.scripts.findings import count_unproven
+from coursebuild.core.scripts.sensitivity import is_worth_moving, sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.recorded_runs import recorded_runs
+from coursebuild.pipeline.recordings import recorded_runs
 from coursebuild.report import ScriptLine
 
 
@@ -208,3 +212,65 @@ def script_lines(
             )
         )
     return tuple(lines)
+
+
+def measure_sensitivity(
+    course: Course,
+    options: Options,
+    runs: Iterable[ScriptRun],
+    documents: Collection[str] | None = None,
+    *,
+    halve: bool = False,
+) -> tuple[Sensitivity, ...]:
+    """Measure which printed digits repeat when initial states move, of scripts that were run.
+
+    Scripts that use MuJoCo and print what is recorded run four times with their initial states
+    moved (`core.run.initial_state_perturbation`), each with three times the time limit; if `halve`,
+    a fifth time with halved timesteps (`core.run.half_steps`). All runs are remembered like others.
+    `documents`: only recorded outputs in documents with these paths count.
+    """
+    recordings: dict[str, list[Recording]] = {}
+    for recording in recorded_outputs(course, documents):
+        assert recording.script is not None
+        recordings.setdefault(recording.script, []).append(recording)
+    bases = {run.path: run for run in runs if run.did_run}
+    pairs = [(e, bases[e.path]) for e in extract(course).value if e.path in bases]
+    moved_scripts = [
+        script
+        for script, base in pairs
+        if is_worth_moving(course, recordings.get(script.path, ()), base)
+    ]
+    numbers = (*range(1, RUNS + 1), *((HALVED_RUN,) if halve else ()))
+    perturbed_runs = _run_perturbed(moved_scripts, options, numbers)
+    return tuple(
+        sensitivity(
+            course,
+            script.path,
+            script.owner,
+            recordings.get(script.path, ()),
+            base,
+            perturbed_runs.get(script.path, ())[:RUNS],
+            next(iter(perturbed_runs.get(script.path, ())[RUNS:]), None),
+        )
+        for script, base in pairs
+    )
+
+
+def _run_perturbed(
+    scripts: Sequence[Extraction], options: Options, numbers: Sequence[int]
+) -> dict[str, list[ScriptRun]]:
+    """Run scripts with moved states or halved timesteps; return the runs by path."""
+    runs: dict[str, list[ScriptRun]] = {script.path: [] for script in scripts}
+    if not scripts:
+        return runs
+    from coursebuild.core.run.script_server import ScriptServer
+
+    memory = options.memory()
+    with ScriptServer(sandbox=options.sandbox) as server:
+        server_options = replace(options, run_all=server.run)
+        for number in numbers:
+            halving = number == HALVED_RUN
+            stage = "halving timesteps" if halving else f"moving initial states, {number} of {RUNS}"
+            for script_run in run(scripts, server_options, stage, memory, perturbation=number):
+                runs[script_run.path].append(script_run)
+    return runs

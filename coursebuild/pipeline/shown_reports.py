@@ -36,10 +36,10 @@ _T = TypeVar("_T")
 def shown_reports(root: Path, course: Course) -> Parsed[Reports]:
     """Read the reports that pages may show; a warning for each that they may not."""
     paths = [path for path in course.files if path.startswith(_FOLDER)]
-    return _Reader(root, course).read(paths) if paths else Parsed(Reports())
+    return _Collector(root, course).read(paths) if paths else Parsed(Reports())
 
 
-class _Reader:
+class _Collector:
     def __init__(self, root: Path, course: Course) -> None:
         self._root = root
         self._models = {model.name: model for model in course.models}

@@ -1,28 +1,34 @@
-"""The files of a site: pages, what they share, what can be downloaded.
+"""From a course, its results and its summaries to the files of its site.
 
-Entry point: `site_files(…)`.
+Entry point: `Site`, with its `files`; `page_request`, what a page is drawn from.
 
-A file that is the same as in the last site need not be made: it has a key, a hash of all that its
-bytes depend on, and `core.engine.publish` makes it only where it was not published under this key.
+1. Every page has inputs, all that it shows of the course, and a key: a hash of its inputs, of its
+   document's text, and of the tool. Where nothing has changed of what the inputs are made of, the
+   key is that of the last build, and the inputs are not made.
+2. The records of the pages of the last build are stored together, so that unchanged pages need not
+   be loaded. Records of pages that were drawn earlier come from the store with their pages; a page
+   that is not there is drawn.
+3. The records say whether all links lead somewhere, and which characters and styles pages use:
+   which fonts and which style sheet they share.
+4. Every file has a key, a hash of all that its bytes depend on. `core.engine.publish` makes it only
+   where it was not published under this key. A page's body is loaded then, and put into its frame:
+   not all bodies of a large course may fit into memory.
 """
 
 from __future__ import annotations
 
 import functools
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from html import unescape
 from typing import TYPE_CHECKING
 
-from msgspec import Struct, field
+from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.engine.memo import Memo
-from coursebuild.core.files.resources import (
-    Bundle,
-    prepared_file,
-    prepared_folder,
-    template_texts,
-)
+from coursebuild.core.engine.tool import step_key
+from coursebuild.core.files.resources import prepared_file
 from coursebuild.core.model import (
     Course,
     HtmlBlock,
@@ -31,60 +37,35 @@ from coursebuild.core.model import (
     document_blocks,
     document_inlines,
 )
-from coursebuild.core.model.results import (
-    CachedFile,
-    FileList,
-    OutputFile,
-    Reports,
-    Results,
-    SiteFile,
-)
+from coursebuild.core.model.results import CachedFile, FileList, OutputFile, SiteFile
 from coursebuild.core.pages import meta, urls
-from coursebuild.core.pages.added_files import SiteContext, added_files
-from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.added_files import NotedPage, SiteContext, added_files
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
 from coursebuild.core.pages.compressed import compressed_files
-from coursebuild.core.pages.frame import Names
+from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_list import PageEntry
+from coursebuild.core.pages.links import Reference, has_anchor
+from coursebuild.core.pages.page_list import PageEntry, page_list
+from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.html import find_address
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.source import Source, Span
-from coursebuild.pipeline.documents import Documents
+from coursebuild.core.text.source import Source, Span, key_of
 from coursebuild.pipeline.downloads import Downloads
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.pages import Pages
+from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.requests import (
+    DrawnPage,
+    PageRequest,
+    SourceText,
+    results_fingerprint,
+)
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.fonts import FontJob
 
-
-class Site(Struct, frozen=True):
-    """A site that may be published where nothing is wrong with it."""
-
-    files: tuple[SiteFile, ...]
-    """Sorted by path."""
-    file_list: FileList | None
-    """The list of all files, if a feature adds one."""
-    diagnostics: tuple[Diagnostic, ...]
-    drawn_pages: tuple[str, ...]
-    """Site paths of the pages that were drawn for it, since they had changed."""
-    names: Names | None = None
-    """The names of the files that all pages share."""
-    keys: Mapping[str, str] = field(default_factory=dict)
-    """The keys of pages, by site path."""
-
-
-def site_files(
-    course: Course, results: Results, documents: Documents, options: Options, reports: Reports
-) -> Site:
-    """Make the site of a course whose documents are summaries; its pages show the `reports`."""
-    assets = Assets(template_texts(), Bundle(), prepared_folder())
-    library = Library(course, results, assets, reports)
-    return SiteMaker(library, assets, documents, options).make_site()
-
-
+_INDEX = "index"
+"""The kind of the entry in the store that has the records of the last build's pages."""
 _FACTS_OF_ANY_PAGE = PageFacts(
     frozenset(map(chr, range(0x20, 0x3000))),
     frozenset(map(chr, (*range(0x20, 0x3000), *range(0x1D400, 0x1D800)))),
@@ -93,89 +74,260 @@ _FACTS_OF_ANY_PAGE = PageFacts(
 """What pages that are not drawn yet may need."""
 
 
-class SiteMaker:
-    """Puts the files of a site together."""
+class _IndexEntry(Struct, frozen=True, array_like=True):
+    """A page that was drawn, now or before."""
+
+    page: PageEntry
+    key: str
+    origin: str
+    """A hash of all that its inputs are made from, and of its text; empty where that is unknown.
+    Where it is unchanged, so is the key."""
+    record: PageRecord
+
+
+class Site:
+    """The site of a course: its pages, what they share, what features add, what can be downloaded.
+
+    Pages that have changed are drawn at once, everything else is made when it is first asked for.
+    """
 
     def __init__(
-        self, library: Library, assets: Assets, documents: Documents, options: Options
-    ) -> None:
-        self.library = library
-        self.course = library.course
-        self.assets = assets
-        self.root = options.root
-        self.store = options.store
-        self.documents = documents
-
-    def make_site(
         self,
+        library: Library,
+        reader: Reader,
+        options: Options,
         entries: Iterable[PageEntry] | None = None,
         last_good: Mapping[str, str] | None = None,
         *,
         whole_fonts: bool = False,
-    ) -> Site:
-        """Make the site, or some of its pages with all other files; then links are not checked.
+    ) -> None:
+        """Draw the pages that have changed of a course that the reader has read.
 
-        See `Pages` for the arguments. `whole_fonts`: leave fonts whole, for pages drawn later.
+        `entries`: only these pages; then links are not checked. `last_good`: the keys, by site
+        path, of pages that stay as they were. `whole_fonts`: leave fonts whole, for pages drawn
+        later.
         """
-        pages = Pages(self.library, self.documents, self.store, entries, last_good)
-        self.documents.stop_workers()
-        names, shared_files = self._make_shared_files(None if whole_fonts else pages.facts)
-        trial_files = self.library.trials.files
-        downloads = Downloads.of(self.library, self.assets, self.documents, self.root, self.store)
-        files: list[SiteFile] = [
-            *shared_files,
-            *trial_files,
-            *self._copies(trial_files),
-            *downloads.files,
-        ]
-        context = functools.partial(self._context, pages, names, downloads)
-        files_added, file_list = added_files(context)
-        files += [*files_added, OutputFile(urls.ROBOTS, meta.robots(self.course))]
-        if self.course.base_url:
-            files.append(OutputFile(urls.SITEMAP, meta.sitemap(self.course, pages.indexed)))
-        page_files = tuple(pages.files(names))
-        diagnostics = tuple(pages.repeated_ids())
-        if entries is None and not pages.are_sound({file.path for file in files}):
-            diagnostics += tuple(broken_links(self.course, [*page_files, *files]))
-        all_files = tuple(sorted((*page_files, *files), key=lambda file: file.path))
-        return Site(all_files, file_list, diagnostics, tuple(pages.drawn_paths), names, pages.keys)
+        self._library = library
+        self._reader = reader
+        self._root, self._store = options.root, options.store
+        self._has_all_pages, self._whole_fonts = entries is None, whole_fonts
+        self._last_good = last_good or {}
+        self._latest: tuple[str, DrawnPage] | None = None
+        """The page that was loaded last: several files are made of it."""
+        self.drawn_paths: list[str] = []
+        """Site paths of the pages that were drawn just now."""
+        index = step_key("index of pages")
+        last_pages = self._store.get_value(_INDEX, index, tuple[_IndexEntry, ...]) or ()
+        self._pages = self._draw_changed(
+            page_list(library) if entries is None else entries,
+            {entry.page.path: entry for entry in last_pages},
+        )
+        all_pages = tuple(self._pages.values())
+        if entries is None and all_pages != last_pages:
+            self._store.put_value(_INDEX, index, all_pages)
+        reader.stop_workers()
 
-    # --- what all pages share
+    @property
+    def keys(self) -> dict[str, str]:
+        """The keys of all pages, by site path."""
+        return {path: entry.key for path, entry in self._pages.items()}
 
-    def _make_shared_files(self, facts: PageFacts | None) -> tuple[Names, list[SiteFile]]:
-        """Make the shared files; with whole fonts where there are no facts."""
-        cut_font = None if facts is None else functools.partial(_cut_font, self.store)
-        facts = facts or _FACTS_OF_ANY_PAGE
-        facts = replace(facts, text=facts.text | common_characters(self.library))
-        shared_files, names = common_files(self.assets, cut_font, facts, self.course.theme)
-        return names, [*shared_files, *self._copies(shared_files)]
+    # --- pages
 
-    def _copies(self, files: Iterable[SiteFile]) -> tuple[CachedFile, ...]:
-        """Make compressed copies."""
+    def _draw_changed(
+        self, pages: Iterable[PageEntry], last_pages: Mapping[str, _IndexEntry]
+    ) -> dict[str, _IndexEntry]:
+        """Return the pages by site path, in order; draw those that are not stored."""
+        known_pages: dict[str, _IndexEntry | None] = {}
+        pending: deque[tuple[PageEntry, str, str]] = deque()
+        library = self._library
+        results = results_fingerprint(library.results, library.reports)
+        bare, with_notes = self._reader.fingerprints(library.course)
+
+        def missing() -> Iterator[PageRequest]:  # inputs are made while pages are drawn
+            for page in pages:
+                path, text = page.path, text_of(page, library)
+                course = with_notes if page.may_show_notes(library) else bare
+                text_key = "" if text is None else text.key
+                origin = "" if course is None else key_of(course, results, text_key)
+                last = last_pages.get(path)
+                key, request = self._last_good.get(path), None
+                if key is None and last is not None and origin and last.origin == origin:
+                    key = last.key
+                if key is None:
+                    request = page_request(page, library)
+                    key = request.key
+                if last is not None and (last.key, last.page) == (key, page):
+                    record: PageRecord | None = last.record
+                else:  # drawn before the last build, perhaps
+                    stored_page = None if self._store.fresh else self._reader.find_page(key)
+                    record = None if stored_page is None else stored_page.record
+                if record is not None:
+                    known_pages[path] = _IndexEntry(page, key, origin, record)
+                elif path not in self._last_good:  # else it is no longer in the store
+                    known_pages[path] = None
+                    pending.append((page, key, origin))
+                    yield request or page_request(page, library)
+
+        for record in self._reader.draw(missing()):
+            page, key, origin = pending.popleft()
+            known_pages[page.path] = _IndexEntry(page, key, origin, record)
+            self.drawn_paths.append(page.path)
+        return {path: entry for path, entry in known_pages.items() if entry is not None}
+
+    def _load(self, path: str) -> DrawnPage:
+        """Return a page of the site, from the store."""
+        if self._latest is None or self._latest[0] != path:
+            entry = self._pages[path]
+            page = self._reader.find_page(entry.key)
+            if page is None:
+                page = self._reader.draw_page(page_request(entry.page, self._library))
+            self._latest = path, page
+        return self._latest[1]
+
+    def _page_files(self) -> Iterator[CachedFile]:
+        """The pages in their frames."""
+        frame = PageFrame(FrameInputs.of(self._library, self.names), self._library.assets)
+        frame_key = step_key("frame", frame.inputs)
+
+        def make(path: str) -> bytes:
+            return frame_page(self._load(path), frame)
+
+        for path, entry in self._pages.items():
+            yield CachedFile(path, key_of(entry.key, frame_key), functools.partial(make, path))
+
+    # --- all files
+
+    @property
+    def names(self) -> Names:
+        """The names of the files that all pages share."""
+        return self._shared_files[1]
+
+    @property
+    def file_list(self) -> FileList | None:
+        """The list of all files, if a feature adds one."""
+        return self._added_files[1]
+
+    @functools.cached_property
+    def files(self) -> tuple[SiteFile, ...]:
+        """All files but that list, sorted by path."""
+        course, trial_files = self._library.course, self._library.trials.files
+        files: list[SiteFile] = [*self._shared_files[0], *trial_files]
 
         def keep(key: str, make: Callable[[], bytes]) -> bytes:
-            return prepared_file("copies", key) or self.store.get_or_create("compressed", key, make)
+            return prepared_file("copies", key) or self._store.get_or_create(
+                "compressed", key, make
+            )
 
-        return compressed_files(files, keep)
+        files += compressed_files(files, keep)
+        files += (*self._downloads.files, *self._added_files[0], *self._page_files())
+        files.append(OutputFile(urls.ROBOTS, meta.robots(course)))
+        if course.base_url:
+            indexed = (path for path, entry in self._pages.items() if entry.record.indexed)
+            files.append(OutputFile(urls.SITEMAP, meta.sitemap(course, indexed)))
+        return tuple(sorted(files, key=lambda file: file.path))
 
-    def _context(
-        self,
-        pages: Pages,
-        names: Names,
-        downloads: Downloads,
-        feature: str,
-    ) -> SiteContext:
+    @functools.cached_property
+    def _shared_files(self) -> tuple[Sequence[SiteFile], Names]:
+        library = self._library
+        records = [entry.record for entry in self._pages.values()]
+        facts, cut_font = _FACTS_OF_ANY_PAGE, None
+        if not self._whole_fonts:
+            cut_font = functools.partial(_cut_font, self._store)
+            facts = PageFacts(
+                frozenset[str]().union(*(record.text for record in records)),
+                frozenset[str]().union(*(record.mathematics for record in records)),
+                frozenset[str]().union(*(record.declarations for record in records)),
+            )
+        facts = replace(facts, text=facts.text | common_characters(library))
+        return common_files(library.assets, cut_font, facts, library.course.theme)
+
+    @functools.cached_property
+    def _downloads(self) -> Downloads:
+        library = self._library
+        return Downloads.of(library, library.assets, self._reader, self._root, self._store)
+
+    @functools.cached_property
+    def _added_files(self) -> tuple[list[SiteFile], FileList | None]:
+        return added_files(self._context)
+
+    def _context(self, feature: str) -> SiteContext:
         """Return what a feature makes its files from."""
         return SiteContext(
-            self.library,
-            self.assets,
-            names,
-            pages.noted_pages(feature),
-            functools.partial(pages.note, feature),
-            functools.partial(self.store.get_or_create, "parts"),
-            downloads.archives,
-            downloads.imports,
+            self._library,
+            self._library.assets,
+            self.names,
+            tuple(
+                NotedPage(path, entry.record.kind, entry.page.id, entry.record.title, digest)
+                for path, entry in self._pages.items()
+                for name, digest in entry.record.notes
+                if name == feature
+            ),
+            lambda path: self._load(path).notes[feature],
+            functools.partial(self._store.get_or_create, "parts"),
+            self._downloads.archives,
+            self._downloads.imports,
         )
+
+    # --- what is wrong with them
+
+    @functools.cached_property
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        """What is wrong with the finished pages: ids that stand there twice, broken links."""
+        diagnostics: list[Diagnostic] = []
+        for path, entry in self._pages.items():
+            for name, start, end in entry.record.repeated_ids:
+                document = entry.page.document(self._library)
+                source = Source(f"public/{path}", "") if document is None else document.source
+                message = f"the id `{name}` is already used on the finished page"
+                help = "give one of the two another id"
+                span = source.span(start, end)
+                diagnostics.append(diagnose("anchor-repeated", span, message, help=help))
+        if self._has_all_pages and not self._are_links_sound():
+            diagnostics += broken_links(self._library.course, self.files)
+        return tuple(diagnostics)
+
+    def _are_links_sound(self) -> bool:
+        """Whether all links of the pages lead to pages or other files of the site."""
+        ids = {path: frozenset(entry.record.ids) for path, entry in self._pages.items()}
+        paths = {file.path for file in self.files}
+        links = set[Reference]().union(*(entry.record.references for entry in self._pages.values()))
+        return all(
+            path in paths
+            if path not in ids
+            else anchor in ("", "top") or has_anchor(ids[path], anchor)
+            for path, anchor in links
+        )
+
+
+def frame_page(page: DrawnPage, frame: PageFrame) -> bytes:
+    """Put a page into its frame, as it is published."""
+    return frame.render(page.head, page.parts, page.body.decode()).encode()
+
+
+def text_of(entry: PageEntry, library: Library) -> SourceText | None:
+    """The text of the document that a page shows, if it shows one."""
+    document = entry.document(library)
+    if document is None:
+        return None
+    lesson = library.lessons.get(entry.id)
+    is_lesson = lesson is not None and lesson.document is document
+    course = library.course
+    return SourceText.of(
+        document.source, course.callout_names, lesson=is_lesson, words=course.words
+    )
+
+
+def page_request(entry: PageEntry, library: Library) -> PageRequest:
+    """Make the request to draw a page."""
+    course = library.course
+    return PageRequest.of(
+        entry.inputs(library),
+        text_of(entry, library),
+        course.language,
+        course.base_url,
+        course.theme.template_texts,
+    )
 
 
 def _cut_font(store: Memo, job: FontJob) -> bytes:

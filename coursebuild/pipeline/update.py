@@ -1,6 +1,8 @@
-"""`coursebuild update`: bring recorded outputs up to date, by span.
+"""`coursebuild update` and `extract`: what scripts print, and what they are, into the lessons.
 
-Entry point: `update(options, names, dry_run=…)`.
+Entry points: `update(options, names, dry_run=…)` brings recorded outputs up to date, by span;
+`extract(options, adopt=…)` writes the scripts to `examples/`, or brings edits made there back.
+Of an update:
 
 1. Every chosen script runs twice. What differs between the two runs cannot be recorded. A
    remembered result counts as the first run, and as both where nothing of it is to be recorded:
@@ -23,23 +25,36 @@ from typing import TypeAlias
 from msgspec.structs import replace
 
 from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.examples import Obstacle
 from coursebuild.core.files.locks import project_lock
+from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import check_writable, write_atomic
 from coursebuild.core.model import Course, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
 from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.scripts.compare import verify as compare_all
-from coursebuild.core.scripts.edit import apply_edits, update_body
-from coursebuild.core.scripts.extract import extract
+from coursebuild.core.scripts.edit import adopt_file, apply_edits, block_text, update_body
+from coursebuild.core.scripts.extract import extract as extract_course
 from coursebuild.core.scripts.findings import collect_evidence, script_findings
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.pipeline.figures import find_figures, write_figures
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
-from coursebuild.pipeline.recorded_runs import check_recorded_runs, record_runs
-from coursebuild.pipeline.scripts import extract_scripts, recorded_outputs, run, script_lines
+from coursebuild.pipeline.recordings import (
+    check_recorded_runs,
+    find_figures,
+    record_runs,
+    write_figures,
+)
+from coursebuild.pipeline.scripts import (
+    ExtractedScripts,
+    extract_scripts,
+    measure_sensitivity,
+    recorded_outputs,
+    run,
+    script_lines,
+)
 from coursebuild.report import Report
 
 Runs: TypeAlias = list[tuple[ScriptRun, ScriptRun]]
@@ -142,11 +157,10 @@ class _Updater:
     ) -> list[Diagnostic]:
         """Find recorded digits that are noise, in the outputs that have changed."""
         from coursebuild.core.scripts.sensitivity import noise_warnings
-        from coursebuild.pipeline.sensitivity import measure
 
         changed = {r.script for r in self.recordings if _is_touched(r, edits, ())}
         changed_runs = [script_run for script_run in runs if script_run.path in changed]
-        sensitivities = measure(new_course, self.options, changed_runs, self.documents)
+        sensitivities = measure_sensitivity(new_course, self.options, changed_runs, self.documents)
         return [warning for sensitivity in sensitivities for warning in noise_warnings(sensitivity)]
 
     # --- edits
@@ -226,7 +240,7 @@ class _Updater:
             return [v for v in compare_all(course, last_runs) if v.recording.script in paths]
 
         # What was written above a script has moved it.
-        extractions = [e for e in extract(new_course).value if e.path in paths]
+        extractions = [e for e in extract_course(new_course).value if e.path in paths]
         evidence = None
         if new_course is not self.course:
             evidence = collect_evidence(self.course, last_runs, verdicts(self.course))
@@ -259,3 +273,84 @@ def changed_text(verb: str, source: Source, new: str) -> str:
         source.text.splitlines(), new.splitlines(), source.path, source.path, n=1, lineterm=""
     )
     return "\n".join([f"{verb} {source.path}", *diff])
+
+
+# --- extract
+
+
+def extract(options: Options, *, adopt: bool = False) -> Report:
+    """Extract; with `adopt` the lessons take over what was edited by hand in `examples/`."""
+    with project_lock(options.root, options.progress.say):
+        began = time.monotonic()
+        parsed_course = load(options.root)
+        course = parsed_course.value
+        if course is None:
+            return judge(None, parsed_course.diagnostics, began)
+        extracted_scripts = extract_scripts(course, options)
+        remarks = _list_changes(extracted_scripts)
+        refusals: list[Diagnostic] = []
+        if adopt and extracted_scripts.files.blocked:
+            adoptions, refusals, files_read = _adopt(options, extracted_scripts)
+            if files_read:
+                parsed_course = load(options.root)
+                course = parsed_course.value or course
+                _write_as_extracted(options, course, files_read)
+                extracted_scripts = extract_scripts(course, options)
+            remarks += [*adoptions, *_list_changes(extracted_scripts)]
+        diagnostics = [*parsed_course.diagnostics, *extracted_scripts.diagnostics, *refusals]
+        if not remarks and all(not d.is_error for d in diagnostics):
+            remarks.append("every script is extracted already")
+        return judge(course, diagnostics, began, remarks=tuple(remarks))
+
+
+def _list_changes(extracted_scripts: ExtractedScripts) -> list[str]:
+    removals = (
+        f"removed {path}, which no lesson has any more" for path in extracted_scripts.files.removed
+    )
+    return [*(f"wrote {path}" for path in extracted_scripts.files.written), *removals]
+
+
+def _adopt(
+    options: Options, extracted_scripts: ExtractedScripts
+) -> tuple[list[str], list[Diagnostic], dict[str, bytes]]:
+    """Write the edited files into their lessons' blocks; also return what these files held."""
+    by_path = {e.path: e for e in extracted_scripts.extractions}
+    edits: dict[Source, list[Edit]] = {}
+    refusals: list[Diagnostic] = []
+    files_read: dict[str, bytes] = {}
+    for example in extracted_scripts.files.blocked:
+        extraction = by_path.get(example.path)
+        if extraction is None or example.obstacle not in (Obstacle.EDITED, Obstacle.FOREIGN):
+            continue
+        data = read_bytes(options.root, example.path)
+        if example.diverged and block_text(data) != extraction.text:
+            continue  # taking one would lose the other; the diagnostic says how to go on
+        adoption = adopt_file(extraction.script, data)
+        if isinstance(adoption, Edit):
+            edits.setdefault(adoption.span.source, []).append(adoption)
+            files_read[example.path] = data
+        else:
+            refusals.append(adoption)
+    remarks: list[str] = []
+    for source in edits:  # all or none
+        check_writable(options.root, source.path)
+    for source, changes in edits.items():
+        new = apply_edits(source.text, changes)
+        if new != source.text:
+            write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
+            remarks.append(changed_text("updated", source, new))
+    return remarks, refusals, files_read
+
+
+def _write_as_extracted(options: Options, course: Course, files_read: Mapping[str, bytes]) -> None:
+    """Make each adopted file what its block extracts to now.
+
+    A block holds no line ends of an editor's and no blank lines at the end: without this the file
+    would count as edited for ever.
+    """
+    for extraction in extract_course(course).value:
+        data = files_read.get(extraction.path, extraction.data)
+        if data != extraction.data and block_text(data) == extraction.text:
+            write_atomic(
+                options.root, extraction.path, extraction.data, expected=data, durable=False
+            )

@@ -8,7 +8,7 @@ Entry point: `verify(course, options, documents)`.
    has none.
 4. Features' trials, such as those of labs, are run while the scripts run.
 
-Documents may be summaries. Formulas are not checked here: see `pipeline.documents`.
+Documents may be summaries. Formulas are not checked here: see `pipeline.reader`.
 """
 
 from __future__ import annotations
@@ -43,10 +43,9 @@ from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.scripts.repeat import repeat_findings
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.pipeline.figures import check_drawings, read_recorded
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.recorded_runs import check_recorded_runs
+from coursebuild.pipeline.recordings import check_drawings, check_recorded_runs, read_recorded
 from coursebuild.pipeline.scripts import extract_scripts, run, script_lines
 from coursebuild.report import ScriptLine
 

@@ -22,11 +22,10 @@ from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.frame import FrameInputs, PageFrame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
-from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.pages import frame_page, page_request
-from coursebuild.pipeline.reading import DrawnPage
-from coursebuild.pipeline.site import Site, SiteMaker
+from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.requests import DrawnPage
+from coursebuild.pipeline.site import Site, frame_page, page_request
 
 _MOST_PAGES = 64
 """How many pages are kept in memory with their frames."""
@@ -41,13 +40,13 @@ class Files:
         self,
         options: Options,
         assets: Assets,
-        documents: Documents,
+        reader: Reader,
         is_sound: Callable[[Document], bool],
     ) -> None:
         """`is_sound` says whether a document can be drawn."""
         self._options = replace(options, jobs=1)  # a process with threads is not forked
         self._assets = assets
-        self._documents = documents
+        self._reader = reader
         self._is_sound = is_sound
         self._library: Library | None = None
         self._entries: dict[str, PageEntry] = {}
@@ -70,10 +69,14 @@ class Files:
         if self._sites:
             self._set_frame()
         else:  # fonts with all characters, as pages are not drawn yet
-            self.serve(self._maker(library).make_site((), whole_fonts=True))
+            self.serve(
+                *_with_files(Site(library, self._reader, self._options, (), whole_fonts=True))
+            )
 
-    def make(self, library: Library, broken: Collection[str], pause: Callable[[], None]) -> Site:
-        """Make all files of the site.
+    def make(
+        self, library: Library, broken: Collection[str], pause: Callable[[], None]
+    ) -> tuple[Site, Mapping[str, SiteFile]]:
+        """Make all files of the site; return them by path.
 
         `broken` are paths of pages whose documents have mistakes. `pause` is called between pages.
         """
@@ -85,21 +88,17 @@ class Files:
                     pause()
                     yield entry
 
-        return self._maker(library).make_site(entries(), last_good)
+        return _with_files(Site(library, self._reader, self._options, entries(), last_good))
 
-    def _maker(self, library: Library) -> SiteMaker:
-        return SiteMaker(library, self._assets, self._documents, self._options)
-
-    def serve(self, site: Site) -> None:
+    def serve(self, site: Site, files: Mapping[str, SiteFile]) -> None:
         """Serve the files of this site from now on."""
-        files = {file.path: file for file in site.files}
         self._sites = [*self._sites[1 - _MOST_SITES :], (site, files)]
         self._last_good |= {p: key for p, key in site.keys.items() if p in self._entries}
         self._set_frame()
 
     def _set_frame(self) -> None:
         names = self._sites[-1][0].names
-        assert self._library is not None and names is not None
+        assert self._library is not None
         self._frame = PageFrame(FrameInputs.of(self._library, names), self._assets)
         self._framed_pages.clear()
 
@@ -154,10 +153,14 @@ class Files:
         assert self._library is not None
         document = self.document(path)
         if document is not None and not self._is_sound(document):
-            return self._documents.find_page(self._last_good.get(path, ""))
+            return self._reader.find_page(self._last_good.get(path, ""))
         request = page_request(self._entries[path], self._library)
         self._last_good[path] = request.key
-        return self._documents.get_or_draw(request.key, lambda: request)
+        return self._reader.find_page(request.key) or self._reader.draw_page(request)
+
+
+def _with_files(site: Site) -> tuple[Site, Mapping[str, SiteFile]]:
+    return site, {file.path: file for file in site.files}
 
 
 def _data(file: SiteFile) -> bytes | None:

@@ -39,8 +39,8 @@ from coursebuild.core.scripts.diff import diff_rows
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
-from coursebuild.pipeline.figures import read_recorded
 from coursebuild.pipeline.judge import judge
+from coursebuild.pipeline.recordings import read_recorded
 from coursebuild.preview.session import Session
 from coursebuild.report import Report
 from coursebuild.report.text import location
@@ -77,7 +77,7 @@ class Offer(Struct, frozen=True):
 
 def report_now(session: Session) -> Report:
     """Return everything that is wrong, as a report."""
-    return judge(session.course, session.diagnostics(), scripts=session.script_lines)
+    return judge(session.course, session.diagnostics(), scripts=session.runs.script_lines)
 
 
 def page_news(session: Session, path: str) -> str:
@@ -207,7 +207,7 @@ def _describe_drift(session: Session, library: Library, verdict: Verdict) -> dic
 def new_output(session: Session, library: Library, verdict: Verdict) -> Edit | Diagnostic | None:
     """Make the edit that `coursebuild update` would; `None` if the script ran only once so far."""
     run = library.runs[verdict.recording.script or ""]
-    second = session.second_output(run.path)
+    second = session.runs.second_output(run.path)
     if second is None:
         return None
     return update_body(verdict.recording, verdict.comparison, run.stdout, second)

@@ -30,13 +30,15 @@ from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptJob, ScriptRun
 from coursebuild.core.run.script_server import OnFinish, RunAll, RunStoppedError, ScriptServer
 from coursebuild.core.scripts.bindings import BindingEvidence
+from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.scripts import run
 from coursebuild.pipeline.verify import verify
 from coursebuild.preview.messages import report_now
-from coursebuild.preview.session import Session, script_keys
+from coursebuild.preview.run_history import script_keys
+from coursebuild.preview.session import Session
 from coursebuild.report import Report, Style, summary_line
 from coursebuild.report.text import diagnostic_paragraphs, location
 
@@ -185,8 +187,8 @@ class BackgroundRebuild:
     def _verify(self, course: Course) -> None:
         session = self._session
         with session.condition:
-            all_due, session.all_due = session.all_due, False
-        known_runs = {} if all_due else session.known_runs(course)
+            is_all_due, session.runs.is_all_due = session.runs.is_all_due, False
+            known_runs = {} if is_all_due else session.runs.known_runs(course)
         try:
             verification = verify(
                 course,
@@ -196,11 +198,15 @@ class BackgroundRebuild:
                 known_runs=known_runs,
             )
         except BaseException:
-            session.all_due |= all_due
+            session.runs.is_all_due |= is_all_due
             raise
         self._options.store.fresh = False  # with `--no-cache`, everything is made anew only once
         session.take_results(course, verification)
-        self._run_again(course, session.drifted_scripts(verification.results.runs))
+        with session.condition:
+            course_now, runs = session.course, verification.results.runs
+            verdicts = () if course_now is None else compare(course_now, runs)
+        drifted_paths = {v.recording.script or "" for v in verdicts if v.status == "drift"}
+        self._run_again(course, drifted_paths)
 
     def _make_run_all(self, course: Course) -> RunAll:
         """Make a function that runs scripts, and shows what each prints as soon as it ends."""
@@ -238,14 +244,16 @@ class BackgroundRebuild:
     def _run_again(self, course: Course, drifted_paths: Collection[str]) -> None:
         """Run drifted scripts once more, unless they have done so already."""
         session, options = self._session, self._options.for_course(course)
-        paths = {path for path in drifted_paths if session.second_output(path) is None}
+        paths = {path for path in drifted_paths if session.runs.second_output(path) is None}
         scripts = [script for script in extract(course).value if script.path in paths]
         if scripts:
             self._begin_step("running scripts again")
             memory = options.memory(fresh=True)
             server_options = replace(options, run_all=self._run_unless_edited(course))
             runs = run(scripts, server_options, "running scripts again", memory)
-            session.take_second_runs(runs)
+            with session.condition:
+                session.runs.take_second_runs(runs)
+                session.notify()
 
 
 def _refuse_runs(*_: object, **__: object) -> NoReturn:

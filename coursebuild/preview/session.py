@@ -4,7 +4,8 @@ Entry point: `Session`.
 
 1. `edit(paths)` takes saves of documents: only these are read and checked.
 2. `read()` reads everything, after other changes and to be sure.
-3. `take_results` takes the results of running the course, `make_site` makes all files of its site.
+3. `take_results` takes the results of running the course, which `runs` knows; `make_site` makes all
+   files of its site.
 4. `find(path)` returns a file.
 
 `condition` is the lock of everything here; whoever waits for news waits on it.
@@ -15,40 +16,33 @@ from __future__ import annotations
 import gc
 import sys
 import threading
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from typing import TypeAlias
+from collections.abc import Callable, Collection, Iterable, Mapping
 
 from msgspec.structs import replace
 
 from coursebuild.core.checks.course import check_document
 from coursebuild.core.checks.links import LinkTargets, link_targets
-from coursebuild.core.features import PublishedTrials
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Course, Document, Lesson, Owner, Page
-from coursebuild.core.model.results import Outcome, Reports, Results, ScriptJob, ScriptRun
+from coursebuild.core.model.results import Reports, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.templates import TemplateFailure
 from coursebuild.core.registry import publish_trials
-from coursebuild.core.run.script_environment import engine_version, python_version
-from coursebuild.core.scripts.compare import verify as compare
-from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.scripts.source_parts import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
-from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import MAP, Code, load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.theme import template_diagnostic
 from coursebuild.pipeline.verify import Verification
 from coursebuild.preview.files import Files
-from coursebuild.report import ScriptLine
+from coursebuild.preview.run_history import RunHistory, ScriptKey
 
-ScriptKey: TypeAlias = tuple[str, ScriptJob]
-"""A script's text, and how it is run."""
 MAX_SINGLE_READS = 8
 """Documents saved at once that are read one by one; for more, the whole course is read."""
 _GARBAGE = 200_000
@@ -83,30 +77,19 @@ class Session:
         self._is_map_broken = False
         self.library: Library | None = None
         """The course with its results, for drawing; `None` before a map could be read."""
-        self.verified_course: Course | None = None
-        """The course that was run last."""
-        self.running_diagnostics: tuple[Diagnostic, ...] = ()
-        self.script_lines: tuple[ScriptLine, ...] = ()
-        self.all_due = True
-        """Whether any script may print something new, since other files have changed."""
+        self.runs = RunHistory()
         quiet_options = replace(options, jobs=1, progress=Progress(quiet=True))
-        self._documents = Documents(quiet_options)
+        self._reader = Reader(quiet_options)
         self._reading_lock = threading.Lock()
-        """Held while documents are read: `Documents` has one text of each."""
+        """Held while documents are read: a `Reader` has one text of each."""
         self._assets = Assets(template_texts(), Bundle(), prepared_folder())
         self._diagnostics_by_file: dict[str, tuple[Diagnostic, ...]] = {}
         """The diagnostics of reading and checking, by file."""
         self._template_diagnostics: tuple[Diagnostic, ...] = ()
         """The diagnostic of a template of the course that failed when a page was drawn."""
         self._targets: LinkTargets | None = None
-        self._results = Results((), (), (), (), python_version(), engine_version())
         self._reports = Reports()
-        self._runs: dict[str, tuple[ScriptKey, ScriptRun]] = {}
-        """The last run of each script, by path, with the key of the script that ran."""
-        self._second_outputs: dict[str, tuple[ScriptKey, str, str]] = {}
-        """Of scripts that ran twice, by path: their key, the first output and the second."""
-        self._trials = PublishedTrials()
-        self.files = Files(options, self._assets, self._documents, self._is_sound)
+        self.files = Files(options, self._assets, self._reader, self._is_sound)
         self._site = site
 
     def run_code(self) -> None:
@@ -117,8 +100,8 @@ class Session:
 
     def start(self) -> None:
         """Read the course on all cores, while this process has no threads and can be copied."""
-        with Documents(self.options) as documents:
-            self.read(documents)
+        with Reader(self.options) as reader:
+            self.read(reader)
         sys.setswitchinterval(_SWITCH)
         gc.freeze()  # what was read lives as long as the process: do not look through it again
         gc.set_threshold(_GARBAGE, 50, 50)
@@ -126,7 +109,7 @@ class Session:
     def close(self) -> None:
         """End what typesets formulas: with it running, the process may hang at its end."""
         with self.condition:
-            self._documents.close()
+            self._reader.close()
 
     # --- the state
 
@@ -140,7 +123,7 @@ class Session:
         with self.condition:
             return (
                 *self.reading_diagnostics,
-                *self.running_diagnostics,
+                *self.runs.diagnostics,
                 *self._template_diagnostics,
             )
 
@@ -234,7 +217,8 @@ class Session:
                 return None
             (source,) = sources
             if source != owner.document.source or self._diagnostics_by_file.get(path):
-                (parsed_document,) = self._documents.read_documents(
+                course = self.library.course
+                (parsed_document,) = self._reader.read_documents(
                     [(source, isinstance(owner, Lesson))], course.callout_names, course.words
                 )
                 diagnostics = (*read.diagnostics, *parsed_document.diagnostics)
@@ -249,20 +233,20 @@ class Session:
     def take_other_saves(self) -> None:
         """Take saves of files other than documents."""
         with self.condition:
-            self.all_due = True
+            self.runs.is_all_due = True
             self.notify(is_saved=True)
         self.read()
 
-    def read(self, documents: Documents | None = None, *, is_saved: bool = True) -> bool:
+    def read(self, reader: Reader | None = None, *, is_saved: bool = True) -> bool:
         """Read the whole course; return whether anything has changed.
 
         `is_saved`: see `edit`.
         """
-        documents = documents or self._documents
+        reader = reader or self._reader
         while True:
             edits = self.edits
             with self._reading_lock:
-                parsed_course = load(self.root, documents, self.open_texts, code=self.code)
+                parsed_course = load(self.root, reader, self.open_texts, code=self.code)
                 course = parsed_course.value
                 reports = Parsed(Reports()) if course is None else shown_reports(self.root, course)
                 with self.condition:
@@ -281,7 +265,7 @@ class Session:
             sources = read_sources(self.root, sorted(texts)).value
             if all(source.text == texts[source.path] for source in sources):
                 return self.course
-            return load(self.root, self._documents, code=self.code).value
+            return load(self.root, self._reader, code=self.code).value
 
     def _take_course(
         self, course: Course | None, diagnostics: Iterable[Diagnostic], reports: Reports
@@ -303,11 +287,9 @@ class Session:
 
     def _show(self, course: Course) -> None:
         """Draw pages of this course from now on, with what is known of it."""
-        keys = script_keys(course)
-        runs = tuple(run for path, (key, run) in self._runs.items() if keys.get(path) == key)
-        results = replace(self._results, runs=runs, verdicts=compare(course, runs))
+        results, trials = self.runs.results(course), self.runs.trials
         self._template_diagnostics = ()
-        self.library = Library(course, results, self._assets, self._reports, self._trials)
+        self.library = Library(course, results, self._assets, self._reports, trials)
         self._targets = link_targets(course)
         if self._site:
             self.files.show(self.library)
@@ -316,15 +298,11 @@ class Session:
 
     def take_results(self, course: Course, verification: Verification) -> None:
         """Take the results of verifying a course."""
-        results, trials = verification.results, self._trials
-        if results.trials != self._results.trials:
+        results, trials = verification.results, self.runs.trials
+        if results.trials != self.runs.last_results.trials:
             trials = publish_trials(results, self._assets)
         with self.condition:
-            self.verified_course, self.running_diagnostics = course, verification.diagnostics
-            self.script_lines = verification.scripts
-            self._results, self._trials = results, trials
-            keys = script_keys(course)
-            self._runs = {run.path: (keys[run.path], run) for run in results.runs}
+            self.runs.take(course, verification, trials)
             if self.course is not None:
                 self._show(self.course)
             self.notify()
@@ -332,39 +310,10 @@ class Session:
     def take_run(self, script: ScriptKey, run: ScriptRun) -> None:
         """Take the result of one script, while others run."""
         with self.condition:
-            self._runs[run.path] = script, run
+            self.runs.take_run(script, run)
             if self.course is not None:
                 self._show(self.course)
             self.notify()
-
-    def drifted_scripts(self, runs: Sequence[ScriptRun]) -> set[str]:
-        """The paths of the scripts that did not print what is recorded."""
-        with self.condition:
-            verdicts = () if self.course is None else compare(self.course, runs)
-        return {v.recording.script or "" for v in verdicts if v.status == "drift"}
-
-    def known_runs(self, course: Course) -> dict[str, ScriptRun]:
-        """The runs of a course's scripts, by path; empty where a script has changed since."""
-        with self.condition:
-            are_same = script_keys(course) == {p: key for p, (key, _) in self._runs.items()}
-            return {path: run for path, (_, run) in self._runs.items()} if are_same else {}
-
-    def take_second_runs(self, runs: Iterable[ScriptRun]) -> None:
-        """Take the outputs of scripts that ran once more."""
-        with self.condition:
-            for run in runs:
-                key, first = self._runs[run.path]
-                printed = run.stdout if run.outcome is Outcome.OK else ""
-                self._second_outputs[run.path] = key, first.stdout, printed
-            self.notify()
-
-    def second_output(self, path: str) -> str | None:
-        """What a script printed when it ran once more, if its text has not changed since."""
-        if path not in self._runs or path not in self._second_outputs:
-            return None
-        key, run = self._runs[path]
-        key_then, first_output, second_output = self._second_outputs[path]
-        return second_output if (key_then, first_output) == (key, run.stdout) else None
 
     def make_site(self, pause: Callable[[], None]) -> None:
         """Make all files of the site, and serve them; `pause` is called between pages."""
@@ -382,12 +331,12 @@ class Session:
                 urls.owner_path(o) for o in library.course.owners if o.path in broken_paths
             }
         try:
-            site = self.files.make(library, broken_pages, pause)
+            site, files = self.files.make(library, broken_pages, pause)
         except TemplateFailure as failure:
             self._take_template_failure(failure)
             return
         with self.condition:
-            self.files.serve(site)
+            self.files.serve(site, files)
             self.notify()
 
     # --- files
@@ -419,12 +368,6 @@ class Session:
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
     """Whether there are errors among diagnostics."""
     return any(d.is_error for d in diagnostics)
-
-
-def script_keys(course: Course) -> dict[str, ScriptKey]:
-    """The keys of a course's scripts by path: scripts with the same key print the same."""
-    scripts = extract(course).value
-    return {job.path: (e.text, job) for e, job in zip(scripts, jobs(scripts), strict=True)}
 
 
 def _replace_owners(course: Course, new_owners: Iterable[Owner]) -> Course:

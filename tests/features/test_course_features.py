@@ -84,6 +84,19 @@ def test_a_fence_of_a_feature_follows_its_code_and_the_map(course: Folder) -> No
     assert "LISTEN" not in course.text(PAGE), "a file that the map does not name is no feature"
 
 
+def test_blocks_of_a_feature_go_from_process_to_process(tmp_path: Path, stores: Path) -> None:
+    course = Folder(tmp_path)
+    course.fill([LESSON.replace("now", str(number)) for number in range(9)], stores)
+    course.replace(MAP, "[course]\n", '[course]\nfeatures = ["features/shout.py"]\n')
+    summary = "    text: str\n\n    def summary(self):\n        return self\n"
+    course.write("features/shout.py", SHOUT.replace("    text: str\n", summary))
+    for out, options in (("one", ["--jobs", "1"]), ("two", ["--jobs", "2", "--no-cache"])):
+        result = course.run("build", "--out", out, *options)
+        assert result.status == 0, result
+    assert course.tree("one") == course.tree("two")
+    assert "<p>LISTEN &lt;8&gt;</p>" in course.text("two/lessons/1.9-nine.html")
+
+
 BROKEN = {
     "1 / 0\n": " fails at line 1: ZeroDivisionError: division by zero",
     "def (\n": " fails: SyntaxError: ",

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.model.results import CachedFile
-from coursebuild.pipeline import reading
-from coursebuild.pipeline.build import build, prepare
+from coursebuild.pipeline.build import build, make_files
+from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.site import Site
 from support.scratch_course import Folder, block
 
 pytestmark = pytest.mark.slow
@@ -20,7 +21,7 @@ TEXT = 20_000
 """Bytes of prose in a lesson."""
 SLOPE = 60_000
 """Bytes that a further lesson may take: its text, its summary, names and keys of its files, and its
-packed tree. Unpacked trees do not count: both courses hold as many as there is room for."""
+packed tree."""
 
 
 def write_course(folder: Folder, count: int, size: int = TEXT) -> None:
@@ -51,7 +52,9 @@ def peak(folder: Folder) -> int:
     gc.freeze()  # else the garbage of other tests decides when the collector runs
     tracemalloc.start()
     try:
-        with prepare(folder.options()) as (report, site):
+        options = folder.options()
+        with Reader(options) as reader:
+            report, site = make_files(options, reader, lambda lib: Site(lib, reader, options))
             assert site is not None, report.diagnostics
             for file in site.files:
                 if file.path.endswith((".html", ".md", ".ipynb", ".epub")):
@@ -64,12 +67,7 @@ def peak(folder: Folder) -> int:
 
 
 @pytest.mark.parametrize("again", [False, True], ids=["cold", "one edit"])
-def test_memory_does_not_grow_with_the_lessons(
-    tmp_path: Path, stores: Path, again: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(
-        reading, "ROOM", FEW_LESSONS * TEXT // 2
-    )  # else it would take hundreds of lessons
+def test_memory_does_not_grow_with_the_lessons(tmp_path: Path, stores: Path, again: bool) -> None:
     peaks: dict[int, list[int]] = {FEW_LESSONS: [], MANY_LESSONS: []}
     # Several times: whatever else the process does can only add to it.
     for number, count in enumerate((FEW_LESSONS, FEW_LESSONS, MANY_LESSONS, MANY_LESSONS)):

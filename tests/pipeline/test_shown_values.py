@@ -18,11 +18,9 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.record import PageRecord
-from coursebuild.core.values import encode
 from coursebuild.pipeline.check import read_and_verify
-from coursebuild.pipeline.documents import Documents
-from coursebuild.pipeline.pages import Pages, page_request, text_of
-from coursebuild.pipeline.reading import PageRequest
+from coursebuild.pipeline.reader import PageRequest, Reader
+from coursebuild.pipeline.site import Site, page_request, text_of
 from coursebuild.report import Report
 from support.built_sites import BuiltCourses
 from support.changed_values import changes
@@ -37,17 +35,17 @@ BROKEN = {
 """What other values name: changed alone, it leaves a course with a mistake."""
 
 
-class UndrawnDocuments(Documents):
-    """Documents whose pages are not drawn: which ones would be is enough."""
+class UndrawingReader(Reader):
+    """Draws no pages: which ones would be drawn is enough."""
 
-    def draw(self, pages: Iterator[PageRequest]) -> Iterator[bytes]:
+    def draw(self, pages: Iterator[PageRequest]) -> Iterator[PageRecord]:
         for _ in pages:
-            yield encode(PageRecord("", "", True, "", "", (), (), ()))
+            yield PageRecord("", "", True, "", "", (), (), ())
 
 
-def read_library(folder: Folder, documents: Documents) -> Library:
+def read_library(folder: Folder, reader: Reader) -> Library:
     """A course that was built, as the next build has it."""
-    checked_course = read_and_verify(folder.options(), documents, static=True)
+    checked_course = read_and_verify(folder.options(), reader, static=True)
     assert not isinstance(checked_course, Report) and checked_course.report().ok
     assets = Assets(template_texts(), Bundle(), prepared_folder())
     results = checked_course.verification.results
@@ -57,18 +55,18 @@ def read_library(folder: Folder, documents: Documents) -> Library:
 @pytest.fixture(scope="module")
 def built_course(
     built_courses: BuiltCourses, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[tuple[Library, Documents, Folder]]:
+) -> Iterator[tuple[Library, Reader, Folder]]:
     folder = built_courses["full"].duplicate(tmp_path_factory.mktemp("shown") / "course")
-    with UndrawnDocuments(folder.options()) as documents:
-        yield read_library(folder, documents), documents, folder
+    with UndrawingReader(folder.options()) as reader:
+        yield read_library(folder, reader), reader, folder
 
 
 def test_no_page_stays_when_a_value_changes_that_it_is_made_of(
-    built_course: tuple[Library, Documents, Folder],
+    built_course: tuple[Library, Reader, Folder],
 ) -> None:
-    library, documents, folder = built_course
-    store = folder.options().store
-    Pages(library, documents, store)  # the last build
+    library, reader, folder = built_course
+    options = folder.options()
+    Site(library, reader, options)  # the last build
     stale, broken = [], set()
     values = library.course, library.results, library.reports
     for name, (course, results, reports) in changes(values).items():
@@ -78,14 +76,14 @@ def test_no_page_stays_when_a_value_changes_that_it_is_made_of(
         except (KeyError, StopIteration):
             broken.add(name)
             continue
-        kept_keys = Pages(changed, documents, store, page_list(changed)).keys
+        kept_keys = Site(changed, reader, options, page_list(changed)).keys
         stale += [f"{name}: {path}" for path, key in keys.items() if kept_keys[path] != key]
     assert stale == []
     assert broken == BROKEN
 
 
 def test_each_value_of_a_page_is_in_its_key(
-    built_course: tuple[Library, Documents, Folder],
+    built_course: tuple[Library, Reader, Folder],
 ) -> None:
     library, _, _ = built_course
     course, names = library.course, set()

@@ -16,9 +16,9 @@ from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.text.diagnostics import Parsed
-from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.reader import Reader
 from support.scratch_course import GOOD, ROOT, Folder, block
 
 pytestmark = pytest.mark.site
@@ -63,8 +63,8 @@ def test_course_of_summaries_tells_what_the_whole_course_tells(tmp_path: Path) -
         folder.write(f"content/lessons/1.{n}-l.md", path.read_bytes())
     (diagnostics, *whole) = parts_of(load(tmp_path))
     for _ in range(2):
-        with Documents(Options(tmp_path, 1, Memo(tmp_path))) as documents:
-            (diagnostics_of_summaries, *parts_of_summaries) = parts_of(load(tmp_path, documents))
+        with Reader(Options(tmp_path, 1, Memo(tmp_path))) as reader:
+            (diagnostics_of_summaries, *parts_of_summaries) = parts_of(load(tmp_path, reader))
         assert isinstance(diagnostics_of_summaries, set) and isinstance(diagnostics, set)
         assert len(diagnostics) > 1000
         assert diagnostics_of_summaries > diagnostics, "formulas are looked at as well"
@@ -131,10 +131,10 @@ def test_fingerprint_changes_with_what_others_see_and_not_with_prose(
 
     def of(text: str) -> str | None:
         folder.write(folder.lesson(), text)
-        with Documents(folder.options()) as documents:
-            course = load(folder.root, documents).value
+        with Reader(folder.options()) as reader:
+            course = load(folder.root, reader).value
             assert isinstance(course, Course)
-            return documents.fingerprints(course)[1]
+            return reader.fingerprints(course)[1]
 
     plain = of(TEXT)
     assert of("Plain words.\n\n" + TEXT) == plain == of(TEXT + "Plain words.\n")

@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from coursebuild.pipeline.build import prepare
+from coursebuild.pipeline.build import make_files
+from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.site import Site
 from support.scratch_course import Folder, block
 
 HEAD = """
@@ -90,10 +92,12 @@ class Course:
 
 def drawn_pages(folder: Folder) -> set[str]:
     """Return the pages that a build draws anew."""
-    with prepare(folder.options()) as (report, site):
+    options = folder.options()
+    with Reader(options) as reader:
+        report, site = make_files(options, reader, lambda lib: Site(lib, reader, options))
         assert site is not None, report.diagnostics
-        assert len(set(site.drawn_pages)) == len(site.drawn_pages)
-        return set(site.drawn_pages)
+        assert len(set(site.drawn_paths)) == len(site.drawn_paths)
+        return set(site.drawn_paths)
 
 
 QUIZ = """```quiz

@@ -42,7 +42,6 @@ READY = (
     "argparse",
     "coursebuild.pipeline.site",
     "coursebuild.pipeline.update",
-    "coursebuild.pipeline.extract",
     "coursebuild.core.syntax.document",
     "coursebuild.core.pages.draw",
     "coursebuild.core.pages.lesson",

@@ -40,9 +40,9 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.urls import Place, lesson_path
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.text.source import Source
-from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.site import SiteMaker
+from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.site import Site
 from support.made_courses import documents_of, with_documents
 
 ROOT = Path(__file__).parents[2]
@@ -152,8 +152,8 @@ class RenderedCourse(Struct, frozen=True):
             course = replace(self.course, files=tuple(files))
             library = Library(course, self.results, self.assets, reports or Reports())
             options = Options(root, 1, Memo(Path(CACHE.name)))
-            with Documents(options) as documents:
-                site = SiteMaker(library, self.assets, documents, options).make_site()
+            with Reader(options) as reader:
+                site = Site(library, reader, options)
                 files_by_path = {file.path: file.make() for file in site.files}
         assert [file.path for file in site.files] == sorted(files_by_path)
         assert site.file_list is not None

@@ -83,9 +83,11 @@ _last: dict[str, tuple[bytes, Feature | str]] = {}
 
 def _run(path: str, code: bytes) -> Feature | str:
     """The feature of a file, or a message that says why there is none."""
-    module = ModuleType(f"course_{path.removesuffix('.py').replace('/', '.')}")
+    name = f"course_{path.removesuffix('.py').replace('/', '.')}"
+    module = sys.modules[name] = ModuleType(name)  # where decoding looks for its classes
     module.__file__ = path
-    sys.modules[module.__name__] = module  # where decoding looks for its classes
+    while name := name.rpartition(".")[0]:  # which it imports
+        sys.modules.setdefault(name, ModuleType(name))
     try:
         exec(compile(code, path, "exec"), module.__dict__)
     except (Exception, SystemExit) as error:  # whatever an author's code raises

@@ -18,8 +18,8 @@ from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import temporary_folder
 from coursebuild.features.diff.report import CourseState, report
 from coursebuild.features.diff.weight import weight_section
-from coursebuild.pipeline.figures import read_recorded
 from coursebuild.pipeline.load import load_course
+from coursebuild.pipeline.recordings import read_recorded
 
 EXAMPLES = """\
 examples:

@@ -1,8 +1,8 @@
 """What code may notice of a model: what cannot be ruled out counts as a use.
 
-Entry points: `read_code(path, text, course_modules)`, `Reader`; of two compiled models, or of their
-states, `difference(whole, variant)`, `unrelated_fields(fields, kinds)`, and `VIEWS`, the words by
-which code asks a model for one thing.
+Entry points: `read_code(path, text, course_modules)`, `ModelReader`; of two compiled models, or of
+their states, `difference(whole, variant)`, `unrelated_fields(fields, kinds)`, and `VIEWS`, the
+words by which code asks a model for one thing.
 
 1. Code is not interpreted, only searched for words. A thing counts as used where code has its name
    as a text, a field where its name stands anywhere, and every thing of a kind where code has the
@@ -153,7 +153,7 @@ _NUMBERS = frozenset(("adr", "id", "num"))
 """Attributes that may change when another thing is taken away: addresses, numbers, counts."""
 
 
-class Reader(Struct, frozen=True):
+class ModelReader(Struct, frozen=True):
     """A file of code, with what it may ask a model for."""
 
     path: str
@@ -193,7 +193,7 @@ class Reader(Struct, frozen=True):
         )
 
 
-def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Reader:
+def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> ModelReader:
     """What a file of Python or JavaScript asks models for.
 
     `course_modules`: modules that are readers themselves, so that importing one is harmless.
@@ -219,7 +219,7 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Rea
     kinds = {VIEWS[word] for word in members if word in VIEWS}
     kinds |= {"Keyframe"} if "mj_resetDataKeyframe" in words else set()
     reason = next(iter(reasons), "")
-    return Reader(path, names, words, members, frozenset(parts), frozenset(kinds), reason)
+    return ModelReader(path, names, words, members, frozenset(parts), frozenset(kinds), reason)
 
 
 def _may_do_anything(word: str) -> bool:

@@ -39,7 +39,7 @@ from coursebuild.numerics.pruning.candidates import (
 from coursebuild.numerics.pruning.comparison import TOLERANCE, MotionComparison, WatchedRun, watch
 from coursebuild.numerics.pruning.model_text import ModelText
 from coursebuild.numerics.pruning.reachability import PREMISES
-from coursebuild.numerics.pruning.readers import Reader, difference, unrelated_fields
+from coursebuild.numerics.pruning.readers import ModelReader, difference, unrelated_fields
 from coursebuild.numerics.pruning.trials import PrunedModel, PruningTrials, largest_subset
 from coursebuild.numerics.pruning.xml_edits import ModelEdit, merge_edits, place_of
 from coursebuild.numerics.reports.diet_report import (
@@ -88,7 +88,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     machine: Machine
     text: ModelText
     scenes: tuple[Scene, ...]
-    readers: tuple[Reader, ...]
+    readers: tuple[ModelReader, ...]
     """All code that uses the model, or may."""
     keeps: Mapping[str, Keep]
     """By the finding: `KIND`, or `KIND NAME`."""
@@ -215,7 +215,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
 
     def _find_noticing_reader(
         self, names: Collection[str], kinds: Collection[str], change: Collection[str]
-    ) -> Reader | None:
+    ) -> ModelReader | None:
         """The first reader that may notice that things are gone."""
         readers = (reader for reader in self.readers if reader.notices(names, kinds, change))
         return next(readers, None)

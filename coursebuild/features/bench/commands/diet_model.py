@@ -41,7 +41,7 @@ from coursebuild.features.bench.commands.measuring import report_errors
 from coursebuild.features.lab.model import Lab
 from coursebuild.numerics.pruning.comparison import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelTextError, model_bytes, open_model
-from coursebuild.numerics.pruning.readers import VIEWS, Reader, read_code
+from coursebuild.numerics.pruning.readers import VIEWS, ModelReader, read_code
 from coursebuild.numerics.pruning.survey import Rerun, Survey, Surveyor
 from coursebuild.numerics.pruning.xml_edits import MarkupError
 from coursebuild.pipeline.load import load
@@ -58,10 +58,10 @@ _COPIED_FOLDERS = ("content", "models")
 
 def readers_of(
     course: Course | None, root: Path, files: CourseFiles, scene: CourseScene
-) -> tuple[Reader, ...]:
+) -> tuple[ModelReader, ...]:
     """List everything in the course that may use a model."""
     if course is None:
-        return (Reader("content/course.toml", opaque="the course cannot be read"),)
+        return (ModelReader("content/course.toml", opaque="the course cannot be read"),)
     modules = {Path(path).stem for path in files.files if path.endswith(".py")}
     scripts = [
         read_code(script.path, script.text, modules)
@@ -83,7 +83,7 @@ def _may_use(text: str, model: str) -> bool:
     return name in text or uses != len(literals) or (not literals and loader is not None)
 
 
-def _block_readers(course: Course, model: str) -> Iterator[Reader]:
+def _block_readers(course: Course, model: str) -> Iterator[ModelReader]:
     """Yield the labs and other blocks that show a model."""
     for document in course.documents:
         for block in find_blocks(document, FeatureBlock):
@@ -92,7 +92,7 @@ def _block_readers(course: Course, model: str) -> Iterator[Reader]:
             place = f"{block.span.path}:{block.span.line}"
             kinds = frozenset(VIEWS.values()) - _NOT_DRAWN
             if not isinstance(block, Lab):
-                yield Reader(place, kinds=kinds)
+                yield ModelReader(place, kinds=kinds)
                 continue
             code = read_code(place, "\n".join(piece.text for _, piece in block.code))
             names = frozenset(re.findall(r"\"((?:[^\"\\]|\\.)*)\"", block.config))
@@ -101,13 +101,13 @@ def _block_readers(course: Course, model: str) -> Iterator[Reader]:
             yield replace(code, names=code.names | names, kinds=code.kinds | kinds)
 
 
-def _code_readers(root: Path, files: CourseFiles, modules: set[str]) -> Iterator[Reader]:
+def _code_readers(root: Path, files: CourseFiles, modules: set[str]) -> Iterator[ModelReader]:
     for path in files.files:
         if path.endswith(_CODE):
             try:
                 text = read_bytes(root, path).decode("utf-8", "replace")
             except EffectError:
-                yield Reader(path, opaque="it cannot be read")
+                yield ModelReader(path, opaque="it cannot be read")
             else:
                 yield read_code(path, text, modules)
 
@@ -310,12 +310,14 @@ def _find_locked_files(root: Path, files: CourseFiles, path: str, text: str) -> 
 
 def _find_readers(
     root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
-) -> tuple[Reader, ...]:
+) -> tuple[ModelReader, ...]:
     """List everything in the course that may read a model, its observables included."""
     readers = list(readers_of(course, root, files, scene))
     scenarios = scene.declarations.scenarios
     names = frozenset(s.observable.name for s in scenarios if s.observable is not None)
     fields = {"energy"} if any("energy" in (s.conserved or ()) for s in scenarios) else set()
     if names or fields:
-        readers.append(Reader(scene.declarations.source.path, names=names, words=frozenset(fields)))
+        readers.append(
+            ModelReader(scene.declarations.source.path, names=names, words=frozenset(fields))
+        )
     return tuple(readers)

@@ -42,8 +42,8 @@ def current_diagnostics(session: Session) -> tuple[Diagnostic, ...]:
 def _diagnose(session: Session, version: int) -> tuple[Diagnostic, ...]:
     """Cached, since an editor asks with each move of its cursor."""
     with session.condition:
-        course, library, verified = session.course, session.library, session.verified_course
-        diagnostics, last_run = session.reading_diagnostics, session.running_diagnostics
+        course, library, verified = session.course, session.library, session.runs.course
+        diagnostics, last_run = session.reading_diagnostics, session.runs.diagnostics
     if course is not None and library is not None and verified is not None:
         sources, old_sources = ({s.path: s for s in c.sources} for c in (course, verified))
         changed_paths = {path for path, s in sources.items() if s != old_sources.get(path)}

@@ -37,7 +37,7 @@ from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.resolve import Meaning, resolver_of
 from coursebuild.features.symbols.mathml import declared_symbol, symbols
-from coursebuild.pipeline.reading import kept_formulas
+from coursebuild.pipeline.reader import kept_formulas
 
 _STRING = re.compile(r"""(["'])([^"'\s]+)\1""")
 

@@ -1,24 +1,34 @@
-"""Recorded runs: of scripts that take long, whose fence says `record=once`.
+"""Recorded runs and figures: what scripts gave once, in files of the course.
 
-Entry points: `recorded_runs`, which take the place of runs; `check_recorded_runs`; `record_runs`,
-which `update --long` calls.
+Entry points: `recorded_runs`, which take the place of runs, `check_recorded_runs`, `record_runs`,
+which `update --long` calls; of figures `read_recorded`, `find_figures`, `write_figures`; of all
+drawings of a course `check_drawings`.
 
-`content/reports/NAME.run.json` holds what a script printed, when and on which machine, with the
-state of every file of the project that it read. As long as these files, its text and its options
-are unchanged, the recorded run counts as if the script had run now.
+The fence of a script that takes long says `record=once`. `content/reports/NAME.run.json` holds what
+it printed, when and on which machine, with the state of every file of the project that it read. As
+long as these files, its text and its options are unchanged, the recorded run counts as if the
+script had run now.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from pathlib import Path
 
 import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.drawing.safe_svg import read_svg
+from coursebuild.core.engine.tool import step_key
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import write_atomic
+from coursebuild.core.model import Course
+from coursebuild.core.model.figures import RecordedFigure, recorded_figures
 from coursebuild.core.model.results import Machine, Outcome, ScriptRun
 from coursebuild.core.run.dependencies import (
     Dependency,
@@ -33,7 +43,9 @@ from coursebuild.core.run.memory import States
 from coursebuild.core.run.run_record import RunRecord, record_of
 from coursebuild.core.run.script_environment import machine
 from coursebuild.core.scripts.extract import Extraction, jobs
+from coursebuild.core.scripts.figures import SVG_HELP, describe_difference, prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.source import Source
 from coursebuild.numerics.reports.records import FOLDER
 from coursebuild.pipeline.options import Options
 
@@ -59,7 +71,7 @@ def recorded_runs(scripts: Iterable[Extraction], options: Options) -> dict[str, 
     if options.long:
         return {}
     once = [extraction for extraction in scripts if extraction.script.once]
-    stored_runs = {extraction.path: _read(extraction, options) for extraction in once}
+    stored_runs = {extraction.path: _read_run(extraction, options) for extraction in once}
     return {
         path: ScriptRun(path, Outcome.NORUN, 0, "", "", 0.0)
         if recorded_run is None
@@ -74,7 +86,7 @@ def check_recorded_runs(scripts: Iterable[Extraction], options: Options) -> Iter
     for extraction in scripts:
         if not extraction.script.once:
             continue
-        recorded_run, path = _read(extraction, options), extraction.path
+        recorded_run, path = _read_run(extraction, options), extraction.path
         if recorded_run is None:
             message = f"`{path}` is recorded once, but no run of it is kept in {_path(path)}"
         else:
@@ -112,7 +124,7 @@ def record_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], option
             if dependency.kind is Kind.MODULE and dependency.state
         )
         recorded_run = RecordedRun(machine(interpreter=options.interpreter), packages, record)
-        before = _read(extraction, options)
+        before = _read_run(extraction, options)
         if before is not None and replace(before.record, timestamp=0) == replace(
             record, timestamp=0
         ):
@@ -149,10 +161,83 @@ def _path(script: str) -> str:
     return f"{FOLDER}/{name}.run.json"
 
 
-def _read(extraction: Extraction, options: Options) -> RecordedRun | None:
+def _read_run(extraction: Extraction, options: Options) -> RecordedRun | None:
     try:
         data = (options.root / _path(extraction.path)).read_bytes()
         recorded_run = msgspec.json.decode(data, type=RecordedRun)
     except (OSError, msgspec.DecodeError):
         return None
     return recorded_run if recorded_run.record.inputs.path == extraction.path else None
+
+
+# --- figures and other drawings
+
+
+def find_figures(course: Course, documents: Collection[str] | None) -> list[RecordedFigure]:
+    """The figures of scripts in these documents, or in all."""
+    return [
+        figure
+        for document in course.documents
+        if documents is None or document.source.path in documents
+        for figure in recorded_figures(document)
+    ]
+
+
+def read_recorded(root: Path, path: str) -> bytes | None:
+    """A file of the course; `None` where there is none."""
+    try:
+        return read_bytes(root, path)
+    except EffectError:
+        return None
+
+
+def write_figures(
+    course: Course,
+    documents: Collection[str] | None,
+    runs: Sequence[ScriptRun],
+    options: Options,
+    *,
+    dry_run: bool,
+) -> tuple[list[str], list[Diagnostic]]:
+    """Write the drawings that differ from the recorded ones; a remark for each, and failures."""
+    by_path = {run.path: run for run in runs if run.outcome is Outcome.OK}
+    remarks: list[str] = []
+    failures: list[Diagnostic] = []
+    for figure in find_figures(course, documents):
+        run = by_path.get(figure.script)
+        data = dict(run.figures).get(figure.name) if run is not None else None
+        drawing = prepare_figure(figure.name, data) if data is not None else ""
+        recorded = read_recorded(options.root, figure.path)
+        if isinstance(drawing, str) or (
+            recorded is not None and not describe_difference(figure.name, recorded, drawing)
+        ):
+            continue
+        try:
+            if not dry_run:
+                write_atomic(options.root, figure.path, drawing, expected=recorded)
+        except (EffectError, OSError) as error:
+            failures.append(diagnose("output-not-updatable", figure.span, str(error)))
+        else:
+            remarks.append(f"{'would draw' if dry_run else 'drew'} {figure.path}")
+    return remarks, failures
+
+
+def check_drawings(course: Course, options: Options) -> Iterator[Diagnostic]:
+    """Judge the files in SVG, which are published as they are."""
+    if course.html == "trusted":
+        return
+    for path in course.files:
+        if path.lower().endswith((".svg", ".svgz")):
+            data = read_recorded(options.root, path) or b""
+
+            def find_fault(data: bytes = data) -> bytes:
+                drawing = read_svg(data)
+                return drawing.encode() if isinstance(drawing, str) else b""
+
+            key = step_key("drawing", hashlib.sha256(data).hexdigest())
+            fault = options.store.get_or_create("drawings", key, find_fault)
+            if fault:
+                message = f"`{path}` {fault.decode()}"
+                help = f'{SVG_HELP}, unless the map says `html = "trusted"`'
+                place = Source(path, "").span(0, 0)
+                yield diagnose("image-forbidden", place, message, help=help)

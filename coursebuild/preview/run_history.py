@@ -1,0 +1,87 @@
+"""What running a course has shown so far, for a preview.
+
+Entry point: `RunHistory`. A script is known by its text and by how it is run: what another text
+printed is not shown. Callers hold the session's lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TypeAlias
+
+from msgspec.structs import replace
+
+from coursebuild.core.features import PublishedTrials
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import Outcome, Results, ScriptJob, ScriptRun
+from coursebuild.core.run.script_environment import engine_version, python_version
+from coursebuild.core.scripts.compare import verify as compare
+from coursebuild.core.scripts.extract import extract, jobs
+from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.pipeline.verify import Verification
+from coursebuild.report import ScriptLine
+
+ScriptKey: TypeAlias = tuple[str, ScriptJob]
+"""A script's text, and how it is run."""
+
+
+class RunHistory:
+    """The last run of each script, and what was found when the whole course was run last."""
+
+    def __init__(self) -> None:
+        self.course: Course | None = None
+        """The course that was run last."""
+        self.diagnostics: tuple[Diagnostic, ...] = ()
+        self.script_lines: tuple[ScriptLine, ...] = ()
+        self.is_all_due = True
+        """Whether any script may print something new, since other files have changed."""
+        self.trials = PublishedTrials()
+        self.last_results = Results((), (), (), (), python_version(), engine_version())
+        self._runs: dict[str, tuple[ScriptKey, ScriptRun]] = {}
+        """The last run of each script, by path, with the key of the script that ran."""
+        self._second_outputs: dict[str, tuple[ScriptKey, str, str]] = {}
+        """Of scripts that ran twice, by path: their key, the first output and the second."""
+
+    def results(self, course: Course) -> Results:
+        """What is known of a course's scripts as they are now."""
+        keys = script_keys(course)
+        runs = tuple(run for path, (key, run) in self._runs.items() if keys.get(path) == key)
+        return replace(self.last_results, runs=runs, verdicts=compare(course, runs))
+
+    def take(self, course: Course, verification: Verification, trials: PublishedTrials) -> None:
+        """Take the results of verifying a course."""
+        self.course, self.diagnostics = course, verification.diagnostics
+        self.script_lines = verification.scripts
+        self.last_results, self.trials = verification.results, trials
+        keys = script_keys(course)
+        self._runs = {run.path: (keys[run.path], run) for run in self.last_results.runs}
+
+    def take_run(self, script: ScriptKey, run: ScriptRun) -> None:
+        """Take the result of one script, while others run."""
+        self._runs[run.path] = script, run
+
+    def known_runs(self, course: Course) -> dict[str, ScriptRun]:
+        """The runs of a course's scripts, by path; empty where a script has changed since."""
+        are_same = script_keys(course) == {p: key for p, (key, _) in self._runs.items()}
+        return {path: run for path, (_, run) in self._runs.items()} if are_same else {}
+
+    def take_second_runs(self, runs: Iterable[ScriptRun]) -> None:
+        """Take the outputs of scripts that ran once more."""
+        for run in runs:
+            key, first = self._runs[run.path]
+            printed = run.stdout if run.outcome is Outcome.OK else ""
+            self._second_outputs[run.path] = key, first.stdout, printed
+
+    def second_output(self, path: str) -> str | None:
+        """What a script printed when it ran once more, if its text has not changed since."""
+        if path not in self._runs or path not in self._second_outputs:
+            return None
+        key, run = self._runs[path]
+        key_then, first_output, second_output = self._second_outputs[path]
+        return second_output if (key_then, first_output) == (key, run.stdout) else None
+
+
+def script_keys(course: Course) -> dict[str, ScriptKey]:
+    """The keys of a course's scripts by path: scripts with the same key print the same."""
+    scripts = extract(course).value
+    return {job.path: (e.text, job) for e, job in zip(scripts, jobs(scripts), strict=True)}
