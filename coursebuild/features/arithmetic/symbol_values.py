@@ -26,16 +26,16 @@ from coursebuild.core.pages.quantities import unit_length
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 from coursebuild.core.text.units import Unit, find_unit
-from coursebuild.features.arithmetic.chains import check_arithmetic
+from coursebuild.features.arithmetic.chains import SymbolQuantity, check_arithmetic
 from coursebuild.features.arithmetic.evaluate import (
+    FormulaComparison,
     WrongDimensions,
     describe_dimension,
     evaluate,
+    read_numeral,
 )
-from coursebuild.features.arithmetic.expressions import NotUnderstood
-from coursebuild.features.arithmetic.numerals import FormulaComparison, read_numeral
 from coursebuild.features.arithmetic.statements import read_statements
-from coursebuild.features.arithmetic.symbol_comparison import SymbolQuantity
+from coursebuild.features.arithmetic.tex import NotUnderstood
 
 _Formula = model.Math | model.MathBlock
 _Level = tuple[int, ...]

@@ -5,8 +5,7 @@
 """
 
 from coursebuild.core.features import Feature, PageCopy
-from coursebuild.features.notebook.cells import note_cells
-from coursebuild.features.notebook.files import notebook_files
+from coursebuild.features.notebook.cells import note_cells, notebook_files
 
 FEATURE = Feature(
     name="notebook",

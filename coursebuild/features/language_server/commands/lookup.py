@@ -30,7 +30,7 @@ from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
-from coursebuild.features.glossary.sentences import definition_of
+from coursebuild.features.glossary.terms import definition_of
 from coursebuild.features.language_server.commands.engine import describe_name, describe_shape
 from coursebuild.features.language_server.commands.fields import field_place
 from coursebuild.features.language_server.commands.texts import OpenTexts
