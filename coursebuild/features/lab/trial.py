@@ -333,7 +333,6 @@ class _LabTrial(Struct, frozen=True):
         return min(steps, max(1, round(_PARITY_SECONDS / float(main["timestep"]))))
 
     def _export(self, trial: TrialReply) -> LabExport:
-        """Write the script that does what the lab does."""
         if trial.main is None or self.lab.kind == MJCF:
             return LabExport(None)
         return export_lab(self.context, self.engines.native, self.trial, self.lab, trial.main)

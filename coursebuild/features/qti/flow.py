@@ -249,7 +249,6 @@ def _trim_line_ends(code: Element) -> None:
 
 
 def _is_block(node: HtmlElement) -> bool:
-    """Whether an element is, or holds, a block."""
     if node.name == "math" or node.name in _ACTIVE or node.name in _HIDDEN_ELEMENTS:
         return False
     return node.name in _BLOCKS or any(map(_is_block, node.elements))

@@ -287,7 +287,6 @@ class _Reader:
         return inner
 
     def _argument(self) -> str:
-        """Read the next group or item."""
         while self._next().isspace():
             self._at += 1
         return "" if self._next() in ("", "}") else self._item().strip()

@@ -452,7 +452,8 @@ def test_the_server_ends_with_its_client(tmp_path: Path, stores: Path) -> None:
 def test_without_pygls_the_command_says_what_to_install(tmp_path: Path, stores: Path) -> None:
     folder = Folder(tmp_path / "course")
     folder.fill(["## One\n"], stores)
-    code = "import sys; sys.modules['pygls'] = None; from coursebuild.cli import main; sys.exit(main())"
+    code = "import sys; sys.modules['pygls'] = None"
+    code += "; from coursebuild.cli import main; sys.exit(main())"
     process = folder.start("lsp", code=code, stderr=subprocess.PIPE)
     message = b"coursebuild: the language server needs pygls: `pip install 'coursebuild[lsp]'`\n"
     assert (process.communicate()[1], process.returncode) == (message, 2)

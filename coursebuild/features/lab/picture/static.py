@@ -96,7 +96,6 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
 
 
 def _size(lab: Lab) -> tuple[int, int]:
-    """Return the width and height of a lab's picture, pixels."""
     return (_WIDTH, max(160, min(round(_WIDTH * lab.fields.height / 480), 480)))
 
 
