@@ -99,11 +99,14 @@ class _Notes(Mapping[str, Struct]):
     def __init__(self, encoded_notes: Mapping[str, bytes], source: Source) -> None:
         self._encoded_notes = encoded_notes
         self._source = source
+        self._notes: dict[str, Struct] = {}
 
     def __getitem__(self, feature: str) -> Struct:
-        note = decode(self._encoded_notes[feature], Struct, self._source)
-        assert note is not None, "what was just encoded can be decoded"
-        return note
+        if feature not in self._notes:
+            note = decode(self._encoded_notes[feature], Struct, self._source)
+            assert note is not None, "what was just encoded can be decoded"
+            self._notes[feature] = note
+        return self._notes[feature]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._encoded_notes)

@@ -8,21 +8,176 @@ Entry point: `LiveCourse`. A thread of its own takes saves; the main thread does
    happened for some milliseconds.
 2. For many files at once, as when a branch is switched, the wait is longer.
 3. So it is for a file that is missing or empty, which may be so only between two steps.
+
+`FolderWatcher` watches by `watchfiles`; caches and editors' own files are ignored. The course's
+folders, and those that its scripts import from, are watched with everything in them, including
+folders that are made later. Files elsewhere, such as pages in `docs/guide.md`, are polled.
 """
 
 from __future__ import annotations
 
+import contextlib
+import queue
+import stat
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NoReturn
 
+from coursebuild.core.files.course_root import FOLDERS, is_dropping
+from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.pipeline.options import Options
 from coursebuild.preview.rebuild import BackgroundRebuild
 from coursebuild.preview.session import MAX_SINGLE_READS, Session
-from coursebuild.preview.watcher import FolderWatcher
 from coursebuild.report import Style
+
+LOOK = 0.200
+"""Seconds between two looks for new and removed folders, and at polled files."""
+_PROBE = "4913"
+"""A file that vim makes for a moment, to see whether the folder can be written."""
+_STEP = 2
+"""Milliseconds between two looks for events: a save is noticed within two of them."""
+
+
+class FolderWatcher:
+    """Reports saves, also those that happen while the caller does something else."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+        self._stop = threading.Event()
+        self._watched_folders: tuple[str, ...] = FOLDERS
+        self._polled_files: dict[str, tuple[int, ...]] = {}
+        """Files elsewhere, with their state at the last look."""
+        self._events: queue.SimpleQueue[frozenset[str] | OSError] = queue.SimpleQueue()
+        self._ready = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="watch", daemon=True)
+
+    def start(self) -> None:
+        """Begin to watch; from its return on, no change is missed."""
+        self._thread.start()
+        self._ready.wait()
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether watching has ended."""
+        return self._stop.is_set()
+
+    def stop(self) -> None:
+        """End watching."""
+        self._stop.set()
+        self._events.put(frozenset())
+        if self._thread.is_alive():
+            self._thread.join(1.0)
+
+    def watch_also(self, paths: frozenset[str], folders: Iterable[str] = ()) -> None:
+        """Set the files and folders elsewhere to watch, by POSIX path from the course's folder.
+
+        The course's folder as a whole cannot be watched: the tool itself writes into it.
+        """
+        self._watched_folders = (*FOLDERS, *(folder for folder in folders if folder != "."))
+        inside = tuple(f"{folder}/" for folder in self._watched_folders)
+        files = {path for path in paths if not path.startswith(inside)}
+        self._polled_files = {
+            path: self._polled_files.get(path, self._file_state(path)) for path in files
+        }
+
+    def get(self, seconds: float) -> frozenset[str]:
+        """Return the paths that changed, POSIX and relative to the root, if there are any.
+
+        Wait for changes for so many seconds.
+
+        Raises:
+            EffectError: changes cannot be watched.
+        """
+        try:
+            change = self._events.get(timeout=max(seconds, 0.0))
+        except queue.Empty:
+            return frozenset()
+        if isinstance(change, OSError):
+            raise EffectError(
+                f"changes of files cannot be watched: {reason(change)}",
+                help="the system's limit of watched files may be reached (fs.inotify on Linux)",
+            )
+        return change
+
+    def _run(self) -> None:
+        try:
+            self._follow()
+        except OSError as error:
+            self._events.put(error)
+        finally:
+            self._ready.set()
+
+    def _follow(self) -> None:
+        before: frozenset[str] | None = None
+        while not self._stop.is_set():
+            folders = self._folders()
+            # Folders that are new, or were not watched for a moment, are reported once they are
+            # watched: files may have been put into them before.
+            unseen_folders = frozenset() if before is None else before | folders.keys()
+            for paths in self._watch(tuple(self._root / f for f in folders)):
+                self._ready.set()
+                all_paths = paths | unseen_folders | self._find_changed_files()
+                if all_paths:
+                    self._events.put(all_paths)
+                unseen_folders = frozenset()
+                if self._folders() != folders:
+                    break
+            before = frozenset(folders)
+
+    def _folders(self) -> dict[str, tuple[int, ...]]:
+        """The watched folders that exist, with their device and inode."""
+        folders: dict[str, tuple[int, ...]] = {}
+        for name in self._watched_folders:
+            with contextlib.suppress(OSError):
+                status = (self._root / name).stat()
+                if stat.S_ISDIR(status.st_mode):
+                    folders[name] = (status.st_dev, status.st_ino)
+        return folders
+
+    def _find_changed_files(self) -> set[str]:
+        """Find the polled files that have changed since the last look."""
+        files = self._polled_files  # `watch_also` replaces the dictionary
+        changed_files = {path for path, before in files.items() if self._file_state(path) != before}
+        files.update((path, self._file_state(path)) for path in changed_files)
+        return changed_files
+
+    def _file_state(self, path: str) -> tuple[int, ...]:
+        """What differs after a save of a file."""
+        try:
+            status = (self._root / path).stat()
+        except OSError:
+            return ()
+        return status.st_mtime_ns, status.st_size, status.st_ino, status.st_mode
+
+    def _watch(self, folders: tuple[Path, ...]) -> Iterator[frozenset[str]]:
+        """Yield changes in these folders; an empty set at first, and now and then."""
+        if not folders:
+            while not self._stop.is_set():
+                yield frozenset()
+                self._stop.wait(LOOK)
+            return
+        from watchfiles import watch
+
+        for batch in watch(
+            *folders,
+            watch_filter=lambda _, path: self._is_source(path),
+            stop_event=self._stop,
+            debounce=5 * _STEP,
+            step=_STEP,
+            rust_timeout=round(1000 * LOOK),
+            yield_on_timeout=True,
+        ):
+            yield frozenset(Path(path).relative_to(self._root).as_posix() for _, path in batch)
+
+    def _is_source(self, path: str) -> bool:
+        """Whether a path is a file of the course, and not one of an editor's or of Python's."""
+        file = Path(path)
+        return file.is_relative_to(self._root) and not any(
+            name == _PROBE or is_dropping(name) for name in file.relative_to(self._root).parts
+        )
+
 
 QUIET = 0.008
 """Seconds without an event after which a save is complete."""

@@ -2,7 +2,7 @@
 
 Entry point: `PreviewServer`.
 
-1. `access` decides whose requests are answered. Without `--host` the server listens on the loopback
+1. `Access` decides whose requests are answered. Without `--host` the server listens on the loopback
    interface only.
 2. Files come from a `Session`; nothing is read from disk here.
 3. Pages get another script and style sheet. The script listens to `/.coursebuild/events`: `page` is
@@ -11,7 +11,9 @@ Entry point: `PreviewServer`.
 4. A published site's service worker is replaced by one that removes itself: a browser may have seen
    such a site at this address before.
 5. `POST /.coursebuild/accept` accepts an output, a figure or a number for the author;
-   `POST /.coursebuild/open` opens a place in the editor.
+   `POST /.coursebuild/open` opens a place where something is wrong in the author's editor: that of
+   `$VISUAL` or `$EDITOR` if it opens a window, as the terminal is the preview's; otherwise the
+   first installed one that is known.
 6. Where a request ends is never in doubt: a proxy before the preview may send those of others over
    the same connection. So a head is read strictly, and a connection goes on only after a request
    without a body that was answered.
@@ -21,25 +23,30 @@ from __future__ import annotations
 
 import ipaddress
 import json
+import os
 import re
 import secrets
+import shlex
+import shutil
 import socket
 import socketserver
+import subprocess
 import threading
 from collections.abc import Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from io import BytesIO
+from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 import msgspec
 
-from coursebuild.preview.access import Access
-from coursebuild.preview.answers import PREFIX, TEXT, Answers, digest
-from coursebuild.preview.editor import open_in_editor
+from coursebuild.core.files.errors import reason
+from coursebuild.preview.answers import PREFIX, TEXT, Access, Answers, digest
 from coursebuild.preview.messages import accept, page_news
 from coursebuild.preview.session import Session
+from coursebuild.report.text import location
 
 _HEARTBEAT = 15.0
 """Seconds between signs of life on an event stream, by which a browser that went away is noticed.
@@ -313,3 +320,55 @@ def _decode_texts(body: bytes) -> dict[str, str]:
         return msgspec.json.decode(body, type=dict[str, str])
     except (msgspec.DecodeError, UnicodeDecodeError):
         return {}
+
+
+_ARGUMENTS = {
+    "--goto {file}:{line}:{column}": "code code-insiders codium cursor windsurf positron",
+    "{file}:{line}:{column}": "subl zed zeditor",
+    "--line {line} --column {column} {file}": "pycharm idea webstorm clion kate",
+    "+{line}:{column} {file}": "emacs emacsclient gedit",
+    "+{line} {file}": "gvim mvim",
+}
+"""The arguments by which editors open a place."""
+_EDITORS = {name: words for words, names in _ARGUMENTS.items() for name in names.split()}
+_PATIENCE = 2.0
+"""Seconds in which an editor that cannot open a window ends."""
+
+
+def open_in_editor(session: Session, place: str) -> str:
+    """Open a place in the editor; return why that failed, or an empty text."""
+    span = next((d.span for d in session.diagnostics() if location(d.span) == place), None)
+    if span is None:
+        return "nothing is wrong there any more"
+    words = _find_editor()
+    if not words:
+        return "no editor that opens a window was found: set VISUAL to one, such as `code`"
+    file = session.root / span.path
+    arguments = [
+        part.format(file=file, line=span.line, column=span.column)
+        for part in _EDITORS[_name(words[0])].split()
+    ]
+    try:
+        null = subprocess.DEVNULL
+        process = subprocess.Popen(
+            [*words, *arguments], stdin=null, stdout=null, stderr=null, start_new_session=True
+        )
+        status = process.wait(_PATIENCE)
+    except OSError as error:
+        return f"{words[0]} cannot be started: {reason(error)}"
+    except subprocess.TimeoutExpired:  # it is open
+        return ""
+    return f"{words[0]} ended with status {status}" if status else ""
+
+
+def _find_editor() -> list[str]:
+    """Find the words that start the editor."""
+    for command in (os.environ.get("VISUAL"), os.environ.get("EDITOR"), *_EDITORS):
+        words = shlex.split(command or "")
+        if words and _name(words[0]) in _EDITORS and shutil.which(words[0]):
+            return words
+    return []
+
+
+def _name(program: str) -> str:
+    return Path(program).stem.lower()

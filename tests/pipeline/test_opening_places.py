@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.preview.editor import open_in_editor
+from coursebuild.preview.server import open_in_editor
 from support.live_course import Live
 from support.live_course import live as live
 from support.scratch_course import Folder, Make

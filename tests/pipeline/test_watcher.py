@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 import watchfiles
 
-from coursebuild.preview.watcher import FolderWatcher
+from coursebuild.preview.live_course import FolderWatcher
 from support.waiting import wait_until
 
 pytestmark = pytest.mark.site

@@ -13,7 +13,7 @@ from lsprotocol import types
 from pygls.lsp.client import LanguageClient
 
 from coursebuild.core.text.source import Source
-from coursebuild.features.language_server.commands.places import Places
+from coursebuild.features.language_server.commands.texts import Places
 from support.scratch_course import Folder
 
 T = TypeVar("T")

@@ -14,8 +14,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import Dimension, find_unit
-from coursebuild.features.arithmetic.identities import check_identity
-from coursebuild.features.arithmetic.numerals import FormulaComparison
+from coursebuild.features.arithmetic.evaluate import FormulaComparison, check_identity
 from coursebuild.features.arithmetic.symbol_values import check_formulas, read_symbols
 
 

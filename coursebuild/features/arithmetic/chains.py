@@ -1,6 +1,6 @@
 r"""Checks arithmetic between numbers: compares each side of a chain of relations with the next.
 
-Entry point: `check_arithmetic(tex, symbols, unit)`.
+Entry points: `check_arithmetic(tex, symbols, unit)`; `SymbolQuantity`, what is known of a symbol.
 
 1. One of two sides is a numeral, as `3.2\cdot10^{-4}\ \mathrm m`. The other must agree with its
    digits, within half a unit of the last place. After `=` a whole number is exact; after
@@ -18,28 +18,29 @@ from __future__ import annotations
 import functools
 import operator
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import Any
 
+from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.text.units import Dimension, Unit, find_unit
 from coursebuild.features.arithmetic.evaluate import (
+    EXACT,
+    FormulaComparison,
+    Numeral,
+    PhysicalQuantity,
+    WrongDimensions,
+    agrees,
     describe_dimension,
     evaluate,
-)
-from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
-from coursebuild.features.arithmetic.numerals import (
-    FormulaComparison,
-    agrees,
     format_number,
     is_close,
     read_numeral,
 )
 from coursebuild.features.arithmetic.statements import FormulaSide, Statement, read_statements
-from coursebuild.features.arithmetic.symbol_comparison import (
-    NotJudged,
-    SymbolComparison,
-    SymbolQuantity,
-)
+from coursebuild.features.arithmetic.tex import CONSTANTS, Expression, NotUnderstood
 
 _RELATION = re.compile(r"[=<>≈≤≥≠]|\\(?:approx|sim|le|ge|ne|ll|gg)")
 _ORDER = {"<": operator.lt, ">": operator.gt, "≤": operator.le, "≥": operator.ge, "≠": operator.ne}
@@ -146,3 +147,240 @@ def _find_mistake(left: Expression, right: Expression, relation: str) -> Formula
     is_rounded = numeral.is_whole and relation == "=" and agrees(numeral, value, "≈")
     help = "write `\\approx` where a whole number is rounded" if is_rounded else ""
     return FormulaComparison("wrong", side.start, side.end, message, help)
+
+
+_LARGEST_COEFFICIENT = 12
+"""A larger number may be a quantity whose unit is left out."""
+_SAMPLES = replace(EXACT, calculus=lambda function, *places: function(places[0]))
+"""Has the units of derivatives and integrals right, though not their values."""
+
+
+class SymbolQuantity(Struct, frozen=True):
+    """What a symbol stands for."""
+
+    name: str
+    unit_text: str
+    unit: Unit | None
+    """`None` if the text does not say it."""
+    value: Any = None
+    """In base units; `None` if it has none."""
+    step: Any = 0
+    """One unit of the last place of its value; 0 if that is exact, as a whole number is."""
+    text: str = ""
+    """Its value as it is written."""
+
+
+class NotJudged(Exception):  # noqa: N818  # it is no mistake
+    """Nothing is known of the symbols of a relation, or it says nothing of their values."""
+
+
+class SymbolComparison:
+    """Compares two sides of a chain, at least one of which has symbols."""
+
+    def __init__(
+        self, chain: Statement, index: int, symbols: Mapping[str, SymbolQuantity], unit: str
+    ) -> None:
+        """`unit`: what follows the second side in the text."""
+        self.chain, self.symbols = chain, symbols
+        self.sides, self.relation = chain.sides[index : index + 2], chain.relations[index]
+        self.unit = find_unit(unit) if unit else None
+        is_equation = self.relation in ("=", "≈")
+        self.is_claim = is_equation and any(side.is_numeric for side in self.sides)
+
+    def find_mistake(self) -> FormulaComparison | None:
+        """Return a comparison that is wrong if the relation does not hold.
+
+        Raises:
+            NotUnderstood: it states a number of symbols with values, and cannot be computed.
+            NotJudged: there is nothing to compare but units, which fit.
+        """
+        self.is_claim &= any(symbol.value is not None for symbol in self.symbols.values())
+        try:
+            self.expressions = [side.get_expression() for side in self.sides]
+            self._find_symbols()
+            try:
+                quantities = self._evaluate({})
+            except WrongDimensions:
+                self._pass_hidden_unit()
+                raise
+        except NotUnderstood as error:
+            if self.is_claim or error.kind == "wrong":
+                raise
+            raise NotJudged from None
+        has_calculus = any(e.has("derivative", "integral") for e in self.expressions)
+        bare = self._bare_side()
+        dimensions = [quantity.dimension for quantity in quantities]
+        if bare is not None:
+            base = dimensions[1 - bare]
+            is_foreign = self.unit is not None and self.unit.dimension != base
+            dimensions[bare] = self.unit.dimension if self.unit and is_foreign else base
+        if dimensions[0] != dimensions[1] and 0 not in (q.value for q in quantities):
+            if bare is None:
+                self._pass_hidden_unit()
+            message = " is held against ".join(map(describe_dimension, dimensions))
+            right = self.expressions[1]
+            return FormulaComparison("wrong", right.start, right.end, message)
+        if not self.has_values or self.relation not in ("=", "≈") or has_calculus:
+            raise NotJudged
+        try:
+            return self._compare_values(
+                [quantity.value for quantity in quantities], bare, dimensions
+            )
+        except OverflowError:
+            reason = "the numbers become too large"
+            raise self.expressions[1].not_understood(reason) from None
+
+    def _pass_hidden_unit(self) -> None:
+        """Raise unless units that do not fit are a mistake for sure."""
+        hidden = next(filter(_may_hide_unit, self.expressions), None)
+        if hidden is not None:
+            if self.is_claim:
+                raise hidden.not_understood("a number in it may leave out its unit")
+            raise NotJudged
+
+    def _find_symbols(self) -> None:
+        """Collect what is known of the symbols."""
+        self.known: dict[str, SymbolQuantity] = {}
+        missing: list[Expression] = []
+        for part in (part for e in self.expressions for part in e.walk()):
+            if part.kind != "symbol" or (part.text in CONSTANTS and part.text not in self.symbols):
+                continue
+            quantity = _find_symbol(part.text, self.symbols)
+            if quantity is not None:
+                self.known[part.text] = quantity
+            if quantity is None or quantity.value is None:
+                missing.append(part)
+        self.has_values = not missing
+        self.is_claim &= any(symbol.value is not None for symbol in self.known.values())
+        if any(part.text not in self.known for part in missing) or (missing and self.is_claim):
+            raise missing[0].not_understood(f"`{missing[0].text}` has no value here")
+
+    def _evaluate(self, shifts: Mapping[str, Any]) -> list[PhysicalQuantity]:
+        """Return the quantities of both sides; without values, of any for which there are some."""
+        for attempt in range(1 if self.has_values else 4):
+            quantities = {
+                name: PhysicalQuantity(
+                    symbol.value + shifts.get(name, 0)
+                    if self.has_values
+                    else 0.5 + (0.618 * i + 0.37 * attempt) % 1.5,
+                    symbol.unit.dimension if symbol.unit is not None else (),
+                )
+                for i, (name, symbol) in enumerate(self.known.items(), 1)
+            }
+            try:
+                return [evaluate(e, quantities, _SAMPLES) for e in self.expressions]
+            except WrongDimensions:
+                raise
+            except NotUnderstood:
+                if self.has_values:
+                    raise
+        raise NotJudged
+
+    def _bare_side(self) -> int | None:
+        """Return the index of a side of numbers alone, which may have left out its unit."""
+        pairs = zip(self.sides, self.expressions, strict=True)
+        return next(
+            (i for i, (s, e) in enumerate(pairs) if s.is_numeric and not e.has("unit")), None
+        )
+
+    def _compare_values(
+        self, values: Sequence[Any], bare: int | None, dimensions: Sequence[Dimension]
+    ) -> FormulaComparison | None:
+        sizes = [Fraction(1)]
+        if bare is not None:
+            units = [self.unit] if self.unit is not None else [*self._chain_units()]
+            sizes = [u.size for u in units if u.dimension == dimensions[1 - bare]]
+            sizes += [] if self.unit is not None else [Fraction(1)]
+        numerals = {i: n for i in (0, 1) if (n := self._numeral(i)) is not None}
+        if not numerals and self.relation == "≈":
+            raise NotJudged
+        mistakes: list[FormulaComparison] = []
+        for size in sizes:
+            scaled = [v * size if i == bare else v for i, v in enumerate(values)]
+            if not numerals:
+                if self._is_within_rounding(scaled):
+                    return None
+                numbers = " and ".join(format_number(value) for value in scaled)
+                mistakes.append(self._mistake(1, f"{numbers} are not the same", ""))
+                continue
+            units_of = {i: size if i == bare else Fraction(1) for i in numerals}
+            index = max(numerals, key=lambda i: (numerals[i].step * units_of[i], i))
+            numeral, unit_size = numerals[index], units_of[index]
+            numeral = replace(
+                numeral, value=numeral.value * unit_size, step=numeral.step * unit_size
+            )
+            value = scaled[1 - index]
+            if agrees(numeral, value, self.relation):
+                return None
+            digits = max(numeral.digits + 2, 4)
+            result = format_number(value / (numeral.unit_size * unit_size), digits)
+            mistakes.append(self._mistake(index, f"{result} comes out", ", and not this"))
+        return mistakes[0]
+
+    def _mistake(self, index: int, message: str, end: str) -> FormulaComparison:
+        """Return what is wrong with a side, with the values that the other side has."""
+        side, opposite = self.expressions[index], self.expressions[1 - index]
+        names = dict.fromkeys(part.text for part in opposite.walk() if part.text in self.known)
+        conditions = " and ".join(f"`{name}` is {self.known[name].text}" for name in names)
+        help = ""
+        if opposite.kind == "symbol":
+            help = "`{given}` after the formula gives the symbol another value in this section"
+        message += (f" where {conditions}" if conditions else "") + end
+        return FormulaComparison("wrong", side.start, side.end, message, help)
+
+    def _chain_units(self) -> Iterator[Unit]:
+        """Yield the units that the chain names."""
+        for side in self.chain.sides:
+            if not isinstance(side.expression, Expression):
+                continue
+            alone = self.symbols.get(side.expression.text) if not side.expression.parts else None
+            texts = [part.text for part in side.expression.walk() if part.kind == "unit"]
+            units = [alone.unit if alone is not None else None, *map(find_unit, texts)]
+            yield from (unit for unit in units if unit is not None)
+
+    def _numeral(self, index: int) -> Numeral | None:
+        """Return the number that a side is, or the value of the symbol that it is."""
+        expression = self.expressions[index]
+        if self.sides[index].is_numeric:
+            return read_numeral(expression)
+        symbol = self.known.get(expression.text) if expression.kind == "symbol" else None
+        if symbol is None or not symbol.step:
+            return None
+        size = symbol.unit.size if symbol.unit is not None else Fraction(1)
+        return Numeral(symbol.value, symbol.step, False, 6, size)
+
+    def _is_within_rounding(self, values: Sequence[Any]) -> bool:
+        """Whether two sides differ by no more than half a unit of the last place of each value."""
+        if is_close(*values):
+            return True
+        slack = 0.0
+        for name, symbol in self.known.items():
+            shifted = [quantity.value for quantity in self._evaluate({name: symbol.step / 2})]
+            first, second = (float(now - then) for now, then in zip(shifted, values, strict=True))
+            slack += abs(first - second)
+        return bool(abs(values[0] - values[1]) <= slack * (1 + 1e-9))
+
+
+def _find_symbol(name: str, symbols: Mapping[str, SymbolQuantity]) -> SymbolQuantity | None:
+    """Return what is known of a symbol; of a time derivative, its unit."""
+    symbol = symbols.get(name)
+    if symbol is not None:
+        return symbol if symbol.unit is not None else None
+    dotted = re.fullmatch(r"\\(d?)dot\{(.+?)\}(.*)", name)
+    base = symbols.get(dotted[2] + dotted[3]) if dotted is not None else None
+    if dotted is None or base is None or base.unit is None:
+        return None
+    per_time = Unit(Fraction(1), (("time", Fraction(-2 if dotted[1] else -1)),))
+    return SymbolQuantity(name, "", base.unit.times(per_time, 1))
+
+
+def _may_hide_unit(expression: Expression) -> bool:
+    """Whether a number may stand for one with a unit, as in `F = 9.81 m` or `x = 1 + v t`."""
+    parts = [*expression.walk()]
+    if any(part.kind == "unit" for part in parts):
+        return False
+    numbers = [part.text for part in parts if part.kind == "number"]
+    terms = [term for part in parts if part.kind in ("+", "-") for term in part.parts]
+    return any("." in number or int(number) > _LARGEST_COEFFICIENT for number in numbers) or any(
+        not term.has("symbol") for term in terms
+    )

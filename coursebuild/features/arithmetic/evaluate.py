@@ -1,23 +1,111 @@
-"""Evaluates expressions to quantities: a value in base units, and a dimension.
+"""Reads sides of a formula as numbers, evaluates them to quantities, compares them as identities.
 
-Entry points: `evaluate(expression, symbols, arithmetic)`; `EXACT`, the arithmetic of fractions,
-which become floating-point numbers where necessary.
+Entry points: `read_numeral(expression)`, `agrees`,
+`is_close`, `format_number`, of numbers as they are written; `evaluate(expression, symbols,
+arithmetic)`, a value in base units with its dimension; `EXACT`, the arithmetic of fractions, which
+become floating-point numbers where necessary; `check_identity(tex, symbols)`.
 
 Results that are too large, or no numbers, are not understood. Sums of different dimensions, and
 functions of an argument with a dimension, are `WrongDimensions`.
+
+Both sides of an identity between symbols are computed at random points, with dimensions. mpmath
+computes derivatives and integrals, in thirty digits. Where one side is an integral without limits,
+its integrand is compared with the derivative of the other side. What is not understood does not
+pass.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import random
+from collections.abc import Callable, Iterator, Mapping
+from decimal import Decimal
 from fractions import Fraction
-from typing import Any
+from itertools import pairwise
+from typing import Any, Literal
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.text.units import Dimension, find_unit, multiply
-from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
+from coursebuild.features.arithmetic.statements import read_statements
+from coursebuild.features.arithmetic.tex import Expression, NotUnderstood
+
+_CLOSE = 1e-12
+
+
+class FormulaComparison(Struct, frozen=True):
+    """The result of comparing two sides of a formula, for a range of its TeX."""
+
+    kind: Literal["holds", "wrong", "unread"]
+    start: int
+    end: int
+    message: str = ""
+    help: str = ""
+
+
+class Numeral(Struct, frozen=True):
+    """A number as it is written, with its precision."""
+
+    value: Any
+    step: Any
+    """One unit of its last place."""
+    is_whole: bool
+    """Whether it has neither a point nor a power of ten."""
+    digits: int
+    unit_size: Any
+    """The size of its unit in base units."""
+
+
+def read_numeral(expression: Expression) -> Numeral | None:
+    """Return the numeral that an expression is; `None` if it is more than that."""
+    match expression:
+        case Expression(kind="number", text=text):
+            whole, _, decimals = text.partition(".")
+            is_whole = "." not in text
+            zeros = len(whole) - len(whole.rstrip("0")) if is_whole and whole.strip("0") else 0
+            step = Fraction(10) ** (zeros - len(decimals))
+            digits = len(text.replace(".", "").lstrip("0")) or 1
+            return Numeral(Fraction(text), step, is_whole, digits, Fraction(1))
+        case Expression(kind="-", parts=(inner,)):
+            numeral = read_numeral(inner)
+            return numeral and replace(numeral, value=-numeral.value)
+        case Expression(kind="^", parts=(Expression(kind="number", text="10"), _)):
+            size = evaluate(expression).value
+            return Numeral(size, size, True, 1, Fraction(1))
+        case Expression(kind="*", parts=(inner, Expression(kind="unit" | "^") as factor)):
+            numeral, power = read_numeral(inner), read_numeral(factor)
+            if numeral is None or (factor.kind == "^" and (power is None or numeral.digits == 0)):
+                return None
+            size = evaluate(factor).value
+            scaled = replace(numeral, value=numeral.value * size, step=numeral.step * size)
+            if factor.kind == "^":
+                return replace(scaled, is_whole=False)
+            return replace(scaled, unit_size=size)
+        case _:
+            return None
+
+
+def agrees(numeral: Numeral, value: Any, relation: str) -> bool:
+    """Whether a value, rounded to the digits of a numeral, is that number."""
+    is_exact = isinstance(value, Fraction) and isinstance(numeral.value, Fraction)
+    if numeral.is_whole and relation == "=":
+        return value == numeral.value if is_exact else is_close(value, numeral.value)
+    gap = 2 * abs(value - numeral.value)
+    return bool(gap <= numeral.step if is_exact else gap <= numeral.step * (1 + 1e-9))
+
+
+def is_close(left: Any, right: Any) -> bool:
+    """Whether two values are the same, but for rounding of floating-point numbers."""
+    return bool(abs(left - right) <= _CLOSE * max(abs(left), abs(right)))
+
+
+def format_number(value: Any, digits: int = 10) -> str:
+    """Return a value as text."""
+    if isinstance(value, Fraction):
+        value = Decimal(value.numerator) / Decimal(value.denominator)
+    return f"{value:.{digits}g}"
+
 
 _MAX_BITS = 4_000
 _MAX_DIGITS = 300
@@ -201,3 +289,82 @@ def describe_dimension(dimension: Dimension) -> str:
         return "a number"
     parts = (name + ("" if power == 1 else f"^{power}") for name, power in dimension)
     return "`" + " ".join(parts) + "`"
+
+
+_POINTS = 5
+_MAX_MAGNITUDE = 1000
+"""The limit for exponents."""
+
+
+def check_identity(tex: str, symbols: Mapping[str, Dimension]) -> Iterator[FormulaComparison]:
+    """Yield the comparisons of a formula's sides that fail or are not understood."""
+    statements = read_statements(tex)
+    if not any(statement.relations for statement in statements):
+        yield FormulaComparison("unread", 0, len(tex), "it is not an equation")
+    for statement in statements:
+        for (left, right), relation in zip(
+            pairwise(statement.sides), statement.relations, strict=True
+        ):
+            try:
+                if relation != "=":
+                    raise NotUnderstood("it is not an equation", left.start, right.end)
+                yield from _compare(left.get_expression(), right.get_expression(), symbols)
+            except NotUnderstood as error:
+                yield FormulaComparison(error.kind, error.start, error.end, error.reason)
+
+
+def _compare(
+    left: Expression, right: Expression, symbols: Mapping[str, Dimension]
+) -> Iterator[FormulaComparison]:
+    import mpmath
+
+    left, right = _without_integral(left, right)
+    right, left = _without_integral(right, left)
+    parts = (*left.walk(), *right.walk())
+    names = sorted({part.text for part in parts if part.kind == "symbol"} & symbols.keys())
+    generator = random.Random(repr((left, right)))
+    with mpmath.workdps(30):
+        arithmetic = _mpmath_arithmetic(mpmath.mp)
+        for _ in range(_POINTS):
+            point = {name: mpmath.mpf(round(generator.uniform(0.5, 2), 3)) for name in names}
+            values = {name: PhysicalQuantity(value, symbols[name]) for name, value in point.items()}
+            lhs, rhs = (evaluate(side, values, arithmetic) for side in (left, right))
+            if lhs.dimension != rhs.dimension and 0 not in (lhs.value, rhs.value):
+                dimensions = [describe_dimension(side.dimension) for side in (lhs, rhs)]
+                message = f"{dimensions[0]} is held against {dimensions[1]}"
+                yield FormulaComparison("wrong", right.start, right.end, message)
+                return
+            if abs(lhs.value - rhs.value) > _CLOSE * (abs(lhs.value) + abs(rhs.value)):
+                symbol_values = ", ".join(f"{n} = {float(value):g}" for n, value in point.items())
+                sides = " and ".join(mpmath.nstr(side.value, 6) for side in (lhs, rhs))
+                suffix = f" where {symbol_values}" if symbol_values else ""
+                message = f"the sides are {sides}{suffix}"
+                yield FormulaComparison("wrong", right.start, right.end, message)
+                return
+
+
+def _without_integral(side: Expression, opposite: Expression) -> tuple[Expression, Expression]:
+    """Differentiate both sides, if the first is an integral without limits."""
+    if side.kind != "integral" or len(side.parts) > 2:
+        return side, opposite
+    integrand, variable = side.parts
+    derivative = Expression("derivative", opposite.start, opposite.end, (opposite, variable))
+    return integrand, derivative
+
+
+def _mpmath_arithmetic(mp: Any) -> Arithmetic:
+
+    def power(base: Any, exponent: Any) -> Any:
+        if exponent and mp.mag(exponent) > _MAX_MAGNITUDE:
+            raise OverflowError
+        return base**exponent
+
+    def calculus(function: Callable[[Any], Any], *places: Any) -> Any:
+        if len(places) == 1:
+            return mp.diff(function, places[0])
+        value, error = mp.quad(function, places, error=True)
+        if not error <= _CLOSE * (1 + abs(value)):
+            raise ValueError
+        return value
+
+    return Arithmetic(mp.mpf, power, mp, calculus)

@@ -13,8 +13,15 @@ from functools import cached_property, lru_cache
 
 from msgspec import Struct
 
-from coursebuild.features.arithmetic.expressions import CONSTANTS, Expression, NotUnderstood
-from coursebuild.features.arithmetic.tex import GREEK, SPACE, TOKEN, read_expression
+from coursebuild.features.arithmetic.tex import (
+    CONSTANTS,
+    GREEK,
+    SPACE,
+    TOKEN,
+    Expression,
+    NotUnderstood,
+    read_expression,
+)
 
 _MAX_LENGTH = 5_000
 _DIGITS = re.compile("[0-9],[0-9]")

@@ -26,16 +26,16 @@ from coursebuild.core.pages.quantities import unit_length
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 from coursebuild.core.text.units import Unit, find_unit
-from coursebuild.features.arithmetic.chains import check_arithmetic
+from coursebuild.features.arithmetic.chains import SymbolQuantity, check_arithmetic
 from coursebuild.features.arithmetic.evaluate import (
+    FormulaComparison,
     WrongDimensions,
     describe_dimension,
     evaluate,
+    read_numeral,
 )
-from coursebuild.features.arithmetic.expressions import NotUnderstood
-from coursebuild.features.arithmetic.numerals import FormulaComparison, read_numeral
 from coursebuild.features.arithmetic.statements import read_statements
-from coursebuild.features.arithmetic.symbol_comparison import SymbolQuantity
+from coursebuild.features.arithmetic.tex import NotUnderstood
 
 _Formula = model.Math | model.MathBlock
 _Level = tuple[int, ...]
@@ -59,7 +59,7 @@ class _GivenValue(Struct, frozen=True):
     span: Span
 
 
-class DocumentSymbols(Struct, frozen=True):
+class DocumentQuantities(Struct, frozen=True):
     """The symbols that a document declares, and what is wrong with their values."""
 
     declarations: Mapping[str, SymbolQuantity]
@@ -81,7 +81,7 @@ class DocumentSymbols(Struct, frozen=True):
         return tuple(quantities.values())
 
 
-def read_symbols(document: model.Document) -> DocumentSymbols:
+def read_symbols(document: model.Document) -> DocumentQuantities:
     """Read the symbols of a document, once."""
     return model.computed_once(document, "symbol_values", lambda: _read_symbols(document))
 
@@ -108,7 +108,7 @@ def check_formulas(document: model.Document) -> Mapping[int, tuple[FormulaCompar
     return model.computed_once(document, "formula_comparisons", compare)
 
 
-def _read_symbols(document: model.Document) -> DocumentSymbols:
+def _read_symbols(document: model.Document) -> DocumentQuantities:
     places = tuple(_read_places(document))
     declarations: dict[str, SymbolQuantity] = {}
     values: dict[str, list[_GivenValue]] = {}
@@ -145,7 +145,7 @@ def _read_symbols(document: model.Document) -> DocumentSymbols:
             help = "give the other quantity another letter or index, or a section of its own"
             note = Note("given here", rival.span)
             diagnostics.append(diagnose("symbol-value", span, message, help=help, notes=[note]))
-    return DocumentSymbols(
+    return DocumentQuantities(
         declarations,
         {name: tuple(group) for name, group in values.items()},
         places,

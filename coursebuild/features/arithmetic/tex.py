@@ -1,15 +1,62 @@
 r"""Parses the part of mathematics in TeX whose meaning is certain.
 
-Entry point: `read_expression(tex, start, end)`, by recursive descent. Numbers, symbols and groups
-side by side are a product; what can be read in two ways (`a/bc`, `f(x)`, `2\tfrac12`) is not
-understood. A number is `12`, `1\,000`, `1{,}000` or `0.5`; `\mathrm{kg}` after it is its unit.
+Entry point: `read_expression(tex, start, end)`, an `Expression`, by recursive descent. Numbers,
+symbols and groups side by side are a product; what can be read in two ways (`a/bc`, `f(x)`,
+`2\tfrac12`) is not understood. A number is `12`, `1\,000`, `1{,}000` or `0.5`; `\mathrm{kg}` after
+it is its unit.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from typing import Literal
 
-from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
+from msgspec import Struct
+
+CONSTANTS = frozenset((r"\pi", r"\mathrm{e}"))
+"""Symbols that stand for fixed numbers."""
+
+
+class NotUnderstood(Exception):  # noqa: N818  # it is no mistake
+    """A part of a formula that cannot be computed, with the reason and its range in the TeX."""
+
+    kind: Literal["wrong", "unread"] = "unread"
+
+    def __init__(self, reason: str, start: int, end: int) -> None:
+        super().__init__(reason)
+        self.reason, self.start, self.end = reason, start, end
+
+
+class Expression(Struct, frozen=True):
+    """An operation on expressions, or a number, symbol or unit.
+
+    `kind` is `number`, `symbol`, `unit`, one of `+ - * / ^`, `abs`, `derivative` (parts: function,
+    variable), `integral` (parts: function, variable, and the limits if there are any), or the name
+    of a function, as `sin`.
+    """
+
+    kind: str
+    start: int
+    end: int
+    parts: tuple[Expression, ...] = ()
+    text: str = ""
+    """The digits of a number; the name of a symbol or a unit."""
+
+    def walk(self) -> Iterator[Expression]:
+        """Yield this expression and all expressions in it."""
+        yield self
+        for part in self.parts:
+            yield from part.walk()
+
+    def has(self, *kinds: str) -> bool:
+        """Whether this expression is or contains one of these kinds."""
+        return any(expression.kind in kinds for expression in self.walk())
+
+    def not_understood(self, reason: str) -> NotUnderstood:
+        """Return the exception that says that this part cannot be computed."""
+        return NotUnderstood(reason, self.start, self.end)
+
 
 _MAX_FACTORS = 100
 """The limit for one expression, which also limits how deep it nests."""

@@ -1,6 +1,8 @@
-"""Edits of the course map: a lesson is added or renamed, or a feature added.
+"""Edits of the course map: a lesson is added or renamed, or a feature added; and of what names it.
 
 Entry points: `with_lesson`, `with_lesson_renamed`, `with_feature`; each returns the new text.
+`rename_references`, the edits of the places that name a lesson; `doubtful_places`, which may mean
+it but are no links: in code, in a comment, in a range such as "Lessons 1.3 to 1.5".
 
 An entry is inserted or moved as a whole, with the comments directly above it, and with the line
 ends and the indentation of the map. The rest stays as its author wrote it. The new text is parsed,
@@ -10,17 +12,27 @@ and refused where it is no valid map, as where all lessons are on one line.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from fnmatch import fnmatchcase
 from itertools import count
 
+from msgspec.structs import replace
+
 from coursebuild.core.files.errors import UsageError
-from coursebuild.core.model import Course, Lesson
+from coursebuild.core.model import (
+    Course,
+    Lesson,
+    LessonTarget,
+    Link,
+    find_inlines,
+    resolve,
+)
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.syntax.coursemap import parse_course_map
-from coursebuild.core.syntax.nodes import ArrayNode, ObjectNode
+from coursebuild.core.syntax.nodes import ArrayNode, ObjectNode, StringNode
 from coursebuild.core.syntax.toml_text import parse_toml, toml_string
 from coursebuild.core.text.diagnostics import Edit, did_you_mean
-from coursebuild.core.text.source import Source
+from coursebuild.core.text.source import Excerpt, Source, Span
 
 _COMMENTS_ABOVE = re.compile(r"(?:^[ \t]*#[^\n]*\n)*[ \t]*\Z", re.MULTILINE)
 _LINE_END = re.compile(r"\r?\n|\Z")
@@ -187,3 +199,86 @@ def _end_of_line(text: str, offset: int) -> int:
 def _indent(lines: Sequence[str], indent: str) -> list[str]:
     """Indent lines as the entries around them."""
     return [indent + line.removeprefix(indent) for line in lines] if indent.isspace() else [*lines]
+
+
+_NUMBER = r"(?>[0-9]+(?:\.[0-9]+)+)"
+_RANGE = re.compile(rf"(?i)\blessons\s+({_NUMBER})\s?(?:–|-|to\b)\s?({_NUMBER})")
+
+
+def rename_references(course: Course, lesson: Lesson, new: str) -> list[Edit]:
+    """Return the edits of the map, and of all links and mentions, each once."""
+    edits = {(e.span.path, e.span.start): e for e in _map_edits(course, lesson, new)}
+    name = re.compile(rf"(?<![\w.]){re.escape(lesson.id)}(?!\w|\.\w)")
+    for document in course.documents:
+        for inline in find_inlines(document, Link):
+            target = resolve(inline.target, course, document.source.path)
+            if isinstance(target, LessonTarget) and target.id == lesson.id:
+                span = inline.target_span
+                address = span.text.partition("#")[0]
+                for match in list(name.finditer(address))[-1:]:
+                    place = Excerpt.of_span(span).span(*match.span())
+                    edits[place.path, place.start] = Edit(place, new)
+    return list(edits.values())
+
+
+def _map_edits(course: Course, lesson: Lesson, new: str) -> Iterator[Edit]:
+    root = _map(course)
+    for level in root.objects("level"):
+        for node in level.objects("lesson"):
+            id = node.get("id")
+            if isinstance(id, StringNode) and id.value == lesson.id:
+                yield Edit(id.span, toml_string(new))
+    for dependent in course.lessons:
+        ids = zip(dependent.prerequisites, dependent.prerequisite_spans, strict=True)
+        yield from (Edit(span, toml_string(new)) for id, span in ids if id == lesson.id)
+    for path in _silenced_paths(root):
+        if path.value == lesson.path:
+            yield Edit(path.span, toml_string(replace(lesson, id=new).path))
+
+
+def doubtful_places(
+    course: Course, lesson: Lesson, new: str, edits: Iterable[Edit], code: Iterable[Source]
+) -> list[Span]:
+    """Return the places that may mean the lesson, and are not among the edits.
+
+    `code` are further texts of the project, such as its features.
+    """
+    edited_spans = [edit.span for edit in edits]
+    id = re.escape(lesson.id)
+    names = re.compile(
+        rf"lesson:({id})(?!\w|\.\w)|(?<![\w.])({id})-{lesson.slug}(?![\w-])"
+        rf"|(?i:\blessons?)\s(?:{_NUMBER}|[\s,–-]|and\b|or\b|to\b)*?(?<![\w.])({id})(?!\w|\.\w)"
+    )
+    places = []
+    for source in (*course.sources, *code):
+        for match in names.finditer(source.text):
+            place = source.span(*match.span(match.lastindex or 0))
+            if not any(span.contains(place) for span in edited_spans):
+                places.append(place)
+        places += [
+            source.span(*match.span())
+            for match in _RANGE.finditer(source.text)
+            if id_order(match[1]) <= id_order(lesson.id) <= id_order(match[2])
+        ]
+    return [*places, *_outdated_globs(course, lesson, new)]
+
+
+def _outdated_globs(course: Course, lesson: Lesson, new: str) -> Iterator[Span]:
+    """Yield the patterns of the map that match the lesson's old path, and not the new one."""
+    new_path = replace(lesson, id=new).path
+    for path in _silenced_paths(_map(course)):
+        fits = [fnmatchcase(name, path.value) for name in (lesson.path, new_path)]
+        if path.value != lesson.path and fits == [True, False]:
+            yield path.span
+
+
+def _silenced_paths(root: ObjectNode) -> Iterator[StringNode]:
+    """Yield the paths and patterns of the map's entries that silence warnings."""
+    paths = (silence.get("path") for silence in root.objects("silence"))
+    return (path for path in paths if isinstance(path, StringNode))
+
+
+def _map(course: Course) -> ObjectNode:
+    root = parse_toml(course.map).value
+    assert root is not None  # the course was read from it
+    return root

@@ -35,15 +35,15 @@ from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.fonts import COURSE
 from coursebuild.core.pages.html_tree import to_xml
 from coursebuild.core.pages.theme import accents
-from coursebuild.features.book.lessons import (
+from coursebuild.features.book.chapters import (
     PICTURES,
+    RewriteRules,
     extension,
     render_lesson,
     site_address,
     style_path,
     summary_line,
 )
-from coursebuild.features.book.rewrite import RewriteRules
 
 _MODIFICATION_TIME = "2000-01-01T00:00:00Z"
 """A constant, see the module."""

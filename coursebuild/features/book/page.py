@@ -20,15 +20,15 @@ from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.html_tree import to_html
-from coursebuild.features.book.lessons import (
+from coursebuild.features.book.chapters import (
     PICTURES,
+    RewriteRules,
     extension,
     render_lesson,
     site_address,
     style_path,
     summary_line,
 )
-from coursebuild.features.book.rewrite import RewriteRules
 
 _HEADING_SHIFT = 2
 """Levels that headings move down: the course is the first heading, its levels are the second."""

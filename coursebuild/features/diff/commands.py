@@ -16,8 +16,7 @@ from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.course_root import MAP
 from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import temporary_folder
-from coursebuild.features.diff.report import CourseState, report
-from coursebuild.features.diff.weight import weight_section
+from coursebuild.features.diff.report import CourseState, report, weight_section
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.recordings import read_recorded
 

@@ -1,16 +1,22 @@
 """The course of another tool → the files of one of coursebuild.
 
 Entry points: `convert`, `write_course`, `change_tried_lessons`.
+
+The map of a course without a `course.json` is the table of contents of its tool: `_toc.yml` of
+Jupyter Book, `myst.yml` of MyST, `_quarto.yml` of Quarto, `mkdocs.yml` of MkDocs; without one the
+files, in the order of their names, a folder for a level.
 """
 
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import posixpath
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -21,25 +27,26 @@ from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.pages.marks import fence
 from coursebuild.core.values import fingerprint
-from coursebuild.features.importer.blocks import convert_segment
-from coursebuild.features.importer.cells import (
+from coursebuild.features.importer.blocks import (
     code_for_readers,
+    convert_segment,
     join_cells,
     join_outputs,
     runnable_code,
 )
-from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext
-from coursebuild.features.importer.course_json import read_course_json
-from coursebuild.features.importer.course_map import map_lines, read_texts
+from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
 from coursebuild.features.importer.prose import find_anchors
 from coursebuild.features.importer.source_files import TEXTS, SourceFiles
 from coursebuild.features.importer.values import (
     ImportedCourse,
+    ImportedLevel,
     ImportedText,
     Leftover,
     Segment,
+    read_yaml,
     stem_of,
+    title_of_file,
 )
 
 TRIED = "tried-lessons"
@@ -239,3 +246,146 @@ def _model_files(files: SourceFiles) -> Iterator[tuple[str, bytes]]:
             yield name, files.read(path)
         elif path.endswith(".xml") and b"<mujoco" in (data := files.read(path)):
             yield f"models/{posixpath.basename(path)}", data
+
+
+_NOT_LESSONS = ("readme", "license", "licence", "changelog", "contributing", "code_of_conduct")
+_PAGES = ("index", "intro", "introduction", "about")
+_TITLE_PATHS = ((), ("project",), ("book",), ("website",))
+"""Keys below which settings have the title of the course."""
+_LIST_KEYS = ("parts", "chapters", "sections", "children", "toc", "contents", "entries")
+_FILE_KEYS = ("file", "href", "part")
+_TITLE_KEYS = ("caption", "title", "section", "text", "part")
+_COURSE_KEYS = {"toc", "root", "site-url", "author", "authors", "version"}
+"""Keys that only the whole course has: a title next to them is not the title of a level."""
+
+
+def read_contents(files: SourceFiles) -> ImportedCourse:
+    """Read the course in a folder of notebooks or Markdown, or that of a single text.
+
+    Raises:
+        UsageError: there is nothing to import.
+    """
+    names = ("myst.yml", "_quarto.yml", "_config.yml", "mkdocs.yml")
+    myst, quarto, _, mkdocs = settings = [_read_settings(name, files) for name in names]
+    titles = [_get(mapping, *path, "title") for mapping in settings for path in _TITLE_PATHS]
+    titles.append(_get(mkdocs, "site_name"))
+    title = next((" ".join(text.split()) for text in titles if isinstance(text, str)), "")
+    parts = [
+        *_read_parts(_read_settings("_toc.yml", files), files),
+        *_read_parts(_get(myst, "project"), files),
+        *_read_parts(_get(quarto, "book", "chapters"), files),
+        *_read_parts(_get(quarto, "website", "sidebar"), files),
+        *_read_nav(_get(mkdocs, "nav"), str(_get(mkdocs, "docs_dir") or "docs"), files),
+    ] or [*_group_by_folder(files)]
+    if not parts:
+        left = [f"{leftover.path}: {leftover.message}" for leftover in sorted(files.leftovers)[:3]]
+        message = "there is nothing to import: no course.json, no notebook and no Markdown file"
+        raise UsageError(message, help="; ".join(left))
+    texts = [] if files.is_single else [part for part in parts if isinstance(part, ImportedText)]
+    pages = [text for text in texts if _base_name(text.file) in _PAGES]
+    levels = _group_levels([part for part in parts if part not in pages], title)
+    return ImportedCourse(
+        title=title or title_of_file(files.name), levels=tuple(levels), pages=tuple(pages)
+    )
+
+
+def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
+    path = next((path for path in (name, name.replace(".yml", ".yaml")) if path in files), None)
+    if path is None:
+        return {}
+    value = read_yaml(files.read_text(path))
+    if value is None:
+        raise UsageError(f"{path} is no YAML, or too large")
+    return value if isinstance(value, dict) else {"chapters": value}
+
+
+def _get(settings: object, *path: str) -> object:
+    """Return the value at a path of nested keys; `None` where there is none."""
+    for key in path:
+        settings = settings.get(key) if isinstance(settings, Mapping) else None
+    return settings
+
+
+def _read_parts(value: object, files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
+    """Yield the lessons and groups of lessons in the table of contents of any of the tools."""
+    if isinstance(value, str):
+        if path := _find_text(value, files):
+            yield ImportedText(file=path)
+    elif isinstance(value, list):
+        for item in value:
+            yield from _read_parts(item, files)
+    elif isinstance(value, Mapping):
+        yield from _read_parts(value.get("root"), files)
+        inside = [part for key in _LIST_KEYS for part in _read_parts(value.get(key), files)]
+        path = next((path for key in _FILE_KEYS if (path := _find_text(value.get(key), files))), "")
+        label = next((str(value[key]) for key in _TITLE_KEYS if value.get(key)), "")
+        title = "" if _find_text(label, files) else label
+        heads = [ImportedText(file=path, title=title)] if path else []
+        if inside and (path or (title and not _COURSE_KEYS & value.keys())):
+            lessons = tuple(_flatten([*heads, *inside]))
+            yield ImportedLevel(title=title or title_of_file(path), lessons=lessons)
+        else:
+            yield from (*heads, *inside)
+
+
+def _flatten(parts: Iterable[ImportedText | ImportedLevel]) -> Iterator[ImportedText]:
+    for part in parts:
+        yield from (part,) if isinstance(part, ImportedText) else part.lessons
+
+
+def _read_nav(
+    entries: object, folder: str, files: SourceFiles
+) -> Iterator[ImportedText | ImportedLevel]:
+    """Yield the entries of MkDocs' `nav`: a file, or a title with a file or further entries."""
+    for entry in entries if isinstance(entries, list) else ():
+        for title, value in entry.items() if isinstance(entry, Mapping) else [("", entry)]:
+            if isinstance(value, list):
+                if inside := tuple(_flatten(_read_nav(value, folder, files))):
+                    yield ImportedLevel(title=str(title), lessons=inside)
+            elif path := _find_text(posixpath.join(folder, str(value)), files):
+                yield ImportedText(file=path, title=str(title))
+
+
+def _find_text(name: object, files: SourceFiles) -> str:
+    """Return a text's path, given with or without its extension; empty where there is none."""
+    if not isinstance(name, str) or not name:
+        return ""
+    name = posixpath.normpath(name)
+    if path := files.find(name):
+        return path if path.endswith(TEXTS) else ""
+    return next((path for end in TEXTS if (path := files.find(name + end))), "")
+
+
+def _natural_order(path: str) -> list[tuple[int, int | str]]:
+    """Return a key that sorts names in natural order: numbers by their values."""
+    parts = re.split(r"(\d+)", path)
+    return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
+
+
+def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
+    texts = sorted((path for path in files if path.endswith(TEXTS)), key=_natural_order)
+    for folder, paths in itertools.groupby(texts, posixpath.dirname):
+        lessons = [
+            ImportedText(file=path)
+            for path in paths
+            if files.is_single or _base_name(path) not in _NOT_LESSONS
+        ]
+        if folder and lessons:
+            yield ImportedLevel(title=title_of_file(folder), lessons=tuple(lessons))
+        else:
+            yield from lessons
+
+
+def _base_name(path: str) -> str:
+    return posixpath.basename(path).split(".")[0].lower()
+
+
+def _group_levels(
+    parts: Iterable[ImportedText | ImportedLevel], title: str
+) -> Iterator[ImportedLevel]:
+    """Yield a level for each group, and one for each run of lessons outside groups."""
+    for kind, run in itertools.groupby(parts, type):
+        if kind is ImportedText:
+            yield ImportedLevel(title=title or "Lessons", lessons=tuple(_flatten(run)))
+        else:
+            yield from (part for part in run if isinstance(part, ImportedLevel))

@@ -1,13 +1,19 @@
 """The map of the new course.
 
-Entry points: `read_texts`, which reads the texts and gives each an id and a path; `map_lines`.
+Entry points: `read_texts`, which reads the texts and gives each an id and a path; `map_lines`;
+`read_course_json`. People write `course.json` by hand in many dialects, so a field can have several
+names; unknown fields are reported once, with their number.
 """
 
 from __future__ import annotations
 
 import itertools
+import json
+import posixpath
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from msgspec.structs import replace
 
@@ -17,7 +23,153 @@ from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
 from coursebuild.features.importer.segments import read_segments
 from coursebuild.features.importer.source_files import SourceFiles
-from coursebuild.features.importer.values import ImportedCourse, ImportedText, title_of_file
+from coursebuild.features.importer.values import (
+    ImportedCourse,
+    ImportedLevel,
+    ImportedText,
+    Leftover,
+    stem_of,
+    title_of_file,
+)
+
+_FIELD_NAMES: dict[str, str] = {
+    "number": "id",
+    "name": "title",
+    **dict.fromkeys(("description", "subtitle", "tagline", "goal"), "summary"),
+    **dict.fromkeys(("path", "source", "markdown"), "file"),
+    **dict.fromkeys(("outcomes", "goals", "learning_objectives"), "objectives"),
+    **dict.fromkeys(("prereqs", "requires", "depends_on", "dependencies"), "prerequisites"),
+    **dict.fromkeys(("estimated_minutes", "estimatedMinutes", "duration", "time"), "minutes"),
+    "state": "status",
+    **dict.fromkeys(("units", "chapters"), "lessons"),
+    **dict.fromkeys(("modules", "parts"), "levels"),
+    **dict.fromkeys(("lang", "locale"), "language"),
+}
+"""The names of fields here, by the names they have in other dialects."""
+_COURSE_FIELDS = ("id", "title", "summary", "levels", "pages", "language")
+_LEVEL_FIELDS = ("id", "title", "summary", "lessons", "checkpoint")
+_LESSON_FIELDS = (
+    *("id", "slug", "title", "summary", "file", "objectives", "prerequisites", "minutes"),
+    *("status", "checkpoint"),
+)
+
+
+def read_course_json(path: str, files: SourceFiles) -> ImportedCourse:
+    """Read the course that a file describes.
+
+    Raises:
+        UsageError: it is no JSON, or holds no levels.
+    """
+    text = files.read_text(path)
+    try:
+        # A number such as 4.10 is the name of a lesson.
+        data = json.loads(text, parse_float=str, parse_int=str)
+    except RecursionError:
+        raise UsageError(f"{path} is no JSON: the text is nested too deeply") from None
+    except ValueError as error:
+        raise UsageError(f"{path} is no JSON: {error}") from None
+    reader = _Reader(files)
+    course = reader.fields(data, _COURSE_FIELDS)
+    levels = tuple(map(reader.level, _read_items(course, "levels")))
+    if not levels:
+        raise UsageError(f"{path} has no `levels`")
+    return ImportedCourse(
+        title=_read_text(course, "title") or "Course",
+        summary=_read_text(course, "summary"),
+        language=_read_text(course, "language"),
+        levels=levels,
+        pages=tuple(map(reader.lesson, _read_items(course, "pages"))),
+        camera_is_position=True,
+        leftovers=tuple(
+            Leftover(path, "", f"`{key}` ({count} times), which a course map does not have")
+            for key, count in reader.unknown.items()
+        ),
+    )
+
+
+class _Reader:
+    """Reads the objects of the file, and counts the fields that it does not know."""
+
+    def __init__(self, files: SourceFiles) -> None:
+        self.files = files
+        self.unknown: Counter[str] = Counter()
+        """How often each unknown field occurs."""
+
+    def fields(self, value: Any, names: tuple[str, ...]) -> dict[str, Any]:
+        """Return the fields of an object, by their names here; of these, `names` are expected."""
+        if not isinstance(value, dict):
+            raise UsageError("course.json: a level or a lesson is not an object")
+        self.unknown.update(key for key in value if _field_name(key) not in names)
+        return {_field_name(key): item for key, item in value.items()}
+
+    def level(self, value: object) -> ImportedLevel:
+        """Read a level with its lessons."""
+        level = self.fields(value, _LEVEL_FIELDS)
+        return ImportedLevel(
+            id=_read_text(level, "id"),
+            title=_read_text(level, "title"),
+            summary=_read_summary(level),
+            lessons=tuple(map(self.lesson, _read_items(level, "lessons"))),
+        )
+
+    def lesson(self, value: object) -> ImportedText:
+        """Read a lesson or a page."""
+        lesson = self.fields(value, _LESSON_FIELDS)
+        minutes = re.search(r"\d+", _read_text(lesson, "minutes"))
+        return ImportedText(
+            old_id=_read_text(lesson, "id"),
+            file=self.find_file(lesson),
+            title=_read_text(lesson, "title"),
+            slug=_read_text(lesson, "slug"),
+            summary=_read_summary(lesson),
+            status=_read_text(lesson, "status"),
+            objectives=_read_texts(lesson, "objectives"),
+            prerequisites=_read_texts(lesson, "prerequisites"),
+            minutes=int(minutes[0]) if minutes and 1 <= int(minutes[0]) <= 100_000 else None,
+        )
+
+    def find_file(self, lesson: dict[str, Any]) -> str:
+        """Return the file of a lesson: the one it names, or one whose name begins with its id."""
+        file, id, slug = (_read_text(lesson, key) for key in ("file", "id", "slug"))
+        paths = [path for path in self.files if path.endswith((".md", ".qmd", ".ipynb"))]
+        suffix = "/" + file.lstrip("./")
+        exact = self.files.find(posixpath.normpath(file))
+        matches = [
+            path for path in paths if file and (path == exact or f"/{path}".endswith(suffix))
+        ]
+        pattern = re.compile(rf"(?:lesson[-_ ]?)?{re.escape(id)}(?![\w.])|{re.escape(slug)}$")
+        for path in paths:
+            if id and pattern.match(posixpath.basename(stem_of(path))):
+                matches.append(path)
+        return matches[0] if matches else ""
+
+
+def _field_name(key: str) -> str:
+    return _FIELD_NAMES.get(key, key)
+
+
+def _read_texts(fields: dict[str, Any], name: str) -> tuple[str, ...]:
+    """Return the texts of a field, each on one line: the items of a list, or its value."""
+    value = fields.get(name)
+    items = value if isinstance(value, list) else [value]
+    texts = (" ".join(item.split()) for item in items if isinstance(item, str))
+    return tuple(text for text in texts if text)
+
+
+def _read_text(fields: dict[str, Any], name: str) -> str:
+    return "; ".join(_read_texts(fields, name))
+
+
+def _read_items(fields: dict[str, Any], name: str) -> list[Any]:
+    value = fields.get(name)
+    return value if isinstance(value, list) else []
+
+
+def _read_summary(fields: dict[str, Any]) -> str:
+    """Return the summary, with what a learner should be able to do by then."""
+    checkpoint = _read_text(fields, "checkpoint")
+    return f"{_read_text(fields, 'summary')} {checkpoint and f'Checkpoint: {checkpoint}'}".strip()
+
 
 _COMPLETE = ("", "complete", "completed", "done", "published", "final", "ready")
 """Statuses of a lesson that is finished; with any other it is a draft."""
@@ -41,11 +193,11 @@ def read_texts(course: ImportedCourse, files: SourceFiles) -> ImportedCourse:
             lesson_id = _free_id(
                 lesson.old_id if fits else next(other_ids), other_ids, used_lesson_ids
             )
-            lessons.append(_read_text(lesson, lesson_id, files))
+            lessons.append(_read_file(lesson, lesson_id, files))
         title = level.title or f"Level {id}"
         levels.append(replace(level, id=id, title=title, lessons=tuple(lessons)))
     used_ids = {*RESERVED_IDS}
-    pages = (_read_text(page, "", files, used_ids) for page in course.pages if page.file)
+    pages = (_read_file(page, "", files, used_ids) for page in course.pages if page.file)
     return replace(course, levels=tuple(levels), pages=tuple(pages))
 
 
@@ -56,7 +208,7 @@ def _free_id(id: str, other_ids: Iterator[str], used_ids: set[str]) -> str:
     return free
 
 
-def _read_text(
+def _read_file(
     text: ImportedText, id: str, files: SourceFiles, used_ids: set[str] | None = None
 ) -> ImportedText:
     """Read the file of a lesson with this id, or of a page, whose id is made from its title.

@@ -17,14 +17,20 @@ from coursebuild.core.features import (
     TrialRun,
     Trials,
 )
-from coursebuild.features.lab.checks import check_labs, check_model_names
 from coursebuild.features.lab.files import publish_labs
-from coursebuild.features.lab.gallery import draw_model, model_picture, model_view
 from coursebuild.features.lab.inputs import lab_trials, trial_inputs
 from coursebuild.features.lab.markdown import lab_markdown
 from coursebuild.features.lab.model import Lab
-from coursebuild.features.lab.page import draw_lab, index_lab, lab_picture
+from coursebuild.features.lab.page import (
+    draw_lab,
+    draw_model,
+    index_lab,
+    lab_picture,
+    model_picture,
+    model_view,
+)
 from coursebuild.features.lab.parse import parse_fence
+from coursebuild.features.lab.relations import check_labs, check_model_names
 from coursebuild.features.lab.schema import SimLab, refine_schema
 
 

@@ -16,9 +16,9 @@ from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.source import key_of
 from coursebuild.features.lab.compile import LabModule, compile_lab
-from coursebuild.features.lab.engines.files import engine_digest, lab_digest
-from coursebuild.features.lab.gallery import gallery_labs
+from coursebuild.features.lab.engines.native import engine_digest, lab_digest
 from coursebuild.features.lab.model import BUILT_IN_KINDS, Lab
+from coursebuild.features.lab.page import gallery_labs
 
 _DISPLAY_FIELDS = ("id", "title", "model", "height", "toggles")
 """Data of a lab on which no trial depends."""

@@ -1,6 +1,7 @@
-"""Checks how the fields of a `simlab` fit together.
+"""Checks how the fields of a `simlab` fit together, and labs with their course.
 
-Entry points: `check_lab(node, structs)`; `check_steps`, for a field that presses and sets controls.
+Entry points: `check_lab(node, structs)`; `check_steps`, for a field that presses and sets controls;
+`check_labs`, their kind and model exist; `check_model_names`, once models are compiled.
 
 Every part whose own fields are right is checked, so that a misspelt field does not hide what is
 wrong elsewhere.
@@ -8,14 +9,17 @@ wrong elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
+from coursebuild.core.model import Course, Document, FeatureBlock, find_blocks
+from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.syntax.fields import check_unique, require_one_of
 from coursebuild.core.syntax.nodes import ArrayNode, Node, NumberNode, ObjectNode, StringNode
 from coursebuild.core.syntax.wording import format_value
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.features.lab.model import BUILT_IN_KINDS, Lab
 from coursebuild.features.lab.schema import Button, Expect, Plot, Select, SimLab, Slider
 
 Structs = Mapping[ObjectNode, Struct]
@@ -194,3 +198,55 @@ def _check_setting(label: StringNode, value: Node, controls: Controls) -> Iterat
                 yield from _check_choice(value, label.value, value.value, select)
         case _:
             pass
+
+
+_FOLDER = "content/labs/"
+
+
+def lab_kinds(course: Course) -> frozenset[str]:
+    """The built-in kinds, and one for each `content/labs/NAME.js` of the course."""
+    files = (path.removeprefix(_FOLDER) for path in course.files if path.startswith(_FOLDER))
+    kinds = (file.removesuffix(".js") for file in files if file.endswith(".js"))
+    return frozenset((*BUILT_IN_KINDS, *(kind for kind in kinds if "/" not in kind)))
+
+
+def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
+    """Report unknown kinds and models of the labs in some documents."""
+    kinds = lab_kinds(course)
+    models = {model.name for model in course.models}
+    for lab in (lab for document in documents for lab in find_blocks(document, Lab)):
+        if lab.kind not in kinds:
+            message, help = (
+                f"`{lab.kind}` is not a known kind of lab",
+                did_you_mean(lab.kind, kinds),
+            )
+            yield diagnose("lab-kind", lab.kind_span, message, help=help)
+        for name in lab.models():
+            if name not in models:
+                message, help = f"no model `{name}` in models/", did_you_mean(name, models)
+                yield diagnose("lab-model", lab.place(("model",)), message, help=help)
+
+
+def check_model_names(
+    course: Course, facts_of: Callable[[FeatureBlock], ModelFacts | None]
+) -> Iterator[Diagnostic]:
+    """Report keyframes and sites that the models of labs do not have."""
+    for lab in (lab for document in course.documents for lab in find_blocks(document, Lab)):
+        facts = facts_of(lab)
+        if facts is not None:
+            yield from _check_names(lab, facts)
+
+
+def _check_names(lab: Lab, facts: ModelFacts) -> Iterator[Diagnostic]:
+    key = lab.fields.key
+    if isinstance(key, int) and not 0 <= key < len(facts.keyframes):
+        count = f"it has {len(facts.keyframes) or 'none'}"
+        message = f"the model has no keyframe {key}: {count}, counted from 0"
+        yield diagnose("lab-name", lab.place(("key",)), message)
+    for field, element, name, names in (
+        ("key", "keyframe", key, [name for name in facts.keyframes if name]),
+        ("trail", "site", lab.fields.trail, facts.sites),
+    ):
+        if isinstance(name, str) and name not in names:
+            message, help = f"the model has no {element} `{name}`", did_you_mean(name, names)
+            yield diagnose("lab-name", lab.place((field,)), message, help=help)

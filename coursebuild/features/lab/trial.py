@@ -36,8 +36,7 @@ from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import fingerprint
 from coursebuild.features.lab.compile import LabModule, compile_lab, pieces
 from coursebuild.features.lab.engines.browser import LabEngine
-from coursebuild.features.lab.engines.files import lab_digest
-from coursebuild.features.lab.engines.native import NativeEngine, NativeError
+from coursebuild.features.lab.engines.native import NativeEngine, NativeError, lab_digest
 from coursebuild.features.lab.export.trial import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.files import LabOutput
 from coursebuild.features.lab.inputs import inputs_of, trial_data
@@ -334,7 +333,6 @@ class _LabTrial(Struct, frozen=True):
         return min(steps, max(1, round(_PARITY_SECONDS / float(main["timestep"]))))
 
     def _export(self, trial: TrialReply) -> LabExport:
-        """Write the script that does what the lab does."""
         if trial.main is None or self.lab.kind == MJCF:
             return LabExport(None)
         return export_lab(self.context, self.engines.native, self.trial, self.lab, trial.main)

@@ -162,7 +162,6 @@ def _check_depth(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 
 
 def _check_depth_claim(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Report a lab that says `deep` without need."""
     if lab.verify.deep and not any(failure.kind == "deep" for failure in trial.failures):
         message = "the lab says `deep`, but no bodies lay deep in each other"
         span = lab.place(("verify", "deep"))

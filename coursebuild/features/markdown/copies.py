@@ -1,10 +1,14 @@
-"""Writes pages as plain Markdown: for people, feeds and language models.
+"""Writes pages as plain Markdown, for people, feeds and language models, and the list `llms.txt`.
 
 Entry points: `note_markdown`, the text of a page; `markdown_files`, the files of all pages; `head`
-and `markdown_href`, parts of them.
+and `markdown_href`, parts of them; `write_llms(library)`.
 
 A lesson or page of the course is written from its document. All other pages (home, levels, models,
 measured figures) are written from their HTML, so that both say the same.
+
+`llms.txt` (<https://llmstxt.org>) leads language models to these copies. There is no
+`llms-full.txt`: for thousands of lessons it would have tens of megabytes, more than any model
+reads, and every edit would write it again.
 """
 
 from __future__ import annotations
@@ -14,18 +18,18 @@ from collections.abc import Callable, Iterator
 from typing import TypeAlias
 from urllib.parse import urlsplit
 
+from coursebuild.core.model import Lesson
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import SiteContext
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.lesson import LessonLink, LevelView
+from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import code_span, escape_line, guard_lines, link
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.strings import Strings
 from coursebuild.features.markdown.from_html import html_to_markdown
-from coursebuild.features.markdown.llms import PATH as LLMS
-from coursebuild.features.markdown.llms import write_llms
 from coursebuild.features.markdown.writer import DocumentWriter
 
 Locate: TypeAlias = Callable[[str], str]
@@ -39,7 +43,7 @@ def markdown_files(site: SiteContext) -> Iterator[SiteFile]:
         path = urls.copy_path(page.path, _EXTENSION)
         if path not in author_paths:
             yield CachedFile(path, page.digest, functools.partial(site.note, page.path))
-    yield OutputFile(LLMS, write_llms(site.library))
+    yield OutputFile(LLMS_PATH, write_llms(site.library))
 
 
 def note_markdown(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
@@ -136,3 +140,47 @@ def _footer(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
         if links:
             rows.append(f"{escape_line(words(key))}: {', '.join(links)}")
     return ["___", "\n".join(f"- {row}" for row in rows)] if rows else []
+
+
+LLMS_PATH = "llms.txt"
+
+
+def write_llms(library: Library) -> bytes:
+    """Return the content of the file."""
+    course, words = library.course, library.words
+    parts = [f"# {escape_line(course.title)}"]
+    if course.summary:
+        parts.append(f"> {escape_line(course.summary)}")
+    parts.append(words("exports.llms"))
+    for level in course.written_levels:
+        label = f"{words('level.label', id=level.id)}: {level.title}"
+        rows = (_lesson_row(library, lesson) for lesson in level.lessons)
+        parts.append("\n".join((f"## {escape_line(label)}", "", *rows)))
+    parts += _optional_part(library)
+    return visible("\n\n".join(parts) + "\n").encode()
+
+
+def _lesson_row(library: Library, lesson: Lesson) -> str:
+    path = urls.lesson_path(lesson)
+    return _row(library, path, f"{lesson.id} {lesson.title}", lesson.summary)
+
+
+def _optional_part(library: Library) -> list[str]:
+    """Return the list of pages that can be left out where there is little room."""
+    course, words = library.course, library.words
+    rows = [_row(library, urls.HOME, words("site.map"), "")]
+    rows += [_row(library, urls.page_path(page), page.title, "") for page in course.pages]
+    rows += [
+        _row(library, urls.model_page_path(m.name), words("model.title", name=m.name), "")
+        for m in course.models
+    ]
+    if library.reports.cases:
+        title, text = words("numerics.title"), words("numerics.description")
+        rows.append(_row(library, urls.NUMERICS, title, text))
+    return ["\n".join(("## Optional", "", *rows))]
+
+
+def _row(library: Library, path: str, title: str, text: str) -> str:
+    copy = urls.copy_path(path, ".md")
+    address = urls.absolute(library.course.base_url, copy) or urls.encode(copy)
+    return f"- {link(escape_line(title), address)}" + (f": {escape_line(text)}" if text else "")

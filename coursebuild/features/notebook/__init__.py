@@ -1,12 +1,304 @@
-"""Every lesson as a Jupyter notebook that runs.
+"""Lessons as Jupyter notebooks that run.
 
-1. `cells` writes a lesson as cells of Markdown and code, when its page is drawn.
-2. `files` writes them to files, with a cell that writes what the scripts need (`setup`).
+Entry points: `note_cells`, the cells of the lesson itself; `notebook_files`, the notebooks of a
+site.
+
+1. A new Markdown cell begins at each heading and after each script. Links get the course's address;
+   if it has none, they stay as they are on the page.
+2. Each script is a cell of its own. The magic `%%example`, defined by a cell at the start, writes
+   the cell to its file and runs it in a process of its own, under the conditions of recorded
+   outputs: `__file__`, `sys.argv`, `sys.exit`, imports of other scripts and the hash seed are as
+   they are when the course is checked, and scripts do not share state.
+3. A recorded output is the output of its cell.
+4. The id of a cell depends on the heading above it, or on its script.
+5. A cell at the start contains the files that scripts need (models, `mjcourse`, other scripts),
+   packed, and writes those that are missing.
 """
 
+from __future__ import annotations
+
+import base64
+import functools
+import hashlib
+import json
+import re
+import shlex
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, TypeAlias
+from urllib.parse import urljoin, urlsplit
+
+import msgspec
+
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.features import Feature, PageCopy
-from coursebuild.features.notebook.cells import note_cells
-from coursebuild.features.notebook.files import notebook_files
+from coursebuild.core.model import (
+    Block,
+    Heading,
+    Lesson,
+    Script,
+    Table,
+    document_scripts,
+    walk_blocks,
+)
+from coursebuild.core.model.results import CachedFile, Outcome
+from coursebuild.core.pages import urls, zips
+from coursebuild.core.pages.added_files import SiteContext
+from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.marks import code_span, escape_marks, hang, link
+from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.features.markdown.copies import head
+from coursebuild.features.markdown.writer import DocumentWriter
+
+Cell: TypeAlias = dict[str, Any]
+"""A cell in the format of nbformat."""
+_MAGIC = "%%example"
+_MAX_LEVEL = 3
+"""Headings up to this level begin a cell."""
+
+
+def note_cells(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
+    """Return the cells of a lesson as JSON; nothing for other pages."""
+    if page is None or inputs.head.kind != "lesson":
+        return b""
+    words, address = page.renderer.words, page.inputs.address
+    locate = functools.partial(_make_absolute, address)
+    page_address = locate(page.place.href(inputs.head.path))
+    writer = DocumentWriter(page, locate, page_address, notebook=True)
+    parts = head(inputs, words, locate)
+    if address:
+        parts.append(link(writer.words("exports.on_site"), page_address))
+    cells = [*_block_cells(writer, page.document.blocks), *_footnote_cells(writer)]
+    counts: Counter[str] = Counter()
+    for cell in cells:
+        counts[cell["id"]] += 1
+        cell["id"] += f"-{counts[cell['id']]}"
+    return json.dumps([markdown_cell("head", "\n\n".join(parts)), *cells]).encode()
+
+
+def markdown_cell(name: str, text: str) -> Cell:
+    """Return a cell of Markdown; `name` is its id."""
+    return {"cell_type": "markdown", "id": name, "metadata": {}, "source": _lines(text)}
+
+
+def code_cell(name: str, text: str, output: str | None = None, *, hidden: bool = False) -> Cell:
+    """Return a cell of Python with its output."""
+    stream = {"output_type": "stream", "name": "stdout"}
+    outputs = [] if output is None else [stream | {"text": _lines(output, "\n")}]
+    return {
+        "cell_type": "code",
+        "id": name,
+        "metadata": {"jupyter": {"source_hidden": True}} if hidden else {},
+        "execution_count": None,
+        "outputs": outputs,
+        "source": _lines(text),
+    }
+
+
+def _lines(text: str, end: str = "") -> list[str]:
+    lines = text.rstrip("\n").split("\n")
+    return [*[f"{line}\n" for line in lines[:-1]], f"{lines[-1]}{end}"]
+
+
+def _make_absolute(address: str, href: str) -> str:
+    """Make a link of the page at an address absolute."""
+    return urljoin(address, href) if address and not urlsplit(href).scheme else href
+
+
+def _block_cells(writer: DocumentWriter, blocks: Iterable[Block]) -> Iterator[Cell]:
+    """Yield the cells of blocks, with ids that are not numbered yet."""
+    section = "start"
+    pending: list[Block] = []
+    script_outputs = writer.page.script_outputs.values()
+    output_ids = {id(output) for outputs in script_outputs for output in outputs}
+
+    def flush() -> Iterator[Cell]:
+        text = writer.blocks(pending)
+        if text:
+            yield _text_cell(section, text)
+        pending.clear()
+
+    for block in blocks:
+        if id(block) in output_ids:
+            continue
+        if isinstance(block, Heading) and block.level <= _MAX_LEVEL:
+            yield from flush()
+            section = block.anchor
+        if not isinstance(block, Script):
+            pending.append(block)
+        if scripts := _find_scripts((block,)):
+            yield from flush()
+            for script in scripts:
+                yield from _script_cells(writer, section, script)
+    yield from flush()
+
+
+def _find_scripts(blocks: tuple[Block, ...]) -> list[Script]:
+    return [block for block in walk_blocks(blocks) if isinstance(block, Script)]
+
+
+def _footnote_cells(writer: DocumentWriter) -> Iterator[Cell]:
+    footnotes = writer.page.document.footnotes
+    if footnotes:
+        notes = (hang(f"{n.number}. ", writer.blocks(n.blocks)) for n in footnotes)
+        title = f"## {writer.words('markup.footnotes')}"
+        yield _text_cell("footnotes", "\n\n".join((title, *notes)))
+    for note in footnotes:
+        for script in _find_scripts(note.blocks):
+            yield from _script_cells(writer, "footnotes", script)
+
+
+def _script_cells(writer: DocumentWriter, section: str, block: Script) -> Iterator[Cell]:
+    """Yield the cell of a script, and a cell of remarks about its outputs."""
+    recordings = writer.page.script_outputs.get(block.span.start, ())
+    run = writer.page.inputs.runs.get(block.path)
+    is_run = run is not None and run.outcome is Outcome.OK
+    output = None
+    remarks: list[str] = []
+    for recording in recordings:
+        if is_run and output is None and not isinstance(recording.body, Table):
+            output = f"{recording.body.text.rstrip()}\n"
+            remarks.append(f"{writer.caption(recording)} {writer.receipt(recording)}")
+        else:
+            remarks.append(writer.recording(recording))
+    if block.norun:
+        remarks.insert(0, writer.words("exports.norun"))
+    yield code_cell(f"code-{_slug(block.path)}", _magic(block) + block.code.text, output)
+    if remarks:
+        yield _text_cell(section, "\n\n".join(remarks))
+
+
+def _magic(block: Script) -> str:
+    options = [f"--requires={','.join(block.requires)}"] if block.requires else []
+    options += ["--norun"] if block.norun else []
+    return f"{shlex.join((_MAGIC, *options, block.path, *block.args))}\n"
+
+
+def _text_cell(section: str, text: str) -> Cell:
+    return markdown_cell(f"text-{_slug(section)}", text)
+
+
+_NOT_IN_IDS = re.compile(r"[^a-zA-Z0-9]+")
+
+
+def _slug(name: str) -> str:
+    """Return a part of a cell's id, which is limited in length and characters."""
+    plain = _NOT_IN_IDS.sub("-", name.removeprefix("examples/").removesuffix(".py"))
+    if name.isascii() and 0 < len(plain) <= 40:
+        return plain.strip("-") or "x"
+    return hashlib.sha256(name.encode("utf-8", "replace")).hexdigest()[:12]
+
+
+_MAX_SIZE = 4 << 20
+"""The limit for the files in a notebook, in bytes."""
+_PLACEHOLDER = "\ue000"
+"""Stands for a name in a text."""
+
+
+def notebook_files(site: SiteContext) -> Iterator[CachedFile]:
+    """Yield the notebooks of all written lessons."""
+    for page in site.pages:
+        lesson = site.library.lessons[page.id]
+        archive = site.archives.get(urls.lesson_zip_path(lesson))
+        language = site.library.words.language
+        key = step_key("notebook", language, page.digest, archive.key if archive else "")
+        path = urls.copy_path(page.path, ".ipynb")
+        yield CachedFile(
+            path, key, functools.partial(_write_notebook, site, lesson, page.path, archive)
+        )
+
+
+def _write_notebook(
+    site: SiteContext, lesson: Lesson, page: str, archive: zips.Archive | None
+) -> bytes:
+    head, *cells = json.loads(site.note(page))
+    setup = () if archive is None else _setup_cells(site, lesson, archive)
+    document = {
+        "cells": [head, *setup, *cells],
+        "metadata": {
+            "kernelspec": {
+                "display_name": "Python 3 (ipykernel)",
+                "language": "python",
+                "name": "python3",
+            },
+            "language_info": {
+                "name": "python",
+                "file_extension": ".py",
+                "mimetype": "text/x-python",
+            },
+        },
+        "nbformat": 4,
+        "nbformat_minor": 5,
+    }
+    text = json.dumps(document, ensure_ascii=False, sort_keys=True)
+    # As Jupyter writes it; `json` takes five times as long to indent.
+    return msgspec.json.format(text.encode("utf-8", "replace"), indent=1) + b"\n"
+
+
+def _setup_cells(site: SiteContext, lesson: Lesson, archive: zips.Archive) -> Iterator[Cell]:
+    assert lesson.document is not None, "a notebook is of a written lesson"
+    files = {path.partition("/")[2]: data for path, data in archive.files.items()}
+    packages = sorted(files.pop("requirements.txt", b"").decode().split())
+    files.pop("README.md", None)
+    scripts = [script.path for script in document_scripts(lesson.document)]
+    early = _imported_early(site, scripts, files)
+    files = {path: data for path, data in files.items() if path not in scripts or path in early}
+    included = _select_smallest(files)
+    words = site.library.words
+    title = f"## {escape_marks(words('exports.before'))}"
+    text = escape_marks(words("exports.setup" if files else "exports.setup_none"))
+    if included.keys() != files.keys():
+        name = code_span(archive.path.rpartition("/")[2])
+        text += f" {escape_marks(words('exports.left_out', zip=_PLACEHOLDER))}".replace(
+            _PLACEHOLDER, name
+        )
+    if packages:
+        yield markdown_cell("before", f"{title}\n\n{escape_marks(words('exports.install'))}")
+        yield code_cell("install", f"# %pip install {' '.join(packages)}")
+        title = ""
+    yield markdown_cell("before-setup", f"{title}\n\n{text}".strip())
+    template = site.assets.template("notebook/setup.py")
+    code = _setup_code(template, included, sorted(files.keys() - included.keys()))
+    yield code_cell("setup", code, hidden=True)
+
+
+def _select_smallest(files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return the files that a notebook can contain, the smallest first."""
+    room, selection = _MAX_SIZE, {}
+    for path, data in sorted(files.items(), key=lambda item: (len(item[1]), item[0])):
+        room -= len(data)
+        if room >= 0:
+            selection[path] = data
+    return selection
+
+
+def _imported_early(site: SiteContext, scripts: list[str], files: Mapping[str, bytes]) -> set[str]:
+    """Return the scripts of the lesson that one above them imports, directly or indirectly."""
+    modules = {
+        path.removeprefix("examples/").removesuffix(".py"): path
+        for path in files
+        if re.fullmatch(r"examples/[^/]+\.py", path)
+    }
+    early: set[str] = set()
+    for number, script in enumerate(scripts, 1):
+        visited, pending = set[str](), [script]
+        while pending:
+            path = pending.pop()
+            if path in files and path not in visited:
+                visited.add(path)
+                names = site.imports(files[path].decode("utf-8", "replace"))
+                pending += [modules[name] for name in names if name in modules]
+        early |= visited.intersection(scripts[number:])
+    return early
+
+
+def _setup_code(template: str, files: Mapping[str, bytes], missing: list[str]) -> str:
+    """Return the cell that writes the files and defines the magic."""
+    packed = base64.b64encode(zips.pack_files(files)).decode() if files else ""
+    lines = "\n".join(packed[start : start + 100] for start in range(0, len(packed), 100))
+    code = template.replace("ELSEWHERE = ()", f"ELSEWHERE = {tuple(missing)!r}")
+    return code.replace('FILES = ""', f'FILES = """\n{lines}\n"""' if packed else 'FILES = ""')
+
 
 FEATURE = Feature(
     name="notebook",

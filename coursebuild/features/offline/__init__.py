@@ -1,7 +1,169 @@
-"""The site without a network, and the page about it, which is also shown for missing pages."""
+"""The site without a network, and the page about it, which is also shown for missing pages.
 
+Entry point: `offline_files(site)`: the manifest, its icons and the service worker; and the list of
+all files, which the worker reads.
+
+1. The worker is the same in every build of the same tool: what changes with a course is in the
+   list. So an edit of a page changes that page and its line in the list.
+2. The list has three groups. `shell` is what every page needs, `text` what pages show, `rest` what
+   is large or rarely needed: the engine and the data of labs, models, scripts. Copies of the course
+   in other forms (archives, books) are in no group.
+3. The list has the first digits of each file's hash, unless its name contains one.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import textwrap
+from collections.abc import Iterable, Iterator
+
+from coursebuild.core.drawing.contrast import GROUNDS_LIGHT
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.features import Feature, PageKind, PagePart
-from coursebuild.features.offline.files import offline_files
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import FileFacts, FileList, OutputFile
+from coursebuild.core.model.theme import ThemeFile
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.added_files import SiteContext
+from coursebuild.core.pages.assets import Assets, hashed_name, page_script
+from coursebuild.core.pages.direction import direction
+from coursebuild.core.pages.frame import Names
+from coursebuild.core.pages.theme import picture_size
+
+PAPER = GROUNDS_LIGHT[0]
+"""The background of a page in light colours."""
+
+_FORMAT = 1
+_DIGITS = 12
+"""Digits of a hash in the list: enough to distinguish the versions of one file."""
+_MAX_NAME = 12
+"""Characters that fit below an icon."""
+_COPIES = (".br", ".gz", ".zip", ".ipynb", ".md")
+_PICTURES = (".svg", ".png", ".jpg", ".jpeg", ".gif", ".webp", ".avif")
+_SHELL = (".css", ".js", ".svg")
+_TEXT = (".html", ".webmanifest", *_PICTURES)
+_SEARCH_INDEX = "search/index.js"
+_LARGE = 1 << 20
+"""Bytes: larger pages and pictures are only stored for those who ask for everything."""
+_FOR_MACHINES = (urls.ROBOTS, urls.SITEMAP, urls.WORKER, "llms.txt")
+
+
+def offline_files(site: SiteContext) -> Iterator[OutputFile | FileList]:
+    """Yield all of them."""
+    yield from _application_files(site.library.course, site.assets, site.names)
+    key = step_key("list of files", site.names)
+    yield FileList(urls.FILES, key, functools.partial(listing, shell_of(site.names)))
+
+
+def _application_files(course: Course, assets: Assets, names: Names) -> tuple[OutputFile, ...]:
+    theme = course.theme
+    icons = [_entry(names.icon, theme.icon or theme.touch_icon)]
+    if theme.touch_icon is not None and theme.icon is not None:
+        icons.append(_entry(names.touch_icon, theme.touch_icon))
+    icon_files: list[OutputFile] = []
+    if not (theme.icon or theme.touch_icon):
+        for name, side in (("192", 192), ("512", 512), ("maskable", 512)):
+            icon_files.append(_icon(assets, f"icon-{name}.png"))
+            icons.append(_png(icon_files[-1].path, f"{side}x{side}"))
+        icons[-1]["purpose"] = "maskable"
+    manifest = {
+        "id": "./",
+        "name": course.title,
+        "short_name": short_name(course.title),
+        "description": course.summary,
+        "lang": course.language or "en",
+        "dir": direction(course.language or "en"),
+        "start_url": "./",
+        "scope": "./",
+        "display": "standalone",
+        "theme_color": PAPER,
+        "background_color": PAPER,
+        "categories": ["education"],
+        "icons": icons,
+    }
+    text = json.dumps({k: v for k, v in manifest.items() if v}, ensure_ascii=False, indent=1)
+    worker = page_script(assets.file("js/service-worker.js"))
+    return (
+        *icon_files,
+        OutputFile(urls.MANIFEST, f"{text}\n".encode("utf-8", "replace")),
+        OutputFile(urls.WORKER, worker),
+    )
+
+
+def _entry(path: str, file: ThemeFile | None) -> dict[str, str]:
+    """Return an icon's entry in the manifest; the tool's own icon is an SVG."""
+    if file is None or file.ending == "svg":
+        return {"src": path, "type": "image/svg+xml", "sizes": "any"}
+    width, height = picture_size(file) or (0, 0)
+    return _png(path, f"{width}x{height}")
+
+
+def _png(path: str, size: str) -> dict[str, str]:
+    return {"src": path, "type": "image/png", "sizes": size}
+
+
+def short_name(title: str) -> str:
+    """Return as many words of a title as fit below an icon, but at least the first."""
+    line = " ".join(title.split())
+    lines = textwrap.wrap(line, _MAX_NAME, break_long_words=False, break_on_hyphens=False)
+    # Punctuation and dashes are removed at the cut.
+    return "".join(lines[:1]).rstrip(" ,;:–—-") or title
+
+
+def _icon(assets: Assets, name: str) -> OutputFile:
+    data = assets.file(f"icons/{name}")
+    return OutputFile(hashed_name(f"assets/{name}", data), data)
+
+
+# ---------------------------------------------------------------------------------- the list
+
+
+def shell_of(names: Names) -> frozenset[str]:
+    """Return what every page needs, except fonts, and the pages for when nothing else is there."""
+    pages = {urls.HOME, "offline/index.html", urls.MANIFEST}
+    return frozenset(pages | {path for path in names.paths() if path.endswith(_SHELL)})
+
+
+def listing(shell: frozenset[str], files: Iterable[FileFacts]) -> bytes:
+    """Return the list of files, as JSON with a line for each."""
+    groups: dict[str, dict[str, str]] = {"shell": {}, "text": {}, "rest": {}}
+    sizes = dict.fromkeys(groups, 0)
+    for file in files:
+        group = _group(shell, file)
+        if group is not None:
+            groups[group][file.path] = "" if _has_hashed_name(file) else file.digest[:_DIGITS]
+            sizes[group] += file.size
+    parts = [f'"format": {_FORMAT}']
+    for name, digests in groups.items():
+        parts.append(f'"{name}": {{\n"bytes": {sizes[name]},\n"files": {_lines(digests)}\n}}')
+    return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8", "surrogatepass")
+
+
+def _lines(files: dict[str, str]) -> str:
+    """Write a line for each file, as `json` does with an indent of 0, but faster."""
+    text = json.dumps(files, ensure_ascii=False, separators=(",\n", ": "))
+    return f"{{\n{text[1:-1]}\n}}" if files else "{}"
+
+
+def _group(shell: frozenset[str], file: FileFacts) -> str | None:
+    path = file.path
+    if path in _FOR_MACHINES or path.endswith(_COPIES) or path == urls.NOT_FOUND:
+        return None
+    if path in shell or path.startswith("assets/fonts/"):
+        return "shell"
+    if path.startswith("assets/"):
+        is_lab_data = path.startswith("assets/labs/") and not path.endswith(_PICTURES)
+        return "rest" if is_lab_data else "text"
+    is_text = path.endswith(_TEXT) or path == _SEARCH_INDEX
+    return "text" if is_text and file.size <= _LARGE else "rest"
+
+
+def _has_hashed_name(file: FileFacts) -> bool:
+    """Whether the name contains the content's hash."""
+    digits = file.path.rpartition(".")[0].rpartition(".")[2]
+    return file.path.startswith("assets/") and digits == file.digest[:8]
+
 
 FEATURE = Feature(
     name="offline",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def export(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
     """Yield the files of the package."""
-    from coursebuild.features.qti.package import package_files
+    from coursebuild.features.qti.items import package_files
 
     return package_files(context)
 

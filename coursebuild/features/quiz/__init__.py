@@ -6,9 +6,8 @@ with the course and with what scripts printed, `page` and `markdown` show it.
 
 from coursebuild.core.features import Feature, FenceKind, PagePart
 from coursebuild.features.quiz.checks import check_output_lines, check_predictions, check_quizzes
-from coursebuild.features.quiz.markdown import quiz_markdown
 from coursebuild.features.quiz.model import Quiz
-from coursebuild.features.quiz.page import index_quiz, quiz
+from coursebuild.features.quiz.page import index_quiz, quiz, quiz_markdown
 from coursebuild.features.quiz.parse import parse_fence
 from coursebuild.features.quiz.schema import QuizFile
 

@@ -8,11 +8,14 @@ Entry points: `parse_fence`; `parse_quiz`, from the text inside one.
 3. The Markdown in it is parsed, and all becomes a `Quiz`. If some questions have mistakes, the quiz
    holds the others, so that diagnostics that only later steps can make (of a formula, a link, a
    script that no lesson has) come in the same run.
+4. A question's key is its `id`, or else a hash of its kind and its text; the key of an option or
+   an item is a hash of its text. So answers lead back to their question, whatever else changes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import unicodedata
+from collections.abc import Iterable, Iterator
 from itertools import chain, repeat
 from typing import assert_never
 
@@ -26,9 +29,8 @@ from coursebuild.core.syntax.nodes import Node, ObjectNode, StringNode
 from coursebuild.core.syntax.texts import Prose, TextParser
 from coursebuild.core.syntax.wording import JSON
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.source import Excerpt, Span, key_of, unique_name
 from coursebuild.core.text.units import check_unit
-from coursebuild.features.quiz.keys import unique_keys
 from coursebuild.features.quiz.model import (
     AnyQuestion,
     Choice,
@@ -233,3 +235,18 @@ def _choices(node: ObjectNode, texts: tuple[str, ...], prose: Prose) -> tuple[Ch
             node.items("options"), keys, chain(feedback, repeat(())), strict=False
         )
     )
+
+
+def text_key(kind: str, text: str) -> str:
+    """Return the key of a text of a kind (`mcq`, `option`), whatever its white space."""
+    normalized_text = unicodedata.normalize("NFC", " ".join(text.split()))
+    return key_of(f"{kind}\n{normalized_text}")[:8]  # few, as addresses hold it
+
+
+def unique_keys(texts: Iterable[tuple[str, str]], used_keys: Iterable[str] = ()) -> Iterator[str]:
+    """Yield the keys of texts, given as (kind, text); a key already in use gets a number."""
+    all_keys = set(used_keys)
+    for kind, text in texts:
+        key = unique_name(text_key(kind, text), all_keys)
+        all_keys.add(key)
+        yield key

@@ -1,7 +1,89 @@
-"""SCORM 1.2: the site as a package for learning platforms."""
+"""The site as a package of ADL SCORM 1.2, for learning platforms.
+
+A platform opens `sco/LESSON.html`, which shows the page of the lesson in a frame and speaks to the
+platform for it (`site/js/scorm.js`). So one visit lasts while the learner follows links from page
+to page, and the pages are those of the site, byte for byte. Each written lesson is a SCO, and the
+files that belong to no single lesson are one asset on which the SCOs depend (SCORM 1.2 Content
+Aggregation Model, section 2.3). A planned lesson has nothing to open, and is no SCO.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 
 from coursebuild.core.features import Exporter, Feature
-from coursebuild.features.scorm.package import package_files
+from coursebuild.core.model import Course, Lesson
+from coursebuild.core.model.results import OutputFile, SiteFile
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.added_files import ExportContext
+from coursebuild.core.pages.assets import page_script
+from coursebuild.core.pages.direction import direction
+from coursebuild.core.pages.frame import policy
+from coursebuild.core.pages.xml import identifier, render_xml
+
+_COPIES = (".br", ".gz")
+_MACHINES = (urls.ROBOTS, urls.SITEMAP, urls.NOT_FOUND, urls.WORKER, urls.FILES)
+"""Files for servers and crawlers, and the service worker's, which could not cache a platform's
+pages."""
+
+
+def package_files(context: ExportContext) -> Iterator[SiteFile]:
+    """Yield the files of the site, a page that opens each lesson, and the manifest."""
+    files: list[SiteFile] = [file for path, file in context.site().items() if _is_packed(path)]
+    script = page_script(context.assets.file("js/scorm.js"))
+    files.append(OutputFile("sco/scorm.css", context.assets.file("css/scorm.css")))
+    files.append(OutputFile("sco/scorm.js", script))
+    yield from files
+    for lesson in context.course.written_lessons:
+        yield OutputFile(_start_path(lesson), _start_page(context, lesson))
+    manifest = _manifest(context.course, sorted(file.path for file in files))
+    yield OutputFile("imsmanifest.xml", manifest)
+
+
+def _is_packed(path: str) -> bool:
+    return path not in _MACHINES and not (path.startswith("assets/") and path.endswith(_COPIES))
+
+
+def _start_path(lesson: Lesson) -> str:
+    return f"sco/{lesson.id}-{lesson.slug}.html"
+
+
+def _start_page(context: ExportContext, lesson: Lesson) -> bytes:
+    language = context.course.language or "en"
+    html = context.library.render(
+        "scorm/start.html",
+        language=language,
+        direction=direction(language),
+        course_key=context.course.key,
+        policy=policy(""),
+        title=f"{lesson.id} {lesson.title}",
+        lesson=lesson.id,
+        address=urls.Place(_start_path(lesson)).href(urls.lesson_path(lesson)),
+    )
+    return f"{html}\n".encode("utf-8", "replace")
+
+
+def _manifest(course: Course, paths: Iterable[str]) -> bytes:
+    """Write the manifest: the lessons, and the files of each, within the lengths IMS allows."""
+    lesson_files = {
+        f"lessons/{x.id}-{x.slug}": (x, [_start_path(x)]) for x in course.written_lessons
+    }
+    shared: list[str] = []
+    for path in paths:
+        lesson = lesson_files.get(path.rpartition(".")[0])
+        (shared if lesson is None else lesson[1]).append(path)
+    return render_xml(
+        Path(__file__).with_name("manifest.jinja"),
+        course=course,
+        language=course.language or "en",
+        levels=course.written_levels,
+        lesson_files=lesson_files.values(),
+        shared=shared,
+        identifier=identifier,
+        encode=urls.encode,
+    )
+
 
 SCORM = Exporter(
     name="scorm",

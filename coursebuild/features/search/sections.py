@@ -20,7 +20,7 @@ from coursebuild.core import model
 from coursebuild.core.model.inlines import CodeSpan
 from coursebuild.core.pages.html_tree import HtmlContent, parse_html
 from coursebuild.core.registry import kind_of_block
-from coursebuild.features.search.tex import plain_formula
+from coursebuild.features.search.words import plain_formula
 
 
 class SectionPiece(Struct, frozen=True):

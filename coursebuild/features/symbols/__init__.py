@@ -1,13 +1,11 @@
 """The symbols of a course: what documents declare of each, and a page that lists all.
 
 1. `mathml` finds the symbols of a formula.
-2. `uses` finds the symbols of a document, and what it declares of them.
-3. `page` collects those of all lessons.
+2. `uses` finds the symbols of a document, what it declares of them, and those of all lessons.
 """
 
 from coursebuild.core.features import Feature, PageKind
-from coursebuild.features.symbols.page import symbols_values, used_symbols
-from coursebuild.features.symbols.uses import document_symbols
+from coursebuild.features.symbols.uses import document_symbols, symbols_values, used_symbols
 
 FEATURE = Feature(
     name="symbols",

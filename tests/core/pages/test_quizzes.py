@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.features.quiz.keys import text_key
 from coursebuild.features.quiz.page import letter, shuffle, unit_html
+from coursebuild.features.quiz.parse import text_key
 from support.rendered_course import Make
 
 SCRIPT = "```python file=examples/a.py\nprint(1)\n```\n\n"

@@ -15,8 +15,8 @@ from coursebuild.core.pages.html_tree import (
     to_xml,
 )
 from coursebuild.core.pages.urls import Place
+from coursebuild.features.book.chapters import RewriteRules, rewrite
 from coursebuild.features.book.epub import xml_id
-from coursebuild.features.book.rewrite import RewriteRules, rewrite
 from support.hostile_html import PAGES
 
 PAGE = Place("lessons/1.1-one.html")

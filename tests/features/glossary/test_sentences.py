@@ -7,7 +7,7 @@ import pytest
 from coursebuild.core.model import Paragraph, Term, plain_text, walk_inlines
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
-from coursebuild.features.glossary.sentences import definition_of, runs_on
+from coursebuild.features.glossary.terms import definition_of, runs_on
 
 
 def definition(text: str) -> tuple[str, bool]:

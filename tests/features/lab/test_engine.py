@@ -16,7 +16,7 @@ import pytest
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.run.v8 import StoppedError
-from coursebuild.features.lab.engines import browser, files
+from coursebuild.features.lab.engines import browser, native
 from coursebuild.features.lab.engines.browser import LabEngine
 from support.lab_values import BALL, Bench, make_lab, request
 from support.runners import processor_time
@@ -201,13 +201,13 @@ def test_damaged_engine_is_told_and_a_sound_one_starts_again(
     folder = tmp_path / "assets"
     for name in ("mujoco/mujoco.wasm", "js/lab-trial.js"):
         (folder / name).parent.mkdir(parents=True)
-        (folder / name).write_bytes((files.assets_dir() / name).read_bytes())
+        (folder / name).write_bytes((native.assets_dir() / name).read_bytes())
     wasm = folder / "mujoco/mujoco.wasm"
     wasm.write_bytes(wasm.read_bytes()[:100_000])
     bench.browser.close()
     bench.browser.close()
     with monkeypatch.context() as damaged:
-        damaged.setattr(files, "assets_dir", lambda: folder)
+        damaged.setattr(native, "assets_dir", lambda: folder)
         with pytest.raises(EffectError, match=r"the browser.s engine does not start: .*Compile"):
             bench.trial(make_lab())
     assert failures_of(bench.trial(make_lab())) == []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from coursebuild.core.features import Trial
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.script_environment import engine_version
-from coursebuild.features.lab.engines.files import engine_digest
+from coursebuild.features.lab.engines.native import engine_digest
 from coursebuild.features.lab.inputs import trial_inputs
 from support.lab_values import lab_of
 

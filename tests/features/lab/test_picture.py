@@ -17,9 +17,9 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from coursebuild.features.lab.picture.draw import FreeCamera, Solid, draw
+from coursebuild.features.lab.picture.raster import Floor
 from coursebuild.features.lab.picture.shapes import Kind, flat_surface, grid_faces, surface
 from coursebuild.features.lab.picture.static import png
-from coursebuild.features.lab.picture.studio import Floor
 from coursebuild.features.lab.picture.textures import TextureMapping, texture_of
 from support.png_files import read_png
 

@@ -14,7 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.drawing.scales import tick_texts, ticks
-from coursebuild.features.lab.picture.plots import plot_svg
+from coursebuild.features.lab.picture.static import plot_svg
 from coursebuild.features.lab.schema import Plot, RefLine, TraceFields
 
 MOVE = re.compile(r"([ML])(-?[\d.]+) (-?[\d.]+)|(h0)")

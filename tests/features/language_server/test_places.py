@@ -8,7 +8,7 @@ import pytest
 from lsprotocol.types import Position
 
 from coursebuild.core.text.source import Source
-from coursebuild.features.language_server.commands.places import Places
+from coursebuild.features.language_server.commands.texts import Places
 
 TEXT = "α\r\nä𝄞b\u2028c\rlast 🙂"
 """A line separator of Unicode ends no line, as it ends none of CommonMark's."""

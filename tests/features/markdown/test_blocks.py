@@ -21,7 +21,7 @@ from coursebuild.core.pages.marks import (
 from coursebuild.core.pages.markup import SpecialBlock
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
-from coursebuild.features.markdown.blocks import BlockWriter
+from coursebuild.features.markdown.writer import BlockWriter
 from support.plain_html import PlainWriter, plain_html
 
 ROOT = Path(__file__).parents[3]

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.model.results import FileFacts
-from coursebuild.features.offline.files import PAPER, listing, short_name
+from coursebuild.features.offline import PAPER, listing, short_name
 from support.rendered_course import Make
 
 ROOT = Path(__file__).parents[3]

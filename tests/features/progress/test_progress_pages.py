@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from coursebuild.features.quiz.keys import text_key
+from coursebuild.features.quiz.parse import text_key
 from support.rendered_course import Make
 
 

@@ -9,8 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.features.search.tex import plain_formula
-from coursebuild.features.search.words import count_terms, is_fuzzy, shelf_of, terms_of
+from coursebuild.features.search.words import (
+    count_terms,
+    is_fuzzy,
+    plain_formula,
+    shelf_of,
+    terms_of,
+)
 
 SHARED_CASES = json.loads(
     (Path(__file__).parents[3] / "site" / "tests" / "search-words.json").read_text("utf-8")

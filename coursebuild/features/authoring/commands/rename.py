@@ -19,8 +19,11 @@ from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.text.diagnostics import Edit, did_you_mean
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.authoring.commands import apply_changes
-from coursebuild.features.authoring.course_map import with_lesson_renamed
-from coursebuild.features.authoring.references import doubtful_places, rename_references
+from coursebuild.features.authoring.course_map import (
+    doubtful_places,
+    rename_references,
+    with_lesson_renamed,
+)
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import documents_by_name
 from coursebuild.report.text import location, visible

@@ -182,7 +182,7 @@ def add_card(
         EffectError: an engine cannot be loaded.
     """
     from coursebuild.core.run.mjcf import existing_files
-    from coursebuild.features.lab.engines.speed import real_time_factor
+    from coursebuild.features.lab.engines.browser import real_time_factor
 
     source = scene.model.source
     with silent():  # MuJoCo would write its warnings into the working directory

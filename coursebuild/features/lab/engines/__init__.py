@@ -1,7 +1,6 @@
 """The two engines of trials: the browser's, in V8, and native MuJoCo.
 
-- `browser` (with `pieces.js`): `LabEngine`
-- `native` (with its child `native_worker`): `NativeEngine`
-- `speed`: how fast the browser's engine runs a model
-- `files`: the files of both on which results depend
+- `browser` (with `pieces.js`): `LabEngine`, and how fast it runs a model
+- `native` (with its child `native_worker`): `NativeEngine`, and the files of both on which results
+  depend
 """

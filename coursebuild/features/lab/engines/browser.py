@@ -18,8 +18,16 @@ from typing import Any, Self
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.v8 import Heartbeat, Isolate, LimitError, ScriptError, StoppedError
-from coursebuild.features.lab.compile import LabCode
-from coursebuild.features.lab.engines.files import script_path, wasm_path
+from coursebuild.core.text.source import Source
+from coursebuild.features.lab.compile import LabCode, compile_lab
+from coursebuild.features.lab.engines.native import (
+    NativeEngine,
+    NativeError,
+    script_path,
+    wasm_path,
+)
+from coursebuild.features.lab.model import SIMLAB, Lab
+from coursebuild.features.lab.schema import SimLab
 
 _START_SECONDS = 60.0
 _PATIENCE = 5.0
@@ -133,3 +141,40 @@ class LabEngine:
             reason = str(error).splitlines()[0]
             raise EffectError(f"the browser's engine does not start: {reason}") from None
         return isolate
+
+
+_STEPS = 5000
+"""The most steps of a run."""
+_RUNS = 8
+"""The fastest counts: in the first ones V8 compiles."""
+
+
+def real_time_factor(
+    root: Path, source: Source, key: int | None, run: tuple[float, float], seconds: float
+) -> float | None:
+    """Measure simulated time over the time that it takes; `None` if no run came to its end.
+
+    `run` is the simulated time and the timestep, s; each of several runs may take `seconds`.
+    """
+    duration, timestep = run
+    place = source.span(0, 0)
+    module = compile_lab(Lab(place, SIMLAB, place, "", SimLab(key=key)), "speed")
+    request = {
+        "config": module.config,
+        "code": module.literal,
+        "seconds": min(duration, _STEPS * timestep),
+        "parity": False,
+    }
+    best = 0
+    try:
+        with NativeEngine(root) as native:
+            mjb = native.save(source.path, source.text)
+        with LabEngine() as engine:
+            for _ in range(_RUNS):
+                reply = engine.trial(request, mjb, seconds)
+                if reply["main"] is None:
+                    break
+                best = max(best, reply.get("stepsPerSecond") or 0)
+    except (NativeError, EffectError):
+        return None
+    return best * timestep if best else None

@@ -1,15 +1,45 @@
 """Native MuJoCo for labs: saves models as MJB files, and repeats runs of the browser's engine.
 
-Entry point: `NativeEngine`, a context manager around a child process.
+Entry points: `NativeEngine`, a context manager around a child process; `wasm_path`, `script_path`,
+`engine_digest`, `lab_digest`: files that a trial runs, whose digests can be had without V8.
 """
 
 from __future__ import annotations
 
 import base64
+import functools
+import hashlib
 from pathlib import Path
 from typing import Any
 
+from coursebuild.core.engine.tool import code_digest
+from coursebuild.core.files.resources import assets_dir
 from coursebuild.core.run.child import LIMITS, JsonChild
+
+
+def wasm_path() -> Path:
+    """The path of MuJoCo for browsers."""
+    return assets_dir() / "mujoco" / "mujoco.wasm"
+
+
+def script_path() -> Path:
+    """The path of the script that runs trials in V8."""
+    return assets_dir() / "js" / "lab-trial.js"
+
+
+@functools.cache
+def engine_digest() -> str:
+    """Return a hash of both files."""
+    digest = hashlib.sha256(wasm_path().read_bytes())
+    digest.update(script_path().read_bytes())
+    return digest.hexdigest()
+
+
+@functools.cache
+def lab_digest(*parts: str) -> str:
+    """Return a hash of parts of this feature's code: `picture`, `engines/native_worker.py`."""
+    return code_digest(*(f"coursebuild/features/lab/{part}" for part in parts))
+
 
 _WORKER = Path(__file__).with_name("native_worker.py")
 

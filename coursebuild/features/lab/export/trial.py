@@ -18,8 +18,7 @@ from coursebuild.core.features import Trial, TrialContext
 from coursebuild.core.model import Course
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.values import fingerprint
-from coursebuild.features.lab.engines.files import lab_digest
-from coursebuild.features.lab.engines.native import NativeEngine, NativeError
+from coursebuild.features.lab.engines.native import NativeEngine, NativeError, lab_digest
 from coursebuild.features.lab.export.script import (
     ExportMetadata,
     export_script,

@@ -21,10 +21,17 @@ from msgspec import Struct
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from coursebuild.features.lab.picture.light import Light, Material, shade, studio
-from coursebuild.features.lab.picture.raster import NORMAL, POSITION, UV, Eye, GBuffer, rotate
-from coursebuild.features.lab.picture.shapes import Array, Surface
-from coursebuild.features.lab.picture.studio import Floor, draw_edges
+from coursebuild.features.lab.picture.raster import (
+    NORMAL,
+    POSITION,
+    UV,
+    Eye,
+    Floor,
+    GBuffer,
+    draw_edges,
+    rotate,
+)
+from coursebuild.features.lab.picture.shapes import Array, Light, Material, Surface, shade, studio
 from coursebuild.features.lab.picture.textures import Texture, TextureMapping, sharpness, sky
 
 _SAMPLES = 2

@@ -12,15 +12,16 @@ import numpy as np
 from msgspec.structs import replace
 
 from coursebuild.features.lab.picture.draw import Solid
-from coursebuild.features.lab.picture.light import Material, material_of
 from coursebuild.features.lab.picture.shapes import (
     Array,
     Kind,
+    Material,
     Surface,
     arrow,
     flat_surface,
     grid_faces,
     join_surfaces,
+    material_of,
     ropes,
     sharpen,
     smooth_surface,

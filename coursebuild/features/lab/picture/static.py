@@ -1,6 +1,10 @@
 """The static form of a lab: what its trial recorded, as a picture, plots and a table.
 
-Entry points: `draw_picture(lab, main)`, `lab_record(lab, main)`; `png(pixels)`.
+Entry points: `draw_picture(lab, main)`, `lab_record(lab, main)`; `png(pixels)`;
+`plot_svg(plot, times, traces)`, for paper, for readers without JavaScript, and until a lab starts.
+
+Lines of a plot have their names at their ends, and differ in dashes as well as in colour. Colours
+are classes that the style sheet defines for light and dark pages; text has the page's colour.
 """
 
 from __future__ import annotations
@@ -8,22 +12,27 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from typing import Any
+from collections.abc import Iterator, Sequence
+from itertools import groupby, pairwise
+from typing import Any, TypeGuard
 
 import numpy as np
 from markupsafe import Markup
+from msgspec import Struct
 from numpy.typing import NDArray
 
-from coursebuild.core.drawing.scales import typeset_number
+from coursebuild.core.drawing.marks import markup_text as _text
+from coursebuild.core.drawing.marks import separate_labels
+from coursebuild.core.drawing.scales import Scale, typeset_number
 from coursebuild.features.lab.files import LabRecord
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.picture.draw import FreeCamera, draw
-from coursebuild.features.lab.picture.light import light_of
-from coursebuild.features.lab.picture.plots import plot_svg
+from coursebuild.features.lab.picture.raster import Floor, round_length
 from coursebuild.features.lab.picture.scenery import scene_solids
-from coursebuild.features.lab.picture.studio import Floor, round_length
+from coursebuild.features.lab.picture.shapes import light_of
 from coursebuild.features.lab.picture.textures import SKY, texture_of
 from coursebuild.features.lab.reply import MainRun, unpack_arrays
+from coursebuild.features.lab.schema import Plot, TraceFields
 
 _WIDTH = 640
 _USUAL = 1.6
@@ -87,7 +96,6 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
 
 
 def _size(lab: Lab) -> tuple[int, int]:
-    """Return the width and height of a lab's picture, pixels."""
     return (_WIDTH, max(160, min(round(_WIDTH * lab.fields.height / 480), 480)))
 
 
@@ -114,3 +122,207 @@ def _format_value(value: Any, digits: int) -> str:
         return "\u2013"
     form = f".{max(2, digits)}e" if abs(value) >= _LARGE else f".{digits}f"
     return typeset_number(f"{value:{form}}")
+
+
+_WIDE, _NARROW, _HEIGHT = 480.0, 340.0, 210.0
+_TOP, _BOTTOM = 24.0, 38.0
+_LETTER = 6.2
+"""Width of a letter or a digit."""
+_DASHES = ("", "6 3", "2 3", "8 3 2 3", "1 4")
+_LABEL_GAP = 13.0
+_TICKS = 5
+"""About how many ticks the axis of values has."""
+_LARGEST = 4e307
+"""Larger values are drawn here, so that the range of an axis is finite."""
+
+
+def plot_svg(
+    plot: Plot,
+    times: Sequence[float],
+    traces: Sequence[Sequence[float | None]],
+    *,
+    narrow: bool = False,
+) -> str:
+    """Draw a plot as an `svg` element; values that are not finite interrupt their line.
+
+    A narrow plot is for the margin: its text has the same size there. The result is empty if
+    nothing was recorded.
+    """
+    start = -math.inf if plot.window is None or not times else times[-1] - plot.window * (1 + 1e-9)
+    samples = [(t, i) for i, t in enumerate(times) if t >= start]
+    if not samples:
+        return ""
+    low_t, high_t = samples[0][0], samples[-1][0]
+    lines = [[(t, line[i]) for t, i in samples] for line in traces]
+    values = [v for points in lines for _, v in points if _is_finite(v)]
+    values += [line.y for line in plot.refLines]
+    low, high = _range(values, plot.ymin, plot.ymax)
+    labels = [trace.label for trace in plot.traces]
+    frame = _frame(low_t, high_t if high_t > low_t else low_t + 1.0, low, high, labels, narrow)
+    paths: list[str] = []
+    ends: list[tuple[float, str, int]] = []
+    for n, (trace, points) in enumerate(zip(plot.traces, lines, strict=True)):
+        paths.append(_line(frame, points, n, _dash(trace, n)))
+        last = next((v for _, v in reversed(points) if _is_finite(v)), None)
+        if last is not None:
+            ends.append((frame.y(last), trace.label, n))
+    references = [
+        _reference(frame, line.y, line.label) for line in plot.refLines if low <= line.y <= high
+    ]
+    parts = [*_axes(frame, plot), *references, *paths, *_labels(frame, ends)]
+    title = f"{plot.ylabel} against {plot.xlabel}" if plot.ylabel else "plot"
+    return (
+        f'<svg class="lab-plot" viewBox="0 0 {frame.width:g} {_HEIGHT:g}" role="img" '
+        f'aria-label="{_text(": ".join((title, ", ".join(labels))))}">' + "".join(parts) + "</svg>"
+    )
+
+
+def _dash(trace: TraceFields, n: int) -> str:
+    if trace.dash is True:
+        return _DASHES[1]
+    return _DASHES[n % len(_DASHES)] if not trace.dash else " ".join(f"{x:g}" for x in trace.dash)
+
+
+def _frame(
+    low_t: float, high_t: float, low: float, high: float, labels: Sequence[str], narrow: bool
+) -> _Frame:
+    """Make the frame, with room for ticks on the left and for the names of lines on the right."""
+    width = _NARROW if narrow else _WIDE
+    y = Scale(_HEIGHT - _BOTTOM, _TOP, low, high, logarithmic=False)
+    longest = max(len(text) for _, text in y.ticks(_TICKS))
+    left = min(8.0 + _LETTER * longest, 0.35 * width)
+    room = min(14.0 + _LETTER * max((len(label) for label in labels), default=0), 0.35 * width)
+    return _Frame(Scale(left, width - room, low_t, high_t, logarithmic=False), y, width)
+
+
+class _Frame(Struct, frozen=True):
+    """The scales of times and values."""
+
+    x: Scale
+    y: Scale
+    width: float
+
+
+def _range(values: list[float], ymin: float | None, ymax: float | None) -> tuple[float, float]:
+    low = min(values, default=0.0) if ymin is None else ymin
+    high = max(values, default=1.0) if ymax is None else ymax
+    low, high = max(low, -_LARGEST), min(high, _LARGEST)
+    size = max(abs(low), abs(high))
+    if not high - low > 1e-12 * size:
+        pad = size * 0.1 or 1.0
+        middle = high if ymin is None and ymax is not None else low
+        return middle - pad, middle + pad
+    pad = 0.04 * (high - low)
+    return (low if ymin is not None else low - pad), (high if ymax is not None else high + pad)
+
+
+def _axes(frame: _Frame, plot: Plot) -> list[str]:
+    left, right, bottom = frame.x.start, frame.x.end, frame.y.start
+    parts = []
+    for y, text in frame.y.ticks(_TICKS):
+        parts.append(f'<path class="lab-grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>')
+        parts.append(f'<text x="{left - 6:.1f}" y="{y + 3.5:.1f}" text-anchor="end">{text}</text>')
+    for x, text in _time_ticks(frame.x):
+        parts.append(f'<path class="lab-axis" d="M{x:.1f} {bottom:g}v4"/>')
+        parts.append(f'<text x="{x:.1f}" y="{bottom + 16:g}" text-anchor="middle">{text}</text>')
+    parts.append(f'<path class="lab-axis" d="M{left:.1f} {_TOP:g}V{bottom:g}H{right:.1f}"/>')
+    # Along the axis a long name would be cut.
+    parts.append(f'<text x="0" y="11">{_text(plot.ylabel)}</text>')
+    centre = (left + right) / 2
+    parts.append(
+        f'<text x="{centre:.1f}" y="{_HEIGHT - 5:g}" text-anchor="middle">'
+        f"{_text(plot.xlabel)}</text>"
+    )
+    return parts
+
+
+def _time_ticks(times: Scale) -> list[tuple[float, str]]:
+    """Return ticks of the time, few enough that their texts do not touch."""
+    for count in (6, 4, 3, 2):
+        ticks = times.ticks(count)
+        longest = max(len(text) for _, text in ticks)
+        if len(ticks) * (longest + 1.5) * _LETTER <= times.end - times.start:
+            return ticks
+    return ticks[:1]
+
+
+def _reference(frame: _Frame, y: float, label: str) -> str:
+    at = frame.y(y)
+    return (
+        f'<path class="lab-reference" d="M{frame.x.start:.1f} {at:.1f}H{frame.x.end:.1f}"/>'
+        f'<text x="{frame.x.start + 4:.1f}" y="{at - 4 if at > _TOP + 12 else at + 11:.1f}">'
+        f"{_text(label)}</text>"
+    )
+
+
+def _line(frame: _Frame, points: Sequence[tuple[float, float | None]], n: int, dash: str) -> str:
+    path: list[str] = []
+    for run in _runs(points):
+        path += _path_commands(frame, run)
+    style = f' stroke-dasharray="{dash}"' if dash else ""
+    style += ' stroke-linecap="round"' if "h0" in path else ""
+    return f'<path class="lab-trace lab-trace-{n % 7 + 1}"{style} d="{"".join(path)}"/>'
+
+
+def _runs(points: Sequence[tuple[float, float | None]]) -> Iterator[list[tuple[float, float]]]:
+    """Yield the runs of points between values that are not finite."""
+    for finite, run in groupby(points, key=lambda point: _is_finite(point[1])):
+        if finite:
+            yield [(t, min(max(v, -_LARGEST), _LARGEST)) for t, v in run if v is not None]
+
+
+def _is_finite(value: float | None) -> TypeGuard[float]:
+    return value is not None and math.isfinite(value)
+
+
+def _path_commands(frame: _Frame, run: list[tuple[float, float]]) -> Iterator[str]:
+    """Yield the path of a run of points, cut at the frame's lower and upper edges."""
+    if len(run) == 1:
+        t, v = run[0]
+        if frame.y.low <= v <= frame.y.high:
+            yield from (
+                f"M{frame.x(t):.1f} {frame.y(v):.1f}",
+                "h0",
+            )  # round ends make a single point visible
+        return
+    pen = False
+    for (t0, v0), (t1, v1) in pairwise(run):
+        begin, end = _clip_segment(frame, v0, v1)
+        if begin > end:
+            pen = False
+            continue
+        if not pen:
+            yield f"M{_interpolate(frame, (t0, v0), (t1, v1), begin)}"
+        yield f"L{_interpolate(frame, (t0, v0), (t1, v1), end)}"
+        pen = end == 1
+
+
+def _interpolate(
+    frame: _Frame, first: tuple[float, float], second: tuple[float, float], fraction: float
+) -> str:
+    """Write the point at a fraction of a segment; it is inside the frame, up to rounding."""
+    t, v = (
+        a + fraction * (b - a) if fraction < 1 else b for a, b in zip(first, second, strict=True)
+    )
+    return f"{frame.x(t):.1f} {frame.y(v):.1f}"
+
+
+def _clip_segment(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:
+    """Return the fractions between which a segment is inside the frame; start > end if none is."""
+    if v0 == v1:
+        return (0.0, 1.0) if frame.y.low <= v0 <= frame.y.high else (1.0, 0.0)
+    # Halved, so that the difference of two large numbers is finite.
+    change = v1 / 2 - v0 / 2
+    cuts = sorted((edge / 2 - v0 / 2) / change for edge in (frame.y.low, frame.y.high))
+    return max(cuts[0], 0.0), min(cuts[1], 1.0)
+
+
+def _labels(frame: _Frame, ends: list[tuple[float, str, int]]) -> list[str]:
+    """Write names at the ends of the lines, moved apart where they would overlap."""
+    heights = [y for y, _, _ in sorted(ends)]
+    places = separate_labels(heights, _LABEL_GAP, -math.inf, _HEIGHT - _BOTTOM)
+    return [
+        f'<text class="lab-name lab-name-{n % 7 + 1}" x="{frame.x.end + 6:.1f}" '
+        f'y="{place + 3.5:.1f}">{_text(label)}</text>'
+        for (_, label, n), place in zip(sorted(ends), places, strict=True)
+    ]

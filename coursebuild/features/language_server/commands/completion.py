@@ -18,13 +18,13 @@ from coursebuild.core.registry import CORE_FENCES, fence_names
 from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
-from coursebuild.features.language_server.commands.engine import members
 from coursebuild.features.language_server.commands.fields import (
     FieldPlace,
     fence_at,
     field_place,
     possible_values,
 )
+from coursebuild.features.language_server.commands.lookup import members
 from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.own_names import options_by_command
@@ -129,8 +129,8 @@ def _find_names(
             return _find_engine_names(texts, cursor.source, subject, prefix)
         case _:
             _, code = fence_at(cursor.source, cursor.start) or ("", cursor)
-            declarations = members(tuple(prefix["path"].split(".")), code.text)
-            return {name: declaration.doc for name, declaration in declarations.items()}
+            names = members(texts, tuple(prefix["path"].split(".")), code.text)
+            return {name: member.doc for name, member in names.items()}
 
 
 def _find_engine_names(

@@ -151,7 +151,6 @@ def _fields(declared_type: inspect.Type, members: Mapping[str, str]) -> dict[str
 
 
 def _mapping_value(declared_type: inspect.Type) -> inspect.Type:
-    """Return the type of a mapping's values."""
     mappings = (t for t in _alternatives(declared_type) if isinstance(t, inspect.DictType))
     return next((mapping.value_type for mapping in mappings), inspect.AnyType())
 

@@ -1,6 +1,6 @@
 """What something in a text refers to, and where that is defined.
 
-Entry points: `hover`, `definition`, `look_up`.
+Entry points: `hover`, `definition`, `look_up`; `members`, the names that can follow a dot.
 
 1. In a document it is the smallest thing at the place that refers to something: a link, a term, a
    bound number, a formula, a kind of callout, a model or a name of the engine in code.
@@ -12,7 +12,7 @@ Entry points: `hover`, `definition`, `look_up`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from urllib.parse import unquote
 
 from lsprotocol import types
@@ -30,15 +30,17 @@ from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
-from coursebuild.features.glossary.sentences import definition_of
-from coursebuild.features.language_server.commands.engine import describe_name, describe_shape
+from coursebuild.features.glossary.terms import definition_of
 from coursebuild.features.language_server.commands.fields import field_place
 from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
+from coursebuild.features.names.engine import EngineName, engine_names
 from coursebuild.features.names.resolve import Meaning, resolver_of
 from coursebuild.features.symbols.mathml import declared_symbol, symbols
 from coursebuild.pipeline.reader import kept_formulas
 
+_ASSIGNMENT = re.compile(r"(\w+)\s*=\s*mujoco\.(Mj(?:Data|Model))\b")
+_NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
 _STRING = re.compile(r"""(["'])([^"'\s]+)\1""")
 
 
@@ -289,8 +291,19 @@ class _Lookup:
             model_names = models_named(node)
         elif isinstance(node, model.FeatureBlock):
             model_names = node.models()
-        description = describe_name(node.span, offset, self.facts(sorted(model_names)))
-        return description and Referent(*description)
+        names = _NAME.finditer(text, node.span.start, node.span.end)
+        match = next((match for match in names if match.start() <= offset < match.end()), None)
+        if match is None:
+            return None
+        end = text.find(".", offset, match.end())
+        span = node.span.source.span(match.start(), end if end >= 0 else match.end())
+        *path, last = span.text.split(".")
+        name = members(self.texts, tuple(path), node.span.text).get(last) if path else None
+        if name is None:
+            return None
+        code = fence("python" if "(" in name.text else "c", name.text)
+        shape = _describe_shape(name.extent, self.facts(sorted(model_names)))
+        return Referent(span, _paragraphs(f"{code}\n{escape_text(name.doc)}", shape))
 
     def look_up_name(self, code: model.CodeSpan, offset: int) -> Referent | None:
         """Look up what the name in inline code at an offset means, or else its first name."""
@@ -310,9 +323,38 @@ class _Lookup:
                 start = sum(map(len, lines[: line - 1]))
                 place = script.span(start, start + len(lines[line - 1].rstrip()))
                 text = fence("python", place.text)
-            shape = describe_shape(meaning.extent, None) if meaning.extent else ""
+            shape = _describe_shape(meaning.extent, None)
             return Referent(span, _paragraphs(text, escape_text(meaning.doc), shape), place)
         return None
+
+
+def members(texts: OpenTexts, path: tuple[str, ...], code: str) -> Mapping[str, EngineName]:
+    """Return what can follow `data.`, `model.opt.` or `mujoco.`, by name.
+
+    The type of a variable follows from its assignment in the code, or else from its name.
+    """
+    engine = resolver_of(texts.library.course).engine
+    if engine is None:  # no text names anything of it
+        engine = engine_names(texts.session.options.store, None, ()).names
+    if path == ("mujoco",):
+        return engine.functions
+    roots = {"data": "MjData", "model": "MjModel"} | dict(_ASSIGNMENT.findall(code))
+    fields = engine.classes.get(roots.get(path[0], ""), {})
+    for name in path[1:]:
+        fields = engine.classes.get(fields[name].type, {}) if name in fields else {}
+    return fields
+
+
+def _describe_shape(extent: tuple[str, ...], facts: ModelFacts | None) -> str:
+    """Say the shape of an array, if it is one, with numbers for the sizes that are known."""
+    sizes: dict[str, int] = {}
+    if facts is not None:
+        sizes = {"nq": facts.nq, "nv": facts.nv, "nu": facts.nu, "nbody": facts.bodies + 1}
+        sizes |= {"ngeom": facts.geoms, "njnt": facts.joints, "nkey": len(facts.keyframes)}
+    text = f"({', '.join(extent)}{',' * (len(extent) == 1)})"
+    numbers = re.sub(r"\w+", lambda size: str(sizes.get(size[0], size[0])), text)
+    suffix = f", here `{numbers}`" if numbers != text else ""
+    return f"shape `{text}`{suffix}" if extent else ""
 
 
 def _is_at(tex: str, span: Span, offset: int) -> bool:

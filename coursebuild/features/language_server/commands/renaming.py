@@ -26,8 +26,7 @@ from coursebuild.core.syntax.attributes import collapse_spaces
 from coursebuild.core.syntax.headings import term_id
 from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Source, Span
-from coursebuild.features.authoring.course_map import with_lesson_renamed
-from coursebuild.features.authoring.references import rename_references
+from coursebuild.features.authoring.course_map import rename_references, with_lesson_renamed
 from coursebuild.features.language_server.commands.lookup import look_up
 from coursebuild.features.language_server.commands.texts import OpenTexts
 

@@ -1,7 +1,8 @@
 """The requests of a client of the language server, and the diagnostics sent to it.
 
-Entry point: `Server`. Answers are about the texts as they are in the editor, which sends the whole
-text at each change: partial changes would count other line ends than a course has.
+Entry point: `Server`. `headings`, `folds` and `format_text` are about a single text. Answers are
+about the texts as they are in the editor, which sends the whole text at each change: partial
+changes would count other line ends than a course has.
 
 To open a folder runs nothing that lies in it. Scripts and features run from the first save on.
 """
@@ -10,7 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -18,16 +19,87 @@ from lsprotocol import types
 from pygls.lsp.server import LanguageServer
 
 from coursebuild import __version__
-from coursebuild.core.text.source import Source
-from coursebuild.features.language_server.commands.actions import actions
+from coursebuild.core.model import (
+    Document,
+    Heading,
+    Lesson,
+    Paragraph,
+    document_blocks,
+    plain_text,
+)
+from coursebuild.core.text.source import Source, Span
+from coursebuild.features.authoring.format import format_document
 from coursebuild.features.language_server.commands.completion import completions
-from coursebuild.features.language_server.commands.diagnosis import current_diagnostics, to_lsp
+from coursebuild.features.language_server.commands.diagnosis import (
+    actions,
+    current_diagnostics,
+    to_lsp,
+)
 from coursebuild.features.language_server.commands.lookup import definition, hover
-from coursebuild.features.language_server.commands.outline import folds, format_text, headings
-from coursebuild.features.language_server.commands.places import Places
 from coursebuild.features.language_server.commands.renaming import name_at, rename
-from coursebuild.features.language_server.commands.texts import OpenTexts
+from coursebuild.features.language_server.commands.texts import OpenTexts, Places
 from coursebuild.preview.session import Session
+
+
+def headings(
+    texts: OpenTexts, source: Source, params: types.DocumentSymbolParams
+) -> list[types.DocumentSymbol]:
+    """Return the headings as a tree."""
+    places, document = texts.places, texts.document(source)
+    roots: list[types.DocumentSymbol] = []
+    open_levels: list[tuple[int, list[types.DocumentSymbol]]] = [(0, roots)]
+    for heading, section in _sections(document) if document else ():
+        while open_levels[-1][0] >= heading.level:
+            open_levels.pop()
+        children: list[types.DocumentSymbol] = []
+        symbol = types.DocumentSymbol(
+            " ".join(plain_text(heading.children).split()) or "…",  # clients refuse an empty name
+            types.SymbolKind.String,
+            places.range(section),
+            places.range(heading.span),
+            children=children,
+        )
+        open_levels[-1][1].append(symbol)
+        open_levels.append((heading.level, children))
+    return roots
+
+
+def _sections(document: Document) -> Iterator[tuple[Heading, Span]]:
+    """Yield each heading with the span of its section."""
+    headings = [block for block in document.blocks if isinstance(block, Heading)]
+    for index, heading in enumerate(headings, 1):
+        ends = (later.span.start for later in headings[index:] if later.level <= heading.level)
+        end = next(ends, len(document.source.text))
+        yield heading, document.source.span(heading.span.start, end)
+
+
+def folds(
+    texts: OpenTexts, source: Source, params: types.FoldingRangeParams
+) -> list[types.FoldingRange]:
+    """Return the sections, and all blocks of several lines except paragraphs."""
+    document = texts.document(source)
+    if document is None:
+        return []
+    blocks = (block for block in document_blocks(document) if not isinstance(block, Paragraph))
+    spans = [*(b.span for b in blocks), *(section for _, section in _sections(document))]
+    lines = ((span.line - 1, span.line + span.text.rstrip().count("\n") - 1) for span in spans)
+    return [types.FoldingRange(first, last) for first, last in lines if first < last]
+
+
+def format_text(
+    texts: OpenTexts, source: Source, params: types.DocumentFormattingParams
+) -> list[types.TextEdit]:
+    """Return the edits that `coursebuild fmt` would make."""
+    owner, course = texts.owner(source), texts.library.course
+    if owner is None:
+        return []
+    lesson, width, words = isinstance(owner, Lesson), course.width, course.words
+    new = format_document(
+        source, course.callout_names, lesson=lesson, width=width, words=words
+    ).value
+    edit = types.TextEdit(texts.places.range(source.span()), new)
+    return [] if new == source.text else [edit]
+
 
 _TEXTS: dict[str, Callable[[Any], Sequence[str | None]]] = {
     types.TEXT_DOCUMENT_DID_OPEN: lambda params: [params.text_document.text],
