@@ -94,6 +94,7 @@ class Pages:
             frozenset[str]().union(*(record.text for record in records)),
             frozenset[str]().union(*(record.mathematics for record in records)),
             frozenset[str]().union(*(record.declarations for record in records)),
+            frozenset[str]().union(*(record.parts for record in records)),
         )
 
     @property
@@ -222,7 +223,7 @@ class Pages:
 
 def frame_page(page: DrawnPage, frame: PageFrame) -> bytes:
     """Put a page into its frame, as it is published."""
-    return frame.render(page.head, page.parts, page.body.decode()).encode()
+    return frame.render(page.head, page.record.parts, page.body.decode()).encode()
 
 
 def text_of(entry: PageEntry, library: Library) -> SourceText | None:

@@ -32,7 +32,6 @@ from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.folding import find_imports
-from coursebuild.core.pages.frame import parts_of
 from coursebuild.core.pages.page_inputs import PageHead, PageInputs
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.renderer import Renderer, known_mathml
@@ -160,8 +159,6 @@ class DrawnPage(Struct, frozen=True):
     """A page as it is stored."""
 
     head: PageHead
-    parts: tuple[str, ...]
-    """See `frame.parts_of`."""
     record: PageRecord
     """What the site must know of it."""
     notes: dict[str, bytes]
@@ -336,8 +333,7 @@ class PageReader:
             notes = page_notes(inputs, context, body)
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
             page_record = replace(page_record, notes=tuple(digests))
-            parts = parts_of(body, head.kind)
-            page = DrawnPage(head, parts, page_record, notes, body.encode())
+            page = DrawnPage(head, page_record, notes, body.encode())
             self._store.put(PAGES, request.key, encode(page))
             return page
 

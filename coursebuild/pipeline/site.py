@@ -44,7 +44,7 @@ from coursebuild.core.pages.added_files import SiteContext, added_files
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
 from coursebuild.core.pages.compressed import compressed_files
-from coursebuild.core.pages.frame import Names
+from coursebuild.core.pages.frame import Names, parts_by_mark
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry
 from coursebuild.core.syntax.document import parse_document
@@ -89,6 +89,7 @@ _FACTS_OF_ANY_PAGE = PageFacts(
     frozenset(map(chr, range(0x20, 0x3000))),
     frozenset(map(chr, (*range(0x20, 0x3000), *range(0x1D400, 0x1D800)))),
     frozenset(),
+    frozenset(),
 )
 """What pages that are not drawn yet may need."""
 
@@ -119,7 +120,10 @@ class SiteMaker:
         """
         pages = Pages(self.library, self.documents, self.store, entries, last_good)
         self.documents.stop_workers()
-        names, shared_files = self._make_shared_files(None if whole_fonts else pages.facts)
+        facts = _FACTS_OF_ANY_PAGE if whole_fonts else pages.facts
+        if entries is not None:  # a page that is drawn later may have any part
+            facts = replace(facts, parts=frozenset(parts_by_mark()))
+        names, shared_files = self._make_shared_files(facts, whole_fonts=whole_fonts)
         trial_files = self.library.trials.files
         downloads = Downloads.of(self.library, self.assets, self.documents, self.root, self.store)
         files: list[SiteFile] = [
@@ -142,11 +146,12 @@ class SiteMaker:
 
     # --- what all pages share
 
-    def _make_shared_files(self, facts: PageFacts | None) -> tuple[Names, list[SiteFile]]:
-        """Make the shared files; with whole fonts where there are no facts."""
-        cut_font = None if facts is None else functools.partial(_cut_font, self.store)
-        facts = facts or _FACTS_OF_ANY_PAGE
-        facts = replace(facts, text=facts.text | common_characters(self.library))
+    def _make_shared_files(
+        self, facts: PageFacts, *, whole_fonts: bool
+    ) -> tuple[Names, list[SiteFile]]:
+        cut_font = None if whole_fonts else functools.partial(_cut_font, self.store)
+        characters = common_characters(self.library, facts.parts)
+        facts = replace(facts, text=facts.text | characters)
         shared_files, names = common_files(self.assets, cut_font, facts, self.course.theme)
         return names, [*shared_files, *self._copies(shared_files)]
 
