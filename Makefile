@@ -43,7 +43,7 @@ help:
 	@echo 'make test-oldest  run the quick tests with the oldest packages that the tool may be used with'
 	@echo 'make fuzz       try inputs that nobody wrote for TIME=600 seconds; an hour before a release'
 	@echo 'make lint       check style and formatting; make format mends what can be mended'
-	@echo 'make types      check types'
+	@echo 'make types      check types, of Python and of JavaScript'
 	@echo 'make vscode     try and make the extension for Visual Studio Code, in editors/vscode/dist/'
 	@echo 'make dist       the wheel and the source distribution, in dist/'
 	@echo 'make lock       lock what pyproject.toml newly asks for; UPGRADE=--upgrade: all, in newest versions'
@@ -94,8 +94,9 @@ format: $(VENV)/.dev
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-types: $(VENV)/.dev
+types: $(VENV)/.dev npm
 	$(BIN)/mypy
+	PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" site/node_modules/.bin/tsc -p site
 
 vscode:
 	cd editors/vscode && PATH="$$PATH:$$(../../$(BIN)/python ../../site/bundle.py node)" && \

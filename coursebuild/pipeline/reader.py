@@ -39,7 +39,6 @@ from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.folding import find_imports
-from coursebuild.core.pages.frame import parts_of
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.renderer import Renderer, known_mathml
 from coursebuild.core.pages.templates import Texts
@@ -329,8 +328,7 @@ class Reader:
             notes = page_notes(request.inputs, context, body)
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
             page_record = replace(page_record, notes=tuple(digests))
-            parts = parts_of(body, head.kind)
-            page = DrawnPage(head, parts, page_record, notes, body.encode())
+            page = DrawnPage(head, page_record, notes, body.encode())
             self._store.put(_PAGES, request.key, encode(page))
             return page
 

@@ -148,8 +148,6 @@ class DrawnPage(Struct, frozen=True):
     """A page as it is stored."""
 
     head: PageHead
-    parts: tuple[str, ...]
-    """See `frame.parts_of`."""
     record: PageRecord
     """What the site must know of it."""
     notes: dict[str, bytes]

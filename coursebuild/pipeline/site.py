@@ -42,7 +42,7 @@ from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.added_files import NotedPage, SiteContext, added_files
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
 from coursebuild.core.pages.compressed import compressed_files
-from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame
+from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame, parts_by_mark
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.links import Reference, has_anchor
 from coursebuild.core.pages.page_list import PageEntry, page_list
@@ -69,6 +69,7 @@ _INDEX = "index"
 _FACTS_OF_ANY_PAGE = PageFacts(
     frozenset(map(chr, range(0x20, 0x3000))),
     frozenset(map(chr, (*range(0x20, 0x3000), *range(0x1D400, 0x1D800)))),
+    frozenset(),
     frozenset(),
 )
 """What pages that are not drawn yet may need."""
@@ -238,8 +239,11 @@ class Site:
                 frozenset[str]().union(*(record.text for record in records)),
                 frozenset[str]().union(*(record.mathematics for record in records)),
                 frozenset[str]().union(*(record.declarations for record in records)),
+                frozenset[str]().union(*(record.parts for record in records)),
             )
-        facts = replace(facts, text=facts.text | common_characters(library))
+        if self._whole_fonts or not self._has_all_pages:  # a page drawn later may have any part
+            facts = replace(facts, parts=frozenset(parts_by_mark()))
+        facts = replace(facts, text=facts.text | common_characters(library, facts.parts))
         return common_files(library.assets, cut_font, facts, library.course.theme)
 
     @functools.cached_property
@@ -302,7 +306,7 @@ class Site:
 
 def frame_page(page: DrawnPage, frame: PageFrame) -> bytes:
     """Put a page into its frame, as it is published."""
-    return frame.render(page.head, page.parts, page.body.decode()).encode()
+    return frame.render(page.head, page.record.parts, page.body.decode()).encode()
 
 
 def text_of(entry: PageEntry, library: Library) -> SourceText | None:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import hashlib
 import ipaddress
+import json
 import posixpath
 import re
 import secrets
@@ -27,8 +28,9 @@ from urllib.parse import parse_qsl, unquote, urlencode, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.core.files.resources import Bundle
-from coursebuild.core.pages.assets import page_script
+from coursebuild.core.files.resources import Bundle, template_texts
+from coursebuild.core.pages.assets import page_script, strings_for
+from coursebuild.core.pages.strings import DEFAULT_LANGUAGE, Strings
 from coursebuild.preview.session import Session
 
 _HOST = re.compile(r"(?P<name>[a-z0-9._-]+|\[[0-9a-f:.]+\])(?::(?P<port>[0-9]{1,5}))?")
@@ -130,7 +132,7 @@ _TYPES = MimeTypes().types_map[True] | {
 }
 """Python's own table, and what it lacks in some version or has otherwise."""
 _WORKER = "/service-worker.js"
-_MESSAGE_PAGE = b"<!DOCTYPE html><html lang=en><title>Preview</title><body><p>%s</p></body></html>"
+_MESSAGE_PAGE = "<!DOCTYPE html><html lang={}><title>{}</title><body><p>{}</p></body></html>"
 
 
 class Answers:
@@ -139,6 +141,7 @@ class Answers:
     def __init__(self, session: Session) -> None:
         self._session = session
         bundled = Bundle()
+        self._templates = template_texts()
         self._preview_files = {
             f"{PREFIX}preview.js": page_script(bundled["js/preview.js"]),
             f"{PREFIX}preview.css": bundled["css/preview.css"],
@@ -155,15 +158,36 @@ class Answers:
             return HTTPStatus.OK, _type_of(path), self._preview_files[path]
         name, data = self._find_file(path)
         if data is not None:
-            text = _add_preview(data, name, digest(data)) if name.endswith(".html") else data
+            text = self._add_preview(data, name, digest(data)) if name.endswith(".html") else data
             return HTTPStatus.OK, _type_of(name), text
         if self._session.files.has_page(name):
-            message = b"This page cannot be shown before its mistakes are mended."
-            return HTTPStatus.OK, HTML, _add_preview(_MESSAGE_PAGE % message, name, "")
+            return HTTPStatus.OK, HTML, self._add_preview(self._message_page("blocked"), name, "")
         missing = self._session.find("404.html")
         if missing is None:
-            missing = _MESSAGE_PAGE % b"Nothing is built yet."
-        return HTTPStatus.NOT_FOUND, HTML, _add_preview(missing, name, "")
+            missing = self._message_page("unbuilt")
+        return HTTPStatus.NOT_FOUND, HTML, self._add_preview(missing, name, "")
+
+    @property
+    def _words(self) -> Strings:
+        course = self._session.course
+        return strings_for(self._templates, (course and course.language) or DEFAULT_LANGUAGE)
+
+    def _message_page(self, key: str) -> bytes:
+        words = self._words
+        texts = escape(words("preview.title")), escape(words(f"preview.{key}"))
+        return _MESSAGE_PAGE.format(words.language, *texts).encode()
+
+    def _add_preview(self, page: bytes, name: str, state: str) -> bytes:
+        """Return a page with the preview's style sheet and script, and the texts of that."""
+        texts = {k: text for k, text in self._words.texts.items() if k.startswith("preview.")}
+        words = escape(json.dumps(texts, ensure_ascii=False))
+        attributes = f'data-page="{escape(name)}" data-state="{state}" data-words="{words}"'
+        tags = (
+            f'<link rel="stylesheet" href="{PREFIX}preview.css">'
+            f'<script src="{PREFIX}preview.js" {attributes}></script>'
+        ).encode("utf-8", "replace")
+        head, end, tail = page.rpartition(b"</body>")
+        return head + tags + end + tail if end else page + tags
 
     def _find_file(self, path: str) -> tuple[str, bytes | None]:
         """Find the path in the site that an address means, and the file there.
@@ -194,14 +218,3 @@ def digest(data: bytes | None) -> str:
 def _type_of(name: str) -> str:
     kind = _TYPES.get(posixpath.splitext(name)[1].lower(), "application/octet-stream")
     return f"{kind}; charset=utf-8" if kind.startswith("text/") else kind
-
-
-def _add_preview(page: bytes, name: str, state: str) -> bytes:
-    """Return a page with the preview's style sheet and script."""
-    attributes = f'data-page="{escape(name)}" data-state="{state}"'
-    tags = (
-        f'<link rel="stylesheet" href="{PREFIX}preview.css">'
-        f'<script src="{PREFIX}preview.js" {attributes}></script>'
-    ).encode("utf-8", "replace")
-    head, end, tail = page.rpartition(b"</body>")
-    return head + tags + end + tail if end else page + tags

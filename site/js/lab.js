@@ -17,7 +17,7 @@ import { fill } from './lab/page/words.js'
  *
  * @param {HTMLElement} element has `data-config`, the address of the lab's JSON
  * @param {(key: string) => string} texts of the interface
- * @param {object | null} progress where reached goals are kept, see progress/store.js
+ * @param {Record<string, any> | null} progress where reached goals are kept, see progress/store.js
  */
 export async function mountLab(element, texts, progress = null) {
   const words = (key, values) => fill(texts(key), values)

@@ -4,13 +4,15 @@
  * A published site may have been served from this address before; its worker would still answer.
  */
 
-self.addEventListener('install', () => self.skipWaiting())
+const worker = /** @type {any} */ (self)
 
-self.addEventListener('activate', (event) => event.waitUntil(leave()))
+worker.addEventListener('install', () => worker.skipWaiting())
+
+worker.addEventListener('activate', (event) => event.waitUntil(leave()))
 
 async function leave() {
-  const { scope } = self.registration
-  await self.registration.unregister()
-  const names = (await self.caches.keys()).filter((name) => name.startsWith('coursebuild ') && name.endsWith(` ${scope}`))
-  await Promise.all(names.map((name) => self.caches.delete(name)))
+  const { scope } = worker.registration
+  await worker.registration.unregister()
+  const names = (await worker.caches.keys()).filter((name) => name.startsWith('coursebuild ') && name.endsWith(` ${scope}`))
+  await Promise.all(names.map((name) => worker.caches.delete(name)))
 }

@@ -12,9 +12,12 @@ import { Panel } from './preview/panel.js'
 import { holdPlace } from './preview/place.js'
 import { Twin } from './preview/twin.js'
 import { dismissWorkers } from './preview/workers.js'
+import { say } from './progress/words.js'
 
 const script = document.currentScript
 const page = script.dataset.page
+const texts = JSON.parse(script.dataset.words)
+const sayHere = (key, values) => say((name) => texts[name] ?? name, `preview.${key}`, values)
 const parse = (text) => new DOMParser().parseFromString(text, 'text/html')
 const stateOf = (next) => next.querySelector('script[data-state]')?.dataset.state ?? ''
 
@@ -25,8 +28,8 @@ let tool = null
 let latestNews = null
 let head = document.cloneNode(true)
 const twin = new Twin(document.body)
-const panel = new Panel((place) => ask('open', { place }))
-const marks = new Marks((id) => ask('accept', { page, id }))
+const panel = new Panel(sayHere, (place) => ask('open', { place }))
+const marks = new Marks(sayHere, (id) => ask('accept', { page, id }))
 
 /** Bring the page to the server's state, again and again while that changes. */
 async function take() {
@@ -66,7 +69,7 @@ async function ask(command, values) {
     const response = await fetch(`/.coursebuild/${command}`, { method: 'POST', body: JSON.stringify(values) })
     return (await response.json()).message
   } catch {
-    return 'the preview does not answer'
+    return sayHere('silent')
   }
 }
 

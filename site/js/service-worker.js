@@ -11,6 +11,7 @@ import { pagesFor, pathOf } from './offline/list.js'
 import { Store } from './offline/store.js'
 import { update } from './offline/update.js'
 
+const self = /** @type {any} */ (globalThis) // of a service worker
 const scope = self.registration.scope
 const store = new Store(self.caches, scope)
 const get = (...request) => self.fetch(...request)

@@ -31,7 +31,8 @@ SCRIPTS = {
     "site.js": "js/site.js",
     "offline.js": "js/offline-page.js",
     "map.js": "js/map-page.js",
-    "reader.js": "js/reader-page.js",
+    "progress.js": "js/progress-page.js",
+    "review.js": "js/review-page.js",
     "search.js": "js/search.js",
 }
 """The published names of plain scripts of pages, with the bundled modules."""

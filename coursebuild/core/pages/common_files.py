@@ -22,7 +22,7 @@ from coursebuild.core.model.theme import Theme, ThemeFile
 from coursebuild.core.pages import fonts, styles
 from coursebuild.core.pages.assets import SCRIPTS, Assets, hashed_name, page_script
 from coursebuild.core.pages.formulas import FORMULA
-from coursebuild.core.pages.frame import LOGO_HEIGHT, Names
+from coursebuild.core.pages.frame import LOGO_HEIGHT, Names, script_words
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.theme import picture_size, theme_faces, theme_style
 from coursebuild.core.registry import features
@@ -37,6 +37,8 @@ class PageFacts(Struct, frozen=True):
     """Characters of its formulas outside ASCII; and a blank if it has a formula."""
     declarations: frozenset[str]
     """Styles taken out of its elements."""
+    parts: frozenset[str]
+    """See `parts_of`."""
 
 
 _TEXT = re.compile(">([^<]+)")
@@ -58,13 +60,13 @@ def _characters(parts: Iterable[str]) -> frozenset[str]:
     return frozenset(_FOREIGN.findall(unescape("\n".join(texts))))
 
 
-def common_characters(library: Library) -> frozenset[str]:
-    """The characters that any page may show: those of the interface and of the frame."""
-    course = library.course
-    text = {*course.title, *course.licence}
-    for page in course.pages:
-        text.update(page.title)
-    return frozenset(text.union(*library.words.texts.values()))
+def common_characters(library: Library, parts: frozenset[str]) -> frozenset[str]:
+    """The characters that frames may show, and the scripts of pages with these parts."""
+    course, texts = library.course, library.words.texts
+    titles = (course.title, course.licence, *(page.title for page in course.pages))
+    own_texts = (text for key, text in texts.items() if key.startswith(("site.", "search.")))
+    script_texts = (texts[key] for key in script_words(texts, parts))
+    return frozenset().union(*titles, *own_texts, *script_texts)
 
 
 def needed_fonts(assets: Assets, facts: PageFacts, theme: Theme) -> tuple[fonts.FontJob, ...]:
@@ -92,7 +94,7 @@ def common_files(
     rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in cut_fonts)
     style = styles.style_rules(facts.declarations) + "".join(f.style for f in features())
     style += theme_style(theme)
-    part_scripts = tuple(shared.add_part_scripts())
+    part_scripts = tuple(shared.add_part_scripts(facts.parts))
     icon, touch_icon = shared.add_icons(theme)
     sheet = rules.encode() + assets.file("css/site.css") + style.encode()
     names = Names(
@@ -130,10 +132,12 @@ class _SharedFiles:
             self._script_names[name] = self.add(name, page_script(code))
         return self._script_names[name]
 
-    def add_part_scripts(self) -> Iterator[tuple[str, str]]:
-        """Add the scripts of parts of pages, each after the mark of the part."""
+    def add_part_scripts(self, marks: frozenset[str]) -> Iterator[tuple[str, str]]:
+        """Add the scripts of the parts that pages have, each after the mark of the part."""
         for feature in features():
             for part in feature.parts:
+                if part.mark not in marks:
+                    continue
                 if part.bundled:
                     yield part.mark, self.add_script(part.bundled)
                 elif part.code:

@@ -4,7 +4,8 @@ Entry point: `compressed_files(files, keep)`.
 
 Each asset of a compressible kind gets `NAME.br` and `NAME.gz`. A server configured for it (nginx's
 `brotli_static` and `gzip_static`, Caddy's `precompressed`) sends the one that the browser accepts.
-Pages are small and change with every build, so compressing them is left to the server.
+Pages change with every build, and small files gain little, so compressing these is left to the
+server.
 
 The same bytes give the same copies, which hold no time.
 """
@@ -19,8 +20,8 @@ from collections.abc import Callable, Iterable, Iterator
 from coursebuild.core.model.results import CachedFile, SiteFile
 
 _SUFFIXES = (".css", ".js", ".json", ".mjb", ".svg", ".wasm")
-_SMALLEST = 1024
-"""Bytes; for smaller files, headers outweigh the saving."""
+_SMALLEST = 8 << 10
+"""Bytes; a copy of a smaller file saves too little to be a file, let alone two of each."""
 _LARGE = 2 << 20
 """Bytes; for larger files, the best quality would take a quarter of a minute."""
 Keep = Callable[[str, Callable[[], bytes]], bytes]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from markupsafe import Markup
 from msgspec import Struct
@@ -24,7 +24,6 @@ from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_title
-from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.templates import Texts
 from coursebuild.core.registry import features, page_copies, page_kind
 
@@ -212,7 +211,7 @@ class PageFrame(Struct, frozen=True):
             credits=place.href(names.credits),
             menu=_links(place, inputs.menu),
             own=_links(place, inputs.added_pages),
-            page_words=_page_words(renderer.words, parts),
+            page_words=script_words(renderer.words.texts, parts),
         )
         return f"{visible(html)}\n"
 
@@ -245,9 +244,8 @@ def _part_scripts(
     return tuple((name, href) for href, name in name_by_href.items())
 
 
-def _page_words(words: Strings, parts: tuple[str, ...]) -> tuple[str, ...]:
-    """The keys of the interface texts that the page carries for its scripts."""
-    keys = words.texts
+def script_words(keys: Collection[str], parts: Iterable[str]) -> tuple[str, ...]:
+    """Those of all interface texts that a page with these parts carries for its scripts."""
     known_parts = parts_by_mark()
     used_keys = [key for mark in parts for key in known_parts[mark].texts]
     prefixes = tuple(key for key in used_keys if key.endswith("."))

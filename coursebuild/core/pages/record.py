@@ -5,8 +5,8 @@ Entry point: `record(head, body, base_url, page)`.
 1. Formulas are glued to punctuation and units (`formulas.glue_formulas`), inline styles become
    classes (`styles.hoist_styles`), and forbidden characters are made visible
    (`characters.visible`).
-2. The record has the characters, anchors and addresses of the result, and the ids that stand there
-   twice, whoever has drawn them.
+2. The record has the characters, anchors and addresses of the result, the parts that have scripts,
+   and the ids that stand there twice, whoever has drawn them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from coursebuild.core.pages import fonts, formulas, styles
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.common_files import page_characters
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.frame import FRAME_IDS
+from coursebuild.core.pages.frame import FRAME_IDS, parts_of
 from coursebuild.core.pages.links import Reference, ids_and_addresses, merge_line_ids, references
 from coursebuild.core.pages.page_inputs import PageHead
 
@@ -42,6 +42,8 @@ class PageRecord(Struct, frozen=True, array_like=True):
     repeated_ids: tuple[tuple[str, int, int], ...] = ()
     """Ids that several elements have, sorted; each with the start and end of its place in the
     page's document (`PageContext.find_repetition`), or zeros."""
+    parts: tuple[str, ...] = ()
+    """See `parts_of`."""
     notes: tuple[tuple[str, str], ...] = ()
     """The features' notes of the page: a feature's name and a digest; see `added_files`."""
 
@@ -69,6 +71,7 @@ def record(
         ids=tuple(sorted(merge_line_ids(ids))),
         references=tuple(sorted(references(head.path, addresses, base_url))),
         repeated_ids=tuple((name, *_place(name, page)) for name in sorted(repeated_ids)),
+        parts=parts_of(html, head.kind),
     )
     return page_record, html
 

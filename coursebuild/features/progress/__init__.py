@@ -87,12 +87,12 @@ FEATURE = Feature(
         PagePart(mark='data-progress="lesson"', texts=("progress.lesson.", _TROUBLE)),
         PagePart(
             mark='data-progress="overall"',
-            bundled="reader.js",
+            bundled="progress.js",
             texts=("progress.live.", "progress.map.", _TROUBLE),
         ),
         PagePart(
             mark='data-progress="review"',
-            bundled="reader.js",
+            bundled="review.js",
             texts=("review.live.", "quiz.live.", _TROUBLE),
         ),
     ),

@@ -28,6 +28,9 @@ FEATURE = Feature(
     summary=check_predictions,
     check=check_quizzes,
     check_runs=check_output_lines,
-    parts=(PagePart(mark="data-quiz=", bundled="quiz.js", late=True, texts=("quiz.live.",)),),
+    parts=(
+        PagePart(mark="data-quiz=", bundled="quiz.js", late=True, texts=("quiz.live.",)),
+        PagePart(mark="data-quizzes=", kinds=("review",), bundled="quiz.js"),
+    ),
     schemas={"quiz": (QuizFile, "A quiz fence")},
 )

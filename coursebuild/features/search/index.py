@@ -7,11 +7,13 @@ A query loads only the file of each of its words. Terms that begin alike are in 
 the beginning of a word finds it. A third kind of file has terms only: they serve to correct
 misspelt words.
 
-1. The terms of a few consecutive pages are sorted into the shards of the index; the part for one
+1. A page's text has a file, as it is long; of pages that are found by title and summary only, some
+   share one.
+2. The terms of a few consecutive pages are sorted into the shards of the index; the part for one
    shard is a slice. Slices are cached from build to build.
-2. A shard is joined from its slices and named by a hash of them. After an edit a few pages are
+3. A shard is joined from its slices and named by a hash of them. After an edit a few pages are
    sorted again, and the shards with a changed slice are written.
-3. `search/index.js` lists the pages and the names of shards. Its own name never changes, so that
+4. `search/index.js` lists the pages and the names of shards. Its own name never changes, so that
    pages need not change with the index.
 """
 
@@ -21,18 +23,18 @@ import functools
 import hashlib
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
 from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages.added_files import NotedPage, SiteContext
-from coursebuild.features.search.page import script, text_and_terms
+from coursebuild.features.search.page import LEAD_ONLY, as_json, script, text_and_terms
 from coursebuild.features.search.words import is_fuzzy, shelf_of
 
 LIST = "search/index.js"
 _FOLDER = "assets/search"
-_FORMAT = 1
+_FORMAT = 2
 """The version of the files' format; part of every name."""
 _BATCH = 16
 """Pages that are sorted together: the number of a page in its batch is one hexadecimal digit."""
@@ -87,32 +89,41 @@ def search_files(site: SiteContext) -> Iterator[CachedFile]:
     slices = [_sorted_slices(site, plan, site.pages[start : start + _BATCH]) for start in starts]
     shards = list(zip(*slices, strict=True))
     names = [_digest(b"\0".join(parts))[:8] for parts in shards]
-    listing = script("index", "", _listing(site, plan, "".join(names)))
+    texts = _texts(site.pages)
+    listing = script("index", "", as_json(_listing(site, plan, "".join(names), texts)))
     yield CachedFile(LIST, _digest(listing), lambda: listing)
     for number, (name, parts) in enumerate(zip(names, shards, strict=True)):
         path = f"{_FOLDER}/{number:04x}.{name}.js"
         make = functools.partial(_shard_script, number, parts)
         yield CachedFile(path, f"search-{number}-{name}", make)
-    for page in site.pages:
-        make = functools.partial(_page_text, site, page.path)
-        yield CachedFile(_text_path(page), f"search-{page.digest}", make)
+    for name, pages in texts.items():
+        make = functools.partial(_text_script, site, pages)
+        yield CachedFile(f"{_FOLDER}/{name}.js", f"search-{name}", make)
 
 
-def _page_text(site: SiteContext, path: str) -> bytes:
-    return text_and_terms(site.note(path))[0]
+def _text_script(site: SiteContext, pages: Iterable[NotedPage]) -> bytes:
+    texts = (text_and_terms(site.note(page.path))[0].decode() for page in pages)
+    return script("page", "", f"[{','.join(texts)}]")
 
 
-def _text_path(page: NotedPage) -> str:
-    """Return the path of a page's text; it depends on the page's path, as two can be the same."""
-    return f"{_FOLDER}/{_digest(f'{page.digest} {page.path}'.encode())[:10]}.js"
+def _texts(pages: Sequence[NotedPage]) -> dict[str, tuple[NotedPage, ...]]:
+    """Return the pages of each file of texts; its name depends on paths, as texts can be alike."""
+    groups: list[tuple[NotedPage, ...]] = [(page,) for page in pages if page.kind not in LEAD_ONLY]
+    leads = tuple(page for page in pages if page.kind in LEAD_ONLY)
+    groups += [leads[start : start + _BATCH] for start in range(0, len(leads), _BATCH)]
+    sums = (" ".join(f"{page.digest} {page.path}" for page in group) for group in groups)
+    return {_digest(s.encode())[:10]: g for s, g in zip(sums, groups, strict=True)}
 
 
 def _digest(data: bytes) -> str:
     return hashlib.sha256(b"%d " % _FORMAT + data).hexdigest()
 
 
-def _listing(site: SiteContext, plan: IndexPlan, names: str) -> dict[str, object]:
+def _listing(
+    site: SiteContext, plan: IndexPlan, names: str, texts: Mapping[str, Sequence[NotedPage]]
+) -> dict[str, object]:
     """Return what a browser has to know before the first query."""
+    places = {p.path: (name, n) for name, pages in texts.items() for n, p in enumerate(pages)}
     kinds = sorted({page.kind for page in site.pages})
     return {
         "format": _FORMAT,
@@ -126,7 +137,7 @@ def _listing(site: SiteContext, plan: IndexPlan, names: str) -> dict[str, object
                 kinds.index(page.kind),
                 page.title,
                 page.id if page.kind in ("lesson", "stub") else "",
-                _text_path(page).removeprefix(f"{_FOLDER}/").removesuffix(".js"),
+                *places[page.path],
             ]
             for page in site.pages
         ],
@@ -180,7 +191,7 @@ def sort_terms(plan: IndexPlan, pages: Iterable[bytes]) -> list[bytes]:
 
 
 def _shard_script(number: int, slices: Iterable[bytes]) -> bytes:
-    return script("shard", f"{number}", join_slices(slices))
+    return script("shard", f"{number}", as_json(join_slices(slices)))
 
 
 def join_slices(slices: Iterable[bytes]) -> str:

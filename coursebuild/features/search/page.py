@@ -1,7 +1,7 @@
 """What the search needs of a page: its text for the reader's browser, its terms for the index.
 
 Entry points: `note_page(inputs, document, body)`, both as bytes, and `text_and_terms`, which
-separates them; `script`, which writes a file of the index.
+separates them; `script` and `as_json`, which write a file of the index.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from coursebuild.features.search.words import count_terms
 
 _EXCLUDED_KINDS = frozenset({"home", "notfound"})
 """Kinds of pages that nobody looks for: other pages have all of their content."""
-_LEAD_ONLY = frozenset({"level", "stub"})
+LEAD_ONLY = frozenset({"level", "stub"})
 """Kinds of pages that are found by title and summary only: other pages have the rest."""
 _TITLE, _HEADING, _TEXT, _CODE = 3, 2, 1, 0
 """The parts of a page, by the weight of a term in them."""
@@ -40,18 +40,18 @@ def note_page(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
         body: its HTML.
     """
     if inputs.head.kind in _EXCLUDED_KINDS or not (
-        inputs.head.indexed or inputs.head.kind in _LEAD_ONLY
+        inputs.head.indexed or inputs.head.kind in LEAD_ONLY
     ):
         return b""
     head = inputs.values.get("lesson")
     name = head.id if isinstance(head, LessonLink) else ""
     sections = page_sections(inputs, None if page is None else page.document, body)
     terms = weigh_terms([name, inputs.head.title], sections)
-    return script("page", "", pack_sections(sections)) + b"\0" + terms
+    return visible(as_json(pack_sections(sections))).encode() + b"\0" + terms
 
 
 def text_and_terms(note: bytes) -> tuple[bytes, bytes]:
-    """Split a note into the file that a browser loads for its results, and the page's terms."""
+    """Split a note into the page's text as a browser reads it, JSON, and the page's terms."""
     text, _, terms = note.partition(b"\0")
     return text, terms
 
@@ -73,17 +73,21 @@ def page_sections(inputs: PageInputs, document: Document | None, body: str) -> t
     for value in inputs.values.values():
         if isinstance(value, HighlightedFile):
             reader.add("code", value.text)
-    if inputs.head.kind not in _LEAD_ONLY:
+    if inputs.head.kind not in LEAD_ONLY:
         reader.html(body)
     return reader.end()
 
 
-def script(kind: str, name: str, value: object) -> bytes:
-    """Write a file of the index: a script that passes a value to the search.
+def as_json(value: object) -> str:
+    """Write a value in as few characters as there can be."""
+    return json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+
+
+def script(kind: str, name: str, text: str) -> bytes:
+    """Write a file of the index: a script that passes a value, given as JSON, to the search.
 
     It is a script because browsers load no other data from a disk.
     """
-    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     return visible(f'coursebuildSearch.take("{kind}","{name}",{text})\n').encode()
 
 

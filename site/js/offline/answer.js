@@ -28,7 +28,7 @@ export function isOurs(request, scope) {
  * @property {import('./store.js').Store} store
  * @property {typeof fetch} fetch
  * @property {Promise<Response | undefined>} [preload] the browser's own request, begun while the worker started
- * @property {(ms: number) => Promise<void>} wait
+ * @property {(ms: number) => Promise<undefined>} wait
  * @property {(work: Promise<unknown>) => void} waitUntil keeps the worker alive for work that outlasts the answer
  * @property {(digest: string) => void} onStored is called when a stored page is shown
  */
@@ -45,12 +45,13 @@ export function answer(request, services) {
   return isLasting(path) ? answerLasting(request, path, services) : answerFile(request, path, services)
 }
 
+/** @param {Request} request @param {string} path @param {Services} services */
 async function answerPage(request, path, { store, fetch, preload, wait, waitUntil, onStored }) {
   const network = Promise.resolve(preload)
     .then((preloaded) => preloaded ?? fetch(request))
     .then(
-      (response) => ({ response }),
-      (error) => ({ error }),
+      (response) => ({ response, error: null }),
+      (error) => ({ response: null, error }),
     )
   const earliest = await Promise.race([network, wait(PATIENCE)])
   if (earliest?.response && earliest.response.status < 500) return earliest.response

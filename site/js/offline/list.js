@@ -12,7 +12,7 @@ export const GROUPS = ['shell', 'text', 'rest']
 export const MODEST = 16_000_000
 
 /**
- * @typedef {object} List
+ * @typedef {Record<string, any>} List
  * @property {Map<string, string>} files digest by path; '' if the hash is in the name
  * @property {Record<string, string[]>} groups paths by group
  * @property {Record<string, number>} bytes by group

@@ -15,7 +15,7 @@ import { groupsFor, isLasting, parseList } from './list.js'
 const AT_ONCE = 3
 
 /**
- * @typedef {object} Wish
+ * @typedef {Record<string, any>} Wish
  * @property {string[]} paths that were visited, and what they use
  * @property {'auto' | 'read' | 'text' | 'all' | 'none'} keep
  * @property {boolean} sparing whether to use the network sparingly
@@ -24,7 +24,7 @@ const AT_ONCE = 3
  */
 
 /**
- * @typedef {object} Outcome
+ * @typedef {Record<string, any>} Outcome
  * @property {number} here files of the wished groups that are stored
  * @property {number} total files of the wished groups
  * @property {boolean} full whether there was no more room

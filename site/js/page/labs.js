@@ -14,7 +14,7 @@ const instruments = new WeakMap() // lab → a promise of its instrument
 /**
  * @param {Document | Element} part of the page
  * @param {(key: string) => string} words
- * @param {object} progress see progress/store.js
+ * @param {Record<string, any>} progress see progress/store.js
  */
 export function loadLabs(part, words, progress) {
   const labs = selectAll(part, '[data-lab][data-config]')

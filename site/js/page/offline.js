@@ -45,9 +45,10 @@ export function workingRoot({ document, location, navigator, isSecureContext, se
 /**
  * Report a visit to the worker.
  *
+ * @param {Window} window
  * @param {ServiceWorker} worker
- * @param {object} wish see `visit` in service-worker.js
- * @param {(progress: object) => void} tell reports progress, and with `end` the outcome
+ * @param {Record<string, any>} wish see `visit` in service-worker.js
+ * @param {(progress: any) => void} tell reports progress, and with `end` the outcome
  */
 export function visit({ location, navigator, performance }, worker, wish, tell) {
   const { port1, port2 } = new MessageChannel()

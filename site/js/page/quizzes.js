@@ -13,7 +13,7 @@ let isLoading = false
 /**
  * @param {Document | Element} part of the page
  * @param {(key: string) => string} words
- * @param {object} progress see progress/store.js
+ * @param {Record<string, any>} progress see progress/store.js
  */
 export function mountQuizzes(part, words, progress) {
   const questions = selectAll(part, '.question[data-question]')

@@ -11,7 +11,7 @@ const LARGEST = 250_000 // pairs that are compared; of larger lists only equal b
 
 export function align(before, after, same, alike) {
   const pairs = []
-  let last = [0, 0]
+  let last = /** @type {[number, number]} */ ([0, 0])
   for (const [i, j] of [...inOrder(before, after, same), [before.length, after.length]]) {
     pairs.push(...alignGap(before, after, last, [i, j], alike))
     if (i < before.length) pairs.push([i, j])

@@ -2,25 +2,19 @@
  * Marks in the page for the results of scripts: at each recorded output that is being checked or has changed, at each figure that
  * has changed, and at each bound number that does not hold.
  *
- *   const marks = new Marks(accept)      accept(id) → Promise<text>: why not, or nothing
- *   marks.show(news)                     after each piece of news, and after each change of the page
+ *   const marks = new Marks(say, accept)      say(key, values) → text; accept(id) → Promise<text>: why not, or nothing
+ *   marks.show(news)                          after each piece of news, and after each change of the page
  */
 
 import { h } from './elements.js'
 
 const SIGNS = { ' ': '\u2007', '-': '−', '+': '+' }
 const KINDS = { ' ': 'both', '-': 'gone', '+': 'come' }
-const STATES = {
-  running: 'The script is running.',
-  failed: 'The script failed.',
-  timeout: 'The script took too long.',
-  killed: 'The script was ended.',
-  'output-limit': 'The script printed too much.',
-  encoding: 'The script printed what is no text.',
-}
+const STATES = ['running', 'failed', 'timeout', 'killed', 'output-limit', 'encoding']
 
 export class Marks {
-  constructor(accept) {
+  constructor(say, accept) {
+    this.say = say
     this.accept = accept
     this.marksByElement = new Map() // element → { text, parts }
   }
@@ -29,7 +23,7 @@ export class Marks {
     const itemsByElement = new Map()
     for (const output of outputs) {
       const element = outputOf(output)
-      if (element && (output.state === 'drift' || output.state in STATES)) itemsByElement.set(element, output)
+      if (element && (output.state === 'drift' || STATES.includes(output.state))) itemsByElement.set(element, output)
     }
     for (const figure of figures) {
       const element = figureOf(figure)
@@ -62,18 +56,18 @@ export class Marks {
   }
 
   markState(element, { state }) {
-    const mark = h('p', { class: `preview-mark preview-${state === 'running' ? 'running' : 'failed'}`, role: 'status' }, STATES[state])
+    const mark = h('p', { class: `preview-mark preview-${state === 'running' ? 'running' : 'failed'}`, role: 'status' }, this.say(`state.${state}`))
     element.classList.add('preview-known')
     element.append(mark)
     return [mark]
   }
 
   markOutput(element, run) {
-    const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': 'Recorded output, and this run' })
+    const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': this.say('output.label') })
     box.append(
-      h('p', { class: 'preview-legend' }, 'The script prints something else now: ', sign('-'), ' recorded, ', sign('+'), ' this run.'),
+      h('p', { class: 'preview-legend' }, `${this.say('output.differs')} `, sign('-'), ` ${this.say('output.recorded')} `, sign('+'), ` ${this.say('output.run')}`),
       diff(run.rows),
-      this.makeFoot(run, 'Accept this output', 'It is run once more, to see whether it prints the same again.'),
+      this.makeFoot(run, 'output', this.say('output.again')),
     )
     element.classList.add('preview-known', 'preview-drifted')
     element.append(box)
@@ -83,14 +77,14 @@ export class Marks {
   markFigure(element, figure) {
     const image = element.querySelector('img')
     const drawings = [
-      ['recorded', bypassCache(image.src)],
-      ['this run', figure.drawn],
+      [this.say('output.recorded'), bypassCache(image.src)],
+      [this.say('output.run'), figure.drawn],
     ].map(([label, src]) => h('div', { class: 'preview-drawing' }, h('img', { src, alt: `${image.alt} (${label})` }), h('p', {}, label)))
-    const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': 'Recorded figure, and this run' })
+    const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': this.say('figure.label') })
     box.append(
-      h('p', { class: 'preview-legend' }, `The script draws something else now: ${figure.differs}.`),
+      h('p', { class: 'preview-legend' }, this.say('figure.differs', { reason: figure.differs })),
       h('div', { class: 'preview-drawings' }, ...drawings),
-      this.makeFoot(figure, 'Accept this figure', ''),
+      this.makeFoot(figure, 'figure', ''),
     )
     element.classList.add('preview-drifted')
     element.prepend(box)
@@ -98,37 +92,37 @@ export class Marks {
   }
 
   markData(element, figure) {
-    const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': 'Recorded data, and this run' })
-    box.append(h('p', { class: 'preview-legend' }, `The script writes other data now: ${figure.differs}.`), this.makeFoot(figure, 'Accept these data', ''))
+    const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': this.say('data.label') })
+    box.append(h('p', { class: 'preview-legend' }, this.say('data.differs', { reason: figure.differs })), this.makeFoot(figure, 'data', ''))
     element.append(box)
     return [box]
   }
 
   markNumber(element, number) {
-    const box = h('span', { class: 'preview-number', role: 'group', 'aria-label': 'A bound number that does not hold' })
+    const box = h('span', { class: 'preview-number', role: 'group', 'aria-label': this.say('number.label') })
     const better = number.better ? [h('ins', { class: 'preview-better' }, number.better), ' '] : []
-    box.append(' ', ...better, h('span', { class: 'preview-why' }, number.label || number.message), ' ', this.makeFoot(number, 'Accept', ''))
+    box.append(' ', ...better, h('span', { class: 'preview-why' }, number.label || number.message), ' ', this.makeFoot(number, 'number', ''))
     element.classList.add('preview-wrong')
     element.after(box)
     return [box]
   }
 
   /** The button that accepts a change, or the reason why there is none. */
-  makeFoot({ offer, refused }, label, note) {
+  makeFoot({ offer, refused }, kind, note) {
     const foot = h('span', { class: 'preview-foot' })
     if (!offer) {
-      const text = refused ? `It cannot be accepted: ${refused}.` : note
+      const text = refused ? this.say('refused', { reason: refused }) : note
       if (text) foot.append(h('span', { class: 'preview-why' }, text))
       return foot
     }
     const answer = h('span', { class: 'preview-why', role: 'status' })
-    const button = h('button', { type: 'button', class: 'preview-accept' }, label)
+    const button = h('button', { type: 'button', class: 'preview-accept' }, this.say(`${kind}.accept`))
     button.addEventListener('click', async () => {
       button.disabled = true
-      answer.textContent = 'Written.'
+      answer.textContent = this.say('written')
       const refusal = await this.accept(offer)
       if (!refusal) return
-      answer.textContent = `Nothing was written: ${refusal}.`
+      answer.textContent = this.say('not_written', { reason: refusal })
       button.disabled = false
     })
     foot.append(button, answer)
@@ -175,7 +169,7 @@ function figureOf({ name, drawn: isDrawing }) {
 /** An address that makes a browser load an image again. */
 function bypassCache(src) {
   const url = new URL(src)
-  url.searchParams.set('at', Date.now())
+  url.searchParams.set('at', String(Date.now()))
   return url.href
 }
 

@@ -8,26 +8,26 @@
 import { h } from './elements.js'
 
 const PATIENCE = 600 // ms
-
-const count = (number, noun) => `${number} ${noun}${number === 1 ? '' : 's'}`
+const OF_THE_TOOL = { lang: 'en', dir: 'ltr' } // its messages, which have no translation
 
 /** The text of the button. */
-export function summary({ problems, busy, trouble }, lost, isGone) {
+export function summary(say, { problems, busy, trouble }, lost, isGone) {
   const errors = problems.filter(({ severity }) => severity === 'error').length
   const warnings = problems.length - errors
   const parts = []
-  if (lost) parts.push('the preview has stopped')
-  if (isGone) parts.push('this page is gone')
-  if (trouble) parts.push('the checks could not be done')
-  if (errors) parts.push(count(errors, 'mistake'))
-  if (warnings) parts.push(count(warnings, 'warning'))
+  if (lost) parts.push(say('lost'))
+  if (isGone) parts.push(say('gone'))
+  if (trouble) parts.push(say('trouble'))
+  if (errors) parts.push(say('errors', { n: errors }))
+  if (warnings) parts.push(say('warnings', { n: warnings }))
   if (busy && !lost) parts.push(`${busy} …`)
   return parts.join(', ')
 }
 
 export class Panel {
   /** `openPlace(place)` opens a place in the editor; it promises why it could not, or nothing. */
-  constructor(openPlace) {
+  constructor(say, openPlace) {
+    this.say = say
     this.openPlace = openPlace
     this.news = { problems: [], more: 0, busy: '', trouble: '' }
     this.lost = false
@@ -36,8 +36,8 @@ export class Panel {
     this.seenErrors = new Set() // mistakes that a reader has seen
     this.button = h('button', { type: 'button', class: 'preview-button', 'aria-expanded': 'false', click: () => this.toggle() })
     this.status = h('span', { class: 'unseen', role: 'status' })
-    this.list = h('section', { class: 'preview-panel', 'aria-label': 'Problems', tabindex: '-1' })
-    this.root = h('div', { class: 'preview-own', lang: 'en', dir: 'ltr' }, this.list, this.button, this.status)
+    this.list = h('section', { class: 'preview-panel', 'aria-label': say('problems'), tabindex: '-1' })
+    this.root = h('div', { class: 'preview-own' }, this.list, this.button, this.status)
     this.root.addEventListener('keydown', (event) => {
       if (event.key === 'Escape' && this.open) this.toggle()
     })
@@ -78,7 +78,7 @@ export class Panel {
   }
 
   draw() {
-    const text = summary(this.news, this.lost, this.gone)
+    const text = summary(this.say, this.news, this.lost, this.gone)
     const hasProblems = this.news.problems.length > 0 || this.news.trouble !== ''
     const key = JSON.stringify([text, this.open, this.news, this.gone])
     if (key === this.drawnKey) return
@@ -95,39 +95,39 @@ export class Panel {
 
   makeContent() {
     const { problems, more, trouble, kept } = this.news
-    const close = h('button', { type: 'button', class: 'preview-close', click: () => this.toggle() }, 'Close')
-    const parts = [h('div', { class: 'preview-head' }, h('p', { class: 'preview-title' }, kept ? 'The last good page is shown' : 'What is wrong with the course'), close)]
-    if (trouble) parts.push(h('pre', { class: 'preview-trouble' }, trouble))
+    const close = h('button', { type: 'button', class: 'preview-close', click: () => this.toggle() }, this.say('close'))
+    const parts = [h('div', { class: 'preview-head' }, h('p', { class: 'preview-title' }, this.say(kept ? 'kept' : 'wrong')), close)]
+    if (trouble) parts.push(h('pre', { class: 'preview-trouble', ...OF_THE_TOOL }, trouble))
     parts.push(h('ol', { class: 'preview-problems' }, ...problems.map((problem) => this.makeProblem(problem))))
-    if (more) parts.push(h('p', {}, `and ${more} more, in the terminal`))
+    if (more) parts.push(h('p', {}, this.say('more', { n: more })))
     return parts
   }
 
   makeProblem({ severity, rule, place, message, label, help, notes, line, start, end, blocks }) {
     const item = h('li', { class: `preview-problem preview-${severity}` })
-    const kind = blocks ? 'Blocks this page' : severity === 'error' ? 'Mistake' : 'Warning'
+    const kind = this.say(blocks ? 'blocks' : severity)
     item.append(
-      h('p', { class: 'preview-message' }, h('strong', {}, kind), ' ', ...formatCode(message)),
+      h('p', { class: 'preview-message' }, h('strong', {}, kind), ' ', h('span', OF_THE_TOOL, ...formatCode(message))),
       this.makePlace(place, rule),
     )
     if (line.trim()) {
       const excerpt = h('mark', {}, line.slice(start, Math.max(end, start + 1)) || '\u00a0')
-      item.append(h('pre', { class: 'preview-source', tabindex: '0' }, line.slice(0, start), excerpt, line.slice(Math.max(end, start + 1))))
+      item.append(h('pre', { class: 'preview-source', tabindex: '0', dir: 'ltr' }, line.slice(0, start), excerpt, line.slice(Math.max(end, start + 1))))
     }
-    if (label) item.append(h('p', { class: 'preview-label' }, ...formatCode(label)))
-    for (const note of notes) item.append(h('pre', { class: 'preview-note' }, note))
-    if (help) item.append(h('p', { class: 'preview-help' }, ...formatCode(help)))
+    if (label) item.append(h('p', { class: 'preview-label', ...OF_THE_TOOL }, ...formatCode(label)))
+    for (const note of notes) item.append(h('pre', { class: 'preview-note', ...OF_THE_TOOL }, note))
+    if (help) item.append(h('p', { class: 'preview-help', ...OF_THE_TOOL }, ...formatCode(help)))
     return item
   }
 
   makePlace(text, rule) {
     const answer = h('span', { class: 'preview-why', role: 'status' })
-    const button = h('button', { type: 'button', title: 'Open in the editor' }, h('code', {}, text))
+    const button = h('button', { type: 'button', title: this.say('open') }, h('code', {}, text))
     button.addEventListener('click', async () => {
       const refusal = await this.openPlace(text)
-      answer.replaceChildren(...(refusal ? formatCode(`It cannot be opened: ${refusal}.`) : []))
+      answer.replaceChildren(...(refusal ? formatCode(this.say('not_opened', { reason: refusal })) : []))
     })
-    return h('p', { class: 'preview-place' }, button, ` ${rule} `, answer)
+    return h('p', { class: 'preview-place', dir: 'ltr' }, button, ` ${rule} `, answer)
   }
 }
 

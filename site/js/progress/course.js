@@ -20,7 +20,7 @@ export function readQuizzes(text) {
 }
 
 /**
- * @typedef {object} Done
+ * @typedef {Record<string, any>} Done
  * @property {boolean} read
  * @property {boolean} begun
  * @property {number} questions
@@ -33,7 +33,7 @@ export function readQuizzes(text) {
  * @param {{id: string, quizzes: ReturnType<typeof readQuizzes>}[]} lessons
  * @param {{quiz: string, key: string, kind: string, number: number, right: boolean | null}[]} answers
  * @param {Map<string, {read: boolean}>} storedLessons
- * @returns {{lessons: Map<string, Done>, answers: object[], orphans: {answers: object[], lessons: string[]}}} `answers`: those whose
+ * @returns {{lessons: Map<string, Done>, answers: any[], orphans: {answers: any[], lessons: string[]}}} `answers`: those whose
  *   question exists, each with the `page` that has it and the present key of the `question`
  */
 export function overview(lessons, answers, storedLessons) {

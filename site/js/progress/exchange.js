@@ -41,7 +41,8 @@ function readFile(text, course) {
 
 /**
  * Merge the text of an `exportText` on this or another device. Nothing is changed if it throws.
- * @param {ReturnType<import('./store.js').openProgress>} progress
+ * @param {ReturnType<typeof import('./store.js').openProgress>} progress
+ * @param {string} text
  * @param {{restore?: boolean}} options `restore`: also restore what was reset or removed
  * @returns {{answers: number, lessons: number, restorable: number}} the numbers of answers and lessons that are new or changed, and of
  *   those in the file that are missing since they were reset or removed
@@ -88,9 +89,9 @@ const isMissing = (current, entry) => [...entry.values.keys()].some((name) => !c
 function countMissing(state, file) {
   let count = 0
   for (const [quiz, entries] of file.answers) {
-    for (const [key, entry] of entries) count += isMissing(state.answers.get(quiz)?.get(key), entry)
+    for (const [key, entry] of entries) count += Number(isMissing(state.answers.get(quiz)?.get(key), entry))
   }
-  for (const [id, entry] of file.lessons) count += isMissing(state.lessons.get(id), entry)
+  for (const [id, entry] of file.lessons) count += Number(isMissing(state.lessons.get(id), entry))
   return count
 }
 

@@ -13,7 +13,7 @@ let start = null
 
 /**
  * @param {(key: string) => string} words
- * @param {ReturnType<import('./store.js').openProgress>} progress
+ * @param {ReturnType<typeof import('./store.js').openProgress>} progress
  * @param {(part: Element) => void} improve called with new parts of the page
  * @returns {() => void} ends it
  */

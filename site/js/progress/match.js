@@ -5,7 +5,7 @@
  * @template {{key: string, kind: string, number: number}} K
  * @param {K[]} answers of a quiz
  * @param {{key: string, kind?: string, number: number}[]} present its questions
- * @returns {{found: Map<string, K>, orphans: K[]}} answers by the present key of their question, and those without a question
+ * @returns {{matched: Map<string, K>, orphans: K[]}} answers by the present key of their question, and those without a question
  */
 export function matchQuestions(answers, present) {
   const matched = new Map()

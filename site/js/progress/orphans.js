@@ -3,7 +3,7 @@
 import { h } from '../lab/page/dom.js'
 import { say } from './words.js'
 
-/** @param {{answers: object[], lessons: string[]}} orphans see `overview` */
+/** @param {{answers: any[], lessons: string[]}} orphans see `overview` */
 export function showOrphans(place, orphans, words, progress) {
   const items = [
     ...orphans.lessons.map((id) => ({ text: say(words, 'progress.live.orphan_lesson', { id }), forget: () => progress.forgetLesson(id) })),

@@ -6,6 +6,7 @@ import { answersByQuiz, matchQuestions } from './match.js'
 export function rekeyAnswers(document, progress) {
   const quizzes = [...document.querySelectorAll('[data-quiz]')]
   if (quizzes.length === 0) return
+  /** @type {Map<string, any[]>} */
   const byQuiz = answersByQuiz(progress.all())
   for (const section of quizzes) {
     const { quiz } = section.dataset

@@ -8,7 +8,6 @@
  */
 
 import { h } from '../lab/page/dom.js'
-import { leaveQuizzes, mountQuestion } from '../quiz/mount.js'
 import { overview } from './course.js'
 import { readRows } from './map.js'
 import { QuestionPages } from './questions.js'
@@ -92,9 +91,9 @@ class Review {
     try {
       const result = await this.pages.question(row.link.href, item.quiz, item.question, this.say('lab'))
       if (result) return { part: result.section, question: result.question }
-      return { part: h('p', {}, this.say('moved')) }
+      return { part: h('p', {}, this.say('moved')), question: null }
     } catch {
-      return { part: h('p', {}, `${this.say('failed')} `, this.#link(item)) }
+      return { part: h('p', {}, `${this.say('failed')} `, this.#link(item)), question: null }
     }
   }
 
@@ -117,12 +116,12 @@ class Review {
         next.textContent = this.say('next')
       },
     }
-    mountQuestion(question, this.words, recorder, { fresh: true })
+    globalThis.coursebuildQuizzes?.mountQuestion(question, this.words, recorder, { fresh: true })
     this.improve(part)
   }
 
   #leave(body, due, index) {
-    leaveQuizzes(body)
+    globalThis.coursebuildQuizzes?.leaveQuizzes(body)
     this.#showQuestion(due, index)
   }
 

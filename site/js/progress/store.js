@@ -87,14 +87,14 @@ class Progress {
   /** @returns {Answer | null} */
   get(quiz, key) {
     const answer = this.#current.answers.get(quiz)?.get(key)?.values.get('answer')
-    return answer ? plain(answer) : null
+    return answer ? /** @type {any} */ (plain(answer)) : null
   }
 
   /**
    * Record an answer. A new verdict, or one after another number of tries, is a recall for the review, unless `recall` decides.
    * @param {Answer} answer
    */
-  put(quiz, key, answer, { recall } = {}) {
+  put(quiz, key, answer, { recall } = /** @type {{recall?: boolean}} */ ({})) {
     const now = this.#now()
     const value = answerOf({ ...answer, given: structuredClone(answer.given), at: isTime(answer.at) ? answer.at : new Date(now).toISOString() })
     this.#read()
@@ -162,6 +162,7 @@ class Progress {
 
   /**
    * Record how far a lesson is read.
+   * @param {string} id
    * @param {{anchor: string, title?: string, share: number}} place the anchor of a section (empty: the beginning), its title, and the
    *   share of the lesson that has been in sight, 0 to 1
    */

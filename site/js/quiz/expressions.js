@@ -27,13 +27,15 @@ const FUNCTIONS = {
 class Unread extends Error {
   constructor(problem, detail = '', readings = []) {
     super(problem)
-    Object.assign(this, { problem, detail, readings })
+    this.problem = problem
+    this.detail = detail
+    this.readings = readings
   }
 }
 
 /**
  * @param {string} text
- * @returns {{value: number, unit: string, step: number | null} | {problem: string, detail: string, readings: string[]}} `step`: a unit
+ * @returns {{value?: number, unit?: string, step?: number | null, problem?: string, detail?: string, readings?: string[]}} `step`: a unit
  *   of the last place of a numeral; null for a calculation. Problems: empty, long, end, sign, numeral, numbers,
  *   comma, product, parenthesis, argument, log, finite
  */
@@ -182,7 +184,7 @@ class Reader {
     const [exponent] = /^[eE][-+]?\d+/.exec(this.#text.slice(end)) ?? ['']
     this.#index = end + exponent.length
     const plain = String(numeral.value)
-    return exponent === '' ? numeral.value : plain.includes('e') ? numeral.value * 10 ** exponent.slice(1) : Number(plain + exponent)
+    return exponent === '' ? numeral.value : plain.includes('e') ? numeral.value * 10 ** Number(exponent.slice(1)) : Number(plain + exponent)
   }
 
   // --- signs

@@ -34,7 +34,7 @@ export function gradeOrder(entered, answers) {
 }
 
 /**
- * @typedef {object} Expected
+ * @typedef {Record<string, any>} Expected
  * @property {number} answer in `unit`
  * @property {number} tolerance absolute, in `unit`
  * @property {string} unit as the author wrote it; empty: none
@@ -45,7 +45,7 @@ export function gradeOrder(entered, answers) {
  *
  * @param {string} text what the learner entered
  * @param {Expected} expected
- * @returns {{state: 'right', value: number, converted: boolean}
+ * @returns {{state: 'right', slip?: undefined, value: number, converted: boolean}
  *   | {state: 'wrong', slip: string, value: number, converted: boolean}
  *   | {state: 'unread', problem: string, detail: string, readings: string[]}}
  *   `value` in the expected unit; `converted`: it was computed, or entered in another unit. `slip`: one of `nearMiss`, or `unit` (the

@@ -17,7 +17,7 @@ const drafts = new Map() // unchecked entries in questions that were replaced
 /**
  * @param {Document | Element} part
  * @param {(key: string) => string} words
- * @param {object | null} progress see progress/store.js; null: nothing is stored
+ * @param {Record<string, any> | null} progress see progress/store.js; null: nothing is stored
  * @param {{fresh?: boolean}} options `fresh`: do not show stored answers, as in a review
  */
 export function mountQuizzes(part, words, progress = null, options = {}) {
@@ -40,7 +40,7 @@ export function mountQuestion(element, words, progress = null, { fresh = false }
   const name = `${place.quiz}/${place.key}`
   if (!fresh && drafts.has(name)) question.showDraft(drafts.get(name))
   drafts.delete(name)
-  const unsubscribe = fresh || !progress?.onChange ? () => {} : progress.onChange(({ isLocal } = {}) => isLocal || follow(question, place, progress))
+  const unsubscribe = fresh || !progress?.onChange ? () => {} : progress.onChange(({ isLocal } = /** @type {{isLocal?: boolean}} */ ({})) => isLocal || follow(question, place, progress))
   disposers.set(element, () => {
     unsubscribe()
     const draft = question.draft()

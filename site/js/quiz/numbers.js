@@ -45,11 +45,13 @@ export function numeralEnd(text, start) {
   return end > start && /[.]/.test(text[end] ?? '') && !/[.,]/.test(text.slice(start, end)) ? end + 1 : end
 }
 
+/** @typedef {{value?: number, step?: number, problem?: 'numbers' | 'numeral' | 'comma', readings?: string[]}} Numeral */
+
 /**
  * The value of a numeral.
  *
  * @param {string} text digits, points, commas, spaces, apostrophes
- * @returns {{value: number, step: number} | {problem: 'numbers' | 'numeral' | 'comma', readings?: string[]}} `step`: a unit of its last
+ * @returns {Numeral} `step`: a unit of its last
  *   place
  */
 export function readNumeral(text) {
@@ -81,7 +83,7 @@ function splitAt(text, mark) {
 
 const isGrouped = (groups) => /^\d{1,3}$/.test(groups[0]) && groups.slice(1).every((group) => /^\d{3}$/.test(group))
 
-/** Read the digits before and after the decimal sign, which may be grouped by spaces or apostrophes. */
+/** Read the digits before and after the decimal sign, which may be grouped by spaces or apostrophes. @returns {Numeral} */
 function readGroups(whole, part) {
   const wholeGroups = whole.split(/[ '’]/)
   const partGroups = part.split(/[ '’]/)

@@ -29,7 +29,7 @@ export class Question {
   /**
    * @param {HTMLElement} element the page's `.question`
    * @param {(key: string) => string} words
-   * @param {(answer: object) => void} keep called with each answer that is to be stored
+   * @param {(answer: Record<string, any>) => void} keep called with each answer that is to be stored
    */
   constructor(element, words, keep) {
     this.element = element

@@ -3,7 +3,7 @@
  *
  * Entry points: `interaction` returns the elements of `cmi.interactions.n` for an answer; `grade` the points and status of a lesson.
  *
- * @typedef {object} Question as its page shows it
+ * @typedef {Record<string, any>} Question as its page shows it
  * @property {string} quiz
  * @property {string} key
  * @property {string} kind mcq, several, predict, numeric, output, order, open
@@ -23,7 +23,7 @@ export const nameOf = (quiz, key) => `${quiz}.${key}`
  * @param {Question} question
  * @param {{given: unknown, right: boolean | null}} answer
  * @param {Date} now
- * @returns {[string, string][]}
+ * @returns {string[][]}
  */
 export function interaction(question, answer, now) {
   const { type, response, pattern } = describe(question, textOf(answer.given))

@@ -16,7 +16,7 @@ const RANK = { passed: 3, completed: 2, incomplete: 1, failed: 1 }
 const MOST = 250 // interactions of one visit, so that a runaway script cannot fill the platform
 
 /**
- * @param {object} api the platform's
+ * @param {Record<string, any>} api the platform's
  * @param {{now?: () => number}} clock ms
  * @returns {Session | null} `null` if the platform refuses to begin
  */

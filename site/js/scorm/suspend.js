@@ -46,7 +46,7 @@ function serialize(answers, read) {
 
 /**
  * Read what `pack` wrote. A damaged text, or one of another version, is empty; invalid entries are skipped.
- * @returns {{answers: object[], read: boolean}}
+ * @returns {{answers: Record<string, any>[], read: boolean}}
  */
 export function unpack(text) {
   let data

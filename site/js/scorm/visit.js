@@ -22,9 +22,9 @@ export class Visit {
   #read
 
   /**
-   * @param {import('./session.js').Session} session
+   * @param {ReturnType<typeof import('./session.js').beginSession>} session
    * @param {{lesson: string, course: string}} place
-   * @param {object} progress see progress/store.js
+   * @param {Record<string, any>} progress see progress/store.js
    * @param {Storage | null} storage
    */
   constructor(session, { lesson, course }, progress, storage) {

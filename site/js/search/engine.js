@@ -19,7 +19,7 @@ const AHEAD = 2 // pages beyond those shown, as their texts may change the order
 const BREATH = 15 // ms of work after which the browser may do something else
 
 /**
- * @param {(path: string) => Promise<unknown>} load loads the value of a file by its path from the site's root
+ * @param {(path: string) => Promise<any>} load loads the value of a file by its path from the site's root
  */
 export async function openSearch(load) {
   const listing = await load(LISTING)
@@ -28,7 +28,8 @@ export async function openSearch(load) {
     shard: memoize(async (number) => readShard(await load(shardFile(listing, number))), SHARDS),
     spelling: memoize(async (number) => lexicon((await load(shardFile(listing, number))).split('\n').filter(Boolean)), SPELLINGS),
   }
-  const text = memoize(async (number) => openPage(await load(pageFile(listing.pages[number]))), PAGES)
+  const file = memoize(load, PAGES)
+  const text = memoize(async (number) => openPage((await file(pageFile(listing.pages[number])))[listing.pages[number][5]]), PAGES)
 
   /** The first `limit` pages for a query with their sections, the number of all pages, and the respelt words. */
   async function find(query, limit) {

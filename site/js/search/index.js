@@ -23,7 +23,7 @@ export function shardFile(listing, number) {
   return `assets/search/${number.toString(16).padStart(4, '0')}.${name}.js`
 }
 
-/** The path of the file with the text of a page. */
+/** The path of the file with the text of a page, perhaps of several; its place there is `page[5]`. */
 export const pageFile = (page) => `assets/search/${page[4]}.js`
 
 /** The lines of a shard by their term. */

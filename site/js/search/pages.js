@@ -28,8 +28,8 @@ const MOST_BEGUN = 64 // terms that begin with a word
 
 /**
  * @param {string} query
- * @param {{ listing: object, shard: (n: number) => Promise<Map<string, string>>, spelling: (n: number) => Promise<object> }} source
- * @returns {Promise<{ pages: { page: number, score: number, words: number }[], words: object[] }>} pages, the best first;
+ * @param {{ listing: Record<string, any>, shard: (n: number) => Promise<Map<string, string>>, spelling: (n: number) => Promise<Record<string, any>> }} source
+ * @returns {Promise<{ pages: { page: number, score: number, words: number }[], words: Record<string, any>[] }>} pages, the best first;
  *   of each word its terms by how well they fit, and the spelling that it was taken for (`instead`)
  */
 export async function findPages(query, source) {

@@ -45,7 +45,7 @@ export function findSections(page, words) {
   const queries = words
     .filter(({ terms }) => terms.size > 0)
     .map(({ terms }) => ({
-      combineWith: 'OR',
+      combineWith: /** @type {'OR'} */ ('OR'),
       queries: [...terms].map(([term, fit]) => ({ queries: [term], boostTerm: () => fit })),
     }))
   if (queries.length === 0) return []

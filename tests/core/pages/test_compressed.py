@@ -9,7 +9,7 @@ import brotli
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.compressed import compressed_files
 
-TEXT = b"function f(x) { return x * x + 1 }\n" * 100
+TEXT = b"function f(x) { return x * x + 1 }\n" * 300
 
 
 def copies(path: str, data: bytes) -> list[OutputFile]:
@@ -31,14 +31,14 @@ def test_pages_pictures_fonts_and_archives_get_no_copy() -> None:
         assert copies(path, TEXT) == []
 
 
-def test_what_is_below_1024_bytes_gets_no_copy() -> None:
-    assert copies("assets/x.js", TEXT[:1023]) == []
-    assert len(copies("assets/x.js", TEXT[:1024])) == 2
+def test_what_is_below_8_kib_gets_no_copy() -> None:
+    assert copies("assets/x.js", TEXT[:8191]) == []
+    assert len(copies("assets/x.js", TEXT[:8192])) == 2
 
 
 def test_what_is_large_is_compressed_less_finely() -> None:
     """From 2 MiB on, where the finer way takes long."""
-    large = (TEXT * 600)[: 2 << 20]
+    large = (TEXT * 200)[: 2 << 20]
     for data, quality in ((large[:-1], 10), (large, 9)):
         brotli_copy, _ = copies("assets/x.js", data)
         assert brotli_copy.data == brotli.compress(data, quality=quality)

@@ -46,14 +46,17 @@ def course(pages: int, words: int = 40) -> dict[str, dict[str, int]]:
 
 
 def search_site(
-    library: Library, terms: dict[str, dict[str, int]], cache: Cache | None = None
+    library: Library,
+    terms: dict[str, dict[str, int]],
+    cache: Cache | None = None,
+    kind: str = "lesson",
 ) -> dict[str, CachedFile]:
     notes = {
-        path: b"text of " + path.encode() + b"\0" + lines(weights)
+        path: f'"text of {path}"'.encode() + b"\0" + lines(weights)
         for path, weights in terms.items()
     }
     pages = tuple(
-        NotedPage(path, "lesson", path[8:-5], f"Title {path}", hashlib.sha256(note).hexdigest())
+        NotedPage(path, kind, path[8:-5], f"Title {path}", hashlib.sha256(note).hexdigest())
         for path, note in notes.items()
     )
     cache = Cache() if cache is None else cache
@@ -148,9 +151,10 @@ def test_the_list_of_pages_says_where_everything_is(library: Library) -> None:
     for number in range(2):
         name = listing["files"][8 * number : 8 * number + 8]
         assert f"assets/search/{number:04x}.{name}.js" in files
-    for number, (path, *values, file) in enumerate(listing["pages"]):
+    for number, (path, *values, file, place) in enumerate(listing["pages"]):
         assert values == [0, f"Title {path}", str(number)]
-        assert files[f"assets/search/{file}.js"].make() == b"text of " + path.encode()
+        text = files[f"assets/search/{file}.js"].make().decode()
+        assert (text, place) == (f'coursebuildSearch.take("page","",["text of {path}"])\n', 0)
     # Keys stand in lines whose fields are parted by blanks.
     assert not [file.key for file in files.values() if len(file.key.split()) != 1]
 
@@ -159,3 +163,13 @@ def test_pages_that_are_alike_have_files_of_their_own(library: Library) -> None:
     page = {"same": 4}
     files = search_site(library, {"lessons/a.html": page, "lessons/b.html": page})
     assert len([path for path in files if path.count(".") == 1 and "assets" in path]) == 2
+
+
+def test_levels_and_planned_lessons_share_files_of_texts(library: Library) -> None:
+    for kind in ("level", "stub"):
+        files = search_site(library, course(40, words=1), kind=kind)
+        listing = json.loads(files[index.LIST].make().decode().partition(',"",')[2].rstrip()[:-1])
+        assert len({page[4] for page in listing["pages"]}) == 3
+        for path, *_, file, place in listing["pages"]:
+            text = files[f"assets/search/{file}.js"].make().decode()
+            assert json.loads(text.partition(',"",')[2].rstrip()[:-1])[place] == f"text of {path}"

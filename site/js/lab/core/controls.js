@@ -9,7 +9,11 @@
 import { call } from './piece.js'
 
 export class Controls {
-  /** @param {object[]} data of the controls; @param {object[]} code of the same; @param {object} env what the code sees */
+  /**
+   * @param {Record<string, any>[]} data of the controls
+   * @param {Record<string, any>[]} code of the same
+   * @param {Record<string, any>} env what the code sees
+   */
   constructor(data, code, env) {
     this.data = data
     this.code = code
@@ -34,7 +38,7 @@ export class Controls {
     this.applyWhere((control) => control.param == null && control.init)
   }
 
-  /** Apply the controls that `accepts` admits and that have a value. */
+  /** Apply the controls that `accepts` admits and that have a value. @param {(control: any) => boolean} [accepts] */
   applyWhere(accepts = () => true) {
     this.data.forEach((control, i) => {
       if (accepts(control)) this.apply(i)

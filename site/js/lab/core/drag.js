@@ -9,7 +9,7 @@ export class Drag {
   /**
    * @param {import('./engine.js').Engine} engine
    * @param {import('./engine.js').Handles} handles
-   * @param {object} scene MjvScene, whose camera has been set
+   * @param {Record<string, any>} scene MjvScene, whose camera has been set
    */
   constructor(engine, handles, scene) {
     this.engine = engine

@@ -24,7 +24,7 @@ export class EngineError extends Error {
  *
  * The module is compiled beforehand: if its own compilation failed, the glue would wait forever.
  *
- * @param {(module: object) => Promise<object>} loadMujoco the default export of @mujoco/mujoco
+ * @param {(module: Record<string, any>) => Promise<Record<string, any>>} loadMujoco the default export of @mujoco/mujoco
  * @param {WebAssembly.Module} module mujoco.wasm
  * @param {(text: string) => void} [log] what the engine prints
  * @returns {Promise<Engine>}
@@ -51,7 +51,7 @@ export async function createEngine(loadMujoco, module, log = () => {}) {
  * Arrays of booleans (`data.eq_active`, `model.light_active`, …) have a type that the bindings forget to register, so that
  * reading one throws. The type is registered here, as bytes, on the first such read.
  *
- * @param {object} env the functions that the engine imports; one is replaced
+ * @param {Record<string, any>} env the functions that the engine imports; one is replaced
  * @returns {(instance: WebAssembly.Instance) => void} to be called with the instance
  */
 function registerBooleanViews(env) {

@@ -4,7 +4,7 @@ import { contactList, createLib } from './lib.js'
 
 /**
  * @param {import('./lab.js').Lab} lab
- * @param {object} data the MjData that the code sees
+ * @param {Record<string, any>} data the MjData that the code sees
  * @param {boolean} acts whether the code may act; what only looks may not
  */
 export function environment(lab, data, acts) {

@@ -41,7 +41,7 @@ export class Pictures {
   /**
    * @param {import('./engine.js').Engine} engine
    * @param {import('./engine.js').Handles} handles their `displayData` is drawn
-   * @param {object} config the lab's data
+   * @param {Record<string, any>} config the lab's data
    * @param {import('./sampler.js').Sampler} sampler keeps the trail
    */
   constructor(engine, handles, config, sampler) {

@@ -6,7 +6,7 @@ const ENTRY = ['goal', 'expr']
 const TOLERANCE = 1e-9 // s
 
 export class Goal {
-  /** @param {{hold: number}} data; @param {(env: object) => boolean} run its condition */
+  /** @param {{hold: number}} data; @param {(env: Record<string, any>) => boolean} run its condition */
   constructor({ hold }, run) {
     this.hold = hold
     this.run = run

@@ -27,8 +27,8 @@ export class Lab {
   /**
    * @param {import('./engine.js').Engine} engine
    * @param {Uint8Array | string} source the model, an MJB file or MJCF
-   * @param {object} config the lab's data (coursebuild/features/lab/compile.py)
-   * @param {object} code the lab's functions (ditto)
+   * @param {Record<string, any>} config the lab's data (coursebuild/features/lab/compile.py)
+   * @param {Record<string, any>} code the lab's functions (ditto)
    * @param {{play?: () => void, pause?: () => void}} [host] called by `sim.play()` and `sim.pause()`
    */
   constructor(engine, source, config, code, host = {}) {
@@ -247,7 +247,7 @@ export class Lab {
       }
       steps += 1
     }
-    return { steps, stopped: reason }
+    return { steps, stopped: /** @type {'code' | 'diverged' | 'stopAt' | null} */ (reason) }
   }
 
   stepOnce() {

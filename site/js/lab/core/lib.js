@@ -12,9 +12,9 @@ const DEGREES = 180 / Math.PI
 
 /**
  * @param {import('./engine.js').Engine} engine
- * @param {object} model MjModel
- * @param {object} data the MjData that is read
- * @param {{force: object}} scratch a DoubleBuffer(6) of the owner
+ * @param {Record<string, any>} model MjModel
+ * @param {Record<string, any>} data the MjData that is read
+ * @param {{force: Record<string, any>}} scratch a DoubleBuffer(6) of the owner
  * @param {() => number} random
  */
 export function createLib(engine, model, data, scratch, random) {

@@ -60,6 +60,6 @@ function describe(value) {
   if (value === null || value === undefined) return String(value)
   if (typeof value === 'string') return `the text ${JSON.stringify(value)}`
   if (typeof value !== 'object') return typeof value === 'function' ? 'a function' : `${typeof value} ${value}`
-  if (Array.isArray(value) || ArrayBuffer.isView(value)) return `an array of ${value.length}`
+  if (Array.isArray(value) || ArrayBuffer.isView(value)) return `an array of ${/** @type {any} */ (value).length}`
   return 'an object'
 }

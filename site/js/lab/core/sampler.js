@@ -14,8 +14,8 @@ const TRAIL = 2000 // points
 
 export class Sampler {
   /**
-   * @param {object} config the lab's data
-   * @param {object} code the lab's code
+   * @param {Record<string, any>} config the lab's data
+   * @param {Record<string, any>} code the lab's code
    * @param {number} site the id of the site whose trail is kept, or -1
    */
   constructor(config, code, site) {

@@ -14,9 +14,9 @@ const ROLE_RGB = 1
 /**
  * @param {import('./engine.js').Engine} engine
  * @param {import('./engine.js').Handles} handles
- * @param {object} config the lab's data
- * @param {object} camera an MjvCamera to work with
- * @param {object} layout of the frames
+ * @param {Record<string, any>} config the lab's data
+ * @param {Record<string, any>} camera an MjvCamera to work with
+ * @param {Record<string, any>} layout of the frames
  */
 export function describeScene(engine, { model, displayData: data }, config, camera, layout) {
   const { mj, k } = engine

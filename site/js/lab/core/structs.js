@@ -17,7 +17,7 @@ const memory = (data) => data.xpos.buffer
 
 /** Counts how often each of MuJoCo's warnings was raised since the last reset of the data. */
 export class WarningCounters {
-  /** @param {object} data MjData, which must outlive the counters */
+  /** @param {Record<string, any>} data MjData, which must outlive the counters */
   constructor(data) {
     this.data = data
     // A vector of {pointer to an mjWarningStat, owned}; the structures themselves lie in mjData, one behind the other.
@@ -74,7 +74,7 @@ const GEOMS_AT = 2 // mjvScene starts with maxgeom, ngeom and a pointer to the g
 
 /** The geoms of an mjvScene: rows of 32-bit words, as integers and as floats. */
 export class SceneGeoms {
-  /** @param {object} scene MjvScene; @param {object} data any MjData of the same engine */
+  /** @param {Record<string, any>} scene MjvScene; @param {Record<string, any>} data any MjData of the same engine */
   constructor(scene, data) {
     this.scene = scene
     this.data = data

@@ -13,7 +13,7 @@ const LARGEST = 1e10 // mjMAXVAL
 /** @typedef {{time: number, kind: string, message: string}} Finding */
 
 export class Watch {
-  /** @param {import('./engine.js').Engine} engine; @param {object} model; @param {object} data */
+  /** @param {import('./engine.js').Engine} engine; @param {Record<string, any>} model; @param {Record<string, any>} data */
   constructor(engine, model, data) {
     this.engine = engine
     this.model = model

@@ -18,7 +18,11 @@ export class OrbitCamera {
 
   reset() {
     const { azimuth, elevation, distance, target, fovy = 45 } = this.start
-    Object.assign(this, { azimuth, elevation, distance, fovy, target: [...target] })
+    this.azimuth = azimuth
+    this.elevation = elevation
+    this.distance = distance
+    this.fovy = fovy
+    this.target = [...target]
   }
 
   /** Unit vectors of the picture in the world: to the right, up, and into it. */

@@ -33,7 +33,7 @@ export class Connection {
    * Open a lab's line.
    *
    * @param {string} id
-   * @param {(message: object) => void} receive gets every message about this lab
+   * @param {(message: Record<string, any>) => void} receive gets every message about this lab
    */
   open(id, receive) {
     if (this.lines.has(id)) throw new Error(`the lab ${id} is on the page twice`)

@@ -7,7 +7,7 @@ const STEPS = 200 // of a slider without a step
 const SIGNS = { momentum: 'p', angularMomentum: 'L', forces: 'F' }
 
 /**
- * @param {object[]} controls of the lab's JSON
+ * @param {any[]} controls of the lab's JSON
  * @param {{set: (index: number, value: unknown) => void, press: (index: number) => void}} actions
  * @returns {{element: HTMLElement | null, show: (values: unknown[]) => void, setEnabled: (on: boolean) => void}}
  */

@@ -46,7 +46,7 @@ const PLAIN_CONTROL = {
 /**
  * Mount a lab with the course's own code.
  *
- * @returns {Promise<{dispose: () => void, restore?: (state: object) => void}>}
+ * @returns {Promise<{dispose: () => void, restore?: (state: Record<string, any>) => void}>}
  */
 export async function mountCustom(element, config, base, words) {
   const { mount } = await import(new URL(config.module, base).href)
@@ -76,7 +76,11 @@ export async function mountCustom(element, config, base, words) {
 /** Makes the `api` of a custom lab, and disposes at the end of what it has created. */
 class Kit {
   constructor(element, body, config, base, words) {
-    Object.assign(this, { element, body, config, base, words })
+    this.element = element
+    this.body = body
+    this.config = config
+    this.base = base
+    this.words = words
     this.notices = new Notices(words)
     this.simulations = []
     this.disposals = []
@@ -113,7 +117,7 @@ class Kit {
         ),
       createTransport: (actions) => buildTransport(words, { full: null, ...actions }),
       announce: (text) => notices.say(text),
-      notice: (text, kind = 'note') => (text === null ? notices.clear() : notices.show(text, kind)),
+      notice: (text, kind = /** @type {'note' | 'warning' | 'wrong'} */ ('note')) => (text === null ? notices.clear() : notices.show(text, kind)),
       onVisible: (watcher) => {
         this.watchers.add(watcher)
         watcher(this.isVisible)
@@ -126,7 +130,7 @@ class Kit {
   /**
    * Create a simulation in the page's worker.
    *
-   * @param {object} [options] fields of a simlab (`controls`, `plots`, …), and `on` (see simulation.js), `picture` (false: none),
+   * @param {Record<string, any>} [options] fields of a simlab (`controls`, `plots`, …), and `on` (see simulation.js), `picture` (false: none),
    *   `height` (px), `label` of the picture, `mjb` and `module` (addresses relative to the lab's JSON)
    */
   createSimulation(options = {}) {

@@ -7,8 +7,9 @@ const SVG = 'http://www.w3.org/2000/svg'
  * the rest become properties of the element.
  *
  * @param {string} tag
- * @param {object} [properties] undefined and null are left out
+ * @param {Record<string, any>} [properties] undefined and null are left out
  * @param {...(Node | string | null)} children
+ * @returns {any} the element, of the kind of its tag
  */
 export function h(tag, properties = {}, ...children) {
   const element = document.createElement(tag)

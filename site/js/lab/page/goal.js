@@ -8,11 +8,14 @@ export class GoalView {
   /**
    * @param {HTMLElement} still the goal in the lab's static form
    * @param {{hold: number}} goal of the lab's JSON
-   * @param {(key: string, values?: object) => string} words
-   * @param {{progress: object | null, say: (text: string) => void, show: () => void}} services `progress`: see progress/store.js
+   * @param {(key: string, values?: Record<string, any>) => string} words
+   * @param {{progress: Record<string, any> | null, say: (text: string) => void, show: () => void}} services `progress`: see progress/store.js
    */
   constructor(still, { hold }, words, { progress, say, show }) {
-    Object.assign(this, { hold, words, progress, say })
+    this.hold = hold
+    this.words = words
+    this.progress = progress
+    this.say = say
     this.key = still.dataset.goal
     this.status = { held: 0, reached: null, counts: true }
     this.bar = h('progress', { max: hold, value: 0, 'aria-hidden': 'true', hidden: hold === 0 })

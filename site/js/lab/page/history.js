@@ -71,7 +71,7 @@ export class History {
     this.counter = 1
   }
 
-  /** The samples for uPlot: times, then one array for each trace, with `null` where its line is interrupted. */
+  /** The samples for uPlot: times, then one array for each trace, with `null` where its line is interrupted. @returns {any} */
   data() {
     const columns = this.columns.map((column) => column.subarray(this.start, this.end))
     return this.gaps ? columns.map((column) => Array.from(column, (x) => (Number.isFinite(x) ? x : null))) : columns

@@ -30,7 +30,10 @@ const HELP = ['keys_mouse', 'keys_touch', 'keys_camera', 'keys_run']
 
 export class Instrument {
   constructor(element, config, base, words, progress = null) {
-    Object.assign(this, { element, config, words, progress })
+    this.element = element
+    this.config = config
+    this.words = words
+    this.progress = progress
     this.values = this.initial = config.controls.map(({ value }) => value ?? null)
     this.textAt = this.plotAt = -Infinity
     this.sayTimer = 0 // of the announcement of a pause
@@ -278,13 +281,13 @@ export class Instrument {
   makeLogButton() {
     const copy = ({ log }) => {
       const text = log ? writeLog(log, this.config.controls) : ''
-      const copying = text ? navigator.clipboard.writeText(text) : Promise.reject(new Error('no log of a pulled body, or of a link'))
+      const copying = text ? navigator.clipboard.writeText(text) : Promise.reject(new Error(this.words('lab.live.no_log')))
       copying.then(
-        () => this.notices.show('The log is copied.', 'note'),
+        () => this.notices.show(this.words('lab.live.log_copied'), 'note'),
         (error) => this.notices.show(text || error.message, 'warning'),
       )
     }
-    return h('button', { type: 'button', class: 'lab-text', onclick: () => this.save(copy) }, 'Copy log')
+    return h('button', { type: 'button', class: 'lab-text', onclick: () => this.save(copy) }, this.words('lab.live.copy_log'))
   }
 
   async share(state) {

@@ -27,7 +27,7 @@ export function ambientOf({ lights, visual: { headlight } }) {
 }
 
 export class Lights {
-  /** @param {object} description of the lab's scene; @param {import('three').Scene} scene */
+  /** @param {any} description of the lab's scene; @param {import('three').Scene} scene */
   constructor(description, scene) {
     this.scene = scene
     this.extent = description.extent

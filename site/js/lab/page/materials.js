@@ -26,7 +26,7 @@ const TEXTURE_CUBE = 1
 const TEXTURE_SKY = 2
 
 export class Materials {
-  /** @param {object} scene the description of a lab's scene */
+  /** @param {any} scene the description of a lab's scene */
   constructor(scene) {
     this.scene = scene
     this.textures = new Map()
@@ -147,7 +147,7 @@ export class Materials {
  *
  * A microfacet surface, whose slopes have the spread `roughness`², has about the highlight of the exponent 2/roughness⁴ - 2.
  *
- * @param {object | undefined} info @param {number} gloss how much weaker highlights are because of their lights
+ * @param {Record<string, any> | undefined} info @param {number} gloss how much weaker highlights are because of their lights
  */
 export function finishOf(info, gloss) {
   const { shininess = SHININESS, specular = SPECULAR, metallic = -1, roughness = -1 } = info ?? {}

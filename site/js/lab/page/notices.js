@@ -5,7 +5,7 @@ import { h } from './dom.js'
 const SHORT = 4000 // ms
 
 export class Notices {
-  /** @param {(key: string, values?: object) => string} words */
+  /** @param {(key: string, values?: Record<string, any>) => string} words */
   constructor(words) {
     this.words = words
     this.message = h('p', { class: 'lab-message', role: 'alert', hidden: true })

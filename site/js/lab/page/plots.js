@@ -22,8 +22,8 @@ const MOST_POWERS = 6 // labels of a logarithmic axis
 
 export class Plot {
   /**
-   * @param {object} config a plot of the lab's JSON; `log: true` gives it a logarithmic y axis
-   * @param {(key: string, values?: object) => string} words
+   * @param {any} config a plot of the lab's JSON; `log: true` gives it a logarithmic y axis
+   * @param {(key: string, values?: Record<string, any>) => string} words
    */
   constructor(config, words) {
     this.config = config

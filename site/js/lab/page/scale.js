@@ -8,7 +8,7 @@ const MARGIN = 10 // CSS pixels
 const TICK = 5
 
 export class ScaleBar {
-  /** @param {(key: string, values?: object) => string} words */
+  /** @param {(key: string, values?: Record<string, any>) => string} words */
   constructor(words) {
     this.words = words
     this.svg = outline('')
@@ -23,7 +23,7 @@ export class ScaleBar {
     if (path === this.path) return
     this.path = path
     this.svg.setAttribute('viewBox', `0 0 ${width} ${height}`)
-    this.svg.firstChild.setAttribute('d', path)
+    this.svg.firstElementChild.setAttribute('d', path)
     const text = `${Number(length.toPrecision(1))} m`
     if (text === this.length.textContent) return
     this.length.textContent = text

@@ -20,14 +20,16 @@ const LINE_END = 10
 
 /**
  * @param {string} id
- * @param {{values: unknown[], steps: number, time: number, physics: Float64Array, text?: string, log?: object | null}} state
+ * @param {{values: unknown[], steps: number, time: number, physics: Float64Array, text?: string, log?: Record<string, any> | null}} state
  * @returns {Promise<{link: string, only: 'state' | 'controls' | null}>} `only`: what it holds if not all fitted
  */
 export async function writeLink(id, { values, steps, time, physics, text, log = null }) {
   const state = { v: values, n: steps, t: time, x: text }
   const motion = log && steps > 0 ? { ...state, l: [log.values, log.events] } : state
   const link = (text) => `#lab=${encodeURIComponent(id)}&${text}`
-  for (const [head, only] of [[motion, null], [state, motion === state ? null : 'state']]) {
+  /** @type {[Record<string, any>, 'state' | null][]} */
+  const forms = [[motion, null], [state, motion === state ? null : 'state']]
+  for (const [head, only] of forms) {
     const whole = await field(content(head, physics))
     if (whole.length <= LONGEST) return { link: link(whole), only }
   }
@@ -94,6 +96,7 @@ export function writeLog({ values, events }, controls) {
 function isLog(value) {
   if (!Array.isArray(value) || !value.slice(0, 2).every(Array.isArray) || value.length !== 2) return false
   const isValue = (item) => typeof item === 'string' || Number.isFinite(item)
+  /** @type {(event: any) => boolean} */
   const isEvent = ([time, control, ...rest]) => time >= 0 && Number.isFinite(time) && Number.isInteger(control) && rest.length <= 1 && rest.every(isValue)
   return value[1].length <= MOST_EVENTS && value[0].every((item) => item === null || isValue(item)) && value[1].every((event) => Array.isArray(event) && isEvent(event))
 }

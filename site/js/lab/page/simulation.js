@@ -23,13 +23,17 @@ import { connection } from './connection.js'
 export class Simulation {
   /**
    * @param {object} options
-   * @param {object} options.config the lab's JSON; `worker`, `wasm`, `module` and `mjb` are addresses
+   * @param {Record<string, any>} options.config the lab's JSON; `worker`, `wasm`, `module` and `mjb` are addresses
    * @param {string} options.base to which these are relative
    * @param {import('./view.js').View | null} [options.view] shows it
-   * @param {object} [options.on] listeners
+   * @param {Record<string, any>} [options.on] listeners
    */
   constructor({ config, base, view = null, on = {} }) {
-    Object.assign(this, { config, view, on })
+    this.config = config
+    this.view = view
+    this.on = on
+    /** @type {HTMLElement | null} of a custom lab: see custom.js */
+    this.element = null
     this.address = (path) => new URL(path, base).href
     this.visible = false
     this.settings = new Map() // messages to repeat after a restart: speed and overlays

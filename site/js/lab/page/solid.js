@@ -10,10 +10,12 @@ export class Solid {
   /**
    * @param {import('three').Object3D} parent
    * @param {import('./materials.js').Materials} materials
-   * @param {object} info `type` (mjtGeom), `material` (id or -1), `geometry` of a mesh or height field, `model` (see `shape`)
+   * @param {Record<string, any>} info `type` (mjtGeom), `material` (id or -1), `geometry` of a mesh or height field, `model` (see `shape`)
    */
   constructor(parent, materials, { type, material = -1, geometry = null, model = true, wrapped = false, extent = 1 }) {
-    Object.assign(this, { materials, type, model })
+    this.materials = materials
+    this.type = type
+    this.model = model
     this.plane = type === GEOM.PLANE
     this.isBelow = false
     this.isVisible = true

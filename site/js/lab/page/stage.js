@@ -112,7 +112,9 @@ export class Stage {
     if (width === 0 || height === 0 || !view.scene) return
     const { renderer } = this
     if (this.width !== width || this.height !== height || this.ratio !== this.sharpness) {
-      Object.assign(this, { width, height, ratio: this.sharpness })
+      this.width = width
+      this.height = height
+      this.ratio = this.sharpness
       renderer.setPixelRatio(this.ratio)
       renderer.setSize(width, height, false)
     }

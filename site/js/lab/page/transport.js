@@ -7,7 +7,7 @@ const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5]
 const ON_TIME = 0.95
 
 /**
- * @param {(key: string, values?: object) => string} words
+ * @param {(key: string, values?: Record<string, any>) => string} words
  * @param {{play: () => void, step: () => void, reset: () => void, speed: (factor: number) => void, full: (() => void) | null}} actions
  */
 export function buildTransport(words, actions) {

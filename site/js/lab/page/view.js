@@ -19,7 +19,7 @@ export class View {
    * @param {number} options.height CSS pixels, where it is 480 wide
    * @param {string} options.label describes the picture for those who cannot see it
    * @param {string} options.name of the view, and how keys move it
-   * @param {(key: string, values?: object) => string} options.words
+   * @param {(key: string, values?: Record<string, any>) => string} options.words
    * @param {HTMLImageElement | null} [options.poster] a picture that is shown until there is a live one
    */
   constructor({ height, label, name, words, poster = null }) {
@@ -131,7 +131,7 @@ export class View {
 
   // --- geometry of the pointer
 
-  /** A place in the window as coordinates of the view, in [-1, 1], to the right and up. */
+  /** A place in the window as coordinates of the view, in [-1, 1], to the right and up. @returns {[number, number]} */
   coordinates(clientX, clientY) {
     const box = this.element.getBoundingClientRect()
     return [(2 * (clientX - box.left)) / box.width - 1, 1 - (2 * (clientY - box.top)) / box.height]

@@ -22,7 +22,7 @@ const IN_FRONT = -2 // see `arrows.js` of the core
 const USUAL = 1.6 // width of a view over its height
 
 export class World {
-  /** @param {object} description the `scene` of the worker's message `ready` */
+  /** @param {any} description the `scene` of the worker's message `ready` */
   constructor(description) {
     this.description = description
     this.scene = new Scene()

@@ -17,7 +17,7 @@ const { toString } = Symbol.prototype
 const MOST = 20 // changes that are listed
 
 export class Guard {
-  /** @param {[string, object, boolean][]} roots name and object, and whether only those of its properties count that are functions */
+  /** @param {[string, Record<string, any>, boolean][]} roots name and object, and whether only those of its properties count that are functions */
   constructor(roots) {
     this.recordsByObject = new Map()
     this.records = []

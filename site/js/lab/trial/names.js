@@ -15,13 +15,14 @@ export function lookUp(engine, bytes, paths) {
   const handles = engine.load(bytes)
   const { model, data } = handles
   try {
-    const env = environment({ engine, model, ctx: {}, scratch: {} }, data, true)
+    const env = environment(/** @type {any} */ ({ engine, model, ctx: {}, scratch: {} }), data, true)
     return paths.map((path) => resolve(env, path))
   } finally {
     handles.dispose()
   }
 }
 
+/** @param {Record<string, any>} env @param {string[]} path */
 function resolve(env, path) {
   const [root] = path
   if (!(root in env || root in globalThis)) return { at: 0, names: [...Object.keys(env), ...GLOBALS] }
@@ -32,7 +33,7 @@ function resolve(env, path) {
     if (!(path[depth] in owner)) return { at: depth, names: namesOf(owner) }
     owner = owner[path[depth]]
   }
-  return ArrayBuffer.isView(owner) ? { length: owner.length } : {}
+  return ArrayBuffer.isView(owner) ? { length: /** @type {any} */ (owner).length } : {}
 }
 
 function namesOf(owner) {

@@ -5,6 +5,7 @@
  * are zero here, so that nothing depends on chance.
  */
 
-globalThis.WorkerGlobalScope ??= class WorkerGlobalScope {}
-globalThis.performance ??= { now: () => Date.now() }
-globalThis.crypto ??= { getRandomValues: (view) => view.fill(0) }
+const globals = /** @type {any} */ (globalThis)
+globals.WorkerGlobalScope ??= class WorkerGlobalScope {}
+globals.performance ??= { now: () => Date.now() }
+globals.crypto ??= { getRandomValues: (view) => view.fill(0) }

@@ -226,7 +226,10 @@ class Trial {
     )
   }
 
-  /** Evaluate an expression. `check(entry, value)` returns the value or throws; `isIntended(value)`: it may be NaN or infinite. */
+  /**
+   * Evaluate an expression. `check(entry, value)` returns the value or throws.
+   * @param {(value: any) => boolean} [isIntended] whether it may be NaN or infinite
+   */
   value(entry, run, env, check, isIntended = () => false) {
     try {
       const value = call(entry, () => check(entry, run(env)))

@@ -6,9 +6,9 @@ class Found extends Error {}
 /**
  * Wrap a lab's code so that it throws after the piece that changes what the guard protects.
  *
- * @param {object} code
+ * @param {Record<string, any>} code
  * @param {import('./guard.js').Guard} guard
- * @returns {{code: object, entry: () => (string | number)[] | null}} `entry` of that piece
+ * @returns {{code: Record<string, any>, entry: () => (string | number)[] | null}} `entry` of that piece
  */
 export function watchedCode(code, guard) {
   let guilty = null

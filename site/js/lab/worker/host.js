@@ -13,13 +13,13 @@ const LONGEST = 8 // ms between two ticks
 export class Host {
   /**
    * @param {object} services
-   * @param {(message: object, transfer: ArrayBuffer[]) => void} services.post
+   * @param {(message: Record<string, any>, transfer: ArrayBuffer[]) => void} services.post
    * @param {() => number} services.now ms
    * @param {(action: () => void, ms: number) => unknown} services.later
    * @param {(url: string) => Promise<Uint8Array>} services.fetchBytes
-   * @param {(url: string) => Promise<object>} services.importModule
+   * @param {(url: string) => Promise<Record<string, any>>} services.importModule
    * @param {(url: string) => Promise<WebAssembly.Module>} services.compile
-   * @param {(module: object) => Promise<object>} services.loadMujoco
+   * @param {(module: Record<string, any>) => Promise<Record<string, any>>} services.loadMujoco
    */
   constructor(services) {
     this.services = services

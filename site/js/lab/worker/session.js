@@ -14,7 +14,7 @@ const LEAST = 4 // ms between two frames of a running lab
 export class Session {
   /**
    * @param {string} id
-   * @param {(message: object, transfer?: ArrayBuffer[]) => void} post
+   * @param {(message: Record<string, any>, transfer?: ArrayBuffer[]) => void} post
    * @param {() => number} now ms
    */
   constructor(id, post, now) {
