@@ -25,7 +25,7 @@ from coursebuild.core.scripts.bindings import (
     document_bindings,
 )
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
-from coursebuild.core.scripts.compare import compare
+from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import (
@@ -37,7 +37,6 @@ from coursebuild.core.scripts.failures import (
 from coursebuild.core.scripts.lines import LineMatcher
 from coursebuild.core.scripts.mapped_text import Side
 from coursebuild.core.scripts.numbers import Number, scan
-from coursebuild.core.scripts.repeat import instability_diagnostic
 from coursebuild.core.scripts.tables import TableMatcher, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note, diagnose
 from coursebuild.core.text.source import Excerpt

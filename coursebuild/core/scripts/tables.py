@@ -22,7 +22,7 @@ from msgspec import Struct
 from coursebuild.core import model
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
-from coursebuild.core.scripts.changes import number_change
+from coursebuild.core.scripts.diff import number_change
 from coursebuild.core.scripts.lines import (
     CanonicalText,
     SameNumber,

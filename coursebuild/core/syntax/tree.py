@@ -19,13 +19,13 @@ from functools import partial
 
 from coursebuild.core import model
 from coursebuild.core.syntax.attributes import LABEL, read_label
+from coursebuild.core.syntax.block_parser import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.callout import Head, read_head
 from coursebuild.core.syntax.dispatch import read_block
 from coursebuild.core.syntax.fence import INDENTED_FENCE, is_known_kind, read_fence
 from coursebuild.core.syntax.headings import Attributes, check_heading, read_attributes
-from coursebuild.core.syntax.html import LITERAL, Balance, find_media, tags
+from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inlines import read_inlines
-from coursebuild.core.syntax.markdown import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
@@ -40,7 +40,6 @@ from coursebuild.core.syntax.recording import (
     record_fence,
     record_table,
 )
-from coursebuild.core.syntax.safe_html import find_forbidden
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
 from coursebuild.core.syntax.tables import read_table
 from coursebuild.core.syntax.unread_markup import check_unread_markup
