@@ -61,7 +61,7 @@ def prepare(options: Options, make: MakeSite | None = None) -> Iterator[tuple[Re
         if not report.ok:
             yield report, None
             return
-        from coursebuild.core.pages.templates import TemplateFailure
+        from coursebuild.core.pages.renderer import TemplateFailure
         from coursebuild.pipeline.site import site_files
 
         course, results = checked_course.course, checked_course.verification.results

@@ -30,13 +30,12 @@ from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.summary import without_prose
 from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.folding import find_imports
+from coursebuild.core.pages.formulas import equations_of
 from coursebuild.core.pages.frame import parts_of
 from coursebuild.core.pages.page_inputs import PageHead, PageInputs
 from coursebuild.core.pages.record import PageRecord, record
-from coursebuild.core.pages.renderer import Renderer, known_mathml
-from coursebuild.core.pages.templates import Texts
+from coursebuild.core.pages.renderer import Renderer, Texts, known_mathml
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import summarize
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
@@ -182,8 +181,8 @@ _HEAVY = (
     "coursebuild.core.run.v8",
     "coursebuild.core.pages.draw",
     "coursebuild.core.pages.highlight",
-    "coursebuild.core.pages.lesson",
-    "coursebuild.core.pages.pages",
+    "coursebuild.core.pages.document_inputs",
+    "coursebuild.core.pages.page_list",
     "coursebuild.core.syntax.document",
 )
 

@@ -30,7 +30,7 @@ from coursebuild.core.model.results import Outcome, Reports, Results, ScriptJob,
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.templates import TemplateFailure
+from coursebuild.core.pages.renderer import TemplateFailure
 from coursebuild.core.registry import publish_trials
 from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.core.scripts.compare import verify as compare

@@ -36,14 +36,13 @@ from coursebuild.core.model import (
     sibling_groups,
 )
 from coursebuild.core.pages import blocks, formulas, urls
-from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.document_inputs import file_address
-from coursebuild.core.pages.equations import number_equations
+from coursebuild.core.pages.formulas import number_equations
 from coursebuild.core.pages.links import ids_and_addresses
 from coursebuild.core.pages.markup import HtmlWriter, SpecialBlock
 from coursebuild.core.pages.page_inputs import DocumentInputs
 from coursebuild.core.pages.renderer import Renderer
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.strings import Strings, direction
 from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.source import Span
 

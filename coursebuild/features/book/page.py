@@ -18,8 +18,8 @@ from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.characters import visible
-from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.html_tree import to_html
+from coursebuild.core.pages.strings import direction
 from coursebuild.features.book.lessons import (
     PICTURES,
     extension,

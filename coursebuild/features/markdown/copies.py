@@ -19,7 +19,7 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import SiteContext
 from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.lesson import LessonLink, LevelView
+from coursebuild.core.pages.document_inputs import LessonLink, LevelView
 from coursebuild.core.pages.marks import code_span, escape_line, guard_lines, link
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.strings import Strings

@@ -26,8 +26,8 @@ from coursebuild.core.model.theme import ThemeFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import SiteContext
 from coursebuild.core.pages.assets import Assets, hashed_name, page_script
-from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.frame import Names
+from coursebuild.core.pages.strings import direction
 from coursebuild.core.pages.theme import picture_size
 
 PAPER = GROUNDS_LIGHT[0]

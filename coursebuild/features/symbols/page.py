@@ -14,14 +14,14 @@ from msgspec import Struct, field
 
 from coursebuild.core.model import Lesson, Owner
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.owner_links import (
+from coursebuild.core.pages.document_inputs import (
     OwnerLink,
     OwnerLinks,
     added_page,
     owner_link,
     owner_links,
 )
+from coursebuild.core.pages.library import Library
 from coursebuild.features.symbols.mathml import sort_key
 from coursebuild.features.symbols.uses import SymbolUse
 

@@ -17,7 +17,7 @@ from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.assets import SCRIPTS, Assets, page_script
 from coursebuild.core.pages.compressed import compressed_files
 from coursebuild.core.pages.fonts import GREEK, font_jobs, read_faces, subset_font
-from coursebuild.core.pages.templates import compile_templates, compiled_name
+from coursebuild.core.pages.renderer import compile_templates, compiled_name
 
 pytestmark = pytest.mark.site
 
