@@ -17,7 +17,7 @@ from coursebuild.core.engine.digests import file_state
 from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.read import read_bytes
-from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls, zips
 from coursebuild.core.pages.assets import Assets

@@ -35,7 +35,7 @@ from coursebuild.core.model import (
     document_inlines,
     local_file,
 )
-from coursebuild.core.model.theme import TEMPLATES, Theme
+from coursebuild.core.model.course import TEMPLATES, Theme
 from coursebuild.core.model.vocabulary import CALLOUTS, ENGLISH, Words
 from coursebuild.core.pages.assets import words_for
 from coursebuild.core.registry import read_references

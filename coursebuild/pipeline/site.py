@@ -40,10 +40,9 @@ from coursebuild.core.model.results import (
     SiteFile,
 )
 from coursebuild.core.pages import meta, urls
-from coursebuild.core.pages.added_files import SiteContext, added_files
+from coursebuild.core.pages.added_files import SiteContext, added_files, compressed_files
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
-from coursebuild.core.pages.compressed import compressed_files
 from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry

@@ -50,7 +50,7 @@ from coursebuild.core.model import (
     resolve,
     walk_inlines,
 )
-from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Span
 

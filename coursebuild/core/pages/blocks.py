@@ -32,7 +32,7 @@ from coursebuild.core.model import (
     output_anchor,
     output_numbers,
 )
-from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.characters import visible

@@ -34,8 +34,8 @@ from markupsafe import Markup
 from msgspec import Struct, field
 
 from coursebuild.core.features import Mathml
+from coursebuild.core.model.course import TEMPLATES
 from coursebuild.core.model.results import Formula, MathError
-from coursebuild.core.model.theme import TEMPLATES
 from coursebuild.core.pages.highlight import highlight_lines
 from coursebuild.core.pages.quantities import text_html
 from coursebuild.core.pages.strings import Strings, direction

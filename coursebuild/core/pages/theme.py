@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, RECOMMENDED_CONTRAST, legible
 from coursebuild.core.drawing.safe_svg import read_svg
-from coursebuild.core.model.theme import Theme, ThemeFile
+from coursebuild.core.model.course import Theme, ThemeFile
 from coursebuild.core.pages.fonts import COURSE, Face, unicode_range
 
 if TYPE_CHECKING:

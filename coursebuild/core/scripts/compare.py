@@ -43,8 +43,7 @@ from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.core.scripts.diff import find_differences, number_change, quote, text_diff
 from coursebuild.core.scripts.extract import Extraction
-from coursebuild.core.scripts.lines import LineMatcher
-from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.tables import compare_table
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Excerpt, Span

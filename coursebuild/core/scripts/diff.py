@@ -26,8 +26,7 @@ from msgspec import Struct
 from coursebuild.core.model import Table
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, Step, StepKind, align, pair
-from coursebuild.core.scripts.lines import LineMatcher
-from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.numbers import (
     Number,
     agreeing_digits,

@@ -28,8 +28,14 @@ from msgspec.structs import replace
 from coursebuild.core.model import Comparison, Mode, Recording, Script, Table
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.core.scripts.compare import instability_diagnostic
-from coursebuild.core.scripts.lines import ELLIPSIS, LineMatcher, canonicalize, same_number
-from coursebuild.core.scripts.mapped_text import Side, replace_ranges
+from coursebuild.core.scripts.lines import (
+    ELLIPSIS,
+    LineMatcher,
+    Side,
+    canonicalize,
+    replace_ranges,
+    same_number,
+)
 from coursebuild.core.scripts.numbers import Number, round_like
 from coursebuild.core.scripts.tables import RowCell, RowMatch, TableMatcher, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose

@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from msgspec.structs import replace
 
 from coursebuild.core.model import CodeBlock, Course, Document, Owner, Table, document_scripts
-from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.align import count_alike
 from coursebuild.core.scripts.bindings import (
@@ -34,8 +34,7 @@ from coursebuild.core.scripts.failures import (
     failure_diagnostic,
     silence_diagnostic,
 )
-from coursebuild.core.scripts.lines import LineMatcher
-from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.numbers import Number, scan
 from coursebuild.core.scripts.tables import TableMatcher, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note, diagnose

@@ -24,8 +24,8 @@ from coursebuild.core.drawing.contrast import (
     legible,
 )
 from coursebuild.core.model import Filter, LessonTable, Limits, Pace, Silence
+from coursebuild.core.model.course import PICTURES, FontFamily, Theme, ThemeFile
 from coursebuild.core.model.fields import NotNegative, Slug, Text, matching
-from coursebuild.core.model.theme import PICTURES, FontFamily, Theme, ThemeFile
 from coursebuild.core.syntax.nodes import ObjectNode
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 

@@ -46,9 +46,16 @@ from coursebuild.core.syntax.course_schema import (
     theme,
 )
 from coursebuild.core.syntax.decode import Decoding, check_unique, decode
-from coursebuild.core.syntax.nodes import Node, NumberNode, ObjectNode, StringNode
+from coursebuild.core.syntax.nodes import (
+    TOML,
+    Node,
+    NumberNode,
+    ObjectNode,
+    StringNode,
+    format_name,
+    shorten,
+)
 from coursebuild.core.syntax.toml_text import parse_toml
-from coursebuild.core.syntax.wording import TOML, format_name, shorten
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
     Note,

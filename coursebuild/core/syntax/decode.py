@@ -29,14 +29,12 @@ from coursebuild.core.syntax.nodes import (
     ArrayNode,
     BoolNode,
     ErrorNode,
+    Format,
     Node,
     NullNode,
     NumberNode,
     ObjectNode,
     StringNode,
-)
-from coursebuild.core.syntax.wording import (
-    Format,
     accepts,
     format_name,
     format_value,

@@ -39,7 +39,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.model.equations import DisplayFormula, feature_block_ids
 from coursebuild.core.model.vocabulary import ENGLISH, Words
-from coursebuild.core.syntax.headings import slug
+from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import ILLUSTRATION
 from coursebuild.core.syntax.spans import read_markdown

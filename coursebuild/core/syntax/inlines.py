@@ -37,9 +37,14 @@ from coursebuild.core.model import (
     Term,
     plain_text,
 )
-from coursebuild.core.syntax.attributes import collapse_spaces, read_label, read_meaning, read_term
+from coursebuild.core.syntax.attributes import (
+    collapse_spaces,
+    read_label,
+    read_meaning,
+    read_term,
+    term_id,
+)
 from coursebuild.core.syntax.block_parser import References
-from coursebuild.core.syntax.headings import term_id
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_parser import inline_tokens
 from coursebuild.core.syntax.links import (

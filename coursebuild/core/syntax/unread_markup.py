@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 
 from coursebuild.core.syntax.fence import is_known_kind
 from coursebuild.core.syntax.markup_kinds import BROKEN, FOREIGN, IN_HTML, MarkupKind
-from coursebuild.core.syntax.wording import shorten
+from coursebuild.core.syntax.nodes import shorten
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Span
 

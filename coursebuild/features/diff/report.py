@@ -15,7 +15,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Course, Recording, find_blocks
-from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.pages.marks import code_span, escape_text, fence, table
 from coursebuild.core.registry import feature_trials
 from coursebuild.core.scripts.compare import compare

@@ -21,8 +21,8 @@ from collections.abc import Iterable, Iterator
 from coursebuild.core.drawing.contrast import GROUNDS_LIGHT
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import Course
+from coursebuild.core.model.course import ThemeFile
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile
-from coursebuild.core.model.theme import ThemeFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import SiteContext
 from coursebuild.core.pages.assets import Assets, hashed_name, page_script

@@ -15,9 +15,8 @@ from typing import TypeGuard
 
 from msgspec import Struct
 
-from coursebuild.core.drawing.marks import markup_text as _text
-from coursebuild.core.drawing.marks import separate_labels
-from coursebuild.core.drawing.scales import Scale
+from coursebuild.core.drawing.scales import Scale, separate_labels
+from coursebuild.core.drawing.scales import markup_text as _text
 from coursebuild.features.lab.schema import Plot, TraceFields
 
 _WIDE, _NARROW, _HEIGHT = 480.0, 340.0, 210.0
