@@ -86,7 +86,7 @@ class Parser:
 
     def read_declarations(self, source: Source) -> Parsed[Declarations | None]:
         """Return what a file beside a model declares, and what is wrong in it."""
-        from coursebuild.core.syntax.scenarios import parse_declarations
+        from coursebuild.core.syntax.declarations import parse_declarations
 
         return parse_declarations(source)
 

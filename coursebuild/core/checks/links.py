@@ -336,7 +336,6 @@ _ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
 
 
 def _ids_of_kind(kind: str, targets: LinkTargets) -> Collection[str]:
-    """The ids of lessons, levels or pages."""
     return {"lesson": targets.lessons, "level": targets.levels, "page": targets.pages}[kind]
 
 

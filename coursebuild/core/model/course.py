@@ -35,7 +35,6 @@ class ThemeFile(Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        """Its content as text."""
         return self.data.decode("utf-8", "replace")
 
 
@@ -64,7 +63,6 @@ class Theme(Struct, frozen=True):
 
     @property
     def pictures(self) -> tuple[ThemeFile, ...]:
-        """Its logo and its icons."""
         fields = (getattr(self, name) for name in PICTURES)
         return tuple(file for file in fields if file is not None)
 
@@ -317,7 +315,6 @@ class Course(Struct, frozen=True):
 
     @property
     def callout_names(self) -> frozenset[str]:
-        """The names of all kinds of callouts."""
         return frozenset(kind.name for kind in self.callouts)
 
     @property

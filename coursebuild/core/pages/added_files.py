@@ -77,7 +77,6 @@ class ExportContext(Struct, frozen=True):
 
     @property
     def course(self) -> Course:
-        """The course."""
         return self.library.course
 
 

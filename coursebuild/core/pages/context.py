@@ -69,12 +69,10 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
 
     @property
     def words(self) -> Strings:
-        """The interface texts."""
         return self.renderer.words
 
     @property
     def direction(self) -> Literal["ltr", "rtl"]:
-        """The direction of the course's language."""
         return direction(self.words.language)
 
     def href(self, target: Target) -> str:

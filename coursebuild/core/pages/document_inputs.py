@@ -17,7 +17,6 @@ from coursebuild.core import model
 from coursebuild.core.model import Document, Lesson, Level, Owner, document_scripts
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.pages import meta, urls
-from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.formulas import equations_of
 from coursebuild.core.pages.graph import neighbourhood
 from coursebuild.core.pages.library import Library
@@ -29,6 +28,7 @@ from coursebuild.core.pages.page_inputs import (
     ShownVerdict,
 )
 from coursebuild.core.registry import code_links, kind_of_block, page_copies
+from coursebuild.core.text.characters import visible
 
 
 def document_inputs(

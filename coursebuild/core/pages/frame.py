@@ -19,12 +19,12 @@ from msgspec import Struct
 from coursebuild.core.features import PageKind, PagePart
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.renderer import Texts
 from coursebuild.core.pages.strings import Strings, direction
 from coursebuild.core.registry import features, page_copies, page_kind
+from coursebuild.core.text.characters import visible
 
 PAGE_WORDS = (
     "theme.label",

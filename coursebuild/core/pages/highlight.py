@@ -26,7 +26,7 @@ from pygments.token import Comment, Keyword, Literal, Name, Operator, String, To
 from pygments.util import ClassNotFound
 from tree_sitter import Language, Parser, Query, QueryCursor
 
-from coursebuild.core.pages.characters import visible
+from coursebuild.core.text.characters import visible
 
 _KEYWORDS = """
     and as assert async await break case class continue def del elif else except finally for from

@@ -1,7 +1,8 @@
-"""A course's own look in the files that all pages share.
+"""A course's own look in the files that all pages share, and drawings for dark pages.
 
 Entry points: `course_face`, a font of the course's own, and `measure_font`; `theme_faces`, all its
-fonts; `theme_style`, the end of the style sheet; `picture_size`.
+fonts; `theme_style`, the end of the style sheet; `picture_size`; `dark_drawing`, made from a light
+one; `dark_colours`, the dark colours that a style sheet pairs with light ones.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import functools
 import io
 import re
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, RECOMMENDED_CONTRAST, legible
@@ -31,7 +33,8 @@ def course_face(use: str, name: str, data: bytes) -> tuple[Face, bytes] | str:
 
     try:
         with TTFont(io.BytesIO(data), recalcTimestamp=False) as font:
-            measure, characters = measure_font(font), unicode_range("".join(map(chr, _codes(font))))
+            measure = measure_font(font)
+            characters = unicode_range("".join(map(chr, sorted(font.getBestCmap()))))
             italic = bool(font["OS/2"].fsSelection & 1 or font["post"].italicAngle)
             weight = _weights(font)
             font.flavor = None
@@ -42,10 +45,6 @@ def course_face(use: str, name: str, data: bytes) -> tuple[Face, bytes] | str:
     subset, style = "latin" if measure else "other", "italic" if italic else "normal"
     face = Face(COURSE[use], subset, name, style, weight, characters, characters, measure)
     return face, whole.getvalue()
-
-
-def _codes(font: TTFont) -> list[int]:
-    return sorted(font.getBestCmap())
 
 
 def _weights(font: TTFont) -> tuple[int, int]:
@@ -131,3 +130,49 @@ def picture_size(file: ThemeFile) -> tuple[float, float] | None:
     if len(numbers) < 2 or not 1e-6 < min(numbers) <= max(numbers) < 1e6:
         return None
     return numbers[0], numbers[1]
+
+
+_PAIR = re.compile(r"light-dark\((#[0-9a-f]{6}), ?(#[0-9a-f]{6})\)")
+_COLOUR = re.compile(
+    r"""(?<![\w-])(?P<name>fill|stroke|color|stop-color)(?P<is>\s*[:=]\s*"?)(?P<value>[^;"{}<>]+)"""
+)
+_ROOT = re.compile(r"<svg\b[^>]*>")
+
+
+def dark_colours(css: str) -> dict[str, str]:
+    """The dark colour for each light one that a style sheet pairs; the first pair counts."""
+    return dict(reversed(_PAIR.findall(css)))
+
+
+def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
+    """An SVG in the colours of a dark page.
+
+    A colour without a pair keeps its hue, but its lightness is inverted.
+    """
+
+    def dark(match: re.Match[str]) -> str:
+        return f"{match['name']}{match['is']}{_dark_colour(match['value'], paired_colours)}"
+
+    return _COLOUR.sub(dark, _ROOT.sub(_with_fill, svg, count=1))
+
+
+def _with_fill(root: re.Match[str]) -> str:
+    """The root element, with the default colour of shapes made explicit."""
+    return root[0] if " fill=" in root[0] else f'<svg fill="#000000"{root[0][4:]}'
+
+
+def _dark_colour(value: str, paired_colours: Mapping[str, str]) -> str:
+    from PIL import ImageColor
+
+    try:
+        red, green, blue = ImageColor.getrgb(value.strip())[:3]
+    except ValueError:  # `none`, a reference, or an unknown name
+        return value
+    light = f"#{red:02x}{green:02x}{blue:02x}"
+    return paired_colours.get(light) or _invert_lightness(red, green, blue)
+
+
+def _invert_lightness(*channels: int) -> str:
+    red, green, blue = channels
+    shift = round(255 - 2 * (0.2126 * red + 0.7152 * green + 0.0722 * blue))
+    return "#" + "".join(f"{min(max(channel + shift, 0), 255):02x}" for channel in channels)

@@ -270,14 +270,11 @@ def dependent_bindings(
     dependents: list[DependentBinding] = []
     for binding in (b for document in documents for b in document_bindings(document)):
         if any(_recording_key(candidate) == key for candidate in outputs.of_binding(binding)):
-            spans = _dependence_spans(binding, lines)
-            change = next((c for p in spans for c in changes if _overlaps(p, c.span)), None)
+            spans = [(span.start, span.end) for span in _dependence_spans(binding, lines)]
+            overlap = (c for a, b in spans for c in changes if a < c.span.end and c.span.start < b)
+            change = next(overlap, None)
             dependents += [] if change is None else [DependentBinding(binding, change)]
     return tuple(dependents)
-
-
-def _overlaps(a: Span, b: Span) -> bool:
-    return a.start < b.end and b.start < a.end
 
 
 def _dependence_spans(binding: NumberBinding, lines: Sequence[PrintedLine]) -> Iterator[Span]:

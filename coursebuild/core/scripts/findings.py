@@ -278,7 +278,6 @@ def classes(changes: Sequence[Change]) -> str:
 
 
 def _label(change: Change) -> str:
-    """The label at the place of a change."""
     match change.kind:
         case DriftKind.ROUNDING | DriftKind.NUMERIC:
             wording = closeness(change)

@@ -88,7 +88,9 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
     ]
     unusable = bool(diagnostics)
     diagnostics += _check_levels(root, decoding)
-    diagnostics += _check_prerequisites(lessons, _read_ids(nodes))
+    diagnostics += _check_prerequisites(
+        lessons, [name for node in nodes if (name := _read_id(node.get("id")))]
+    )
     if unusable or decoding.value is None:
         return Parsed(None, sort_diagnostics(diagnostics))
     course = _build_course(source, root, decoding.value, levels)
@@ -176,10 +178,6 @@ def _read_id(node: Node | None) -> str:
             return node.raw if isinstance(node.value, float) else str(node.value)
         case _:
             return ""
-
-
-def _read_ids(nodes: Iterable[ObjectNode]) -> list[str]:
-    return [name for node in nodes if (name := _read_id(node.get("id")))]
 
 
 # ---------------------------------------------------------------------------------------- checks

@@ -65,7 +65,6 @@ class Word(Struct, frozen=True):
 
     @property
     def value(self) -> str | None:
-        """The value as text."""
         return None if self.value_text is None else self.value_text.text
 
     @property
@@ -178,7 +177,11 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
             message = f"`{match[0]}` has no key before the `=`"
             diagnostics.append(diagnose("fence-info", info.span(at, end), message))
         else:
-            words.append(_build_word(info, match))
+            value = info.slice(*match.span(match.lastindex or 0)) if match[2] else None
+            if value is not None and match[3]:
+                value = _unescape(value)
+            key, span = info.span(*match.span(1)), info.span(*match.span())
+            words.append(Word(span, match[1], key, value))
         at = end
     return Parsed(tuple(words), tuple(diagnostics))
 
@@ -195,13 +198,6 @@ def _diagnose_malformed(info: Excerpt, at: int, end: int) -> tuple[Diagnostic, i
     message = f"`{text[at:word_end]}` cannot be read"
     help = 'write `key=value`, `key="value with spaces"` or a flag, with spaces between them'
     return diagnose("fence-info", info.span(at, word_end), message, help=help), word_end
-
-
-def _build_word(info: Excerpt, match: re.Match[str]) -> Word:
-    value = info.slice(*match.span(match.lastindex or 0)) if match[2] else None
-    if value is not None and match[3]:
-        value = _unescape(value)
-    return Word(info.span(*match.span()), match[1], info.span(*match.span(1)), value)
 
 
 def _unescape(value: Excerpt) -> Excerpt:

@@ -47,7 +47,7 @@ from coursebuild.core.syntax.attributes import (
 from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_parser import inline_tokens
-from coursebuild.core.syntax.links import (
+from coursebuild.core.syntax.mentions import (
     TextPiece,
     check_scheme,
     classify,

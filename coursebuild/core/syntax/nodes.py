@@ -45,7 +45,6 @@ class _PositionedNode(Struct, eq=False):
 
     @property
     def raw(self) -> str:
-        """The value as written."""
         return self.body.text[self.start : self.end]
 
 
@@ -94,7 +93,6 @@ class _Container(_PositionedNode, eq=False):
 
     @property
     def mark(self) -> Span:
-        """Its opening."""
         return self.body.span(*self.opening)
 
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 from coursebuild.core.syntax.json_text import to_one_line
 from coursebuild.core.syntax.nodes import ArrayNode, Member, Node, ObjectNode
-from coursebuild.core.text.cells import cells
+from coursebuild.core.text.characters import cells
 from coursebuild.core.text.source import Span
 
 GAP = re.compile(r"[ \t]*(?:\r\n|\r|\n)([ \t>]*)|[ \t]+")

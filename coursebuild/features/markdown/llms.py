@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import escape_line, link
+from coursebuild.core.text.characters import visible
 
 PATH = "llms.txt"
 
