@@ -40,7 +40,7 @@ from coursebuild.core.model.vocabulary import CALLOUTS, ENGLISH, Words
 from coursebuild.core.pages.assets import words_for
 from coursebuild.core.registry import read_references
 from coursebuild.core.run.script_environment import Interpreter, course_environment, engine_version
-from coursebuild.core.scripts.source_parts import check_source_parts, shown_files
+from coursebuild.core.scripts.edit import check_source_parts, shown_files
 from coursebuild.core.text.conflicts import find_conflict
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source, Span

@@ -34,8 +34,8 @@ from coursebuild.core.pages.renderer import TemplateFailure
 from coursebuild.core.registry import publish_trials
 from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.core.scripts.compare import verify as compare
+from coursebuild.core.scripts.edit import shown_files
 from coursebuild.core.scripts.extract import extract, jobs
-from coursebuild.core.scripts.source_parts import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.pipeline.documents import Documents
 from coursebuild.pipeline.load import MAP, Code, load
