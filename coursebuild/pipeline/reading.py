@@ -86,7 +86,7 @@ class DocumentSummary(Struct, frozen=True):
     """What is known of a document beyond its own page, and what is wrong in it."""
 
     document: Document
-    """Without its prose; see `model.summary`. What features note of it is in `notes`."""
+    """Without its prose; see `without_prose`. What features note of it is in `notes`."""
     diagnostics: tuple[Diagnostic, ...]
     """With those of its formulas."""
     imports: tuple[tuple[str, tuple[str, ...]], ...]

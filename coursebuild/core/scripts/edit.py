@@ -18,7 +18,8 @@ refused: which line it was meant to show cannot be known.
 
 `check_source_parts`: code that lessons show from the project's files is what these hold, or gets
 the edit that makes it so; `shown_files` are these files. A part is a function, a class or a method,
-with its decorators, or the whole file. Indentation and white space at the ends of lines do not count.
+with its decorators, or the whole file. Indentation and white space at the ends of lines do not
+count.
 """
 
 from __future__ import annotations

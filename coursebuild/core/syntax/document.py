@@ -190,7 +190,7 @@ def _is_reported(first: AnchorOwner, second: AnchorOwner) -> bool:
     if isinstance(first, FeatureBlock) and isinstance(second, FeatureBlock):
         keys, other_keys = first.progress_keys(), second.progress_keys()
         return keys is not None and other_keys is not None and keys[0] == other_keys[0]
-    labelled_types = Heading | DisplayFormula  # see `headings.Anchors`
+    labelled_types = Heading | DisplayFormula  # see `attributes.Anchors`
     return (isinstance(first, labelled_types) and isinstance(second, labelled_types)) or (
         isinstance(first, Script | Term) and type(first) is type(second)
     )
