@@ -28,7 +28,7 @@ from coursebuild.core.engine.memo import Memo
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Formula, MathError, Reports, Results
-from coursebuild.core.model.summary import without_prose
+from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages import folding
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.draw import draw

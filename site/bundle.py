@@ -60,10 +60,10 @@ _PREPARING = (
     "site/prepare_sbom.py",
     "site/prepare_templates.py",
     "coursebuild/core/pages/assets.py",
-    "coursebuild/core/pages/compressed.py",
-    "coursebuild/core/pages/font_files.py",
+    "coursebuild/core/pages/added_files.py",
+    "coursebuild/core/pages/theme.py",
     "coursebuild/core/pages/fonts.py",
-    "coursebuild/core/pages/templates.py",
+    "coursebuild/core/pages/renderer.py",
     "templates/icon.svg",
 )
 """Files that decide what prepared files hold."""

@@ -24,7 +24,7 @@ from fontTools.ttLib import TTFont
 from fontTools.varLib import instancer
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from coursebuild.core.pages import font_files, fonts
+from coursebuild.core.pages import fonts, theme
 
 WEIGHTS = {fonts.TEXT: (400, 700), fonts.CODE: (400, 700)}
 """The weights that the style sheet uses."""
@@ -91,7 +91,7 @@ def prepare(folder: Path, cuts: Path) -> None:
         data = source.read_bytes()
         source.unlink()
         with TTFont(io.BytesIO(data)) as whole:
-            face["measure"] = font_files.measure_font(whole)
+            face["measure"] = theme.measure_font(whole)
         weights = WEIGHTS.get(face["family"])
         face["weight"] = weights or face["weight"]
         with prepare_font(data, weights) as font:
@@ -113,7 +113,7 @@ def hash_sources(bundle: Path) -> str:
     """A hash of the fonts and of the modules that cut them."""
     digest = hashlib.sha256()
     for path in (
-        *map(Path, (__file__, fonts.__file__, font_files.__file__)),
+        *map(Path, (__file__, fonts.__file__, theme.__file__)),
         *sorted((bundle / "fonts").iterdir()),
     ):
         digest.update(f"{path.name}\0".encode() + path.read_bytes())

@@ -2,7 +2,7 @@
 
     python site/prepare_templates.py FOLDER
 
-`site/bundle.py` calls it with the bundle that it makes; `core/pages/templates.py` loads them.
+`site/bundle.py` calls it with the bundle that it makes; `core/pages/renderer.py` loads them.
 """
 
 import sys
@@ -10,7 +10,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from coursebuild.core.files.resources import template_texts
-from coursebuild.core.pages.templates import compile_templates
+from coursebuild.core.pages.renderer import compile_templates
 
 
 def main(bundle: Path) -> None:

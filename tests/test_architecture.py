@@ -1,4 +1,4 @@
-"""The imports of the packages form the DAG that DESIGN names, and the start-up path stays light."""
+"""Imports form the DAG of docs/explanation/architecture.md, and the start-up path stays light."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ from coursebuild.core.run.packages import (
     prepare_environment,
 )
 from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
-from coursebuild.core.scripts.against import (
+from coursebuild.core.scripts.compare import (
     RunStanding,
     judge,
     judge_comparability,

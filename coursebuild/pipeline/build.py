@@ -29,7 +29,7 @@ from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import page_list
-from coursebuild.core.pages.templates import TemplateFailure
+from coursebuild.core.pages.renderer import TemplateFailure
 from coursebuild.core.registry import find_exporter
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.check import read_and_verify

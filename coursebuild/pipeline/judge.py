@@ -16,7 +16,7 @@ from coursebuild.core.model import Course, Script, Silence, document_scripts
 from coursebuild.core.model.results import Results, TrialLine
 from coursebuild.core.run.dependencies import sought_files
 from coursebuild.core.run.script_environment import Interpreter
-from coursebuild.core.scripts.source_parts import shown_files
+from coursebuild.core.scripts.edit import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnostics
 from coursebuild.report import Report, ScriptLine, Summary
 from coursebuild.report.values import unproven_things

@@ -35,12 +35,12 @@ from coursebuild.core.model import (
     document_inlines,
     local_file,
 )
-from coursebuild.core.model.theme import TEMPLATES, Theme
+from coursebuild.core.model.course import TEMPLATES, Theme
 from coursebuild.core.model.vocabulary import CALLOUTS, ENGLISH, Words
 from coursebuild.core.pages.assets import words_for
 from coursebuild.core.registry import read_references
 from coursebuild.core.run.script_environment import Interpreter, course_environment, engine_version
-from coursebuild.core.scripts.source_parts import check_source_parts, shown_files
+from coursebuild.core.scripts.edit import check_source_parts, shown_files
 from coursebuild.core.text.conflicts import find_conflict
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source, Span
@@ -124,8 +124,8 @@ class _Loader:
             return
         from coursebuild.core.checks.course import check_course
         from coursebuild.core.syntax.coursemap import parse_course_map
+        from coursebuild.core.syntax.declarations import parse_declarations
         from coursebuild.core.syntax.document import parse_document
-        from coursebuild.core.syntax.scenarios import parse_declarations
 
         self._read_map, self._read_declarations = parse_course_map, parse_declarations
         self._check = check_course

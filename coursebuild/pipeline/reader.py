@@ -34,14 +34,13 @@ from coursebuild.core.engine.tool import step_key, typesetter_digest
 from coursebuild.core.files.resources import prepared_folder, template_texts
 from coursebuild.core.model import Course, Declarations, Document, document_scripts
 from coursebuild.core.model.results import Formula, MathError
-from coursebuild.core.model.summary import without_prose
 from coursebuild.core.model.vocabulary import Words
+from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.equations import equations_of
 from coursebuild.core.pages.folding import find_imports
+from coursebuild.core.pages.formulas import equations_of
 from coursebuild.core.pages.record import PageRecord, record
-from coursebuild.core.pages.renderer import Renderer, known_mathml
-from coursebuild.core.pages.templates import Texts
+from coursebuild.core.pages.renderer import Renderer, Texts, known_mathml
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import summarize
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
@@ -175,7 +174,7 @@ class Reader:
 
     def read_declarations(self, source: Source) -> Parsed[Declarations | None]:
         """Return what a file beside a model declares, and what is wrong in it."""
-        from coursebuild.core.syntax.scenarios import parse_declarations
+        from coursebuild.core.syntax.declarations import parse_declarations
 
         return self._get_or_parse(_DECLARATIONS, Declarations, source, parse_declarations)
 
@@ -399,8 +398,8 @@ _HEAVY = (
     "coursebuild.core.run.v8",
     "coursebuild.core.pages.draw",
     "coursebuild.core.pages.highlight",
-    "coursebuild.core.pages.lesson",
-    "coursebuild.core.pages.pages",
+    "coursebuild.core.pages.document_inputs",
+    "coursebuild.core.pages.page_list",
     "coursebuild.core.syntax.document",
 )
 

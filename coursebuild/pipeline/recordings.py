@@ -28,7 +28,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Course
-from coursebuild.core.model.figures import RecordedFigure, recorded_figures
+from coursebuild.core.model.addresses import RecordedFigure, recorded_figures
 from coursebuild.core.model.results import Machine, Outcome, ScriptRun
 from coursebuild.core.run.dependencies import (
     Dependency,

@@ -32,7 +32,7 @@ from coursebuild.core.model.results import Reports, Results
 from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.pages.page_inputs import PageHead, PageInputs
 from coursebuild.core.pages.record import PageRecord
-from coursebuild.core.pages.templates import Texts
+from coursebuild.core.pages.renderer import Texts
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.values import decode, encode, fingerprint

@@ -29,7 +29,7 @@ from coursebuild.core.model import Declarations, Limits, MjcfModel
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.run.mjcf import compile_all, model_files, readable_error
 from coursebuild.core.syntax.coursemap import parse_course_map
-from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
     Parsed,

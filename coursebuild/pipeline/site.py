@@ -39,9 +39,8 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, SiteFile
 from coursebuild.core.pages import meta, urls
-from coursebuild.core.pages.added_files import NotedPage, SiteContext, added_files
+from coursebuild.core.pages.added_files import NotedPage, SiteContext, added_files, compressed_files
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
-from coursebuild.core.pages.compressed import compressed_files
 from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame, parts_by_mark
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.links import Reference, has_anchor

@@ -21,10 +21,9 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes, read_folder
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Course
-from coursebuild.core.model.theme import PICTURES, TEMPLATES, Theme, ThemeFile
-from coursebuild.core.pages.font_files import course_face
-from coursebuild.core.pages.templates import TemplateFailure, find_template_error
-from coursebuild.core.pages.theme import picture_size
+from coursebuild.core.model.course import PICTURES, TEMPLATES, Theme, ThemeFile
+from coursebuild.core.pages.renderer import TemplateFailure, find_template_error
+from coursebuild.core.pages.theme import course_face, picture_size
 from coursebuild.core.scripts.figures import prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Source

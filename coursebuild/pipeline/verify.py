@@ -37,11 +37,11 @@ from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.core.scripts.bindings import BindingEvidence, document_bindings
+from coursebuild.core.scripts.compare import repeat_findings
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
-from coursebuild.core.scripts.repeat import repeat_findings
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress

@@ -31,7 +31,7 @@ from coursebuild.core.model import (
     find_blocks,
     output_numbers,
 )
-from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import ScriptRun, Verdict
 from coursebuild.core.pages.library import Library
 from coursebuild.core.scripts.bindings import document_bindings

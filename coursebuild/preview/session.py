@@ -29,9 +29,9 @@ from coursebuild.core.model.results import Reports, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.templates import TemplateFailure
+from coursebuild.core.pages.renderer import TemplateFailure
 from coursebuild.core.registry import publish_trials
-from coursebuild.core.scripts.source_parts import shown_files
+from coursebuild.core.scripts.edit import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.pipeline.load import MAP, Code, load
 from coursebuild.pipeline.options import Options

@@ -10,10 +10,10 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from coursebuild.core.model.results import TrialLine
 from coursebuild.core.model.sensitivity import Sensitivity
+from coursebuild.core.text.characters import clean_xml
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.rules import HELP, RULES
 from coursebuild.core.text.source import Span
-from coursebuild.core.text.xml import clean_xml
 from coursebuild.report.text import Style as Style
 from coursebuild.report.text import diagnostic_text as diagnostic_text
 from coursebuild.report.text import location, to_text

@@ -18,8 +18,8 @@ from coursebuild.core.model import Course, Document, Filter
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
 from coursebuild.report.text import Style, diagnostic_text

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.drawing.marks import markup_text, separate_labels
-from coursebuild.core.drawing.scales import log_ticks
+from coursebuild.core.drawing.scales import log_ticks, markup_text, separate_labels
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from coursebuild.core.drawing.marks import text_width
+from coursebuild.core.drawing.scales import text_width
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.report_plots import plot_svg, work_precision
 from coursebuild.numerics.reports.scene_report import ScenarioReport

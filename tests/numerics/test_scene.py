@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model.scenarios import is_multiple
-from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.scene import Scene, SceneError, scenes
 from support.surveys import NO_DECLARATIONS, parse_declared

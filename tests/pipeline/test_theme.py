@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, GROUNDS_LIGHT, contrast, legible
-from coursebuild.core.model.theme import Theme
+from coursebuild.core.model.course import Theme
 from coursebuild.core.pages.theme import accents
 from support.archives import epub_messages
 from support.live_course import Live

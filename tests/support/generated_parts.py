@@ -19,7 +19,7 @@ from itertools import chain
 from typing import Any
 
 from coursebuild.cli.commands import known_commands, parser_of
-from coursebuild.core.syntax.headings import slug
+from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.syntax.schemas import json_schema
 
 _PART = re.compile(r"(<!-- generated: ([^>\n]+) -->\n).*?(<!-- end -->)", re.DOTALL)

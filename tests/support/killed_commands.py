@@ -44,8 +44,8 @@ READY = (
     "coursebuild.pipeline.update",
     "coursebuild.core.syntax.document",
     "coursebuild.core.pages.draw",
-    "coursebuild.core.pages.lesson",
-    "coursebuild.core.pages.pages",
+    "coursebuild.core.pages.document_inputs",
+    "coursebuild.core.pages.page_list",
     "coursebuild.features.authoring.commands.rename",
 )
 """Modules that are imported once, before children are forked."""

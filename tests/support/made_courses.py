@@ -14,8 +14,8 @@ from coursebuild.core.model import Course, Document, MjcfModel
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.syntax.scenarios import parse_declarations
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
 

@@ -16,7 +16,7 @@ from typing import Any, Self
 from playwright.sync_api import Browser, Dialog, Error, Request
 
 from coursebuild.core.drawing.safe_svg import read_svg
-from coursebuild.core.pages.dark import dark_drawing
+from coursebuild.core.pages.theme import dark_drawing
 from coursebuild.core.scripts.figures import prepare_figure
 from support.static_host import Host
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import mujoco
 
 from coursebuild.core.model.scenarios import Declarations, Keep
-from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.costs import Clock
 from coursebuild.numerics.pruning.comparison import pruning_scenes

@@ -50,7 +50,7 @@ from coursebuild.core.model import (
     resolve,
     walk_inlines,
 )
-from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Span
 
@@ -336,7 +336,6 @@ _ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
 
 
 def _ids_of_kind(kind: str, targets: LinkTargets) -> Collection[str]:
-    """The ids of lessons, levels or pages."""
     return {"lesson": targets.lessons, "level": targets.levels, "page": targets.pages}[kind]
 
 

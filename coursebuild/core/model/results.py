@@ -400,7 +400,6 @@ class Machine(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def hardware(self) -> str:
-        """System and processor, in words."""
         parts = [self.system, self.cpu]
         if self.processors:
             many = f"{self.processors} processor{'s' if self.processors > 1 else ''}"

@@ -89,5 +89,4 @@ class Sensitivity(Struct, frozen=True):
 
     @property
     def chaotic(self) -> bool:
-        """Whether a simulation in it is chaotic."""
         return self.amplification is not None and self.amplification > CHAOTIC

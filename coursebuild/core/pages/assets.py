@@ -21,9 +21,8 @@ from msgspec import Struct
 
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.vocabulary import ENGLISH, Words
-from coursebuild.core.pages.renderer import Renderer
+from coursebuild.core.pages.renderer import Renderer, Texts, templates_of
 from coursebuild.core.pages.strings import DEFAULT_LANGUAGE, Strings, parse_strings
-from coursebuild.core.pages.templates import Texts, templates_of
 from coursebuild.core.registry import features
 
 SCRIPTS = {

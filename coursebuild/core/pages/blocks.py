@@ -32,14 +32,14 @@ from coursebuild.core.model import (
     output_anchor,
     output_numbers,
 )
-from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.folding import Part, fold
 from coursebuild.core.pages.highlight import highlight_lines
 from coursebuild.core.pages.page_inputs import ShownRun
 from coursebuild.core.pages.strings import Strings
+from coursebuild.core.text.characters import visible
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext

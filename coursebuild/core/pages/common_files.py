@@ -17,8 +17,8 @@ from html import unescape
 
 from msgspec import Struct
 
+from coursebuild.core.model.course import Theme, ThemeFile
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
-from coursebuild.core.model.theme import Theme, ThemeFile
 from coursebuild.core.pages import fonts, styles
 from coursebuild.core.pages.assets import SCRIPTS, Assets, hashed_name, page_script
 from coursebuild.core.pages.formulas import FORMULA

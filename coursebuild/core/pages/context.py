@@ -36,14 +36,13 @@ from coursebuild.core.model import (
     sibling_groups,
 )
 from coursebuild.core.pages import blocks, formulas, urls
-from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.document_inputs import file_address
-from coursebuild.core.pages.equations import number_equations
+from coursebuild.core.pages.formulas import number_equations
 from coursebuild.core.pages.links import ids_and_addresses
 from coursebuild.core.pages.markup import HtmlWriter, SpecialBlock
 from coursebuild.core.pages.page_inputs import DocumentInputs
 from coursebuild.core.pages.renderer import Renderer
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.strings import Strings, direction
 from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.source import Span
 
@@ -70,12 +69,10 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
 
     @property
     def words(self) -> Strings:
-        """The interface texts."""
         return self.renderer.words
 
     @property
     def direction(self) -> Literal["ltr", "rtl"]:
-        """The direction of the course's language."""
         return direction(self.words.language)
 
     def href(self, target: Target) -> str:

@@ -1,16 +1,32 @@
 """Drawing a page: its inputs and its document through the templates.
 
-Entry point: `draw(inputs, document, renderer)`.
+Entry points: `draw(inputs, document, renderer)`; `article`, the text of a document on its page.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from markupsafe import Markup
+from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model import Document, Paragraph, plain_text
+from coursebuild.core.model import (
+    Block,
+    Document,
+    FeatureBlock,
+    Heading,
+    HtmlBlock,
+    Mjcf,
+    Paragraph,
+    Recording,
+    Script,
+    Table,
+    main_and_further,
+    plain_text,
+    without_links,
+)
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.article import article, contents
 from coursebuild.core.pages.blocks import numbered_lines
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.graph import drawings
@@ -23,7 +39,101 @@ from coursebuild.core.pages.page_inputs import (
     PageInputs,
 )
 from coursebuild.core.pages.renderer import Renderer
-from coursebuild.core.registry import model_parts, page_kind
+from coursebuild.core.registry import kind_of_block, model_parts, page_kind
+
+
+class ContentsEntry(Struct, frozen=True):
+    """An entry of the table of contents."""
+
+    anchor: str
+    title: Markup
+    further: bool = False
+    children: tuple[ContentsEntry, ...] = ()
+
+
+def article(page: PageContext, document: Document) -> Markup:
+    """The text of a document. A docked block is placed beside the paragraphs around it.
+
+    A section that goes further is folded under its heading.
+    """
+    parts: list[Markup] = []
+    for further, blocks in main_and_further(document.blocks):
+        heading = page.blocks(blocks[:1]) if further else None
+        text = Markup("\n").join(_text(page, blocks[1:] if further else blocks))
+        parts.append(
+            page.template("partials/further.html", heading=heading, text=text) if further else text
+        )
+    return Markup("\n").join((*parts, page.footnotes()))
+
+
+def _text(page: PageContext, blocks: tuple[Block, ...]) -> Iterator[Markup]:
+    for group in _groups(blocks):
+        if group.docked is None:
+            yield page.blocks(group.before)
+        else:
+            before, after = page.blocks(group.before), page.blocks(group.after)
+            docked = page.block(group.docked)
+            yield page.template("partials/dock.html", before=before, docked=docked, after=after)
+
+
+class _Group(Struct, frozen=True):
+    """Consecutive blocks; with a docked one, those before and after it."""
+
+    before: tuple[Block, ...]
+    docked: FeatureBlock | None = None
+    after: tuple[Block, ...] = ()
+
+
+_WIDE = (Script, Recording, Mjcf, Table, HtmlBlock)
+
+
+def _is_wide(block: Block) -> bool:
+    """Whether a block takes the whole width, so that nothing can be beside it."""
+    if isinstance(block, FeatureBlock):
+        return kind_of_block(block).wide
+    return isinstance(block, _WIDE)
+
+
+def _docked(block: Block) -> FeatureBlock | None:
+    return block if isinstance(block, FeatureBlock) and block.is_docked() else None
+
+
+def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
+    """Group the blocks of a text around its docked blocks.
+
+    Each of those takes the blocks up to the next heading or wide block on both sides.
+    """
+    groups: list[_Group] = []
+    rest = blocks
+    while (at := next((i for i, b in enumerate(rest) if _docked(b)), None)) is not None:
+        docked = _docked(rest[at])
+        start, end = at, at + 1
+        while start and not _is_wide(rest[start - 1]):
+            start -= 1
+            if isinstance(rest[start], Heading):
+                break
+        while end < len(rest) and not (_is_wide(rest[end]) or isinstance(rest[end], Heading)):
+            end += 1
+        if start:
+            groups.append(_Group(rest[:start]))
+        groups.append(_Group(rest[start:at], docked, rest[at + 1 : end]))
+        rest = rest[end:]
+    return (*groups, _Group(rest)) if rest else tuple(groups)
+
+
+def contents(page: PageContext, document: Document) -> tuple[ContentsEntry, ...]:
+    """The table of contents: headings of level 2, with those of level 3 below them."""
+    entries: list[ContentsEntry] = []
+    for block in document.blocks:
+        if not isinstance(block, Heading) or block.level > 3:
+            continue
+        title = page.inlines(without_links(block.children))
+        entry = ContentsEntry(block.anchor, title, block.goes_further)
+        if block.level == 3 and entries:
+            entries[-1] = replace(entries[-1], children=(*entries[-1].children, entry))
+        else:
+            entries.append(entry)
+    return tuple(entries)
 
 
 def draw(

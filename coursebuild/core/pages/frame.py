@@ -16,16 +16,15 @@ from collections.abc import Collection, Iterable
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import PagePart
+from coursebuild.core.features import PageKind, PagePart
 from coursebuild.core.pages import meta, urls
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.characters import visible
-from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageHead
-from coursebuild.core.pages.page_list import page_title
-from coursebuild.core.pages.templates import Texts
+from coursebuild.core.pages.renderer import Texts
+from coursebuild.core.pages.strings import direction
 from coursebuild.core.registry import features, page_copies, page_kind
+from coursebuild.core.text.characters import visible
 
 PAGE_WORDS = (
     "theme.label",
@@ -106,6 +105,12 @@ class NavLink(Struct, frozen=True):
 def place_of(base_url: str, path: str) -> urls.Place:
     """The place of a page: the page for missing addresses is served at any depth."""
     return urls.Place(path, urls.base_path(base_url) if path == urls.NOT_FOUND else None)
+
+
+def page_title(library: Library, kind: PageKind) -> str:
+    """The title of a page that a feature adds."""
+    key = f"{kind.name}.title"
+    return library.words(key) if library.words.has(key) else kind.name.capitalize()
 
 
 def parts_by_mark() -> dict[str, PagePart]:

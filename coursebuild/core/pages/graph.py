@@ -17,7 +17,7 @@ from markupsafe import Markup, escape
 from msgspec import Struct
 
 from coursebuild.core.drawing.layered import Layout, layered_layout, transitive_reduction
-from coursebuild.core.drawing.marks import markup_text, shorten_to_width, text_width
+from coursebuild.core.drawing.scales import markup_text, shorten_to_width, text_width
 from coursebuild.core.model import Lesson, Level
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library

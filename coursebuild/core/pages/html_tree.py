@@ -17,7 +17,7 @@ from typing import TypeAlias
 from msgspec import Struct, field
 from selectolax.lexbor import LexborHTMLParser, LexborNode
 
-from coursebuild.core.text.xml import clean_xml
+from coursebuild.core.text.characters import clean_xml
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
 """Elements without content and end tag."""
@@ -43,7 +43,6 @@ class HtmlElement(Struct):
 
     @property
     def classes(self) -> frozenset[str]:
-        """Its classes."""
         return frozenset(self.attributes.get("class", "").split())
 
     @property
@@ -53,7 +52,6 @@ class HtmlElement(Struct):
 
     @property
     def text(self) -> str:
-        """All text in it."""
         return "".join(child if isinstance(child, str) else child.text for child in self.children)
 
     def nearest(self, *names: str) -> Iterator[HtmlElement]:

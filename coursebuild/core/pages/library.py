@@ -90,12 +90,10 @@ class Library(Struct, frozen=True, dict=True):
 
     @cached_property
     def levels(self) -> Mapping[str, Level]:
-        """By id."""
         return {level.id: level for level in self.course.levels}
 
     @cached_property
     def pages(self) -> Mapping[str, Page]:
-        """By id."""
         return {page.id: page for page in self.course.pages}
 
     @property
@@ -221,12 +219,10 @@ class Library(Struct, frozen=True, dict=True):
 
     @cached_property
     def words(self) -> Strings:
-        """The interface texts."""
         return strings_for(self.assets.templates, self.course.language)
 
     @cached_property
     def renderer(self) -> Renderer:
-        """The renderer of pages."""
         course, formulas = self.course, dict(self.results.formulas)
         return self.assets.renderer(course.language, course.theme.template_texts, formulas)
 

@@ -16,9 +16,9 @@ from markupsafe import Markup
 
 from coursebuild.core.model import Course, Lesson
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageHead
+from coursebuild.core.text.characters import visible
 
 Json: TypeAlias = "str | int | list[Json] | dict[str, Json]"
 

@@ -1,6 +1,7 @@
-"""The list of all pages of a site, in order.
+"""The list of all pages of a site, in order, and the inputs of those that are no lesson.
 
-Entry point: `page_list(library)`.
+Entry points: `page_list(library)`; `home_inputs`, `level_inputs`, `model_inputs`, `page_inputs`,
+`not_found_inputs`.
 
 An entry works with any library of the same course: edits change documents, but the pages stay the
 same as long as the course map does.
@@ -8,16 +9,40 @@ same as long as the course map does.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
-from coursebuild.core.features import PageKind
-from coursebuild.core.model import Document, FeatureBlock, document_blocks
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import PageHead, PageInputs
-from coursebuild.core.registry import kind_of_block, page_kind
+from coursebuild.core.features import ModelPart, PageKind
+from coursebuild.core.model import (
+    Document,
+    FeatureBlock,
+    Lesson,
+    Level,
+    MjcfModel,
+    Owner,
+    Page,
+    document_blocks,
+    find_blocks,
+    listing_anchor,
+)
+from coursebuild.core.model.results import ModelFacts
+from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages.document_inputs import (
+    LessonLink,
+    document_inputs,
+    edit_address,
+    lesson_inputs,
+    lesson_link,
+    level_view,
+    stub_inputs,
+)
+from coursebuild.core.pages.frame import page_title, place_of
+from coursebuild.core.pages.graph import level_graph
+from coursebuild.core.pages.library import Library, ModelUse
+from coursebuild.core.pages.page_inputs import AddedParts, HighlightedFile, PageHead, PageInputs
+from coursebuild.core.pages.quantities import number
+from coursebuild.core.registry import kind_of_block, model_parts, page_kind
 
 
 class PageEntry(Struct, frozen=True):
@@ -76,12 +101,6 @@ def page_list(library: Library) -> Iterator[PageEntry]:
     yield PageEntry(urls.NOT_FOUND, "notfound")
 
 
-def page_title(library: Library, kind: PageKind) -> str:
-    """The title of a page that a feature adds."""
-    key = f"{kind.name}.title"
-    return library.words(key) if library.words.has(key) else kind.name.capitalize()
-
-
 def _added_inputs(kind: PageKind, library: Library) -> PageInputs:
     key = f"{kind.name}.description"
     description = library.words(key) if library.words.has(key) else ""
@@ -93,27 +112,268 @@ def _added_inputs(kind: PageKind, library: Library) -> PageInputs:
 
 
 def _course_inputs(entry: PageEntry, library: Library) -> PageInputs:
-    # Imported only if there are inputs to make: after an edit these are few.
-    from coursebuild.core.pages import lesson, pages
-
     match entry.kind:
         case "home":
-            return pages.home_inputs(library, entry.document(library))
+            return home_inputs(library, entry.document(library))
         case "level":
-            return pages.level_inputs(library, library.levels[entry.id])
+            return level_inputs(library, library.levels[entry.id])
         case "lesson":
             entry_lesson = library.lessons[entry.id]
             if entry_lesson.document is None:
-                return lesson.stub_inputs(library, entry_lesson)
-            return lesson.lesson_inputs(library, entry_lesson, entry_lesson.document)
+                return stub_inputs(library, entry_lesson)
+            return lesson_inputs(library, entry_lesson, entry_lesson.document)
         case "models":
-            return pages.gallery_inputs(library)
+            return gallery_inputs(library)
         case "model":
             model = next(model for model in library.course.models if model.name == entry.id)
-            return pages.model_inputs(library, model)
+            return model_inputs(library, model)
         case "page":
             page = library.pages[entry.id]
             assert page.document is not None, "a page without a document is not in the list"
-            return pages.page_inputs(library, page, page.document)
+            return page_inputs(library, page, page.document)
         case _:
-            return pages.not_found_inputs(library)
+            return not_found_inputs(library)
+
+
+class NamedLink(Struct, frozen=True):
+    """A link with its text and a remark."""
+
+    href: str
+    text: str
+    remark: str = ""
+
+
+class PictureLink(Struct, frozen=True):
+    """A picture of a block, with a link to the block."""
+
+    src: str
+    width: int
+    height: int
+    title: str
+    href: str
+
+
+class LessonCard(Struct, frozen=True):
+    """A written lesson as a card."""
+
+    link: LessonLink
+    level: str
+    picture: PictureLink | None
+
+
+class Gallery(Struct, frozen=True):
+    """A page with several pictures."""
+
+    title: str
+    href: str
+    pictures: tuple[PictureLink, ...]
+
+
+class ModelCard(Struct, frozen=True):
+    """A model in the gallery."""
+
+    name: str
+    description: str
+    href: str
+    picture: PictureLink | None
+    lessons: tuple[LessonLink, ...]
+    """The lessons that use it."""
+
+
+def home_inputs(library: Library, document: Document | None) -> PageInputs:
+    """The inputs of the home page: what can be read, and the whole plan.
+
+    The document of the page `home` opens it, if there is one; its summary is enough.
+    """
+    course = library.course
+    place = urls.Place(urls.HOME)
+    written_lessons = [lesson for lesson in library.order if lesson.document is not None]
+    values = {
+        "title": course.title,
+        "summary": course.summary,
+        "cards": _lesson_cards(library, place),
+        "galleries": _list_galleries(library, place),
+        "levels": tuple(level_view(library, place, level, whole=True) for level in course.levels),
+        "start": lesson_link(library, place, written_lessons[0]) if written_lessons else None,
+        "total": len(library.order),
+        "written": len(written_lessons),
+        "models": len(course.models),
+        "gallery": place.href(library.gallery) if library.gallery else "",
+        "numerics": place.href(urls.NUMERICS) if library.reports.cases else "",
+        "article": "",  # without a document
+        "scripts": len(library.scripts),
+        "scripts_zip": place.href(urls.EXAMPLES_ZIP) if library.scripts else None,
+    }
+    head = PageHead(urls.HOME, "home", course.title, course.summary, meta.course_data(library))
+    inputs = None if document is None else document_inputs(library, place, document)
+    return PageInputs(head, "home.html", values, inputs)
+
+
+def _pictures_of(library: Library, place: urls.Place, owner: Owner) -> tuple[PictureLink, ...]:
+    """The pictures of a document's blocks in order, with addresses relative to a place."""
+    links = []
+    for block in find_blocks(owner.document, FeatureBlock) if owner.document is not None else ():
+        picture = kind_of_block(block).picture(block, library.trial_value(block))
+        if picture is not None:
+            src = place.href(picture.path)
+            href = place.href(urls.owner_path(owner), picture.anchor)
+            links.append(PictureLink(src, picture.width, picture.height, picture.title, href))
+    return tuple(links)
+
+
+def _lesson_cards(library: Library, place: urls.Place) -> tuple[LessonCard, ...]:
+    """The cards of the written lessons, in the order of the course."""
+    return tuple(
+        _lesson_card(library, place, lesson)
+        for lesson in library.order
+        if lesson.document is not None
+    )
+
+
+def _lesson_card(library: Library, place: urls.Place, lesson: Lesson) -> LessonCard:
+    pictures = _pictures_of(library, place, lesson)
+    link = lesson_link(library, place, lesson, whole=True)
+    level = library.levels[lesson.level].title
+    return LessonCard(link, level, pictures[0] if pictures else None)
+
+
+def _list_galleries(library: Library, place: urls.Place) -> tuple[Gallery, ...]:
+    """The pages in the menu that have more than one picture."""
+    galleries = []
+    for page in library.menu:
+        pictures = _pictures_of(library, place, page)
+        if len(pictures) > 1:
+            galleries.append(Gallery(page.title, place.href(urls.page_path(page)), pictures))
+    return tuple(galleries)
+
+
+def level_inputs(library: Library, level: Level) -> PageInputs:
+    """The inputs of the page of a level."""
+    place = urls.Place(urls.level_path(level))
+    levels = library.course.levels
+    position = next(i for i, candidate in enumerate(levels) if candidate.id == level.id)
+    values = {
+        "home": place.href(urls.HOME),
+        "level": level_view(library, place, level, whole=True),
+        "graph": level_graph(library, place, level),
+        "previous": _level_link(library, place, levels[position - 1]) if position else None,
+        "following": _level_link(library, place, levels[position + 1])
+        if position + 1 < len(levels)
+        else None,
+    }
+    title = f"{library.words('level.label', id=level.id)}: {level.title}"
+    head = PageHead(place.path, "level", title, level.summary)
+    return PageInputs(head, "level.html", values)
+
+
+def _level_link(library: Library, place: urls.Place, level: Level) -> NamedLink:
+    label = library.words("level.label", id=level.id)
+    return NamedLink(place.href(urls.level_path(level)), level.title, label)
+
+
+def gallery_inputs(library: Library) -> PageInputs:
+    """The inputs of the page of all models."""
+    place = urls.Place(library.gallery)
+    values = {
+        "home": place.href(urls.HOME),
+        "models": tuple(_model_card(library, place, model) for model in library.course.models),
+    }
+    head = PageHead(place.path, "models", library.words("models.title"), "")
+    return PageInputs(head, "models.html", values)
+
+
+def _model_card(library: Library, place: urls.Place, model: MjcfModel) -> ModelCard:
+    href = place.href(urls.model_page_path(model.name))
+    pictures = (part.picture(library, model) for part in model_parts().values())
+    view = next(filter(None, pictures), None)
+    picture = None
+    if view is not None:
+        src = place.href(view.path)
+        picture = PictureLink(src, view.width, view.height, model.name, href)
+    owners = [use.owner for use in library.uses[model.name]]
+    lessons = tuple(
+        lesson_link(library, place, owner) for owner in owners if isinstance(owner, Lesson)
+    )
+    return ModelCard(model.name, model.description, href, picture, lessons)
+
+
+def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
+    """The inputs of the page of a model: description, facts, uses, text."""
+    place = urls.Place(urls.model_page_path(model.name))
+    title = library.words("model.title", name=model.name)
+    facts = library.facts.get(model.name)
+    parts = {} if facts is None else model_parts()
+    further_facts = [fact for part in parts.values() for fact in part.facts(library, model)]
+    values_by_part = {name: part.values(library, place, model) for name, part in parts.items()}
+    values = {
+        "home": place.href(urls.HOME),
+        "gallery": place.href(library.gallery) if library.gallery else "",
+        "name": model.name,
+        "path": model.source.path,
+        "anchor": listing_anchor(model.source.path),
+        "title": title,
+        "href": place.href(urls.model_file_path(model.name)),
+        "facts": () if facts is None else (*_facts(library, facts), *further_facts),
+        "code": HighlightedFile("xml", model.source.text.rstrip(), model.source.path),
+        "about": model.description,
+        "opening": _added_parts(parts, values_by_part, opens=True),
+        "added": _added_parts(parts, values_by_part, opens=False),
+        "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
+    }
+    return PageInputs(PageHead(place.path, "model", title, model.description), "model.html", values)
+
+
+def _added_parts(
+    parts: Mapping[str, ModelPart], values: Mapping[str, Struct | None], *, opens: bool
+) -> AddedParts:
+    pairs = ((name, values[name]) for name, part in parts.items() if part.opens is opens)
+    return AddedParts({name: value for name, value in pairs if value is not None})
+
+
+def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
+    """The facts about a compiled model, as pairs of label and value."""
+    words = library.words
+    unnamed = words("model.unnamed")
+    rows = (
+        (words("model.bodies"), str(facts.bodies)),
+        (words("model.geoms"), str(facts.geoms)),
+        (words("model.joints"), str(facts.joints)),
+        (words("model.coordinates"), str(facts.nq)),
+        (words("model.freedom"), str(facts.nv)),
+        (words("model.actuators"), str(facts.nu)),
+        (words("model.mass"), f"{number(facts.total_mass)} kg"),
+        (words("model.timestep"), f"{number(facts.timestep)} s"),
+        (words("model.integrator"), facts.integrator),
+        (words("model.keyframes"), ", ".join(name or unnamed for name in facts.keyframes)),
+        (words("model.sites"), ", ".join(name or unnamed for name in facts.sites)),
+        (words("model.includes"), ", ".join(facts.includes)),
+    )
+    return tuple((label, value) for label, value in rows if value)
+
+
+def _use_link(library: Library, place: urls.Place, use: ModelUse) -> NamedLink:
+    words, owner = library.words, use.owner
+    text = owner.title
+    if isinstance(owner, Lesson):
+        text = f"{words('lesson.label', id=owner.id)}: {owner.title}"
+    return NamedLink(place.href(urls.owner_path(owner)), text, ", ".join(map(words, use.ways)))
+
+
+def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
+    """The inputs of a page that is not a lesson; its document's summary is enough."""
+    place = urls.Place(urls.page_path(page))
+    return PageInputs(
+        PageHead(place.path, "page", page.title, ""),
+        "page.html",
+        {"title": page.title, "edit": edit_address(library, page.path)},
+        document_inputs=document_inputs(library, place, document),
+    )
+
+
+def not_found_inputs(library: Library) -> PageInputs:
+    """The inputs of the page for missing addresses."""
+    place = place_of(library.course.base_url, urls.NOT_FOUND)
+    values = {"home": place.href(urls.HOME)}
+    title = library.words("notfound.title")
+    head = PageHead(urls.NOT_FOUND, "notfound", title, "", indexed=False)
+    return PageInputs(head, "notfound.html", values)

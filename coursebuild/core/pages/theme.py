@@ -1,17 +1,74 @@
-"""A course's own look in the files that all pages share.
+"""A course's own look in the files that all pages share, and drawings for dark pages.
 
-Entry points: `theme_faces`, its fonts; `theme_style`, the end of the style sheet; `picture_size`.
+Entry points: `course_face`, a font of the course's own, and `measure_font`; `theme_faces`, all its
+fonts; `theme_style`, the end of the style sheet; `picture_size`; `dark_drawing`, made from a light
+one; `dark_colours`, the dark colours that a style sheet pairs with light ones.
 """
 
 from __future__ import annotations
 
+import functools
+import io
 import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, RECOMMENDED_CONTRAST, legible
 from coursebuild.core.drawing.safe_svg import read_svg
-from coursebuild.core.model.theme import Theme, ThemeFile
-from coursebuild.core.pages.font_files import course_face
-from coursebuild.core.pages.fonts import Face
+from coursebuild.core.model.course import Theme, ThemeFile
+from coursebuild.core.pages.fonts import COURSE, Face, unicode_range
+
+if TYPE_CHECKING:
+    from fontTools.ttLib import TTFont
+
+PER_MILLE = "183 103 75 65 62 57 57 53 50 50 33 33 23 22 20 20 17 16 15 14 13 8 6 1 1 1 1"
+FREQUENCY = dict(zip(" etaoinsrhldcumfwgpybvkxjqz", map(int, PER_MILLE.split()), strict=True))
+"""The frequency of characters in English text, per thousand."""
+
+
+@functools.lru_cache(maxsize=16)
+def course_face(use: str, name: str, data: bytes) -> tuple[Face, bytes] | str:
+    """The face of a font file and its uncompressed bytes, or words for what is wrong."""
+    from fontTools.ttLib import TTFont
+
+    try:
+        with TTFont(io.BytesIO(data), recalcTimestamp=False) as font:
+            measure = measure_font(font)
+            characters = unicode_range("".join(map(chr, sorted(font.getBestCmap()))))
+            italic = bool(font["OS/2"].fsSelection & 1 or font["post"].italicAngle)
+            weight = _weights(font)
+            font.flavor = None
+            whole = io.BytesIO()
+            font.save(whole)
+    except Exception as error:  # fontTools raises many kinds for damaged files
+        return f"cannot be read as a font: {error or type(error).__name__}"
+    subset, style = "latin" if measure else "other", "italic" if italic else "normal"
+    face = Face(COURSE[use], subset, name, style, weight, characters, characters, measure)
+    return face, whole.getvalue()
+
+
+def _weights(font: TTFont) -> tuple[int, int]:
+    """The least and the greatest weight."""
+    for axis in font["fvar"].axes if "fvar" in font else ():
+        if axis.axisTag == "wght":
+            return round(axis.minValue), round(axis.maxValue)
+    weight = font["OS/2"].usWeightClass
+    return weight, weight
+
+
+def measure_font(font: TTFont) -> tuple[float, float, float, float] | None:
+    """Mean advance width, weighted by `FREQUENCY`, ascent, descent and line gap of a font, in em.
+
+    `None` for a font without the letters of `FREQUENCY`.
+    """
+    names, advances = font.getBestCmap(), font["hmtx"]
+    if not all(ord(c) in names for c in FREQUENCY):
+        return None
+    em, head = font["head"].unitsPerEm, font["hhea"]
+    total = sum(advances[names[ord(c)]][0] * weight for c, weight in FREQUENCY.items())
+    width = total / sum(FREQUENCY.values()) / em
+    return width, head.ascent / em, -head.descent / em, head.lineGap / em
+
 
 _ACCENT = "#17487a", "#9fc6ef"
 """The accent of the style sheet, on light and dark pages."""
@@ -73,3 +130,49 @@ def picture_size(file: ThemeFile) -> tuple[float, float] | None:
     if len(numbers) < 2 or not 1e-6 < min(numbers) <= max(numbers) < 1e6:
         return None
     return numbers[0], numbers[1]
+
+
+_PAIR = re.compile(r"light-dark\((#[0-9a-f]{6}), ?(#[0-9a-f]{6})\)")
+_COLOUR = re.compile(
+    r"""(?<![\w-])(?P<name>fill|stroke|color|stop-color)(?P<is>\s*[:=]\s*"?)(?P<value>[^;"{}<>]+)"""
+)
+_ROOT = re.compile(r"<svg\b[^>]*>")
+
+
+def dark_colours(css: str) -> dict[str, str]:
+    """The dark colour for each light one that a style sheet pairs; the first pair counts."""
+    return dict(reversed(_PAIR.findall(css)))
+
+
+def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
+    """An SVG in the colours of a dark page.
+
+    A colour without a pair keeps its hue, but its lightness is inverted.
+    """
+
+    def dark(match: re.Match[str]) -> str:
+        return f"{match['name']}{match['is']}{_dark_colour(match['value'], paired_colours)}"
+
+    return _COLOUR.sub(dark, _ROOT.sub(_with_fill, svg, count=1))
+
+
+def _with_fill(root: re.Match[str]) -> str:
+    """The root element, with the default colour of shapes made explicit."""
+    return root[0] if " fill=" in root[0] else f'<svg fill="#000000"{root[0][4:]}'
+
+
+def _dark_colour(value: str, paired_colours: Mapping[str, str]) -> str:
+    from PIL import ImageColor
+
+    try:
+        red, green, blue = ImageColor.getrgb(value.strip())[:3]
+    except ValueError:  # `none`, a reference, or an unknown name
+        return value
+    light = f"#{red:02x}{green:02x}{blue:02x}"
+    return paired_colours.get(light) or _invert_lightness(red, green, blue)
+
+
+def _invert_lightness(*channels: int) -> str:
+    red, green, blue = channels
+    shift = round(255 - 2 * (0.2126 * red + 0.7152 * green + 0.0722 * blue))
+    return "#" + "".join(f"{min(max(channel + shift, 0), 255):02x}" for channel in channels)

@@ -18,7 +18,7 @@ from xml.etree.ElementTree import tostring
 from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup, escape
 
-from coursebuild.core.text.xml import clean_xml
+from coursebuild.core.text.characters import clean_xml
 
 Child: TypeAlias = "Element | str | None"
 

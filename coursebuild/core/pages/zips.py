@@ -74,7 +74,6 @@ class Archive(Struct, frozen=True):
 
     @property
     def key(self) -> str:
-        """A hash of its content."""
         digest = hashlib.sha256()
         for path in sorted(self.parts):
             part = self.parts[path]
@@ -92,7 +91,7 @@ def make_archives(library: Library, surroundings: Surroundings) -> Iterator[Arch
     by_module = {_module(path): script for path, (script, _) in library.scripts.items()}
     if library.scripts:
         scripts = tuple(script for script, _ in library.scripts.values())
-        folder = _slug(library.course.title)
+        folder = re.sub(r"[^a-z0-9]+", "-", library.course.title.lower()).strip("-") or "course"
         files = _files(library, surroundings, scripts, folder, by_module)
         yield Archive(urls.EXAMPLES_ZIP, files)
     for lesson in library.order:
@@ -199,10 +198,6 @@ def _requirements(library: Library, packages: Iterable[Package], modules: Iterab
     lines_by_module.setdefault("mujoco", f"mujoco=={library.results.engine}")
     lines = (lines_by_module.get(name, name) for name in modules)
     return "".join(f"{line}\n" for line in sorted(lines)).encode()
-
-
-def _slug(title: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "course"
 
 
 def pack_files(files: Mapping[str, bytes]) -> bytes:

@@ -27,8 +27,7 @@ from collections.abc import Callable, Sequence
 from msgspec import Struct
 
 from coursebuild.core.model import Comparison
-from coursebuild.core.scripts.lines import LineMatcher
-from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.scripts.lines import LineMatcher, Side
 
 _ALIKE_WEIGHT = 6
 _WORD = re.compile(r"[^\W\d]+")

@@ -14,7 +14,7 @@ from functools import cached_property
 from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
-from coursebuild.core.scripts.mapped_text import MappedText, Side, plain_text, replace_ranges
+from coursebuild.core.scripts.lines import MappedText, Side, plain_text, replace_ranges
 from coursebuild.core.scripts.numbers import (
     Number,
     round_like,

@@ -1,20 +1,31 @@
-"""Is a recorded output what the script prints?
+"""Is a recorded output what the script prints: here, a second time, with another version of MuJoCo?
 
-Entry points: `verify` (all recordings of a course), `compare` (one recording).
+Entry points: `verify` (all recordings of a course), `compare` (one recording); `repeat_findings`,
+for a remembered run and a later one; `instability_diagnostic`, for two runs whose output is to be
+recorded; `run_standings`, runs elsewhere compared with what is recorded; `judge_comparability` and
+`judge`, the verdict on one script.
 
 1. Where both are the same, character by character, the recording is verified.
 2. Else both sides are filtered and split into lines; if these match, it is verified too.
 3. Else the lines are aligned (`align`), and each step that differs becomes changes: numbers
-   and texts inside lines (`changes`), runs of missing or extra lines.
+   and texts inside lines (`diff`), runs of missing or extra lines.
 4. Every change is traced back through the filters to its place in the lesson.
 
 A recorded table has its own way of matching: see `tables`.
+
+An output that its lesson calls volatile may differ, and so may one that matches the recorded output
+both times.
+
+MuJoCo is the cause only if nothing else can be: the script prints here what is recorded; so does a
+control run in a fresh environment that differs from the other one in nothing but MuJoCo; and two
+runs in the other one agree.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
+from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
@@ -26,13 +37,15 @@ from coursebuild.core.model import (
     Script,
     Table,
     document_blocks,
+    find_blocks,
 )
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
-from coursebuild.core.scripts.changes import find_differences, number_change
-from coursebuild.core.scripts.lines import LineMatcher
-from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.scripts.diff import find_differences, number_change, quote, text_diff
+from coursebuild.core.scripts.extract import Extraction
+from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.tables import compare_table
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 
@@ -139,3 +152,193 @@ class _ChangeFinder(Struct, frozen=True):
             span = self.recording.body_span
             return Span(span.source, span.start, span.start)
         return self.body.span(start, end)
+
+
+_MAX_NOTES, _WIDTH = 10, 80
+
+
+def repeat_findings(
+    course: Course,
+    extractions: Iterable[Extraction],
+    differing_runs: Sequence[tuple[ScriptRun, ScriptRun]],
+) -> tuple[Diagnostic, ...]:
+    """A warning for each script; `differing_runs` are pairs of a remembered run and a new one."""
+    by_path = {extraction.path: extraction for extraction in extractions}
+    return tuple(
+        _unrepeatable(by_path[now.path], before, now)
+        for before, now in differing_runs
+        if now.path in by_path and not _may_differ(course, before, now)
+    )
+
+
+def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
+    if before.outcome is not Outcome.OK or now.outcome is not Outcome.OK:
+        return False
+    recordings = [
+        recording
+        for document in course.documents
+        for recording in find_blocks(document, Recording)
+        if recording.script == now.path and recording.readable
+    ]
+    return bool(recordings) and all(
+        compare(r, course.comparison_of(r), run.stdout).status != "drift"
+        for r in recordings
+        for run in (before, now)
+    )
+
+
+def _unrepeatable(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> Diagnostic:
+    notes = []
+    if (before.outcome, before.status) != (now.outcome, now.status):
+        notes.append(
+            Note(f"it ended otherwise: before {_describe_end(before)}, now {_describe_end(now)}")
+        )
+    diff = text_diff(before.stdout, now.stdout)
+    if diff:
+        notes.append(Note("its output:\n" + diff))
+    return diagnose(
+        "script-unrepeatable",
+        extraction.script.span.first_line(),
+        f"`{extraction.path}` behaves differently than before, though nothing that "
+        "it is known to depend on has changed",
+        help="make it do the same each time (a fixed seed, no clock, files that it opens itself), "
+        "or put `volatile` on its output",
+        notes=notes,
+    )
+
+
+def _describe_end(run: ScriptRun) -> str:
+    return f"{run.outcome.value} ({run.status})" if run.status else run.outcome.value
+
+
+def instability_diagnostic(
+    recording: Recording, first: Side, second: Side, comparison: Comparison
+) -> Diagnostic:
+    """Say which lines differ between two runs.
+
+    `first` is the recorded or new text that matches the first run.
+    """
+    steps = align(first, second, LineMatcher(comparison))
+    different_steps = [step for step in steps if step.kind in _DIFFERENT]
+    notes = [
+        Note(_describe_difference(step, first, second)) for step in different_steps[:_MAX_NOTES]
+    ]
+    if (rest := len(different_steps) - _MAX_NOTES) > 0:
+        notes.append(Note(f"and {rest} more {'line' if rest == 1 else 'lines'}"))
+    return diagnose(
+        "output-unstable",
+        recording.caption_span,
+        "two runs of the script printed different lines",
+        help=_TABLE_HELP if isinstance(recording.body, Table) else _HELP,
+        notes=notes,
+    )
+
+
+_REPEAT_HELP = "make the script print the same each time (a fixed seed, no clock)"
+_HELP = (
+    f'{_REPEAT_HELP}, or say what varies by `volatile="…"` on the fence, or by `ellipsis` and `...`'
+)
+_TABLE_HELP = f"{_REPEAT_HELP}, or record the output in a `text` fence with `volatile`"
+
+
+_DIFFERENT = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
+
+
+def _describe_difference(step: Step, first: Side, second: Side) -> str:
+    if step.kind is StepKind.MISSING:
+        return f"{quote(first.lines[step.recorded], _WIDTH)} was printed in the first run only"
+    if step.kind is StepKind.EXTRA:
+        return f"{quote(second.lines[step.printed], _WIDTH)} was printed in the second run only"
+    a, b = first.lines[step.recorded], second.lines[step.printed]
+    number = second.raw_line(step.printed)
+    return f"line {number}: {quote(a, _WIDTH)} in one run, {quote(b, _WIDTH)} in the next"
+
+
+Status: TypeAlias = Literal["same", "changed", "fails", "unclear", "drifted", "uncompared"]
+"""`changed` and `fails` are caused by MuJoCo; of `unclear` that cannot be said."""
+
+Judgement: TypeAlias = tuple[Status, str]
+"""What became of a script with another version of MuJoCo; why, as a clause, if need be."""
+
+
+class RunStanding(Struct, frozen=True):
+    """A run compared with what is recorded, or else with what the script prints here."""
+
+    run: ScriptRun
+    is_compared: bool
+    """Whether there was anything to compare it with."""
+    changes: tuple[Change, ...] = ()
+    diff: str = ""
+    """The difference between the outputs, where nothing is recorded."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether it ran to its end and printed what it should."""
+        return self.run.outcome is Outcome.OK and not (self.changes or self.diff)
+
+
+def run_standings(
+    course: Course, current_runs: Mapping[str, ScriptRun], runs: Iterable[ScriptRun]
+) -> dict[str, RunStanding]:
+    """The standing of each run, by path; `current_runs` are those of this environment."""
+    runs = tuple(runs)
+    verdicts: dict[str, list[Verdict]] = {}
+    for verdict in verify(course, runs):
+        verdicts.setdefault(verdict.recording.script or "", []).append(verdict)
+    return {
+        run.path: _compare_with_recordings(run, verdicts[run.path])
+        if run.path in verdicts
+        else _compare_with_current(course, current_runs[run.path], run)
+        for run in runs
+    }
+
+
+def _compare_with_recordings(run: ScriptRun, verdicts: Iterable[Verdict]) -> RunStanding:
+    compared = [verdict for verdict in verdicts if verdict.status != "volatile"]
+    return RunStanding(
+        run, bool(compared), tuple(c for verdict in compared for c in verdict.changes)
+    )
+
+
+def _compare_with_current(course: Course, current_run: ScriptRun, run: ScriptRun) -> RunStanding:
+    current, new = (Side.of(run.stdout, course.filters) for run in (current_run, run))
+    is_same = same_lines(current, new, course.comparison)
+    return RunStanding(run, True, diff="" if is_same else text_diff(current_run.stdout, run.stdout))
+
+
+def judge_comparability(standing: RunStanding) -> Judgement | None:
+    """Why a script, as it runs here, cannot be compared; `None` where it can."""
+    match standing.run.outcome:
+        case Outcome.NORUN:
+            return "uncompared", "its lesson says `norun`"
+        case Outcome.SKIPPED:
+            return "uncompared", f"it needs {', '.join(standing.run.missing)}"
+        case Outcome.OK if not standing.is_compared:
+            return "uncompared", "its output is volatile"
+        case Outcome.OK if not standing.holds:
+            return "drifted", "what is recorded is not what it prints here"
+        case Outcome.OK:
+            return None
+        case _:
+            return "uncompared", "it does not run to its end here"
+
+
+def judge(
+    standing: RunStanding, control: RunStanding | None, repeated: RunStanding, engine: str
+) -> Judgement:
+    """Judge a script that prints what is recorded here, but not with the other MuJoCo.
+
+    Args:
+        standing: its run with the other version of MuJoCo.
+        control: with this version, in a fresh environment; `None` where there is none.
+        repeated: with the other version once more.
+        engine: this version.
+    """
+    if (standing.run.outcome, standing.run.stdout) != (repeated.run.outcome, repeated.run.stdout):
+        return "unclear", "two runs of it there did not do the same"
+    if control is None:
+        return "unclear", f"no fresh environment with MuJoCo {engine} could be made"
+    if not control.holds:
+        fresh = f"a fresh environment with MuJoCo {engine}"
+        return "unclear", f"it does not do in {fresh} what it does here either"
+    return ("changed" if standing.run.outcome is Outcome.OK else "fails"), ""

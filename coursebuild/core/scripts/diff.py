@@ -1,6 +1,13 @@
-"""The line-by-line difference between a recorded output and what its script prints now.
+"""How a recorded output differs from what its script prints now: inside a line, and line by line.
 
-Entry points: `diff_rows`; `text_diff`, `shorten`, `quote`.
+Entry points: `find_differences` (inside one line), `number_kind`; `diff_rows`; `text_diff`,
+`shorten`, `quote`.
+
+1. Lines that differ in their numbers only: each pair of numbers that does not match.
+2. Other lines are cut into numbers, words, signs and white space, and these are aligned: paired
+   numbers are compared, the rest is text. White space that differs is reported only where nothing
+   else does, because columns shift when a number gets wider.
+3. A recorded line with an ellipsis that does not fit differs as a whole.
 
 Lines that match under the comparison's mode count as recorded, even where their characters differ;
 lines that a `...` stands for are left out. A row marks the parts of its line that changed.
@@ -9,16 +16,160 @@ lines that a `...` stands for are left out. A row marks the parts of its line th
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Iterator
 from itertools import groupby
 from typing import Literal, TypeAlias
 
+from msgspec import Struct
+
 from coursebuild.core.model import Table
-from coursebuild.core.model.results import Verdict
-from coursebuild.core.scripts.align import Step, StepKind, align
-from coursebuild.core.scripts.changes import find_differences
-from coursebuild.core.scripts.lines import LineMatcher
-from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.model.results import Change, DriftKind, Verdict
+from coursebuild.core.scripts.align import MATCH, Step, StepKind, align, pair
+from coursebuild.core.scripts.lines import LineMatcher, Side
+from coursebuild.core.scripts.numbers import (
+    Number,
+    agreeing_digits,
+    difference,
+    relative_error,
+    scan,
+    unit,
+)
+from coursebuild.core.text.source import Span
+
+_PART = re.compile(r"\s+|\w+|[^\w\s]")
+_SPACE, _NUMBER = 1, 4
+
+
+class Difference(Struct, frozen=True):
+    """A stretch of a recorded line, and the stretch of the printed line in its place."""
+
+    start: int
+    end: int
+    printed_start: int
+    printed_end: int
+    numbers: tuple[Number, Number] | None = None
+    """Recorded and printed, where both are a number."""
+
+
+def number_kind(recorded: Number, printed: Number) -> DriftKind:
+    """The class of a difference between two numbers.
+
+    It is rounding where a number with a point or an exponent is off by at most one unit of its last
+    recorded place; a count that is off by one is not. The same value in another notation is text.
+    """
+    if not (recorded.is_finite and printed.is_finite):
+        return DriftKind.NUMERIC
+    gap = difference(recorded.value, printed.value)
+    if gap == 0:
+        return DriftKind.TEXT
+    is_rounding = recorded.is_inexact and gap <= unit(recorded.place)
+    return DriftKind.ROUNDING if is_rounding else DriftKind.NUMERIC
+
+
+def number_change(
+    span: Span, recorded: str, printed: str, numbers: tuple[Number, Number]
+) -> Change:
+    """The change of a number that stands at `span` in the lesson."""
+    error = relative_error(numbers[0].value, numbers[1].value)
+    size = None if error is None else float(error)
+    return Change(
+        number_kind(*numbers),
+        span,
+        recorded,
+        printed,
+        None if size == float("inf") else size,
+        None if error is None else agreeing_digits(error),
+    )
+
+
+def find_differences(recorded: str, printed: str, matcher: LineMatcher) -> tuple[Difference, ...]:
+    """Where a printed line differs from the recorded one; at least one difference."""
+    pairs = matcher.pairs(recorded, printed)
+    if pairs is not None:
+        numeric = tuple(
+            Difference(a.start, a.end, b.start, b.end, (a, b))
+            for a, b in pairs
+            if not matcher.numbers_match(a, b)
+        )
+        if numeric:
+            return numeric
+    if not matcher.elides(recorded):
+        token_differences = _token_differences(recorded, printed, matcher)
+        if token_differences:
+            return token_differences
+    return (Difference(0, len(recorded), 0, len(printed)),)
+
+
+class _Token(Struct, frozen=True):
+    start: int
+    end: int
+    text: str
+    number: Number | None = None
+
+
+def _tokens(text: str) -> Iterator[_Token]:
+    at = 0
+    for number in (*scan(text), None):
+        stop = len(text) if number is None else number.start
+        for part in _PART.finditer(text, at, stop):
+            yield _Token(part.start(), part.end(), part.group())
+        if number is not None:
+            yield _Token(number.start, number.end, number.text, number)
+            at = number.end
+
+
+def _token_differences(recorded: str, printed: str, matcher: LineMatcher) -> tuple[Difference, ...]:
+    left, right = list(_tokens(recorded)), list(_tokens(printed))
+
+    def weight(i: int, j: int) -> int:
+        a, b = left[i], right[j]
+        if a.number is not None and b.number is not None:
+            return MATCH if matcher.numbers_match(a.number, b.number) else _NUMBER
+        if a.text.isspace() and b.text.isspace():
+            return _SPACE
+        return MATCH if a.text == b.text else 0
+
+    differences: list[Difference] = []
+    at = printed_at = 0
+    pairs = pair([t.text for t in left], [t.text for t in right], weight)
+    left.append(_Token(len(recorded), len(recorded), ""))
+    right.append(_Token(len(printed), len(printed), ""))
+    for i, j in (*pairs, (-1, -1)):
+        a, b = left[i], right[j]
+        if at < a.start or printed_at < b.start:
+            differences.append(Difference(at, a.start, printed_at, b.start))
+        if a.number is not None and b.number is not None:
+            if not matcher.numbers_match(a.number, b.number):
+                numbers = (a.number, b.number)
+                differences.append(Difference(a.start, a.end, b.start, b.end, numbers))
+        elif a.text != b.text:
+            differences.append(Difference(a.start, a.end, b.start, b.end))
+        at, printed_at = a.end, b.end
+    return _merge_differences(differences, recorded, printed)
+
+
+def _merge_differences(
+    differences: list[Difference], recorded: str, printed: str
+) -> tuple[Difference, ...]:
+    """Drop white space where anything else differs; join texts with only white space between."""
+
+    def is_blank(d: Difference) -> bool:
+        return not (
+            recorded[d.start : d.end].strip() or printed[d.printed_start : d.printed_end].strip()
+        )
+
+    merged_differences: list[Difference] = []
+    for d in [d for d in differences if not is_blank(d)] or differences:
+        if merged_differences and d.numbers is None:
+            last = merged_differences[-1]
+            gap = Difference(last.end, d.start, last.printed_end, d.printed_start)
+            if last.numbers is None and is_blank(gap):
+                merged_differences.pop()
+                d = Difference(last.start, d.end, last.printed_start, d.printed_end)
+        merged_differences.append(d)
+    return tuple(merged_differences)
+
 
 Mark: TypeAlias = Literal[" ", "-", "+"]
 _LINES, _WIDTH = 12, 120

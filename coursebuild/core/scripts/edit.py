@@ -11,22 +11,53 @@ Entry points: `update_body` (one recorded output), `adopt_file` (an extracted fi
 3. The new text is compared with both runs: an output that differs from run to run, or that the
    lesson's text cannot hold, is refused with the reason.
 
-Tables are brought up to date number by number: see `tableedit`.
+A table is brought up to date number by number. Where a row fits a line except for its numbers,
+these are replaced in place; a U+2212 minus stays.
+Under `digits` a number keeps as many decimals as the author showed. A row that fits no line is
+refused: which line it was meant to show cannot be known.
+
+`check_source_parts`: code that lessons show from the project's files is what these hold, or gets
+the edit that makes it so; `shown_files` are these files. A part is a function, a class or a method,
+with its decorators, or the whole file. Indentation and white space at the ends of lines do not
+count.
 """
 
 from __future__ import annotations
 
+import ast
+import contextlib
 import re
-from collections.abc import Iterable, Sequence
-from itertools import groupby
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import groupby, zip_longest
 
-from coursebuild.core.model import Comparison, Mode, Recording, Script, Table
+from msgspec.structs import replace
+
+from coursebuild.core.model import (
+    Comparison,
+    Course,
+    Mode,
+    PlainCode,
+    Recording,
+    Script,
+    SourcePart,
+    Table,
+    find_blocks,
+)
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
-from coursebuild.core.scripts.lines import ELLIPSIS, LineMatcher
-from coursebuild.core.scripts.mapped_text import Side, replace_ranges
-from coursebuild.core.scripts.repeat import instability_diagnostic
-from coursebuild.core.scripts.tableedit import update_table
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
+from coursebuild.core.scripts.compare import instability_diagnostic
+from coursebuild.core.scripts.failures import without_indentation
+from coursebuild.core.scripts.lines import (
+    ELLIPSIS,
+    LineMatcher,
+    Side,
+    canonicalize,
+    replace_ranges,
+    same_number,
+)
+from coursebuild.core.scripts.numbers import Number, round_like
+from coursebuild.core.scripts.tables import RowCell, RowMatch, TableMatcher, table_rows
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt, Span
 
 _FENCE = re.compile(r"`{3,}|~{3,}")
@@ -62,7 +93,7 @@ def update_body(
     if not first.strip():
         return refusal(recording.caption_span, "the script printed nothing to record", "")
     if isinstance(recording.body, Table):
-        return update_table(recording, recording.body, comparison, first, second)
+        return _update_table(recording, recording.body, comparison, first, second)
     body, filters = recording.body, comparison.filters
     if comparison.mode is Mode.VOLATILE:
         before, now = Side.of(body.text).lines, Side.of(first).lines
@@ -256,3 +287,156 @@ def whole_lines(body: Span, prefix: str, lines: Sequence[str]) -> Edit:
     line_end = "\r\n" if before.endswith("\r\n") else "\r" if before.endswith("\r") else "\n"
     texts = (prefix + line if line else prefix.rstrip() for line in lines)
     return Edit(body, "".join(line + line_end for line in texts))
+
+
+MINUS = "\u2212"
+_BY_HAND = "bring the row up to date by hand"
+
+
+def _update_table(
+    recording: Recording,
+    table: Table,
+    comparison: Comparison,
+    first: str,
+    second: str,
+) -> Edit | Diagnostic | None:
+    """What to write into a recorded table; see `edit.update_body`."""
+    filters = comparison.filters
+    printed, repeated = Side.of(first, filters), Side.of(second, filters)
+    if comparison.mode is Mode.VOLATILE:
+        comparison = Comparison()
+    matches = TableMatcher(table_rows(table, filters), printed, comparison).match()
+    rows: list[tuple[RowCell, ...]] = []
+    edits: list[Edit] = []
+    for match in matches:
+        row = _update_row(match, comparison)
+        if isinstance(row, Diagnostic):
+            return row
+        cells, row_edits = row
+        rows.append(cells)
+        edits += row_edits
+    if TableMatcher(rows, printed, comparison).find_matching_lines() is None:
+        span = table.span if not edits else edits[0].span
+        return _refuse(span, "the table cannot be made to match what the script prints")
+    if TableMatcher(rows, repeated, comparison).find_matching_lines() is None:
+        return instability_diagnostic(recording, printed, repeated, comparison)
+    return _join_edits(edits) if edits else None
+
+
+def _update_row(
+    match: RowMatch, comparison: Comparison
+) -> tuple[tuple[RowCell, ...], list[Edit]] | Diagnostic:
+    """A row with the numbers of its line, and the edits that make it so."""
+    if match.line < 0:
+        span = match.row[0].cell.span.to(match.row[-1].cell.span)
+        return _refuse(span, "no line of this run has the cells of this row in order")
+    edits: list[Edit] = []
+    places: dict[int, list[tuple[int, int, str]]] = {id(cell): [] for cell in match.row}
+    for cell, recorded, printed in match.pairs:
+        if same_number(recorded, printed, comparison):
+            continue
+        span = cell.span(recorded)
+        if span.text.replace(MINUS, "-") != recorded.text:
+            return _refuse(span, "a number written with an entity or an escape cannot be replaced")
+        new = _format_like(recorded, printed, comparison)
+        places[id(cell)].append((recorded.start, recorded.end, new))
+        edits.append(Edit(span, _with_signs_of(span.text, new)))
+    texts = ((cell, replace_ranges(cell.mapped.text, places[id(cell)])) for cell in match.row)
+    return tuple(replace(cell, canonical=canonicalize(text)) for cell, text in texts), edits
+
+
+def _with_signs_of(old: str, new: str) -> str:
+    """The new number with the minus signs of the old one: before it, and in its exponent."""
+    parts = zip_longest(*(re.split("(?=[eE])", text) for text in (old, new)), fillvalue="")
+    return "".join(part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
+
+
+def _format_like(recorded: Number, printed: Number, comparison: Comparison) -> str:
+    """A printed number as the table shows it."""
+    if comparison.mode is Mode.DIGITS and recorded.is_inexact and printed.place < recorded.place:
+        return round_like(recorded, printed.value) or printed.text
+    return printed.text
+
+
+def _join_edits(edits: Sequence[Edit]) -> Edit:
+    """One edit that does what several do, in order."""
+    whole = edits[0].span.to(edits[-1].span)
+    at = whole.start
+    places = ((edit.span.start - at, edit.span.end - at, edit.text) for edit in edits)
+    return Edit(whole, replace_ranges(whole.text, places))
+
+
+def _refuse(span: Span, message: str) -> Diagnostic:
+    return diagnose("output-not-updatable", span, message, help=_BY_HAND)
+
+
+ReadText = Callable[[str], str | None]
+"""The text of a file of the project; `None` where there is none."""
+
+
+def shown_files(course: Course) -> frozenset[str]:
+    """The files of which lessons show parts."""
+    return frozenset(source.path for _, source in _source_parts(course))
+
+
+def check_source_parts(course: Course, read: ReadText) -> Iterator[Diagnostic]:
+    """A diagnostic, with an edit, for each part that differs from its file."""
+    for block, source in _source_parts(course):
+        text = read(source.path)
+        if text is None:
+            yield diagnose("source-part", source.place, f"there is no text file `{source.path}`")
+            continue
+        parts = _read_parts(text)
+        if source.part not in parts:
+            message = f"`{source.path}` has no function or class `{source.part}`"
+            help = did_you_mean(source.part, [name for name in parts if name])
+            yield diagnose("source-part", source.place, message, help=help)
+        elif parts[source.part] != (lesson_lines := _lines(block.code.text)):
+            file_lines = parts[source.part]
+            equalities = (a == b for a, b in zip(file_lines, lesson_lines, strict=False))
+            first = next((i for i, equal in enumerate(equalities) if not equal), len(lesson_lines))
+            code_lines = block.code.lines()
+            span = (
+                without_indentation(code_lines[first].span())
+                if first < len(code_lines)
+                else source.place
+            )
+            yield diagnose(
+                "source-part",
+                span,
+                f"this differs from what `{source.path}` holds",
+                label=f"it has `{file_lines[first].strip()}` here"
+                if first < len(file_lines)
+                else "",
+                help="run `coursebuild update`, which copies it here",
+                edits=[whole_lines(source.body_span, source.prefix, file_lines)],
+            )
+
+
+def _source_parts(course: Course) -> Iterator[tuple[PlainCode, SourcePart]]:
+    for document in course.documents:
+        for code in find_blocks(document, PlainCode):
+            if code.source is not None:
+                yield code, code.source
+
+
+def _read_parts(text: str) -> dict[str, list[str]]:
+    """The lines of each part of a file by name; the whole file has an empty name."""
+    parts = {"": _lines(text)}
+    rows = text.split("\n")
+
+    def add_parts(nodes: list[ast.stmt], prefix: str) -> None:
+        for node in nodes:
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+                start = min([node.lineno, *(d.lineno for d in node.decorator_list)])
+                name = f"{prefix}{node.name}"
+                parts[name] = _lines("\n".join(rows[start - 1 : node.end_lineno]))
+                add_parts(node.body, f"{name}.")
+
+    with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        add_parts(ast.parse(text).body, "")
+    return parts
+
+
+def _lines(text: str) -> list[str]:
+    return [line.rstrip() for line in textwrap.dedent(text).rstrip().split("\n")]

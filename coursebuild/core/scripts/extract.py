@@ -41,7 +41,6 @@ class Extraction(Struct, frozen=True):
 
     @property
     def data(self) -> bytes:
-        """The file's bytes."""
         return self.text.encode()
 
     @property

@@ -41,7 +41,7 @@ _ABORTED = "Fatal Python error: Aborted\n\n"
 _LIBRARIES = ("site-packages", "dist-packages")
 
 _FIRST_SIGNALS = "HUP INT QUIT ILL TRAP ABRT BUS FPE KILL USR1 SEGV USR2 PIPE ALRM TERM"
-_SIGNALS = {**dict(enumerate(_FIRST_SIGNALS.split(), 1)), 24: "XCPU", 25: "XFSZ", 31: "SYS"}
+_SIGNALS = dict(enumerate(_FIRST_SIGNALS.split(), 1)) | {24: "XCPU", 25: "XFSZ", 31: "SYS"}
 """As Linux numbers them (signal(7))."""
 
 _HELPS = (

@@ -27,7 +27,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from coursebuild.core.drawing.safe_svg import SVG, XLINK, read_svg
 from coursebuild.core.model import Course
-from coursebuild.core.model.figures import RecordedFigure, recorded_figures, unshown_figures
+from coursebuild.core.model.addresses import RecordedFigure, recorded_figures, unshown_figures
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 

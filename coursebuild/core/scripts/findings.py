@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from msgspec.structs import replace
 
 from coursebuild.core.model import CodeBlock, Course, Document, Owner, Table, document_scripts
-from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.align import count_alike
 from coursebuild.core.scripts.bindings import (
@@ -25,7 +25,7 @@ from coursebuild.core.scripts.bindings import (
     document_bindings,
 )
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
-from coursebuild.core.scripts.compare import compare
+from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import (
@@ -34,10 +34,8 @@ from coursebuild.core.scripts.failures import (
     failure_diagnostic,
     silence_diagnostic,
 )
-from coursebuild.core.scripts.lines import LineMatcher
-from coursebuild.core.scripts.mapped_text import Side
+from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.numbers import Number, scan
-from coursebuild.core.scripts.repeat import instability_diagnostic
 from coursebuild.core.scripts.tables import TableMatcher, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note, diagnose
 from coursebuild.core.text.source import Excerpt
@@ -280,7 +278,6 @@ def classes(changes: Sequence[Change]) -> str:
 
 
 def _label(change: Change) -> str:
-    """The label at the place of a change."""
     match change.kind:
         case DriftKind.ROUNDING | DriftKind.NUMERIC:
             wording = closeness(change)

@@ -22,20 +22,18 @@ from msgspec import Struct
 from coursebuild.core import model
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
-from coursebuild.core.scripts.changes import number_change
+from coursebuild.core.scripts.diff import number_change
 from coursebuild.core.scripts.lines import (
     CanonicalText,
+    MappedText,
     SameNumber,
+    Side,
     always_match,
+    apply_filters,
     canonicalize,
     numbers_fit,
-    same_number,
-)
-from coursebuild.core.scripts.mapped_text import (
-    MappedText,
-    Side,
-    apply_filters,
     plain_text,
+    same_number,
 )
 from coursebuild.core.scripts.numbers import Number, relative_error
 from coursebuild.core.text.source import Span

@@ -39,7 +39,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.model.equations import DisplayFormula, feature_block_ids
 from coursebuild.core.model.vocabulary import ENGLISH, Words
-from coursebuild.core.syntax.headings import slug
+from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import ILLUSTRATION
 from coursebuild.core.syntax.spans import read_markdown
@@ -190,7 +190,7 @@ def _is_reported(first: AnchorOwner, second: AnchorOwner) -> bool:
     if isinstance(first, FeatureBlock) and isinstance(second, FeatureBlock):
         keys, other_keys = first.progress_keys(), second.progress_keys()
         return keys is not None and other_keys is not None and keys[0] == other_keys[0]
-    labelled_types = Heading | DisplayFormula  # see `headings.Anchors`
+    labelled_types = Heading | DisplayFormula  # see `attributes.Anchors`
     return (isinstance(first, labelled_types) and isinstance(second, labelled_types)) or (
         isinstance(first, Script | Term) and type(first) is type(second)
     )

@@ -32,8 +32,8 @@ from markdown_it.token import Token
 from markdown_it.utils import EnvType
 
 from coursebuild.core.syntax.attributes import TERM
+from coursebuild.core.syntax.block_parser import BACKTICKS, math_inline
 from coursebuild.core.syntax.html import LITERAL, tag_at
-from coursebuild.core.syntax.math import BACKTICKS, math_inline
 from coursebuild.core.syntax.spans import InlineState, PositionedToken
 
 MAX_NESTING = 20

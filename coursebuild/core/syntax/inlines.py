@@ -37,11 +37,17 @@ from coursebuild.core.model import (
     Term,
     plain_text,
 )
-from coursebuild.core.syntax.attributes import collapse_spaces, read_label, read_meaning, read_term
-from coursebuild.core.syntax.headings import term_id
-from coursebuild.core.syntax.html import LITERAL, Balance, find_media, tags
+from coursebuild.core.syntax.attributes import (
+    collapse_spaces,
+    read_label,
+    read_meaning,
+    read_term,
+    term_id,
+)
+from coursebuild.core.syntax.block_parser import References
+from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_parser import inline_tokens
-from coursebuild.core.syntax.links import (
+from coursebuild.core.syntax.mentions import (
     TextPiece,
     check_scheme,
     classify,
@@ -49,9 +55,7 @@ from coursebuild.core.syntax.links import (
     may_mention,
     text_inlines,
 )
-from coursebuild.core.syntax.markdown import References
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.syntax.safe_html import find_forbidden
 from coursebuild.core.syntax.spans import PositionedToken
 from coursebuild.core.syntax.unread_markup import (
     check_inline_code,

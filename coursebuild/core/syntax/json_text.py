@@ -30,9 +30,9 @@ from coursebuild.core.syntax.nodes import (
     check_tex_escapes,
     odd_character,
     replace_escapes,
+    shorten,
     tex_word,
 )
-from coursebuild.core.syntax.wording import shorten
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 

@@ -1,8 +1,8 @@
 """The kinds of markup that readers would see as it is written.
 
 Entry points: `BROKEN`, markup of ours that is not whole; `FOREIGN`, that of other tools; `IN_HTML`,
-what is unread between tags. Patterns are searched for in a text in which NUL stands for all that
-was read, so that a mark directly after a NUL stands directly after a link, code and so on.
+what is unread between tags; `ONCE`. Patterns are searched for in a text in which NUL stands for all
+that was read, so that a mark directly after a NUL stands directly after a link, code and so on.
 """
 
 from __future__ import annotations
@@ -17,9 +17,8 @@ class MarkupKind(NamedTuple):
     reason: str
     """Why it is not read, after "would be shown as written: "."""
     help: str
-    rule: str = "markup-foreign"
-    once: bool = False
-    """Whether one mistake often leaves several marks in a text, of which the first is reported."""
+    rule: str = "markup-unread"
+    """Of markup of ours."""
 
 
 _NUMBER = r"(?<![\w.])[-+\u2212]?\d[\w.,]*"
@@ -165,7 +164,6 @@ BROKEN = {
         r"\{[ \t]*(?:term|symbol|further)\b[^{}\n\0]*\}",
         "braces stand directly after what they mark",
         'write `[word]{term}`, `$x${symbol="meaning"}`, `## Heading {.further}`',
-        "markup-unread",
     ),
     "braces": MarkupKind(r"(?<=[\0\]])\{(?![%{]|[ \t]*[.#:])(?:[^{}\n\0]*\}|\w*)", "", ""),
     "link": MarkupKind(
@@ -179,22 +177,17 @@ BROKEN = {
         r"|(?<!\\)\[[^\[\]]{0,200}\]#\([^()\s]*\)|(?<=\0)\]|\[(?=\0)",
         "this is not a complete link",
         "a link is `[text](address)`, with no blank before the `(` and none in the address",
-        "markup-unread",
-        once=True,
     ),
     "bracket": MarkupKind(
         r"(?<![\\\w])\[(?=[^\W\d_]{2})(?![^\[\]]*\])",
         "no link begins here",
         "a link is `[text](address)`; write a backslash before a bracket that is meant to be seen",
-        "markup-unread",
-        once=True,
     ),
     "heading": MarkupKind(
         r"^[ \t]*#{2,6}(?=[^\s#])|^[ \t]*#{7,}(?=\s)"
         r"|^(?-i:[^\sA-Z#\0]#{1,5} (?=[A-Z])|#{1,5}[^\s#\0\d]#{0,4} (?=[A-Z]))",
         "no heading begins here",
         "a heading is `## Title`, with two to six `#` and a blank after them",
-        "markup-unread",
     ),
     "table": MarkupKind(
         r"^[ \t]*\|?[ \t]*:?-{2,}:?(?:[ \t]*\|[ \t]*:?-{2,}:?)+[ \t]*\|?[ \t]*$"
@@ -204,65 +197,52 @@ BROKEN = {
         "no table was read here",
         "a table has an empty line before it, a line `| --- | --- |` below its header, and as many "
         "cells in the one as in the other",
-        "markup-unread",
-        once=True,
     ),
     "note": MarkupKind(
         r"(?<!\\)\[\^[^\[\]\n\0]*\]?",
         "no footnote begins here",
         "a footnote is `[^name]`, its name without blanks, with a paragraph `[^name]: …`",
-        "markup-unread",
     ),
     "conflict": MarkupKind(
         r"^={7}$",
         "a merge conflict may have left it behind",
         "delete it; a line between two parts is `---`",
-        "markup-unread",
     ),
     "task": MarkupKind(
         r"^[-*+]\[[ xX]?\](?=[ \t])|\A\[(?: [xX] ?|[xX] |)\](?=[ \t]*\w)",
         "no task begins here",
         "a task is `- [ ] text` or `- [x] text`",
-        "markup-unread",
     ),
     "mention": MarkupKind(
         r"(?<![\w\\])(?-i:Lesson) \d+(?:(?:[,;/:]|\.\.)\d+(?![\w,])|(?<=\d\d)(?![\w.,]))",
         "no lesson has such a number",
         "a lesson is mentioned as `Lesson 1.2`, with a point",
-        "markup-unread",
     ),
     "item": MarkupKind(
         r"^\d{1,2}(?:[.)][.,)]|[,;]) (?=(?-i:[A-Z\0]))|^\d{1,2}[.)](?=(?-i:[A-Z][a-z]))"
         r"|^-(?=(?-i:[A-Z][a-z]))",
         "no item of a list begins here",
         "an item is `- text` or `1. text`, with one blank after the mark",
-        "markup-unread",
     ),
     "fence": MarkupKind(
         r"^(?:'{3}|´{3}|‘{3}|’{3})[ \t]*\w*(?=[\w \t=./\"-]*$)",
         "no block begins here",
         "a block of code begins and ends with three backticks on a line of their own",
-        "markup-unread",
-        once=True,
     ),
     "html": MarkupKind(
         r"<!--|</[A-Za-z][\w-]*>?|<[A-Za-z][\w-]*\s+[\w-]+\s*=[^<>\n]*>?",
         "no tag or comment was read here",
         'close it: `<tag attribute="value">`, `</tag>`, `<!-- comment -->`',
-        "markup-unread",
     ),
     "entity": MarkupKind(
         rf"&(?:{'|'.join(_ENTITIES.split())})(?![\w;])",
         "an entity ends with a semicolon",
         "write the character itself, or add the `;`",
-        "markup-unread",
     ),
     "code": MarkupKind(
         r"(?<!\w)`+|`+(?!\w)",
         "no code begins or ends here",
         "put a backtick at both ends, in the same paragraph; write `` \\` `` for the character",
-        "markup-unread",
-        once=True,
     ),
     "emphasis": MarkupKind(
         rf"{_BEFORE}(?:\*\*\*?|__|~~)(?=[^\W_]|[\"'“„(\[$\\\0])"
@@ -272,15 +252,12 @@ BROKEN = {
         "no emphasis begins or ends here",
         "put the same mark at both ends, in the same paragraph and with no blank inside it; write "
         "a backslash before each character that is meant to be seen",
-        "markup-unread",
-        once=True,
     ),
     "character": MarkupKind(
         "[\ufffd\x01-\x08\x0b\x0e-\x1f\x7f-\x9f]",
         "",
         "delete it, or write the character that was meant",
         "control-character",
-        once=True,
     ),
 }
 """Markup of ours that is not whole."""
@@ -292,9 +269,9 @@ IN_HTML = {
         "inside HTML, Markdown is read only after an empty line",
         "leave a line empty after the opening tag and another before the closing one, or write "
         "HTML: `<b>`, `<code>`, `<a href=…>`",
-        "markup-unread",
-        once=True,
     ),
     **FOREIGN,
 }
 """What is unread between the tags of HTML, where nothing but formulas is read."""
+ONCE = frozenset("link bracket table fence code emphasis character markdown".split())
+"""One mistake often leaves several of these marks in a text; the first is reported."""

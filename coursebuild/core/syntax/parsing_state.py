@@ -14,8 +14,8 @@ from msgspec import Struct, field
 
 from coursebuild.core.model import Block, Footnote, FootnoteRef
 from coursebuild.core.model.vocabulary import Words
-from coursebuild.core.syntax.headings import Anchors
-from coursebuild.core.syntax.markdown import References
+from coursebuild.core.syntax.attributes import Anchors
+from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
 

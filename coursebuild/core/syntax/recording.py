@@ -24,8 +24,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.blocks import volatile_pattern
 from coursebuild.core.model.vocabulary import Words
-from coursebuild.core.syntax.fence import Fence, is_known_kind
-from coursebuild.core.syntax.info import FenceKeys, Word
+from coursebuild.core.syntax.fence import Fence, FenceKeys, Word, is_known_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, misspelt
 from coursebuild.core.text.patterns import matches_empty_text, pattern_mistake

@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from coursebuild.core.registry import features
 from coursebuild.core.syntax.course_schema import CourseFile
-from coursebuild.core.syntax.scenarios import ModelFile
+from coursebuild.core.syntax.declarations import ModelFile
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -1,8 +1,12 @@
-"""Python blocks: scripts that are extracted and run, and code that is only shown.
+"""Fences become blocks according to their kind: scripts, code that is only shown, models.
 
-Entry point: `parse_python`. Keys of a script: `file`, `timeout`, `requires`, `args`, `figure`,
-`norun`, `diverges`, `deep`, `writes`, `record`. Code that is only shown may have `fragment`, if it
-need not parse, or `show`, if it is copied from a file.
+Entry points: `read_block`; `parse_python`. Fences of features are read by the features.
+
+1. Keys of a script: `file`, `timeout`, `requires`, `args`, `figure`, `norun`, `diverges`, `deep`,
+   `writes`, `record`. Code that is only shown may have `fragment`, if it need not parse, or `show`,
+   if it is copied from a file.
+2. `mjcf` is a model or a fragment of one. Keys: `fragment="worldbody"` (where the fragment goes;
+   `worldbody/body` names nested elements), `error="…"` (the message it must fail with).
 """
 
 from __future__ import annotations
@@ -15,16 +19,32 @@ import warnings
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
-from coursebuild.core.model import PlainCode, Script, SourcePart
+from coursebuild.core.model import (
+    Block,
+    CodeBlock,
+    Mjcf,
+    PlainCode,
+    Script,
+    SourcePart,
+)
 from coursebuild.core.model.blocks import FigureName
-from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.info import FenceKeys, Word, split_words
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
+from coursebuild.core.registry import fence_kind
+from coursebuild.core.syntax.fence import (
+    Fence,
+    FenceKeys,
+    Word,
+    check_kind,
+    find_likely_end,
+    find_likely_start,
+    split_words,
+)
+from coursebuild.core.syntax.parsing_state import ParsingState
+from coursebuild.core.syntax.recording import check_stray_keys, record_fence
+from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
-DEFAULT_TIMEOUT = 60.0
-"""Seconds."""
-MAX_TIMEOUT = 86400.0
+DEFAULT_TIMEOUT, MAX_TIMEOUT = 60.0, 86400.0
 """Seconds."""
 
 _VALUES = ("timeout", "requires", "args", "writes", "record", "figure")
@@ -32,14 +52,13 @@ _FLAGS = ("norun", "diverges", "deep")
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _DEVICE = re.compile(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
 _UNPORTABLE = re.compile(r'[\x00-\x1f\x7f<>:"|?*\ud800-\udfff]')
-_UNUSABLE_NAMES = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"}) - {
-    "code",
-    "test",
-    "this",
-}
+_UNUSABLE_NAMES = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"}) - set(
+    "code test this".split()
+)
 _PATH = re.compile(r"\w[\w.-]*(?:/\w[\w.-]*)*")
 _RESERVED_FOLDERS = ("content", "models", "examples", "features", "public")
 _FIGURE = re.compile(r"[A-Za-z0-9][\w-]*(?:\.[\w-]+)*\.(?:svg|png|csv)", re.ASCII)
+_ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
 _LINE_REFERENCE = re.compile(r"\b(on|at) line ([0-9]+)")
 
 
@@ -333,3 +352,89 @@ def _compile_error(code: str) -> SyntaxError | None:
         syntax_error.end_offset = 1
         return syntax_error
     return None
+
+
+_HEAD_RULES = frozenset(
+    {"fence-info", "fence-key-repeated", "fence-key-unknown", "fence-key-value", "script-path"}
+)
+"""Mistakes that may be why a block is no script."""
+
+
+def read_block(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
+    """The block of a fence; recorded outputs are read in `recording`."""
+    if not fence.is_closed or fence.inner is not None:
+        return _read_unclosed(fence, state)
+    match fence.kind:
+        case "python":
+            python = parse_python(fence)
+            state.diagnostics += python.diagnostics
+            if isinstance(python.value, Script):
+                state.script, state.has_invalid_script = python.value.path, False
+                names = (figure.name for figure in python.value.figures)
+                state.figures += [name for name in names if not name.endswith(".csv")]
+            elif not fence.nested and any(d.rule in _HEAD_RULES for d in python.diagnostics):
+                state.script, state.has_invalid_script = None, True
+            return python.value
+        case "output" if fence.nested:
+            message = "a text of a quiz or lab cannot hold a recorded output"
+            state.report(diagnose("fence-info", fence.head, message))
+            return fence.code()
+        case "output":
+            return record_fence((), fence.head, fence, state) or fence.code()
+        case "text":
+            check_stray_keys(fence, state)
+            return fence.code()
+        case "mjcf":
+            return _read_mjcf(fence, state)
+        case name if (kind := fence_kind(name)) is not None and fence.nested and not kind.nested:
+            message = f"a text of a quiz or lab cannot hold a {name}"
+            state.report(diagnose("fence-info", fence.head, message))
+            return fence.code()
+        case _ if kind is not None:
+            block = kind.parse(fence, texts)
+            state.diagnostics += block.diagnostics
+            return block.value or fence.code()
+        case _:
+            state.diagnostics += check_kind(fence)
+            return fence.code()
+
+
+def _read_unclosed(fence: Fence, state: ParsingState) -> CodeBlock:
+    """Report a fence without end, and show it as code; its content is not checked."""
+    if state.closes_indented and not fence.info.text:
+        state.closes_indented = False
+        return fence.code()
+    marks = fence.head.text[: len(fence.head.text) - len(fence.head.text.lstrip("`~"))]
+    name = "backticks" if marks[0] == "`" else "tildes"
+    help = f"close it with a line of {len(marks)} {name} in the same quote or list item"
+    message, notes = "this code fence is never closed", []
+    if fence.inner is not None:
+        message = "this code fence is not closed before another one begins"
+        notes = [Note("this line is read as text of the fence above it", fence.inner)]
+    likely_end = find_likely_end(fence)
+    likely_start = None if fence.info.text else find_likely_start(fence.head)
+    if likely_end is not None:
+        notes.append(Note("its block seems to end here", likely_end))
+    if likely_start is not None:
+        notes.append(Note("or a block that begins here has lost its first line", likely_start))
+    state.report(diagnose("fence-unclosed", fence.head, message, help=help, notes=notes))
+    if fence.kind == "python" or fence.inner is not None:
+        state.script, state.has_invalid_script = None, True
+    return fence.code()
+
+
+def _read_mjcf(fence: Fence, state: ParsingState) -> Mjcf | CodeBlock:
+    """An `mjcf` fence; with wrong keys it cannot be compiled, and is shown as code."""
+    parsed_keys = fence.keys(values=("fragment", "error"))
+    state.diagnostics += parsed_keys.diagnostics
+    keys, fragment = parsed_keys.value, parsed_keys.value.get("fragment")
+    if fragment is not None and not _ELEMENTS.fullmatch(fragment.value or ""):
+        message = f"`{fragment.value}` is not the name of an element"
+        help = 'name the element that it goes into, for example `fragment="worldbody"`'
+        state.report(diagnose("fence-key-value", fragment.value_span, message, help=help))
+        return fence.code()
+    if parsed_keys.diagnostics:
+        return fence.code()
+    return Mjcf(
+        fence.span, fence.body, keys.value("fragment"), keys.value("error"), keys.place("error")
+    )

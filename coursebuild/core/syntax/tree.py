@@ -14,18 +14,28 @@ for quizzes and labs.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 from coursebuild.core import model
-from coursebuild.core.syntax.attributes import LABEL, read_label
-from coursebuild.core.syntax.callout import Head, read_head
-from coursebuild.core.syntax.dispatch import read_block
+from coursebuild.core.syntax.attributes import (
+    LABEL,
+    Attributes,
+    check_heading,
+    read_attributes,
+    read_label,
+)
+from coursebuild.core.syntax.block_parser import TOO_DEEP, References, block_tokens
+from coursebuild.core.syntax.containers import (
+    Head,
+    check_quote_marks,
+    check_torn_callout,
+    read_head,
+    read_table,
+)
 from coursebuild.core.syntax.fence import INDENTED_FENCE, is_known_kind, read_fence
-from coursebuild.core.syntax.headings import Attributes, check_heading, read_attributes
-from coursebuild.core.syntax.html import LITERAL, Balance, find_media, tags
+from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inlines import read_inlines
-from coursebuild.core.syntax.markdown import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
@@ -40,9 +50,8 @@ from coursebuild.core.syntax.recording import (
     record_fence,
     record_table,
 )
-from coursebuild.core.syntax.safe_html import find_forbidden
+from coursebuild.core.syntax.script import read_block
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
-from coursebuild.core.syntax.tables import read_table
 from coursebuild.core.syntax.unread_markup import check_unread_markup
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
@@ -111,7 +120,7 @@ class TextReader:
                 break
             block = _READERS[token.type](self, token)
             if block is not None:
-                self._check_torn_callout(blocks, block)
+                self.state.diagnostics += check_torn_callout(blocks, block)
                 blocks.append(block)
         self.balance.leave()
         return tuple(blocks)
@@ -286,46 +295,13 @@ class TextReader:
 
     def _read_quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
         span, first_token = self._span(token), self.tokens[self.index]
-        self._check_quote_marks(span)
+        self.state.diagnostics += check_quote_marks(span)
         if first_token.type == "paragraph_open":
             head = read_head(trim(first_token.text), self.state.callouts)
             if head is not None:
                 self.state.diagnostics += head.diagnostics
                 return self._read_callout(span, head.value)
         return model.BlockQuote(span, self._read_blocks("blockquote_close"))
-
-    def _check_quote_marks(self, span: Span) -> None:
-        """Report a mark too many in the middle of a paragraph, and another character for one."""
-        source = span.source
-        above, line = source.line_text(span.line - 1) if span.line > 1 else "", span.line
-        outer, marks = (_QUOTE_MARKS.match(text) for text in (above, source.line_text(line)))
-        assert outer is not None and marks is not None, "they match nothing as well"
-        is_in_text = above[outer.end() :].strip() and not span.text.startswith("> [!")
-        if is_in_text and ">>" in marks[0] and 0 < outer[0].count(">") < marks[0].count(">"):
-            message = "a quotation begins in the middle of a paragraph"
-            help = "take one `>` away, or leave a line with nothing but `>` above it"
-            place = source.span(at := source.line_start(line), at + len(marks[0].rstrip()))
-            self.state.report(diagnose("markup-unread", place, message, help=help))
-        for line in range(span.line + 1, span.end_line + 1):
-            slip = _SLIP_OF_MARK.match(source.line_text(line))
-            if slip is not None:
-                start = source.line_start(line)
-                message = f"`{slip[1]}` would be shown as written: this line continues a quotation"
-                place = source.span(start + slip.start(1), start + slip.end(1))
-                help = "begin the line with `> `"
-                self.state.report(diagnose("markup-unread", place, message, help=help))
-
-    def _check_torn_callout(self, above: Sequence[model.Block], block: model.Block) -> None:
-        """Report a quotation directly below a callout, of which it was surely a part."""
-        callout = above[-1] if above else None
-        if not isinstance(callout, model.Callout) or not isinstance(block, model.BlockQuote):
-            return
-        gap = Span(block.span.source, callout.span.end, block.span.start)
-        if not gap.text.strip(" \t\r\n>") and gap.text.count("\n") <= 2:
-            message = "a quotation begins directly below a callout"
-            help = "begin the empty line between them with `>`, or write a paragraph between them"
-            place = block.span.first_line()
-            self.state.report(diagnose("markup-unread", place, message, help=help))
 
     def _read_callout(self, span: Span, head: Head) -> model.Callout:
         title = self.inlines(head.title)
@@ -393,9 +369,6 @@ class TextReader:
         return None
 
 
-_QUOTE_MARKS = re.compile(r"[ >]*")
-_SLIP_OF_MARK = re.compile(r" {0,3}([<.?/,;:|])(?= |$)")
-"""What a line of a quotation may begin with if `>` was mistyped."""
 _BODIES: tuple[tuple[str, list[str]], ...] = (
     ("fence", ["text"]),
     ("fence", [OUTPUT_KIND]),

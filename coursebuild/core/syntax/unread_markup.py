@@ -15,8 +15,8 @@ import re
 from collections.abc import Iterator, Sequence
 
 from coursebuild.core.syntax.fence import is_known_kind
-from coursebuild.core.syntax.markup_kinds import BROKEN, FOREIGN, IN_HTML, MarkupKind
-from coursebuild.core.syntax.wording import shorten
+from coursebuild.core.syntax.markup_kinds import BROKEN, FOREIGN, IN_HTML, ONCE, MarkupKind
+from coursebuild.core.syntax.nodes import shorten
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -83,7 +83,7 @@ def check_unread_markup(
             continue
         diagnostic = _diagnose(content, name, kinds[name], match)
         if diagnostic is not None:
-            reported |= {name} if kinds[name].once else set()
+            reported |= ONCE.intersection([name])
             yield diagnostic
 
 
@@ -167,7 +167,8 @@ def _diagnose(
         case _:
             pass
     message = f"`{shorten(markup)}` would be shown as written: {kind.reason}"
-    return diagnose(kind.rule, span, message, help=help)
+    rule = "markup-foreign" if name in FOREIGN else kind.rule
+    return diagnose(rule, span, message, help=help)
 
 
 def _is_escaped(text: str, end: int) -> bool:

@@ -56,7 +56,6 @@ class Source(Struct, frozen=True, dict=True):
 
     @cached_property
     def digest(self) -> bytes:
-        """SHA-256 of the text."""
         return text_digest(self.text)
 
     @cached_property
@@ -101,12 +100,10 @@ class Span(Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        """The text of the span."""
         return self.source.text[self.start : self.end]
 
     @property
     def path(self) -> str:
-        """The source's path."""
         return self.source.path
 
     @property
@@ -157,7 +154,6 @@ class Excerpt(Struct, frozen=True):
 
     @property
     def digest(self) -> bytes:
-        """SHA-256 of the text."""
         return text_digest(self.text)
 
     @classmethod

@@ -30,11 +30,11 @@ from coursebuild.core.model import Lesson, Level
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import ExportContext
-from coursebuild.core.pages.characters import visible
-from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.fonts import COURSE
 from coursebuild.core.pages.html_tree import to_xml
+from coursebuild.core.pages.strings import direction
 from coursebuild.core.pages.theme import accents
+from coursebuild.core.text.characters import visible
 from coursebuild.features.book.chapters import (
     PICTURES,
     RewriteRules,

@@ -16,7 +16,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Course, Recording, find_blocks
-from coursebuild.core.model.figures import recorded_figures
+from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.pages.html_tree import elements_with
 from coursebuild.core.pages.marks import code_span, escape_text, fence, table
 from coursebuild.core.pages.urls import Place

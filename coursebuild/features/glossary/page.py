@@ -13,14 +13,14 @@ from msgspec import Struct
 
 from coursebuild.core.model import Owner, TermTarget
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library, links
-from coursebuild.core.pages.owner_links import (
+from coursebuild.core.pages.document_inputs import (
     OwnerLink,
     OwnerLinks,
     added_page,
     owner_link,
     owner_links,
 )
+from coursebuild.core.pages.library import Library, links
 from coursebuild.features.glossary.terms import DefinedTerm
 
 

@@ -35,7 +35,7 @@ from coursebuild.core.model import (
     without_links,
 )
 from coursebuild.core.pages import formulas
-from coursebuild.core.pages.equations import number_equations
+from coursebuild.core.pages.formulas import number_equations
 from coursebuild.core.pages.markup import HtmlWriter
 from coursebuild.core.text.diagnostics import Parsed
 

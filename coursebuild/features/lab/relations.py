@@ -15,9 +15,15 @@ from msgspec import Struct
 
 from coursebuild.core.model import Course, Document, FeatureBlock, find_blocks
 from coursebuild.core.model.results import ModelFacts
-from coursebuild.core.syntax.fields import check_unique, require_one_of
-from coursebuild.core.syntax.nodes import ArrayNode, Node, NumberNode, ObjectNode, StringNode
-from coursebuild.core.syntax.wording import format_value
+from coursebuild.core.syntax.decode import check_unique, require_one_of
+from coursebuild.core.syntax.nodes import (
+    ArrayNode,
+    Node,
+    NumberNode,
+    ObjectNode,
+    StringNode,
+    format_value,
+)
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.features.lab.model import BUILT_IN_KINDS, Lab
 from coursebuild.features.lab.schema import Button, Expect, Plot, Select, SimLab, Slider

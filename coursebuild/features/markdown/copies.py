@@ -22,13 +22,13 @@ from coursebuild.core.model import Lesson
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import SiteContext
-from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.lesson import LessonLink, LevelView
+from coursebuild.core.pages.document_inputs import LessonLink, LevelView
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import code_span, escape_line, guard_lines, link
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.strings import Strings
+from coursebuild.core.text.characters import visible
 from coursebuild.features.markdown.from_html import html_to_markdown
 from coursebuild.features.markdown.writer import DocumentWriter
 

@@ -22,13 +22,13 @@ from coursebuild.core.drawing.contrast import GROUNDS_LIGHT
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.features import Feature, PageKind, PagePart
 from coursebuild.core.model import Course
+from coursebuild.core.model.course import ThemeFile
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile
-from coursebuild.core.model.theme import ThemeFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.added_files import SiteContext
 from coursebuild.core.pages.assets import Assets, hashed_name, page_script
-from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.frame import Names
+from coursebuild.core.pages.strings import direction
 from coursebuild.core.pages.theme import picture_size
 
 PAPER = GROUNDS_LIGHT[0]

@@ -11,7 +11,7 @@ from msgspec import Struct
 from coursebuild.core.features import Feature, PageKind, PagePart
 from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.lesson import level_view
+from coursebuild.core.pages.document_inputs import level_view
 from coursebuild.core.pages.library import Library
 
 _PROGRESS, _REVIEW = "progress/index.html", "review/index.html"

@@ -10,10 +10,10 @@ import json
 from collections.abc import Iterable
 
 from coursebuild.core.model import Document
-from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.lesson import LessonLink
+from coursebuild.core.pages.document_inputs import LessonLink
 from coursebuild.core.pages.page_inputs import DocumentInputs, HighlightedFile, PageInputs
+from coursebuild.core.text.characters import visible
 from coursebuild.features.search.sections import Section, SectionReader
 from coursebuild.features.search.words import count_terms
 

@@ -17,14 +17,14 @@ from coursebuild.core import model
 from coursebuild.core.features import Mathml
 from coursebuild.core.model import Lesson, Owner
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.owner_links import (
+from coursebuild.core.pages.document_inputs import (
     OwnerLink,
     OwnerLinks,
     added_page,
     owner_link,
     owner_links,
 )
+from coursebuild.core.pages.library import Library
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.features.symbols.mathml import declared_symbol, sort_key, symbols
 

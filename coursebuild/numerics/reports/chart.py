@@ -21,13 +21,15 @@ from typing import NamedTuple
 
 from msgspec import Struct
 
-from coursebuild.core.drawing.marks import (
+from coursebuild.core.drawing.scales import (
+    Scale,
+    log,
     markup_text,
+    number_text,
     separate_labels,
     shorten_to_width,
     text_width,
 )
-from coursebuild.core.drawing.scales import Scale, log, number_text
 from coursebuild.numerics.reports import Interval
 
 _DASHES = ("", "7 3", "2 3", "10 3 2 3", "1 4", "5 2 1 2 1 2", "12 4")

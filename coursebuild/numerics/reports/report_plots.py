@@ -21,8 +21,7 @@ import statistics
 from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 
-from coursebuild.core.drawing.marks import shorten_to_width, text_width
-from coursebuild.core.drawing.scales import Scale, log
+from coursebuild.core.drawing.scales import Scale, log, shorten_to_width, text_width
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.case_report import CaseReport
 from coursebuild.numerics.reports.chart import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coursebuild.core.pages.dark import dark_colours, dark_drawing
+from coursebuild.core.pages.theme import dark_colours, dark_drawing
 
 DRAWING = """<svg viewBox="0 0 9 9"><style>.a{fill:#0072B2}</style>
 <defs><g id="x1"/></defs>

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.pages.direction import direction
 from coursebuild.core.pages.quantities import (
     join_units,
     split_quantities,
     text_html,
     unit_length,
 )
+from coursebuild.core.pages.strings import direction
 from support.rendered_course import MAP, Make
 
 LANGUAGES = {

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.pages.characters import visible
 from coursebuild.core.pages.highlight import highlight_lines
+from coursebuild.core.text.characters import visible
 
 
 def highlight(language: str, code: str) -> str:

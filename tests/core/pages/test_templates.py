@@ -8,7 +8,7 @@ import pytest
 from jinja2 import TemplateNotFound, UndefinedError
 from markupsafe import Markup
 
-from coursebuild.core.pages.templates import compile_templates, templates_of
+from coursebuild.core.pages.renderer import compile_templates, templates_of
 
 TEXTS = (
     ("page.html", "<p>{{ a }}{% include 'part.html' %}</p>\n"),

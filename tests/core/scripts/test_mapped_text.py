@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Filter
-from coursebuild.core.scripts.mapped_text import MappedText, apply_filters
+from coursebuild.core.scripts.lines import MappedText, apply_filters
 
 TEXTS = st.text(alphabet="ab1 \n-x", max_size=30)
 PATTERNS = st.sampled_from(

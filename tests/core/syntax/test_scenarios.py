@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Declarations, Measured
-from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source
 

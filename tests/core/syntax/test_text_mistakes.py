@@ -9,7 +9,7 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.core.syntax.coursemap import parse_course_map
-from coursebuild.core.syntax.scenarios import parse_declarations
+from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source

@@ -15,7 +15,7 @@ from coursebuild.cli.arguments import options_of
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.write import FileChange
-from coursebuild.core.model.theme import TEMPLATES
+from coursebuild.core.model.course import TEMPLATES
 from coursebuild.core.registry import CORE_FENCES, features, fence_names
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.text.diagnostics import did_you_mean

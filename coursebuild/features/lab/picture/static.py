@@ -21,9 +21,8 @@ from markupsafe import Markup
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from coursebuild.core.drawing.marks import markup_text as _text
-from coursebuild.core.drawing.marks import separate_labels
-from coursebuild.core.drawing.scales import Scale, typeset_number
+from coursebuild.core.drawing.scales import Scale, separate_labels, typeset_number
+from coursebuild.core.drawing.scales import markup_text as _text
 from coursebuild.features.lab.files import LabRecord
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.picture.draw import FreeCamera, draw

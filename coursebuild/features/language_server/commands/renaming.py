@@ -22,8 +22,7 @@ from coursebuild.core import model
 from coursebuild.core.checks.links import anchors
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.pages.library import Library
-from coursebuild.core.syntax.attributes import collapse_spaces
-from coursebuild.core.syntax.headings import term_id
+from coursebuild.core.syntax.attributes import collapse_spaces, term_id
 from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.authoring.course_map import rename_references, with_lesson_renamed

@@ -33,7 +33,7 @@ from coursebuild.core.model import (
     UrlTarget,
 )
 from coursebuild.core.model.vocabulary import Words
-from coursebuild.core.syntax.headings import term_id
+from coursebuild.core.syntax.attributes import term_id
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Span
 

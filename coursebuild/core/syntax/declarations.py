@@ -33,11 +33,9 @@ from coursebuild.core.model.scenarios import (
     is_multiple,
 )
 from coursebuild.core.model.vocabulary import CLOSED_FORMS
-from coursebuild.core.syntax.decode import Decoding, decode
-from coursebuild.core.syntax.fields import check_unique
-from coursebuild.core.syntax.nodes import ObjectNode
+from coursebuild.core.syntax.decode import Decoding, check_unique, decode
+from coursebuild.core.syntax.nodes import TOML, ObjectNode, shorten
 from coursebuild.core.syntax.toml_text import parse_toml
-from coursebuild.core.syntax.wording import TOML, shorten
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
     Parsed,

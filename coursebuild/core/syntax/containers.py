@@ -1,0 +1,201 @@
+r"""Containers: quotations, callouts and tables, each part with its place.
+
+A callout is a quotation whose first line is `[!kind] Optional title`; `[!kind]- Title` makes one
+that starts folded.
+
+Entry points: `read_head`, which reads that line; `check_quote_marks` and `check_torn_callout`;
+`read_table`. markdown-it finds the tables and their rows. A row is split here, at each `|` without
+a backslash before it; `\|` is a `|` in the cell.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterator, Sequence
+from typing import Literal
+
+from markdown_it.common.utils import MD_TRIM_CHARS
+from msgspec import Struct
+
+from coursebuild.core.model import Block, BlockQuote, Callout, Cell, Inline, Table
+from coursebuild.core.syntax.spans import PositionedToken, trim
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean, misspelt
+from coursebuild.core.text.source import Excerpt, Span
+
+_HEAD = re.compile(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
+_BROKEN_HEAD = re.compile(
+    r"(?:\w?[^\w\s\\]{0,2}![^\w\s\\]?[ ]?([A-Za-z][\w-]*)[^\w\s(]?+"  # `!note`, `[!note`, `![note]`
+    r"|\[([A-Za-z]!\w[\w-]*)\]"  # `[n!ote]`
+    r"|\[[^\w\s\\]?([A-Za-z][\w-]*)[!\])}]{1,2}+)-?+(?![(\[:])([^\n]*)(?:\n|$)"  # `[note]`
+)
+"""A line that was surely meant to be the first of a callout if the word is a kind."""
+_QUOTE_MARKS = re.compile(r"[ >]*")
+_SLIP_OF_MARK = re.compile(r" {0,3}([<.?/,;:|])(?= |$)")
+"""What a line of a quotation may begin with if `>` was mistyped."""
+FALLBACK = "note"
+"""The kind that a callout of an unknown kind gets, so that its content is still checked."""
+
+
+class Head(Struct, frozen=True):
+    """The first line of a callout, and what follows it in its paragraph."""
+
+    kind: str
+    kind_span: Span
+    title: Excerpt
+    folded: bool
+    rest: Excerpt
+
+
+def read_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None:
+    """The head of a callout, if a blockquote's first paragraph begins with one.
+
+    Its kind is one of `kinds`, without regard to case.
+    """
+    match = _HEAD.match(paragraph.text)
+    if match is None:
+        return _read_broken_head(paragraph, kinds)
+    name, kind, diagnostic = trim(paragraph.slice(*match.span(1))), FALLBACK, None
+    if match[3][:1].strip():
+        start = match.start(3)
+        message = f"`{match[3][0]}` cannot follow the kind of a callout"
+        help = "write `[!kind] Title`, or `[!kind]- Title` for a callout that starts folded"
+        place = paragraph.span(start, start + 1)
+        diagnostic = diagnose("callout-unknown", place, message, help=help)
+    elif name.text.lower() in kinds:
+        kind = name.text.lower()
+    else:
+        choice = ", ".join(f"`{kind}`" for kind in sorted(kinds))
+        message = "the kind of this callout is missing"
+        message = f"no callout kind `{name.text}`" if name.text else message
+        help = did_you_mean(name.text.lower(), kinds) or f"known: {choice}"
+        diagnostic = diagnose("callout-unknown", name.span(), message, help=help)
+    title, rest = trim(paragraph.slice(*match.span(3))), trim(paragraph.slice(match.end()))
+    head = Head(kind, name.span(), title, bool(match[2]), rest)
+    return Parsed(head, () if diagnostic is None else (diagnostic,))
+
+
+def _read_broken_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None:
+    match = _BROKEN_HEAD.match(paragraph.text)
+    if match is None:
+        return None
+    kind = (match[1] or match[2] or match[3]).replace("!", "").lower()
+    if kind not in kinds:
+        kind = misspelt(kind, [name for name in kinds if len(name) > 5]) or ""
+    if not kind:
+        return None
+    title = trim(paragraph.slice(*match.span(4)))
+    place = trim(paragraph.slice(0, match.start(4)))
+    head = Head(kind, place.span(), title, False, trim(paragraph.slice(match.end())))
+    help = f"write `> [!{kind}] Title`, or a backslash before the bracket that is meant to be seen"
+    message = f"`{place.text}` does not begin a callout"
+    return Parsed(head, (diagnose("callout-unknown", place.span(), message, help=help),))
+
+
+def check_quote_marks(span: Span) -> Iterator[Diagnostic]:
+    """Report a mark too many in the middle of a paragraph, and another character for one."""
+    source = span.source
+    above, line = source.line_text(span.line - 1) if span.line > 1 else "", span.line
+    outer, marks = (_QUOTE_MARKS.match(text) for text in (above, source.line_text(line)))
+    assert outer is not None and marks is not None, "they match nothing as well"
+    is_in_text = above[outer.end() :].strip() and not span.text.startswith("> [!")
+    if is_in_text and ">>" in marks[0] and 0 < outer[0].count(">") < marks[0].count(">"):
+        message = "a quotation begins in the middle of a paragraph"
+        help = "take one `>` away, or leave a line with nothing but `>` above it"
+        place = source.span(at := source.line_start(line), at + len(marks[0].rstrip()))
+        yield diagnose("markup-unread", place, message, help=help)
+    for line in range(span.line + 1, span.end_line + 1):
+        slip = _SLIP_OF_MARK.match(source.line_text(line))
+        if slip is not None:
+            start = source.line_start(line)
+            message = f"`{slip[1]}` would be shown as written: this line continues a quotation"
+            place = source.span(start + slip.start(1), start + slip.end(1))
+            help = "begin the line with `> `"
+            yield diagnose("markup-unread", place, message, help=help)
+
+
+def check_torn_callout(above: Sequence[Block], block: Block) -> Iterator[Diagnostic]:
+    """Report a quotation directly below a callout, of which it was surely a part."""
+    callout = above[-1] if above else None
+    if not isinstance(callout, Callout) or not isinstance(block, BlockQuote):
+        return
+    gap = Span(block.span.source, callout.span.end, block.span.start)
+    if not gap.text.strip(" \t\r\n>") and gap.text.count("\n") <= 2:
+        message = "a quotation begins directly below a callout"
+        help = "begin the empty line between them with `>`, or write a paragraph between them"
+        place = block.span.first_line()
+        yield diagnose("markup-unread", place, message, help=help)
+
+
+_PIPE = re.compile(r"\\?\|")
+_ALIGN: dict[object, Literal["left", "right", "center"]] = {
+    "text-align:left": "left",
+    "text-align:right": "right",
+    "text-align:center": "center",
+}
+
+
+def read_table(
+    tokens: Sequence[PositionedToken],
+    at: int,
+    base: Excerpt,
+    inlines: Callable[[Excerpt], tuple[Inline, ...]],
+    report: Callable[[Diagnostic], None],
+) -> tuple[Table, int]:
+    """The table whose opening token has the index `at`, and the index after its closing one."""
+    opening = tokens[at]
+    align: list[Literal["left", "right", "center"] | None] = []
+    rows: list[PositionedToken] = []
+    while (token := tokens[at]).type != "table_close":
+        at += 1
+        if token.type == "tr_open":
+            rows.append(token)
+        elif token.type == "th_open":
+            align.append(_ALIGN.get(token.attrs.get("style")))
+    cells = [_read_cells(base, row, len(align), inlines, report) for row in rows]
+    span = base.span(opening.start, opening.end)
+    return Table(span, tuple(align), cells[0], tuple(cells[1:])), at + 1
+
+
+def _read_cells(
+    base: Excerpt,
+    row: PositionedToken,
+    columns: int,
+    inlines: Callable[[Excerpt], tuple[Inline, ...]],
+    report: Callable[[Diagnostic], None],
+) -> tuple[Cell, ...]:
+    cells = _split_row(base, row.start, row.end)
+    if any(cell.text for cell in cells[columns:]):
+        message = f"this row has {len(cells)} cells and the header {columns}, so this is not shown"
+        help = "write `\\|` for a `|` that is part of a cell, and `\\vert` for one in a formula"
+        span = cells[columns].span().to(cells[-1].span())
+        report(diagnose("table-cells", span, message, help=help))
+    elif len(cells) < columns:
+        count = "1 cell" if len(cells) == 1 else f"{len(cells)} cells"
+        message = f"this row has {count} and the header {columns}"
+        help = "write `|` between cells, and `| |` for a cell with nothing in it"
+        report(diagnose("table-cells", base.span(row.start, row.end), message, help=help))
+    empty = Excerpt(base.source, "", ((0, base.offset(row.end)),))
+    cells = [*cells, *[empty] * columns][:columns]
+    return tuple([Cell(cell.span(), cell, inlines(cell)) for cell in cells])
+
+
+def _split_row(base: Excerpt, start: int, end: int) -> list[Excerpt]:
+    """The cells of the row between two offsets of `base`."""
+    line = base.text[start:end]
+    at = start + len(line) - len(line.lstrip(MD_TRIM_CHARS))
+    end = start + len(line.rstrip(MD_TRIM_CHARS))
+    parts: list[list[Excerpt]] = [[]]
+    for pipe in _PIPE.finditer(base.text, at, end):
+        parts[-1].append(base.slice(at, pipe.start()))
+        if pipe[0] == "|":
+            parts.append([])
+            at = pipe.end()
+        else:  # the pipe is text, without its backslash
+            at = pipe.end() - 1
+    parts[-1].append(base.slice(at, end))
+    cells = [Excerpt.join(cell_parts) for cell_parts in parts]
+    if not cells[0].text:
+        del cells[0]
+    if cells and not cells[-1].text:
+        del cells[-1]
+    return [trim(cell) for cell in cells]

@@ -1,0 +1,54 @@
+"""Characters: what HTML and XML forbid, and how wide a text is on a terminal.
+
+Entry points: `visible(text)`, with symbols for what HTML forbids; `clean_xml`, without what XML
+forbids; `cells`, the width in columns.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+_NOT_HTML = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff\U0001fffe-\U0010ffff]"
+)
+"""Past U+1FFFF also allowed ones: listing only the last two of each plane would be slow."""
+
+
+def visible(text: str) -> str:
+    """The text without what HTML forbids: a symbol for each control, U+FFFD for the rest."""
+    return _NOT_HTML.sub(_picture, str(text))  # `str`, as `Markup` would escape
+
+
+def _picture(match: re.Match[str]) -> str:
+    code = ord(match[0])
+    if code > 0xFFFF and code & 0xFFFE != 0xFFFE:
+        return match[0]
+    if code < 0x20:
+        return chr(0x2400 + code)
+    return "\u2421" if code == 0x7F else "\ufffd"
+
+
+_NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+"""XML 1.0 has no place for these characters (section 2.2)."""
+
+
+def clean_xml(text: str) -> str:
+    """The text with U+FFFD in place of each character that XML cannot hold."""
+    return _NOT_XML.sub("\ufffd", text)
+
+
+TAB = 4
+
+
+def cells(text: str) -> int:
+    """The number of columns that a text takes."""
+    return sum(map(_cells, text))
+
+
+def _cells(char: str) -> int:
+    if char == "\t":
+        return TAB
+    if unicodedata.combining(char) or char == "\u200d":
+        return 0
+    return 2 if unicodedata.east_asian_width(char) in ("W", "F") else 1
