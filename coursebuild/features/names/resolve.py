@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import builtins
 import functools
+import keyword
 import re
+import string
+from collections import Counter
 from collections.abc import Iterable
 from typing import TypeAlias
 
@@ -36,6 +39,9 @@ _HTML = frozenset(
     title tr track u ul use var video wbr
     """.split()
 )
+
+
+_LETTERS = string.ascii_letters + string.digits + "_"
 
 
 class Meaning(Struct, frozen=True):
@@ -145,6 +151,8 @@ class Resolver:
                 return self._table(*claim.name.split(" "))
             case "file":
                 return self._file(claim.name)
+            case "plain":
+                return self._plain(claim.name, names)
 
     # --- Python
 
@@ -174,6 +182,39 @@ class Resolver:
         candidates = {*self.words, *known_keys(), *(() if engine is None else engine.words)}
         message = f"nothing that the course knows is called `{name}`"
         return Unknown(message, _propose(name, candidates), name)
+
+    @functools.cached_property
+    def plain_words(self) -> dict[str, int]:
+        """What a word may be that has not the shape of a name.
+
+        Each has the fewest letters by which it is told from words of English.
+        """
+        claims = (claim for names in course_names(self.course) for claim in names.claims)
+        uses = Counter(claim.name for claim in claims if claim.kind == "plain")
+        engine, files = self.engine, (path.rpartition("/")[2] for path in self.files)
+        others = {*known_keys(), *self.imports, *options_by_command(), *keyword.kwlist}
+        others.update(vars(builtins), *(() if engine is None else engine.modules.values()))
+        own_words = {*self.words, *files, *(word for word, count in uses.items() if count > 1)}
+        engine_words = engine.words if engine is not None and self.has_engine else ()
+        sets = ((others, 7), (own_words, 5), (engine_words, 3))
+        return {word: length for words, length in sets for word in words}
+
+    def _plain(self, name: str, names: CodeNames) -> Answer:
+        known = self.plain_words
+        if name in known or name in names.words or name.isupper():
+            return None
+        cuts = [(name[:at], name[at:]) for at in range(len(name) + 1)]
+        slips = {a + b[1:2] + b[:1] + b[2:] for a, b in cuts}
+        if len(name) > 3:
+            slips |= {a + b[1:] for a, b in cuts}
+            slips |= {a + x + b[n:] for a, b in cuts for x in _LETTERS for n in (0, 1)}
+        slips -= {name, f"{name}s", *([] if name.endswith("ss") else [name.removesuffix("s")])}
+        near = (word for word in slips if len(word) >= known.get(word, len(word) + 1))
+        likely = min(near, default=None)
+        if likely is None:
+            return None
+        message = f"nothing that the course knows is called `{name}`"
+        return Unknown(message, f"did you mean `{likely}`?", name)
 
     def _path(self, path: str, names: CodeNames) -> Answer:
         parts = [re.sub(r"[()\[\]]+", "", part) for part in path.split(".")]
