@@ -184,8 +184,8 @@ def _find_fault(code: Excerpt, lines_before: int, text: str = "") -> tuple[Span,
 
     def read_words(words: str) -> None:
         if words.strip() and not faults:
-            shown = textwrap.shorten(words, 40, placeholder="…")
-            faults.append((parser.CurrentLineNumber, f"`{shown}` outside any tag"))
+            extract = textwrap.shorten(words, 40, placeholder="…")
+            faults.append((parser.CurrentLineNumber, f"`{extract}` outside any tag"))
 
     parser.CharacterDataHandler = read_words
     try:

@@ -14,9 +14,8 @@ for quizzes and labs.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
 
 from coursebuild.core import model
 from coursebuild.core.syntax.attributes import LABEL, read_label
@@ -27,6 +26,12 @@ from coursebuild.core.syntax.headings import Attributes, check_heading, read_att
 from coursebuild.core.syntax.html import LITERAL, Balance, find_media, tags
 from coursebuild.core.syntax.inlines import read_inlines
 from coursebuild.core.syntax.markdown import TOO_DEEP, References, block_tokens
+from coursebuild.core.syntax.marks import (
+    check_item,
+    check_neighbours,
+    check_numbers,
+    check_quotation,
+)
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
@@ -45,7 +50,7 @@ from coursebuild.core.syntax.safe_html import find_forbidden
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
 from coursebuild.core.syntax.tables import read_table
 from coursebuild.core.syntax.unread_markup import check_unread_markup
-from coursebuild.core.text.diagnostics import Note, Parsed, diagnose
+from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 
@@ -112,7 +117,7 @@ class TextReader:
                 break
             block = _READERS[token.type](self, token)
             if block is not None:
-                self._check_neighbours(blocks, block)
+                self.state.diagnostics += check_neighbours(blocks, block)
                 blocks.append(block)
         self.balance.leave()
         return tuple(blocks)
@@ -287,78 +292,13 @@ class TextReader:
 
     def _read_quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
         span, first_token = self._span(token), self.tokens[self.index]
-        self._check_quote_marks(span)
+        self.state.diagnostics += check_quotation(span)
         if first_token.type == "paragraph_open":
             head = read_head(trim(first_token.text), self.state.callouts)
             if head is not None:
                 self.state.diagnostics += head.diagnostics
                 return self._read_callout(span, head.value)
         return model.BlockQuote(span, self._read_blocks("blockquote_close"))
-
-    def _check_quote_marks(self, span: Span) -> None:
-        """Report a mark too many in the middle of a paragraph, and another character for one."""
-        source = span.source
-        line = span.line
-        lines = [source.line_text(n) if n else "" for n in range(line - 1, span.end_line + 1)]
-        above = lines[0]
-        outer, marks = (_QUOTE_MARKS.match(text) for text in lines[:2])
-        assert outer is not None and marks is not None, "they match nothing as well"
-        is_in_text = bool(above[outer.end() :].strip()) and not span.text.startswith("> [!")
-        is_in_text = is_in_text and 0 < outer[0].count(">") < marks[0].count(">")
-        if source.text[max(span.start - 1, 0)] == ">":  # a mark was typed twice
-            fewer = (text.count(">", 0, marks.end()) < marks[0].count(">") for text in lines[2:])
-            begins_inside = re.match(r">[ >]*(?:[a-z]|\$\$)", span.text)
-            is_in_text = is_in_text or any(fewer) or begins_inside is not None
-        if is_in_text and ">>" in marks[0]:
-            message = "a quotation begins in the middle of a paragraph"
-            help = "take one `>` away, or leave a line with nothing but `>` above it"
-            place = source.span(at := source.line_start(line), at + len(marks[0].rstrip()))
-            self.state.report(diagnose("markup-unread", place, message, help=help))
-        end_line = min(span.end_line + 1, len(source.line_starts))
-        for line in range(span.line + 1, end_line + 1):
-            slip = _SLIP_OF_MARK.match(source.line_text(line))
-            if slip is not None and (line <= span.end_line or slip[1] != "|"):
-                start = source.line_start(line)
-                message = f"`{slip[1]}` would be shown as written: this line continues a quotation"
-                place = source.span(start + slip.start(1), start + slip.end(1))
-                help = "begin the line with `> `"
-                self.state.report(diagnose("markup-unread", place, message, help=help))
-
-    def _check_neighbours(self, above: Sequence[model.Block], block: model.Block) -> None:
-        """Report a quotation that was surely a part of the callout above it, and lost list marks.
-
-        A `>` is lost on the empty line between the two where one sentence goes on, or where other
-        empty lines of theirs have it.
-        """
-        source, before = block.span.source, above[-1] if above else None
-        if before is None:
-            return
-        gap = Span(source, before.span.end, block.span.start)
-        if isinstance(before, model.Callout) and isinstance(block, model.BlockQuote):
-            last = before.span.text.rstrip(" \t\r\n>")[-1:]
-            both = f"{before.span.text}\n{block.span.text}"
-            is_torn = last.isalnum() or last in ",;:\u2013\u2014" or _EMPTY_QUOTED.search(both)
-            is_torn = is_torn or re.match(r"[> \t]*[^\W\dA-Z_]", block.span.text)
-            if is_torn and not gap.text.strip(" \t\r\n>") and gap.text.count("\n") <= 2:
-                message = "a quotation begins directly below a callout"
-                help = (
-                    "begin the empty line between them with `>`; a quotation of its own has a "
-                    "second empty line above it"
-                )
-                place = block.span.first_line()
-                self.state.report(diagnose("markup-unread", place, message, help=help))
-        elif isinstance(block, model.ListBlock) and isinstance(before, model.Paragraph):
-            column, list_column = (
-                part.start - source.line_start(part.line) for part in (before.span, block.span)
-            )
-            if column == list_column + 1 and gap.text.count("\n") == 1:
-                self._report_lost_mark(before.span.start)
-
-    def _report_lost_mark(self, at: int) -> None:
-        place = self.base.source.span(at - 1, at + 1)
-        message = "a mark of a list may be lost here: only its blank is left"
-        help = "begin the line with `- `, or take the blank away"
-        self.state.report(diagnose("markup-unread", place, message, help=help))
 
     def _read_callout(self, span: Span, head: Head) -> model.Callout:
         title = self.inlines(head.title)
@@ -377,37 +317,16 @@ class TextReader:
             items.append(self._read_item(item))
         self.index += 1
         if ordered:
-            self._check_numbers([item.span for item in items])
+            self.state.diagnostics += check_numbers([item.span for item in items])
         return model.ListBlock(
             self._span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
         )
-
-    def _check_numbers(self, spans: Sequence[Span]) -> None:
-        """Report an item whose number is not the one that readers will see."""
-        numbers = [int(span.text.partition(".")[0].partition(")")[0]) for span in spans]
-        if len(set(numbers)) == 1:
-            return  # all are 1, and counted by the browser
-        for before, after in pairwise(range(len(spans))):
-            if numbers[after] != numbers[before] + 1:
-                message = f"{numbers[after]} does not follow {numbers[before]} in this list"
-                help = "number the items in order, or all of them with 1"
-                place, note = (
-                    spans[after].first_line(),
-                    Note("the item before", spans[before].first_line()),
-                )
-                diagnostic = diagnose("markup-unread", place, message, help=help, notes=[note])
-                self.state.report(diagnostic)
-                return
 
     def _read_item(self, token: PositionedToken) -> model.ListItem:
         blocks = self._read_blocks("list_item_close")
         marker = self.base.span(token.start, token.start + len(token.info) + 1)
         span = marker.to(blocks[-1].span) if blocks else marker
-        source = span.source
-        prefix = source.text[source.line_start(span.line) : span.start]
-        for line in range(span.line + 1, span.end_line + 1) if marker.text[0] in "-*+" else ():
-            if re.match(re.escape(prefix) + r" [A-Z*`$\[]", source.line_text(line)):
-                self._report_lost_mark(source.line_start(line) + len(prefix) + 1)
+        self.state.diagnostics += check_item(span)
         return model.ListItem(span, blocks, token.meta.get("checked"))
 
     def _read_table(self, token: PositionedToken) -> model.Table:
@@ -450,10 +369,6 @@ class TextReader:
         return None
 
 
-_EMPTY_QUOTED = re.compile(r"^[ >]*>[ \t]*$", re.MULTILINE)
-_QUOTE_MARKS = re.compile(r"[ >]*")
-_SLIP_OF_MARK = re.compile(r" {0,3}([<.?/,;:|])(?= |$)")
-"""What a line of a quotation may begin with if `>` was mistyped."""
 _BODIES: tuple[tuple[str, list[str]], ...] = (
     ("fence", ["text"]),
     ("fence", [OUTPUT_KIND]),

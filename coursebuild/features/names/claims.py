@@ -176,13 +176,13 @@ def _read_script(script: model.Script, names: CodeNames) -> None:
 def claims_of(code: model.CodeSpan) -> Iterator[tuple[Claim, Span]]:
     """Yield the claims of a piece of inline code, each with its place."""
     text = code.text.strip()
-    found: list[tuple[Kind, str, str]] = []
+    finds: list[tuple[Kind, str, str]] = []
     if _SHAPE.search(text) or ENGINE_WORD.fullmatch(text):
-        found += _find(text)
-    named = {word for _, name, part in found for word in re.findall(r"\w+", f"{name} {part}")}
-    plain = (word for word in _PLAIN.findall(text) if word not in named)
-    found += (("plain", word, word) for word in dict.fromkeys(plain))
-    for number, (kind, name, part) in enumerate(found):
+        finds += _find(text)
+    used_words = {word for _, name, part in finds for word in re.findall(r"\w+", f"{name} {part}")}
+    plain = (word for word in _PLAIN.findall(text) if word not in used_words)
+    finds += (("plain", word, word) for word in dict.fromkeys(plain))
+    for number, (kind, name, part) in enumerate(finds):
         start = code.span.start + code.span.text.find(part)
         has_part = start >= code.span.start
         span = code.span.source.span(start, start + len(part)) if has_part else code.span

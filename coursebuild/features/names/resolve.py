@@ -10,7 +10,6 @@ import builtins
 import functools
 import keyword
 import re
-import string
 from collections import Counter
 from collections.abc import Iterable
 from typing import TypeAlias
@@ -20,7 +19,7 @@ from msgspec import Struct
 from coursebuild.core.model import Course, Document, document_scripts
 from coursebuild.core.model.addresses import line_anchor
 from coursebuild.core.syntax.course_schema import CourseFile
-from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest
+from coursebuild.core.text.diagnostics import did_you_mean, misspellings, misspelt, nearest
 from coursebuild.core.text.rules import HELP
 from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, DocumentNames
 from coursebuild.features.names.engine import EngineName, EngineNames, EngineTable
@@ -39,9 +38,6 @@ _HTML = frozenset(
     title tr track u ul use var video wbr
     """.split()
 )
-
-
-_LETTERS = string.ascii_letters + string.digits + "_"
 
 
 class Meaning(Struct, frozen=True):
@@ -68,7 +64,6 @@ class Unknown(Struct, frozen=True):
 
 
 Answer: TypeAlias = Meaning | Unknown | None
-
 
 _resolvers: list[Resolver] = []
 """The one that was asked last."""
@@ -185,33 +180,24 @@ class Resolver:
 
     @functools.cached_property
     def plain_words(self) -> dict[str, int]:
-        """What a word may be that has not the shape of a name.
-
-        Each has the fewest letters by which it is told from words of English.
-        """
+        """Words without the shape of a name, each with the least length that is telling."""
         claims = (claim for names in course_names(self.course) for claim in names.claims)
         uses = Counter(claim.name for claim in claims if claim.kind == "plain")
         engine, files = self.engine, (path.rpartition("/")[2] for path in self.files)
-        others = {*known_keys(), *self.imports, *options_by_command(), *keyword.kwlist}
-        others.update(vars(builtins), *(() if engine is None else engine.modules.values()))
+        common_words = {*known_keys(), *self.imports, *options_by_command(), *keyword.kwlist}
+        common_words.update(vars(builtins), *(() if engine is None else engine.modules.values()))
         own_words = {*self.words, *files, *(word for word, count in uses.items() if count > 1)}
         engine_words = engine.words if engine is not None and self.has_engine else ()
-        sets = ((others, 7), (own_words, 5), (engine_words, 3))
+        sets = ((common_words, 7), (own_words, 5), (engine_words, 3))
         return {word: length for words, length in sets for word in words}
 
     def _plain(self, name: str, names: CodeNames) -> Answer:
-        known = self.plain_words
-        if name in known or name in names.words or name.isupper():
+        if name in (lengths := self.plain_words) or name in names.words or name.isupper():
             return None
-        cuts = [(name[:at], name[at:]) for at in range(len(name) + 1)]
-        slips = {a + b[1:2] + b[:1] + b[2:] for a, b in cuts}
-        if len(name) > 3:
-            slips |= {a + b[1:] for a, b in cuts}
-            slips |= {a + x + b[n:] for a, b in cuts for x in _LETTERS for n in (0, 1)}
+        slips = misspellings(name)
         slips -= {name, f"{name}s", *([] if name.endswith("ss") else [name.removesuffix("s")])}
-        near = (word for word in slips if len(word) >= known.get(word, len(word) + 1))
-        likely = min(near, default=None)
-        if likely is None:
+        near = (word for word in slips if len(word) >= lengths.get(word, len(word) + 1))
+        if (likely := min(near, default=None)) is None:
             return None
         message = f"nothing that the course knows is called `{name}`"
         return Unknown(message, f"did you mean `{likely}`?", name)
