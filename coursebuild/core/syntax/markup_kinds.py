@@ -221,7 +221,7 @@ BROKEN = {
         "markup-unread",
     ),
     "task": MarkupKind(
-        r"^[-*+]\[[ xX]?\](?=[ \t])|\A\[(?: [xX] ?|[xX] |)\](?=[ \t]*\w)",
+        r"^[-*+]\[[ xX]?\](?=[ \t])|\A\[(?: [xX] ?|[xX] |)\](?=[ \t]*\w)|\A\[[ xX]\](?=\w)",
         "no task begins here",
         "a task is `- [ ] text` or `- [x] text`",
         "markup-unread",
@@ -235,7 +235,7 @@ BROKEN = {
     ),
     "item": MarkupKind(
         r"^\d{1,2}(?:[.)][.,)]|[,;]) (?=(?-i:[A-Z\0]))|^\d{1,2}[.)](?=(?-i:[A-Z][a-z]))"
-        r"|^-(?=(?-i:[A-Z][a-z]))|^[0=_] (?=(?-i:\0*[A-Z][a-z]{2}))",
+        r"|^-(?=(?-i:[A-Z][a-z]))|^[0=_] (?=(?-i:[A-Z][a-z]{2}|\0\0?[A-Z]))",
         "no item of a list begins here",
         "an item is `- text` or `1. text`, with one blank after the mark",
         "markup-unread",
