@@ -30,6 +30,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from datetime import date
+from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any
 
@@ -170,7 +171,7 @@ class Checker:
         if paths is None:  # of the map and of declarations, all
             paths = self._all_pages()
         whole = change.slip in ("line lost", "line repeated", "paragraph moved")
-        whole &= change.place in ("words", "digits", "list", "emphasis", "text", "code", "formula")
+        whole &= change.place not in ("script", "output", "lab", "declarations")
         worst = "same"
         changed = {path: self.session.find(path) or b"" for path in paths}
         for path, page in changed.items():
@@ -209,33 +210,76 @@ def _describe(diagnostic: Diagnostic) -> str:
     return f"{span.path}:{span.line}: {diagnostic.rule}: {diagnostic.message}"
 
 
-REASONS = {
-    "heading": "another level that a heading may have",
-    "formula": "another formula that is whole: what it says is proven where it has numbers",
-    "lab": "another value with which all holds that is claimed of the lab",
-    "script": "the script prints and draws the same",
-    "map": "an address or a setting that nothing contradicts",
-    "declarations": "what is measured is the author's choice",
-    "other block": "the block does what the lesson says of it",
-    "callout": "a quotation is what is left",
-    "quiz": "a question that is whole without it",
-    "fence": "a name that nothing else names",
-    "number": "given by the author: no script prints it",
-}
-"""Why nothing can know that a changed value is wrong, by the place of the change."""
+class Reason(Struct, frozen=True):
+    """Why nothing can know that a change of some sort is wrong."""
+
+    text: str
+    place: str
+    """What `Change.place` is, as a pattern, like all of these."""
+    letters: str = r"[\w.]*"
+    """The letters that the change took away and put in."""
+    line: str = ".*"
+    """The line as it is now."""
+    slip: str = ".*"
+
+
+REASONS = (
+    Reason("another level that a heading may have", "heading", "#+", "#{2,6} .*"),
+    Reason(
+        "another formula that is whole: what it says is proven where it has numbers",
+        "formula",
+        r"[^$`\\]*",
+    ),
+    Reason("another word or number, with which all holds that is claimed of the lab", "lab"),
+    Reason("the script prints and draws the same", "script", "(?s).*", "(?s).*"),
+    Reason("an address or a setting that nothing contradicts", "map", r"[\w.]*", r"\w+ = .*"),
+    Reason("what is measured is the author's choice", "declarations", r"[\w.]*", r"\w+ = .*"),
+    Reason("a callout without its first line is a quotation", "callout", slip="line lost"),
+    Reason("a name that nothing else names", "fence", r"[\w.]*", r".*file=\S+.*"),
+    Reason("given by the author: no script prints it", "number", r"[\d.]*", r".*\{given.*"),
+    Reason("a printed number with a digit less, or a zero more", "output", r"\d"),
+    Reason("no name, as the author says", "number", r"[a-z]+", r".*\{code\}.*"),
+    Reason("a whole number without a unit, as words say one", "digits|emphasis", r"\d+"),
+    Reason("a number in code that names something", "code", r"\d+"),
+)
+_QUOTED = frozenset("bash console html ini json markdown md sh text toml xml yaml".split())
+"""Kinds of blocks that show what nothing runs."""
 
 
 def find_reason(change: Change, old: str, claims: Iterable[Diagnostic]) -> str:
     """Why a change is no mistake that can be known; empty where it should be."""
-    start, end = change.start, max(change.start + len(change.text), change.start + 1)
-    for claim in claims:
+    new, start = change.apply(old), change.start
+    end = max(start + len(change.text), start + 1)
+    steps = SequenceMatcher(None, old[start : change.end], change.text, False).get_opcodes()
+    letters = "".join(
+        old[start + a : start + b] + change.text[c:d]
+        for step, a, b, c, d in steps
+        if step != "equal"
+    )
+    is_number = re.fullmatch(r"[\d.,\u2212-]+", letters)
+    for claim in claims if is_number else ():
         span = claim.span
         if span.path == change.path and span.start <= end and start <= span.end:
             return "listed by `check --truth`"
-    before = old[old.rfind("\n", 0, start) + 1 : start]
-    if re.search(r"Lessons? (?:[\d.]+ and )?[\d.]*$", before):
+    if is_number and re.fullmatch(r"(?s).*Lessons? (?:[\d.]+ and )?\d+\.\d+", new[:end].rstrip()):
         return "another lesson of the map"
-    return REASONS.get(change.place, "")
+    line = new[new.rfind("\n", 0, start) + 1 : new.find("\n", end) % (len(new) + 1)]
+    if change.place == "other block":
+        kind = re.findall(r"^[ >]*`{3,} *([^\s`]*)", old[:start], re.MULTILINE)[-1]
+        if kind in _QUOTED:
+            return f"what a block of kind `{kind}` quotes: nothing runs it"
+        is_value = kind == "mjcf" and re.fullmatch(r"[\w.]*", letters)
+        return "another model that compiles" if is_value else ""
+    for reason in REASONS:
+        pairs = (
+            (reason.place, change.place),
+            (reason.letters, letters),
+            (reason.line, line),
+            (reason.slip, change.slip),
+        )
+        if all(re.fullmatch(pattern, text) for pattern, text in pairs):
+            return reason.text
+    return ""
 
 
 # --- the run

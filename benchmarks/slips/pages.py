@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias
 
 Token: TypeAlias = tuple[str, str]
 """A word of prose, or something else that readers see or a browser does; with what it is."""
-_PIECES = re.compile(r"[^\W\d_]+|\S")
+_PIECES = re.compile(r"[^\W\d_][^\W_]*|\S")
 _PUNCTUATION = set(".,;:!?'\"()-/‘’“”–—…")
 _CODE = {"code", "pre", "math", "script", "style", "svg", "kbd", "samp"}
 _SAID = ("alt", "title", "aria-label", "content", "placeholder")
@@ -23,6 +23,8 @@ _SAID_FIELDS = frozenset(
     "title label text note q options explain hint hints reference ylabel xlabel unit name".split()
 )
 """Fields of JSON that hold prose."""
+
+
 _BLOCKS = frozenset(
     "h1 h2 h3 h4 h5 h6 ul ol li table tr td th pre figure aside section details blockquote img "
     "div button input".split()
@@ -70,7 +72,7 @@ class _Reader(HTMLParser):
 
     def _say(self, text: str) -> None:
         for piece in _PIECES.findall(text):
-            is_word = piece in _PUNCTUATION or piece.isalpha()
+            is_word = piece in _PUNCTUATION or piece[0].isalpha()
             self.tokens.append(("word" if is_word else "mark", piece))
 
     def _read_data(self, value: str) -> None:
@@ -114,13 +116,17 @@ def compare_pages(
     if Counter(before) == Counter(after):
         return "prose"  # in another order
     if whole_lines:
-        blocks, new_blocks = (
-            [value.partition("{")[0] for kind, value in tokens if kind == "tag"]
+        lost, gained = Counter(before) - Counter(after), Counter(after) - Counter(before)
+        if {kind for kind, _ in lost + gained} <= {"word", "tag"}:
+            return "prose"
+        old_blocks, new_blocks = (
+            [
+                name
+                for kind, value in tokens
+                if kind == "tag" and (name := value.partition("{")[0]) in _BLOCKS
+            ]
             for tokens in (before, after)
         )
-        before_blocks, after_blocks = (
-            [name for name in names if name in _BLOCKS] for names in (blocks, new_blocks)
-        )
-        return "prose" if before_blocks == after_blocks else "other"
+        return "prose" if old_blocks == new_blocks else "other"
     rest, new_rest = ([t for t in tokens if t[0] != "word"] for tokens in (before, after))
     return "prose" if rest == new_rest else "other"

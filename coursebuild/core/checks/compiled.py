@@ -15,7 +15,9 @@ Entry points: `mjcf_texts(course)` (what to compile), `check_compiled(course, mo
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from xml.parsers import expat
 
 from msgspec import Struct
 
@@ -98,6 +100,9 @@ def check_compiled(
         result = models[model.name]
         if result.error and model.name not in included:
             diagnostics.append(diagnose_model(model, result, readable))
+        elif not result.error and (fault := _find_fault(model.source.excerpt(), 0)) is not None:
+            message = f"the model `{model.name}` holds {fault[1]}"
+            diagnostics.append(diagnose("model-error", fault[0], message, help=_FAULT_HELP))
     facts: dict[tuple[str, int], ModelFacts] = {}
     for text, result in texts:
         diagnostics += _check_text(text, result, readable)
@@ -127,7 +132,8 @@ def diagnose_model(
     if result.timeout:
         return _diagnose_timeout(span, f"the model `{model.name}`", result)
     message = f"the model `{model.name}` does not compile: {readable(result.error)}"
-    return diagnose("model-error", span, message)
+    notes = _note_opening(model.source.excerpt(), 0, result.error)
+    return diagnose("model-error", span, message, notes=notes)
 
 
 def _diagnose_timeout(span: Span, subject: str, result: CompileResult) -> Diagnostic:
@@ -168,6 +174,39 @@ def line_span(code: Excerpt, line: int | None, lines_before: int, fallback: Span
     return row.slice(indent, len(row.text.rstrip())).span() if row.text.strip() else row.span()
 
 
+_FAULT_HELP = "write `<` before an element and `<!-- … -->` around a comment, or delete it"
+
+
+def _find_fault(code: Excerpt, lines_before: int, text: str = "") -> tuple[Span, str] | None:
+    """Where XML is broken or holds words between elements, which MuJoCo may pass over."""
+    parser = expat.ParserCreate()
+    faults = list[tuple[int, str]]()
+
+    def read_words(words: str) -> None:
+        if words.strip() and not faults:
+            extract = textwrap.shorten(words, 40, placeholder="…")
+            faults.append((parser.CurrentLineNumber, f"`{extract}` outside any tag"))
+
+    parser.CharacterDataHandler = read_words
+    try:
+        parser.Parse(text or code.text, True)
+    except expat.ExpatError as error:
+        faults.append((error.lineno, f"broken XML: {expat.ErrorString(error.code)}"))
+    if not faults:
+        return None
+    line, message = faults[0]
+    return line_span(code, line, lines_before, code.span()), message
+
+
+def _note_opening(code: Excerpt, lines_before: int, error: str) -> tuple[Note, ...]:
+    """Where the element begins that MuJoCo says is not closed."""
+    match = re.search(r"MISMATCHED_ELEMENT.*Line number=(\d+): XMLElement name=(\S+)", error)
+    if match is None:
+        return ()
+    place = line_span(code, int(match[1]), lines_before, code.span())
+    return (Note(f"<{match[2]}> begins here", place),)
+
+
 def _check_text(
     text: MjcfText, result: CompileResult, readable: Callable[[str], str]
 ) -> Iterator[Diagnostic]:
@@ -180,6 +219,7 @@ def _check_text(
         return
     if isinstance(block, Mjcf) and block.error is not None:
         span = block.error_span or block.span.first_line()
+        place = line_span(text.code, result.line, text.lines_before, block.span.first_line())
         if not result.error:
             yield diagnose(
                 "mjcf-compiles",
@@ -192,7 +232,7 @@ def _check_text(
                 "mjcf-message",
                 span,
                 f"the message of the compiler does not contain `{block.error}`",
-                notes=[Note(f"it says: {result.error}")],
+                notes=[Note(f"it says: {result.error}", place)],
             )
         return
     if result.error:
@@ -201,7 +241,11 @@ def _check_text(
         if isinstance(block, Mjcf) and block.fragment is None and "<mujoco" not in text.text:
             help = 'if it is a part of a model say so: `fragment="worldbody"`'
         message = f"{subject} does not compile: {readable(result.error)}"
-        yield diagnose("mjcf-error", span, message, help=help)
+        notes = _note_opening(text.code, text.lines_before, result.error)
+        yield diagnose("mjcf-error", span, message, help=help, notes=notes)
+    elif (fault := _find_fault(text.code, text.lines_before, text.text)) is not None:
+        message = f"{subject} holds {fault[1]}"
+        yield diagnose("mjcf-error", fault[0], message, help=_FAULT_HELP)
 
 
 def _collapse_spaces(text: str) -> str:

@@ -86,6 +86,9 @@ def _check_letters(tex: Excerpt, commands: frozenset[str]) -> Iterator[Diagnosti
             message = f"`{letters[0]}` would be shown as a product of letters"
             help = f"write `\\{letters[0]}`, or `\\mathrm{{{letters[0]}}}` for a name"
             yield diagnose("math-command", tex.span(*letters.span()), message, help=help)
+    if (prime := re.search(r"(?:^|[(\[=+,;&-])\s*(')", text)) is not None:
+        message, help = "this prime follows nothing", "write the letter before it"
+        yield diagnose("math-syntax", tex.span(*prime.span(1)), message, help=help)
     if _INTERVAL.search(text):
         return
     unmatched: list[int] = []

@@ -70,6 +70,8 @@ def _row_line(row: tuple[RowCell, ...]) -> PrintedLine:
 
 def shows(number: Number, printed: Number) -> bool:
     """Whether a number in prose is a printed one, rounded to the digits shown."""
+    if number.is_padded and not printed.is_padded:
+        return False
     if not (number.is_finite and printed.is_finite):
         return (number.value.is_nan() and printed.value.is_nan()) or number.value == printed.value
     if number.is_integer and printed.is_integer:

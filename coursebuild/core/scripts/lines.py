@@ -216,6 +216,8 @@ def same_number(recorded: Number, printed: Number, comparison: Comparison) -> bo
     """Whether a printed number matches the recorded one in this comparison."""
     if recorded.text == printed.text:
         return True
+    if recorded.is_padded and not printed.is_padded:
+        return False
     if comparison.mode is Mode.DIGITS:
         return (
             recorded.is_inexact and printed.is_inexact and within_half_unit(recorded, printed.value)

@@ -82,6 +82,11 @@ class Number(Struct, frozen=True):
         return self.value.is_finite()
 
     @property
+    def is_padded(self) -> bool:
+        """Whether a zero stands before its first digit, as nobody writes it by hand."""
+        return bool(re.match(r"\D?0[0-9]", self.text))
+
+    @property
     def is_inexact(self) -> bool:
         """Whether it has a point or an exponent, so that it stands for a rounded value."""
         return self.is_finite and not self.is_integer

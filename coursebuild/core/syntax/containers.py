@@ -3,21 +3,20 @@ r"""Containers: quotations, callouts and tables, each part with its place.
 A callout is a quotation whose first line is `[!kind] Optional title`; `[!kind]- Title` makes one
 that starts folded.
 
-Entry points: `read_head`, which reads that line; `check_quote_marks` and `check_torn_callout`;
-`read_table`. markdown-it finds the tables and their rows. A row is split here, at each `|` without
+Entry points: `read_head`, which reads that line; `read_table`. markdown-it finds the tables and their rows. A row is split here, at each `|` without
 a backslash before it; `\|` is a `|` in the cell.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Literal
 
 from markdown_it.common.utils import MD_TRIM_CHARS
 from msgspec import Struct
 
-from coursebuild.core.model import Block, BlockQuote, Callout, Cell, Inline, Table
+from coursebuild.core.model import Cell, Inline, Table
 from coursebuild.core.syntax.spans import PositionedToken, trim
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean, misspelt
 from coursebuild.core.text.source import Excerpt, Span
@@ -29,9 +28,6 @@ _BROKEN_HEAD = re.compile(
     r"|\[[^\w\s\\]?([A-Za-z][\w-]*)[!\])}]{1,2}+)-?+(?![(\[:])([^\n]*)(?:\n|$)"  # `[note]`
 )
 """A line that was surely meant to be the first of a callout if the word is a kind."""
-_QUOTE_MARKS = re.compile(r"[ >]*")
-_SLIP_OF_MARK = re.compile(r" {0,3}([<.?/,;:|])(?= |$)")
-"""What a line of a quotation may begin with if `>` was mistyped."""
 FALLBACK = "note"
 """The kind that a callout of an unknown kind gets, so that its content is still checked."""
 
@@ -89,41 +85,6 @@ def _read_broken_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head
     help = f"write `> [!{kind}] Title`, or a backslash before the bracket that is meant to be seen"
     message = f"`{place.text}` does not begin a callout"
     return Parsed(head, (diagnose("callout-unknown", place.span(), message, help=help),))
-
-
-def check_quote_marks(span: Span) -> Iterator[Diagnostic]:
-    """Report a mark too many in the middle of a paragraph, and another character for one."""
-    source = span.source
-    above, line = source.line_text(span.line - 1) if span.line > 1 else "", span.line
-    outer, marks = (_QUOTE_MARKS.match(text) for text in (above, source.line_text(line)))
-    assert outer is not None and marks is not None, "they match nothing as well"
-    is_in_text = above[outer.end() :].strip() and not span.text.startswith("> [!")
-    if is_in_text and ">>" in marks[0] and 0 < outer[0].count(">") < marks[0].count(">"):
-        message = "a quotation begins in the middle of a paragraph"
-        help = "take one `>` away, or leave a line with nothing but `>` above it"
-        place = source.span(at := source.line_start(line), at + len(marks[0].rstrip()))
-        yield diagnose("markup-unread", place, message, help=help)
-    for line in range(span.line + 1, span.end_line + 1):
-        slip = _SLIP_OF_MARK.match(source.line_text(line))
-        if slip is not None:
-            start = source.line_start(line)
-            message = f"`{slip[1]}` would be shown as written: this line continues a quotation"
-            place = source.span(start + slip.start(1), start + slip.end(1))
-            help = "begin the line with `> `"
-            yield diagnose("markup-unread", place, message, help=help)
-
-
-def check_torn_callout(above: Sequence[Block], block: Block) -> Iterator[Diagnostic]:
-    """Report a quotation directly below a callout, of which it was surely a part."""
-    callout = above[-1] if above else None
-    if not isinstance(callout, Callout) or not isinstance(block, BlockQuote):
-        return
-    gap = Span(block.span.source, callout.span.end, block.span.start)
-    if not gap.text.strip(" \t\r\n>") and gap.text.count("\n") <= 2:
-        message = "a quotation begins directly below a callout"
-        help = "begin the empty line between them with `>`, or write a paragraph between them"
-        place = block.span.first_line()
-        yield diagnose("markup-unread", place, message, help=help)
 
 
 _PIPE = re.compile(r"\\?\|")

@@ -60,6 +60,7 @@ from coursebuild.core.syntax.spans import PositionedToken
 from coursebuild.core.syntax.unread_markup import (
     check_inline_code,
     check_unread_markup,
+    find_repetitions,
     find_stars,
 )
 from coursebuild.core.text.diagnostics import diagnose
@@ -129,6 +130,11 @@ class _TokenReader:
             kind = token.type
             if kind in ("text", "text_special"):
                 text = token.content
+                if token.markup[:1] == "\\" and text in tuple(",;/?@"):
+                    place = self.content.span(token.start, token.end)
+                    message = f"the backslash before `{text}` is not shown and does nothing"
+                    help = "take it away; write two for one that readers should see"
+                    self.report(diagnose("markup-unread", place, message, help=help))
                 if text:
                     literal = kind == "text" or text == token.markup
                     self.pieces.append(TextPiece(text, token.start, token.end, literal))
@@ -147,6 +153,8 @@ class _TokenReader:
             else:
                 self._add_leaf(token)
         self._flush()
+        if not html:
+            self.state.diagnostics += find_repetitions(self.content)
         for diagnostic in check_unread_markup(self.content, self.texts, html=html):
             self.report(diagnostic)
         if not html and not self.open_literals:

@@ -264,7 +264,9 @@ class _Reader:
         self.diagnostics.append(diagnose("json-syntax", span, message, help=help, notes=notes))
 
     def fail_unclosed(self, opening: int) -> NoReturn:
-        self.report(opening, opening + 1, f"`{self.text[opening]}` is never closed")
+        end = len(self.text.rstrip())
+        notes = (Note("the block ends here", self.body.span(max(end - 1, 0), end)),)
+        self.report(opening, opening + 1, f"`{self.text[opening]}` is never closed", notes=notes)
         raise _UnreadableError
 
     def fail_expecting(self, noun: str, *, opening: int | None = None) -> NoReturn:

@@ -171,6 +171,7 @@ BROKEN = {
         r"|(?:(?<!\\)!?\[[^\[\]]{0,200})?(?<!\\)\]\([^\s)]*\)?"
         r"|\([^()\n]{1,200}\)\[" + _ADDRESS + r"[^\]\n]*\]"
         r"|(?<!\\)!\[[^\[\]\n\0]*\]"
+        r"|(?<!\\)\[[^\[\]]{1,200}(?<!\\)\]\w\([^()\s]*[:/#.][^()\s]*\)"
         rf"|(?<![\w:/.])(?-i:{_SCHEME})[\w.#/-]*\w"
         r"|(?<!\\)\[[^\[\]]{0,200}\(" + _ADDRESS + r"[^()\s]*\)(?![^\[\n]*\])"
         r"|(?<!\\)\[[^\[\]]{0,200}\]?\(?\]?\S?" + _ADDRESS + r"[^()\s\]]*\)(?![^\[\n]*\])"
@@ -209,18 +210,19 @@ BROKEN = {
         "delete it; a line between two parts is `---`",
     ),
     "task": MarkupKind(
-        r"^[-*+]\[[ xX]?\](?=[ \t])|\A\[(?: [xX] ?|[xX] |)\](?=[ \t]*\w)",
+        r"^[-*+]\[[ xX]?\](?=[ \t])|\A\[(?: [xX] ?|[xX] |)\](?=[ \t]*\w)|\A\[[ xX]\](?=\w)",
         "no task begins here",
         "a task is `- [ ] text` or `- [x] text`",
     ),
     "mention": MarkupKind(
-        r"(?<![\w\\])(?-i:Lesson) \d+(?:(?:[,;/:]|\.\.)\d+(?![\w,])|(?<=\d\d)(?![\w.,]))",
+        r"(?<![\w\\])(?-i:Lesson) (?:0\d[\d.]*|\d+(?:(?:[,;/:]|\.\.)\d+(?![\w,])"
+        r"|(?<=\d\d)(?![\w.,]|\.\d)|(?<=\d\d)\.(?= (?-i:[a-z]))))",
         "no lesson has such a number",
         "a lesson is mentioned as `Lesson 1.2`, with a point",
     ),
     "item": MarkupKind(
         r"^\d{1,2}(?:[.)][.,)]|[,;]) (?=(?-i:[A-Z\0]))|^\d{1,2}[.)](?=(?-i:[A-Z][a-z]))"
-        r"|^-(?=(?-i:[A-Z][a-z]))",
+        r"|^-(?=(?-i:[A-Z][a-z]))|^[0=_] (?=(?-i:[A-Z][a-z]{2}|\0\0?[A-Z]))",
         "no item of a list begins here",
         "an item is `- text` or `1. text`, with one blank after the mark",
     ),
@@ -248,7 +250,7 @@ BROKEN = {
         rf"{_BEFORE}(?:\*\*\*?|__|~~)(?=[^\W_]|[\"'“„(\[$\\\0])"
         rf"|(?:(?<=[^\W\d_])|(?<=[\"'”\].!?…\0]))(?:\*\*|__|~~)(?!\*){_AFTER}"
         rf"|(?<={_WIDE})\*\*|\*\*(?={_WIDE})"
-        r"|(?<=[ \t(])\*(?=[^\W\d_]{3})|(?<=\0)\*|\*(?=\0)",
+        r"|(?<=[ \t(])\*(?=[^\W\d_]{2}|(?-i:[aA]) [a-z])|(?<=\0)\*|\*(?=\0)",
         "no emphasis begins or ends here",
         "put the same mark at both ends, in the same paragraph and with no blank inside it; write "
         "a backslash before each character that is meant to be seen",

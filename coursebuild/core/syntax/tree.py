@@ -28,14 +28,18 @@ from coursebuild.core.syntax.attributes import (
 from coursebuild.core.syntax.block_parser import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.containers import (
     Head,
-    check_quote_marks,
-    check_torn_callout,
     read_head,
     read_table,
 )
 from coursebuild.core.syntax.fence import INDENTED_FENCE, is_known_kind, read_fence
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inlines import read_inlines
+from coursebuild.core.syntax.marks import (
+    check_item,
+    check_neighbours,
+    check_numbers,
+    check_quotation,
+)
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
@@ -120,7 +124,7 @@ class TextReader:
                 break
             block = _READERS[token.type](self, token)
             if block is not None:
-                self.state.diagnostics += check_torn_callout(blocks, block)
+                self.state.diagnostics += check_neighbours(blocks, block)
                 blocks.append(block)
         self.balance.leave()
         return tuple(blocks)
@@ -295,7 +299,7 @@ class TextReader:
 
     def _read_quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
         span, first_token = self._span(token), self.tokens[self.index]
-        self.state.diagnostics += check_quote_marks(span)
+        self.state.diagnostics += check_quotation(span)
         if first_token.type == "paragraph_open":
             head = read_head(trim(first_token.text), self.state.callouts)
             if head is not None:
@@ -319,6 +323,8 @@ class TextReader:
             self.index += 1
             items.append(self._read_item(item))
         self.index += 1
+        if ordered:
+            self.state.diagnostics += check_numbers([item.span for item in items])
         return model.ListBlock(
             self._span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
         )
@@ -327,6 +333,7 @@ class TextReader:
         blocks = self._read_blocks("list_item_close")
         marker = self.base.span(token.start, token.start + len(token.info) + 1)
         span = marker.to(blocks[-1].span) if blocks else marker
+        self.state.diagnostics += check_item(span)
         return model.ListItem(span, blocks, token.meta.get("checked"))
 
     def _read_table(self, token: PositionedToken) -> model.Table:

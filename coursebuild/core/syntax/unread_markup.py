@@ -23,7 +23,7 @@ from coursebuild.core.text.source import Excerpt, Span
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
 _SIGNS = re.compile(
     r"[{}\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f]|[!?=:._']{2}|:\w|[´‘’]{3}"
-    r"|\((?:out|given)\)|\A_\Z|^\d{1,2}[.,;)][^\d\s]|^\d{1,2}[,;] |^-[A-Z]|^h\d\. |^[A-Z]> "
+    r"|\((?:out|given)\)|\A_\Z|^\d{1,2}[.,;)][^\d\s]|^\d{1,2}[,;] |^-[A-Z]|^[0=_] |^h\d\. |^[A-Z]> "
     r"|^import |Lesson \d",
     re.MULTILINE,
 )
@@ -52,7 +52,7 @@ _CELL = re.compile(r"\{[=.]?(?:bash|julia|js|ojs|python|py|r|sql)\}\s|r [A-Za-z_
 """How an expression begins that Quarto or R Markdown would compute."""
 
 _STAR = re.compile(
-    r"^\*[^\W\d_]{3,}|[^\W\d_]{2,}\*(?![\w*])"
+    r"^\*(?:[^\W\d_]{2,}|[aA] )|[^\W\d_]{2,}\*(?![\w*])|[^\W_][.!?]\*(?= [A-Z])"
     r"|(?<=[a-z] )[+\u2212-]?\d[\d.,]*\*\*(?= [a-z]|[.,;:]?$)",
     re.MULTILINE,
 )
@@ -144,7 +144,7 @@ def _diagnose(
             if not is_adjacent_mark or whole.count("[") == whole.count("]"):
                 return None
         case "emphasis" if markup == "*" and "**" not in before[-1:] + markup + after[:1]:
-            if match[0] == "*" and not re.match(r"[^\W\d_]{3}", after):
+            if match[0] == "*" and not re.match(r"[^\W\d_]{2}|[aA] ", after):
                 return None
         case "latex" if markup.startswith("$") and markup[1] != "`":
             return None  # no code stands between the dollars
@@ -219,6 +219,17 @@ def find_stars(
         message = f"`{match[0]}` would be shown as written: {kind.reason}"
         diagnostic = diagnose(kind.rule, content.span(*match.span()), message, help=kind.help)
         yield match[0].startswith("*"), diagnostic
+
+
+def find_repetitions(content: Excerpt) -> Iterator[Diagnostic]:
+    """Report lines that begin with the same words twice, as half an edit leaves them."""
+    for line in re.finditer(r"^\S.{23,}", content.text, re.MULTILINE):
+        at = line[0].find(line[0][:12], 12)
+        half = re.sub(r"(?:[-*+>]|#+|\d+\.) ?\Z", "", line[0][: max(at, 0)])
+        if re.search(r"[^\W\d_]{2,} \S", half) and line[0].startswith(half, at):
+            span = content.span(line.start() + at, line.start() + at + len(half))
+            message = f"`{shorten(half)}` stands here twice"
+            yield diagnose("text-repeated", span, message, help="delete it once")
 
 
 def check_inline_code(content: Excerpt, start: int, end: int, code: str) -> Iterator[Diagnostic]:

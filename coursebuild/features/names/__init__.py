@@ -44,7 +44,8 @@ def reference(course: Course, store: Memo, interpreter: Interpreter | None) -> E
             module = names.imports.get(root, "numpy" if root == "np" else "")
             paths |= {f"{module}.{rest}"} if dot and module else set()
     modules = {path[: dot.start()] for path in paths for dot in re.finditer(r"\.", path)}
-    return engine_names(store, interpreter, modules) if any(n.claims for n in documents) else None
+    is_asked = any(claim.kind != "plain" for names in documents for claim in names.claims)
+    return engine_names(store, interpreter, modules) if is_asked else None
 
 
 def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:
@@ -60,6 +61,8 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
             if not isinstance(answer, Unknown):
                 continue
             text = code.text.strip("` ")
+            if claim.kind == "plain" and _is_used_again(course, claim.name):
+                continue
             if any(
                 fnmatchcase(word, name) for word in (text, answer.part) for name in course.names
             ):
@@ -67,6 +70,13 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
             at = code.source.text.find(answer.part, span.start, code.end)
             place = code.source.span(at, at + len(answer.part)) if at >= 0 else span
             yield diagnose("name-unknown", place, answer.message, help=answer.help or _HELP)
+
+
+def _is_used_again(course: Course, word: str) -> bool:
+    """Whether the texts of a course have a word more than once, so that it is no slip."""
+    pattern = re.compile(rf"\b{re.escape(word)}\b")
+    texts = (source.text for source in course.sources if word in source.text)
+    return sum(len(pattern.findall(text)) for text in texts) > 1
 
 
 def lost_names(course: Course, python: str) -> Iterator[Diagnostic]:

@@ -5,7 +5,8 @@ one piece of inline code; `Claim` and `CodeNames`.
 
 Inline code is a claim only where it has the shape of a name: a call, a dotted name, a word with an
 underscore or one that begins as MuJoCo's do, elements and attributes of MJCF, a command or an
-option of coursebuild, a table of the course map, a file of the course.
+option of coursebuild, a table of the course map, a file of the course. Any other word may be one:
+it is "plain", and wrong only where it is a letter from a name.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from coursebuild.core import model
 from coursebuild.core.text.source import Span
 
 Kind: TypeAlias = Literal[
-    "word", "call", "path", "element", "attribute", "command", "option", "table", "file"
+    "word", "call", "path", "element", "attribute", "command", "option", "table", "file", "plain"
 ]
 
 _SHAPE = re.compile(
@@ -45,6 +46,8 @@ _CODE_WORD = re.compile(
 _CODE = (
     model.Script | model.PlainCode | model.CodeBlock | model.Mjcf | model.FeatureBlock
 ) | model.Recording
+_PLAIN = re.compile(r"(?<![\w.\\/-])[A-Za-z]\w+[^\W_](?:\.(?:md|py|toml|xml)\b)?(?![\w./\\-])")
+"""A word of inline code that is no part of a path."""
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
 
 
@@ -173,13 +176,17 @@ def _read_script(script: model.Script, names: CodeNames) -> None:
 def claims_of(code: model.CodeSpan) -> Iterator[tuple[Claim, Span]]:
     """Yield the claims of a piece of inline code, each with its place."""
     text = code.text.strip()
-    if not _SHAPE.search(text) and ENGINE_WORD.fullmatch(text) is None:
-        return
-    for number, (kind, name, part) in enumerate(_find(text)):
+    finds: list[tuple[Kind, str, str]] = []
+    if _SHAPE.search(text) or ENGINE_WORD.fullmatch(text):
+        finds += _find(text)
+    used_words = {word for _, name, part in finds for word in re.findall(r"\w+", f"{name} {part}")}
+    plain = (word for word in _PLAIN.findall(text) if word not in used_words)
+    finds += (("plain", word, word) for word in dict.fromkeys(plain))
+    for number, (kind, name, part) in enumerate(finds):
         start = code.span.start + code.span.text.find(part)
         has_part = start >= code.span.start
         span = code.span.source.span(start, start + len(part)) if has_part else code.span
-        yield Claim(kind, name, not number), span
+        yield Claim(kind, name, not number and kind != "plain"), span
 
 
 def _find(text: str) -> Iterator[tuple[Kind, str, str]]:

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import builtins
 import functools
+import keyword
 import re
+from collections import Counter
 from collections.abc import Iterable
 from typing import TypeAlias
 
@@ -17,7 +19,7 @@ from msgspec import Struct
 from coursebuild.core.model import Course, Document, document_scripts
 from coursebuild.core.model.addresses import line_anchor
 from coursebuild.core.syntax.course_schema import CourseFile
-from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest
+from coursebuild.core.text.diagnostics import did_you_mean, misspellings, misspelt, nearest
 from coursebuild.core.text.rules import HELP
 from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, DocumentNames
 from coursebuild.features.names.engine import EngineName, EngineNames, EngineTable
@@ -62,7 +64,6 @@ class Unknown(Struct, frozen=True):
 
 
 Answer: TypeAlias = Meaning | Unknown | None
-
 
 _resolvers: list[Resolver] = []
 """The one that was asked last."""
@@ -145,6 +146,8 @@ class Resolver:
                 return self._table(*claim.name.split(" "))
             case "file":
                 return self._file(claim.name)
+            case "plain":
+                return self._plain(claim.name, names)
 
     # --- Python
 
@@ -174,6 +177,30 @@ class Resolver:
         candidates = {*self.words, *known_keys(), *(() if engine is None else engine.words)}
         message = f"nothing that the course knows is called `{name}`"
         return Unknown(message, _propose(name, candidates), name)
+
+    @functools.cached_property
+    def plain_words(self) -> dict[str, int]:
+        """Words without the shape of a name, each with the least length that is telling."""
+        claims = (claim for names in course_names(self.course) for claim in names.claims)
+        uses = Counter(claim.name for claim in claims if claim.kind == "plain")
+        engine, files = self.engine, (path.rpartition("/")[2] for path in self.files)
+        common_words = {*known_keys(), *self.imports, *options_by_command(), *keyword.kwlist}
+        common_words.update(vars(builtins), *(() if engine is None else engine.modules.values()))
+        own_words = {*self.words, *files, *(word for word, count in uses.items() if count > 1)}
+        engine_words = engine.words if engine is not None and self.has_engine else ()
+        sets = ((common_words, 7), (own_words, 5), (engine_words, 3))
+        return {word: length for words, length in sets for word in words}
+
+    def _plain(self, name: str, names: CodeNames) -> Answer:
+        if name in (lengths := self.plain_words) or name in names.words or name.isupper():
+            return None
+        slips = misspellings(name)
+        slips -= {name, f"{name}s", *([] if name.endswith("ss") else [name.removesuffix("s")])}
+        near = (word for word in slips if len(word) >= lengths.get(word, len(word) + 1))
+        if (likely := min(near, default=None)) is None:
+            return None
+        message = f"nothing that the course knows is called `{name}`"
+        return Unknown(message, f"did you mean `{likely}`?", name)
 
     def _path(self, path: str, names: CodeNames) -> Answer:
         parts = [re.sub(r"[()\[\]]+", "", part) for part in path.split(".")]
