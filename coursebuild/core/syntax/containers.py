@@ -3,8 +3,9 @@ r"""Containers: quotations, callouts and tables, each part with its place.
 A callout is a quotation whose first line is `[!kind] Optional title`; `[!kind]- Title` makes one
 that starts folded.
 
-Entry points: `read_head`, which reads that line; `read_table`. markdown-it finds the tables and their rows. A row is split here, at each `|` without
-a backslash before it; `\|` is a `|` in the cell.
+Entry points: `read_head`, which reads that line; `read_table`. markdown-it finds the tables and
+their rows. A row is split here, at each `|` without a backslash before it; `\|` is a `|` in the
+cell.
 """
 
 from __future__ import annotations
