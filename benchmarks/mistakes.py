@@ -54,7 +54,8 @@ from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
 from coursebuild.pipeline.judge import judge  # noqa: E402
 from coursebuild.pipeline.options import Options, open_store  # noqa: E402
 from coursebuild.pipeline.verify import verify  # noqa: E402
-from coursebuild.preview.session import Session, script_keys  # noqa: E402
+from coursebuild.preview.run_history import script_keys  # noqa: E402
+from coursebuild.preview.session import Session  # noqa: E402
 
 DOCS = ROOT / "docs/explanation/mistakes.md"
 ENDS = ("at its place", "in its result", "elsewhere", "same", "prose", "reason", "silent")

@@ -109,7 +109,7 @@ def open_store(root: Path, location: str | None, size: str | None, *, fresh: boo
     if size is not None:
         match = re.fullmatch(r"([0-9]{1,15})([KMGT]?)", size, re.IGNORECASE)
         if match is None:
-            message = f"{option}: {size!r} is no size: a whole number, perhaps with K, M, G or T"
+            message = f"{option}: {size!r} is not a size: a whole number, perhaps with K, M, G or T"
             raise UsageError(message)
         limit = int(match[1]) << (10 * " KMGT".index(match[2].upper() or " "))
     if location is None:

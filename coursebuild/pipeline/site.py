@@ -240,9 +240,9 @@ class Site:
                 frozenset[str]().union(*(record.declarations for record in records)),
                 frozenset[str]().union(*(record.parts for record in records)),
             )
-        if self._whole_fonts or not self._has_all_pages:  # a page drawn later may have any part
-            facts = replace(facts, parts=frozenset(parts_by_mark()))
         facts = replace(facts, text=facts.text | common_characters(library, facts.parts))
+        if not self._has_all_pages:  # a page drawn later may have any part
+            facts = replace(facts, parts=frozenset(parts_by_mark()))
         return common_files(library.assets, cut_font, facts, library.course.theme)
 
     @functools.cached_property

@@ -98,10 +98,10 @@ def test_errors_are_apart_and_none_for_what_is_not_there() -> None:
 
 def test_a_timestep_that_misses_the_end_is_refused() -> None:
     problem = all_problems()["projectile"]
-    with pytest.raises(ValueError, match=r"the sampling interval \(0\.1 s\) is no multiple"):
+    with pytest.raises(ValueError, match=r"the sampling interval \(0\.1 s\) is not a multiple"):
         measure(problem, Integrator.EULER, 0.03)
     longer = replace(problem, scenario=replace(problem.scenario, duration=1.05))
-    with pytest.raises(ValueError, match=r"the duration \(1\.05 s\) is no multiple"):
+    with pytest.raises(ValueError, match=r"the duration \(1\.05 s\) is not a multiple"):
         measure(longer, Integrator.EULER, 0.01)
 
 

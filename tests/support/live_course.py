@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -43,7 +44,16 @@ class Live:
         """All compared files of the site, after the background rebuild has finished."""
         self.rebuild.run_once()
         files = {path: self.find(path) for path in self.session.files.paths}
-        return {p: d for p, d in files.items() if d is not None and _is_compared(p)}
+        texts = [d for p, d in files.items() if d is not None and p.endswith((".html", ".js"))]
+        # A preview has all scripts, since a page drawn later may load any; a site those in use.
+        unused = {
+            path
+            for path in files
+            if re.fullmatch(r"assets/[\w-]+\.\w+\.js", path)
+            and not any(path.rpartition("/")[2].encode() in text for text in texts)
+        }
+        compared = files.keys() - {*unused, *(p + end for p in unused for end in (".br", ".gz"))}
+        return {p: files[p] for p in compared if files[p] is not None and _is_compared(p)}
 
     def close(self) -> None:
         self.rebuild.close()

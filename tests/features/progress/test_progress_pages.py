@@ -81,5 +81,6 @@ def test_each_page_carries_the_words_that_it_shows(pages: dict[str, str]) -> Non
 
 
 def test_only_the_pages_about_the_reader_load_their_script(pages: dict[str, str]) -> None:
-    loading = {path for path, html in pages.items() if "/reader." in html}
-    assert loading == {"progress/index.html", "review/index.html"}
+    for script, page in (("progress", "progress/index.html"), ("review", "review/index.html")):
+        loading = {path for path, html in pages.items() if f"assets/{script}." in html}
+        assert loading == {page}
