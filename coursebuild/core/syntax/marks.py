@@ -33,7 +33,8 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
     if source.text[max(span.start - 1, 0)] == ">":  # a mark was typed twice
         fewer = (text.count(">", 0, marks.end()) < marks[0].count(">") for text in lines[2:])
         begins_inside = re.match(r">[ >]*(?:[a-z]|\$\$)", span.text)
-        is_in_text = is_in_text or any(fewer) or begins_inside is not None
+        is_doubled = marks[0].count(">") == 2 and (any(fewer) or begins_inside is not None)
+        is_in_text = is_in_text or is_doubled
     if is_in_text and ">>" in marks[0]:
         message = "a quotation begins in the middle of a paragraph"
         help = "take one `>` away, or leave a line with nothing but `>` above it"
