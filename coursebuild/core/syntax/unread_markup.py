@@ -222,11 +222,15 @@ def find_stars(
 
 
 def find_repetitions(content: Excerpt) -> Iterator[Diagnostic]:
-    """Report lines that begin with the same words twice, as half an edit leaves them."""
+    """Report lines that begin with the same words twice, as half an edit leaves them.
+
+    What ends with punctuation, or is repeated again and again, is meant.
+    """
     for line in re.finditer(r"^\S.{23,}", content.text, re.MULTILINE):
         at = line[0].find(line[0][:12], 12)
         half = re.sub(r"(?:[-*+>]|#+|\d+\.) ?\Z", "", line[0][: max(at, 0)])
-        if re.search(r"[^\W\d_]{2,} \S", half) and line[0].startswith(half, at):
+        is_begun = re.search(r"[^\W\d_]{2,} \S", half) and not re.search(r"[.,:;!?]\W*\Z", half)
+        if is_begun and line[0].startswith(half, at) and line[0].count(half.rstrip()) == 2:
             span = content.span(line.start() + at, line.start() + at + len(half))
             message = f"`{shorten(half)}` stands here twice"
             yield diagnose("text-repeated", span, message, help="delete it once")
