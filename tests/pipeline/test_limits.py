@@ -96,3 +96,9 @@ def test_containers_that_hold_too_many_lines_together_are_told_and_read_no_furth
 
     assert (read(2), read(16)) == ([], ["nesting-deep"])
     assert processor_time_growth(read, 2) < 5, "the depth is another, the text is not"
+
+
+@pytest.mark.parametrize("item", ["* A\n\n    B\n\n", "* A\n    * B\n", "> 1. A\n>\n>    B\n>\n"])
+def test_a_long_list_is_not_taken_for_a_deep_one(item: str) -> None:
+    document = parse_document(Source("x.md", item * 1_000), frozenset(), lesson=False)
+    assert document.diagnostics == ()

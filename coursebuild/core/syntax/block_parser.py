@@ -196,6 +196,7 @@ class _BlockParser(ParserBlock):
         assert isinstance(state, BlockState)
         state.lines_left -= endLine - startLine
         super().tokenize(state, startLine, endLine)
+        state.lines_left += endLine - state.line  # an item of a list leaves some to the next
 
 
 def _deep_paragraph(state: StateBlock, start: int, end: int, silent: bool) -> bool:
