@@ -126,20 +126,6 @@ def misspelt(word: str, names: Iterable[str]) -> str | None:
     return None
 
 
-def misspellings(word: str) -> set[str]:
-    """All words of which this one is a slip of one letter.
-
-    Up to five letters, only those with two swapped: `code` is not a slip of `cone`.
-    """
-    cuts = [(word[:at], word[at:]) for at in range(len(word) + 1)]
-    words = {a + b[1:2] + b[:1] + b[2:] for a, b in cuts}
-    if len(word) > 5:
-        letters = "".join(filter(str.isidentifier, map(chr, range(128)))) + "0123456789"
-        words |= {a + b[1:] for a, b in cuts}
-        words |= {a + letter + b[n:] for a, b in cuts for letter in letters for n in (0, 1)}
-    return words
-
-
 def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     """A help text that proposes the nearest known name, or lists the names if they are few.
 

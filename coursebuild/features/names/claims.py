@@ -6,7 +6,7 @@ one piece of inline code; `Claim` and `CodeNames`.
 Inline code is a claim only where it has the shape of a name: a call, a dotted name, a word with an
 underscore or one that begins as MuJoCo's do, elements and attributes of MJCF, a command or an
 option of coursebuild, a table of the course map, a file of the course. Any other word may be one:
-it is "plain", and wrong only where it is a letter from a name.
+it is "plain", and wrong only where it is a name with two letters swapped.
 """
 
 from __future__ import annotations
