@@ -140,7 +140,12 @@ def _module(name: str) -> Iterator[str]:
         yield "*"
         return
     yield from _submodules(file)
-    for node in ast.walk(ast.parse(file.read_bytes())):
+    try:
+        tree = ast.parse(file.read_bytes())
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):  # of another Python
+        yield "*"
+        return
+    for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             yield "*" if node.name == "__getattr__" else node.name
         elif isinstance(node, ast.Import | ast.ImportFrom):

@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
+
+import pytest
 
 from coursebuild.core.run.script_environment import engine_version
+from coursebuild.features.names import introspect
 from support.scratch_course import Folder, block
 
 MakeCourse = Callable[..., Folder]
@@ -117,3 +124,21 @@ def test_pages_link_names_to_what_explains_them(make_course: MakeCourse) -> None
         "#spin.L9",
         "../examples/spin.py",
     ]
+
+
+@pytest.mark.parametrize(
+    "code", [b"def f(:\n", b"print 1\n", b"x = '\xff'\n", b"a\0b", b"x = " + b"(" * 100_000]
+)
+def test_all_names_of_a_module_pass_that_this_python_cannot_read(
+    tmp_path: Path, code: bytes
+) -> None:
+    (tmp_path / "old.py").write_bytes(code)
+    process = subprocess.run(
+        [sys.executable, introspect.__file__],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        input=b'["old"]\n',
+        capture_output=True,
+        check=True,
+    )
+    ready, answer = process.stdout.splitlines()
+    assert (ready, json.loads(answer)["modules"]) == (b"ready", {"old": ["*"]})
