@@ -4,9 +4,9 @@ Entry point: `compare_with_version(options, names, version)`.
 
 1. The scripts run here, unless their results are remembered.
 2. They run in an environment with the other version and otherwise the same packages (see
-   `core.run.environments`). Their results are remembered, too.
+   `core.run.packages`). Their results are remembered, too.
 3. Those that do something else run once more there, and in a fresh environment with the version of
-   here, to find the cause (see `core.scripts.against`).
+   here, to find the cause (see `core.scripts.compare`).
 4. The models and MJCF blocks are compiled there, and the names in inline code looked up.
 """
 

@@ -67,7 +67,7 @@ class DocumentSummary(Struct, frozen=True):
     """What is known of a document beyond its own page, and what is wrong in it."""
 
     document: Document
-    """Without its prose; see `model.summary`."""
+    """Without its prose; see `core.model.walk`."""
     diagnostics: tuple[Diagnostic, ...]
     """With those of its formulas."""
     imports: tuple[tuple[str, tuple[str, ...]], ...]

@@ -193,6 +193,37 @@ def defined_names(place: Path) -> set[str]:
     return {name for path in paths for name in top.findall(path.read_text(encoding="utf-8"))}
 
 
+def test_modules_that_a_text_names_are_there() -> None:
+    """As `core/text/source.py` or `core.text.source`, in documents and in the code's own texts."""
+    package = ROOT / "coursebuild"
+    folders = "|".join(path.name for path in package.iterdir() if path.is_dir())
+    name = re.compile(
+        rf"`(?:coursebuild[/.])?((?:{folders})(?:/\w+)+\.py|(?:{folders})(?:\.[a-z_]+)+)`"
+    )
+    texts = [*(DOCS / "explanation").glob("*.md"), *package.rglob("*.py"), ROOT / "SECURITY.md"]
+    places = [
+        (path, match[1]) for path in texts for match in name.finditer(path.read_text("utf-8"))
+    ]
+    places = [
+        (path, named)
+        for path, named in places
+        if "/test_" not in named and named != "features/tabs.py"
+    ]
+    assert len(places) > 100
+    gone = []
+    for path, named in places:
+        place = package / (named if named.endswith(".py") else named.replace(".", "/"))
+        module = place if place.suffix else place.with_suffix(".py")
+        member = module.parent.with_suffix(".py")  # or a package, or a name in a module
+        if not (module.exists() or place.is_dir() or _has_name(member, module.stem)):
+            gone.append(f"{path.relative_to(ROOT)}: {named}")
+    assert gone == []
+
+
+def _has_name(module: Path, name: str) -> bool:
+    return module.exists() and re.search(rf"\b{name}\b", module.read_text("utf-8")) is not None
+
+
 def test_what_is_promised_of_security_is_tested_where_it_says() -> None:
     paths = {path for page in SECURITY for path in re.findall(r"`([\w/]+\.py)`", page.read_text())}
     assert len(paths) > 20
