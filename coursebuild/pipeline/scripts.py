@@ -225,8 +225,8 @@ def measure_sensitivity(
     """Measure which printed digits repeat when initial states move, of scripts that were run.
 
     Scripts that use MuJoCo and print what is recorded run four times with their initial states
-    moved (`core.run.perturbation`), each with three times the time limit; if `halve`,
-    a fifth time with halved timesteps (`core.run.perturbation`). All runs are remembered like others.
+    moved (`core.run.perturbation`), each with three times the time limit; if `halve`, a fifth time
+    with halved timesteps. All runs are remembered like others.
     `documents`: only recorded outputs in documents with these paths count.
     """
     recordings: dict[str, list[Recording]] = {}
