@@ -314,7 +314,7 @@ class SymbolComparison:
                 return None
             digits = max(numeral.digits + 2, 4)
             result = format_number(value / (numeral.unit_size * unit_size), digits)
-            mistakes.append(self._mistake(index, f"{result} comes out", ", and not this"))
+            mistakes.append(self._mistake(index, f"{result} is the result", ", not this"))
         return mistakes[0]
 
     def _mistake(self, index: int, message: str, end: str) -> FormulaComparison:

@@ -22,7 +22,7 @@ from coursebuild.core.text.rules import Rule
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.engine import EngineTable, engine_names, list_names
 from coursebuild.features.names.resolve import (
-    Meaning,
+    KnownName,
     Resolver,
     Unknown,
     course_names,
@@ -86,7 +86,7 @@ def lost_names(course: Course, python: str) -> Iterator[Diagnostic]:
         (claim, span, note.names, meaning)
         for note in filter(None, map(names_of, course.documents))
         for claim, _, span in note.claims
-        if isinstance(meaning := resolver.resolve(claim, note.names), Meaning) and meaning.engine
+        if isinstance(meaning := resolver.resolve(claim, note.names), KnownName) and meaning.engine
     ]
     if not uses or resolver.engine is None:
         return
@@ -94,7 +94,7 @@ def lost_names(course: Course, python: str) -> Iterator[Diagnostic]:
     other_resolver = Resolver(course, engine)
     for claim, span, names, meaning in uses:
         answer = other_resolver.resolve(claim, names)
-        if isinstance(answer, Meaning) and answer.engine:
+        if isinstance(answer, KnownName) and answer.engine:
             if "deprecated" in answer.doc.lower() and "deprecated" not in meaning.doc.lower():
                 message = f"MuJoCo {engine.version} discourages `{claim.name}`: {answer.doc}"
                 yield diagnose("name-unknown", span, message)
@@ -114,7 +114,7 @@ def code_links(library: Library, place: urls.Place, document: Document) -> dict[
     pages = {page.path: page for page in library.course.pages}
     for claim, code, _ in note.claims:
         answer = resolver.resolve(claim, note.names) if claim.linked else None
-        href = answer.href if isinstance(answer, Meaning) else ""
+        href = answer.href if isinstance(answer, KnownName) else ""
         page = pages.get(href)
         if href.startswith("#examples/"):
             href = place.href(href[1:]) if href[1:] in library.scripts else ""

@@ -1,6 +1,6 @@
 """Resolves the names in inline code: what each one means, or why there is nothing of that name.
 
-Entry points: `resolver_of`, a course; `Meaning` and `Unknown`, its answers. `None` means that
+Entry points: `resolver_of`, a course; `KnownName` and `Unknown`, its answers. `None` means that
 nobody can say: the name belongs to something that is read nowhere, such as another program.
 """
 
@@ -40,8 +40,8 @@ _HTML = frozenset(
 )
 
 
-class Meaning(Struct, frozen=True):
-    """What a name means."""
+class KnownName(Struct, frozen=True):
+    """What a name refers to."""
 
     href: str = ""
     """Its address: of another site, or that of a line (`#stem.L12`)."""
@@ -63,7 +63,7 @@ class Unknown(Struct, frozen=True):
     """The part of the name that is wrong."""
 
 
-Answer: TypeAlias = Meaning | Unknown | None
+Answer: TypeAlias = KnownName | Unknown | None
 
 _resolvers: list[Resolver] = []
 """The one that was asked last."""
@@ -154,14 +154,14 @@ class Resolver:
     def _word(self, claim: Claim, names: CodeNames) -> Answer:
         name, engine = claim.name, self.engine
         if name in names.definitions:
-            return Meaning(f"#{line_anchor(*names.definitions[name])}", name)
+            return KnownName(f"#{line_anchor(*names.definitions[name])}", name)
         if name in names.imports or hasattr(builtins, name):
-            return Meaning()
+            return KnownName()
         meaning = None if engine is None else find_engine_name(engine, name)
         if meaning is not None:
             return meaning
         if engine is not None and name in engine.words:
-            return Meaning()
+            return KnownName()
         if engine is not None and ENGINE_WORD.fullmatch(name):
             version = engine.version
             engine_words = {*engine.functions, *engine.constants, *engine.enums, *engine.enum_of}
@@ -170,7 +170,7 @@ class Resolver:
                 f"MuJoCo {version} has no `{name}`", did_you_mean(name, engine_words), name
             )
         if name in self.words or name in known_keys():
-            return Meaning()
+            return KnownName()
         is_vague = claim.kind == "call" or name.isupper()  # prose, or an environment variable
         if is_vague and (len(name) < 4 or misspelt(name, names.definitions) is None):
             return None
@@ -226,7 +226,7 @@ class Resolver:
             return None
         likely = misspelt(root, ("model", "data", "mujoco")) if self.has_engine else None
         if likely is not None and isinstance(
-            self._path(path.replace(root, likely, 1), names), Meaning
+            self._path(path.replace(root, likely, 1), names), KnownName
         ):
             message = f"nothing that the course knows is called `{root}`"
             return Unknown(message, f"did you mean `{likely}`?", root)
@@ -262,7 +262,7 @@ class Resolver:
         if member is None:
             return None
         href = _class_href(self.engine, first_class)
-        return Meaning(href, member.text, member.doc, member.extent, engine=True)
+        return KnownName(href, member.text, member.doc, member.extent, engine=True)
 
     def _module_member(self, module: str, parts: list[str], names: CodeNames) -> Answer:
         engine = self.engine
@@ -273,7 +273,7 @@ class Resolver:
                 if name in engine.classes:
                     rest = parts[number + 1 :]
                     href = _class_href(engine, name)
-                    return self._member(name, rest) if rest else Meaning(href, name, engine=True)
+                    return self._member(name, rest) if rest else KnownName(href, name, engine=True)
                 if name in engine.enums and parts[number + 1 :]:
                     return self._path(".".join(parts[number:]), names)
                 meaning = find_engine_name(engine, name)
@@ -287,7 +287,7 @@ class Resolver:
                 label = f"MuJoCo {engine.version}" if is_engine else f"the module `{module}`"
                 return Unknown(f"{label} has no `{name}`", did_you_mean(name, module_names), name)
             module = f"{module}.{name}"
-        return Meaning()
+        return KnownName()
 
     # --- MJCF
 
@@ -296,7 +296,7 @@ class Resolver:
         if engine is None or not self.has_engine:
             return None
         if name in engine.elements:
-            return Meaning(element_href(engine, name), f"<{name}>", engine=True)
+            return KnownName(element_href(engine, name), f"<{name}>", engine=True)
         if name in _HTML or name in self.words:
             return None
         message = f"MJCF of MuJoCo {engine.version} has no element `<{name}>`"
@@ -309,13 +309,13 @@ class Resolver:
         if element:
             attributes = {name for places in engine.elements[element].values() for name in places}
             if name in attributes:
-                return Meaning(element_href(engine, element, name), name, engine=True)
+                return KnownName(element_href(engine, element, name), name, engine=True)
             if element in _HTML:
                 return None
             message = f"`<{element}>` of MuJoCo {engine.version} has no attribute `{name}`"
             return Unknown(message, did_you_mean(name, attributes), name)
         if name in engine.attributes:
-            return Meaning(engine=True, text=name)
+            return KnownName(engine=True, text=name)
         likely = nearest(name, engine.attributes, cutoff=0.75)
         if name in self.words or likely is None or name in known_keys():
             return None
@@ -326,7 +326,7 @@ class Resolver:
 
     def _command(self, name: str) -> Answer:
         if name in options_by_command():
-            return Meaning(self._manual("commands"))
+            return KnownName(self._manual("commands"))
         help = did_you_mean(name, options_by_command())
         return Unknown(f"coursebuild has no command `{name}`", help, name)
 
@@ -336,7 +336,7 @@ class Resolver:
         if options is None:
             options = frozenset(option for options in commands.values() for option in options)
         if name in options:
-            return Meaning(self._manual("commands"))
+            return KnownName(self._manual("commands"))
         if not command and nearest(name, options, cutoff=0.85) is None:
             return None  # of another program
         subject = f"`coursebuild {command}`" if command else "coursebuild"
@@ -355,7 +355,7 @@ class Resolver:
         if key and tables[name] and key not in tables[name]:
             help = did_you_mean(key, tables[name])
             return Unknown(f"the table `{name}` of the course map has no key `{key}`", help, key)
-        return Meaning(self._manual("course-map"))
+        return KnownName(self._manual("course-map"))
 
     def _manual(self, page: str) -> str:
         path = f"docs/reference/{page}.md"
@@ -365,7 +365,7 @@ class Resolver:
 
     def _file(self, path: str) -> Answer:
         if path in self.files:
-            return Meaning(f"#{path}" if path.startswith("examples/") else "")
+            return KnownName(f"#{path}" if path.startswith("examples/") else "")
         help = _propose(path, self.files) or "write it, or say `{code}` after the name"
         return Unknown(f"the course has no file `{path}`", help, path)
 
@@ -398,31 +398,31 @@ def course_names(course: Course) -> tuple[CodeNames, ...]:
     return tuple(note.names for note in map(names_of, course.documents) if note is not None)
 
 
-def find_engine_name(engine: EngineNames, name: str) -> Meaning | None:
+def find_engine_name(engine: EngineNames, name: str) -> KnownName | None:
     """What a single name of MuJoCo means, as C or Python has it."""
     api = "APIreference/"
     if name in engine.functions:
         function = engine.functions[name]
         page = f"{api}APIfunctions.html#{name.lower().replace('_', '-')}"
         href = _MANUAL.format(engine.version, page) if name.startswith("mj") else ""
-        return Meaning(href, function.text, function.doc, engine=True)
+        return KnownName(href, function.text, function.doc, engine=True)
     enum = name if name in engine.enums else engine.enum_of.get(name)
     if enum is not None:
         href = _MANUAL.format(engine.version, f"{api}APItypes.html#{enum.lower()}")
-        return Meaning(href, name, f"of `{enum}`" if enum != name else "", engine=True)
+        return KnownName(href, name, f"of `{enum}`" if enum != name else "", engine=True)
     if name in engine.constants:
         href = _MANUAL.format(engine.version, f"{api}APIglobals.html")
-        return Meaning(href, f"{name} = {engine.constants[name]}", engine=True)
+        return KnownName(href, f"{name} = {engine.constants[name]}", engine=True)
     for class_name in (name, f"Mj{name[2:]}"):
         if class_name in engine.classes and name[:2].lower() == "mj":
-            return Meaning(_class_href(engine, class_name), name, engine=True)
+            return KnownName(_class_href(engine, class_name), name, engine=True)
     classes = [c for c in engine.classes_of.get(name, ()) if c in ("MjModel", "MjData", "MjOption")]
     if classes and "_" in name:
         member = engine.classes[classes[0]][name]
         href = _class_href(engine, classes[0])
-        return Meaning(href, member.text, member.doc, member.extent, engine=True)
+        return KnownName(href, member.text, member.doc, member.extent, engine=True)
     if name in ("mjtNum", "mjtByte", "mjtSize", "mjtBool"):
-        return Meaning(_MANUAL.format(engine.version, f"{api}APItypes.html#{name.lower()}"), name)
+        return KnownName(_MANUAL.format(engine.version, f"{api}APItypes.html#{name.lower()}"), name)
     return None
 
 

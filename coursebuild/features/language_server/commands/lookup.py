@@ -35,7 +35,7 @@ from coursebuild.features.language_server.commands.fields import field_place
 from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.engine import EngineName, engine_names
-from coursebuild.features.names.resolve import Meaning, resolver_of
+from coursebuild.features.names.resolve import KnownName, resolver_of
 from coursebuild.features.symbols.mathml import declared_symbol, symbols
 from coursebuild.pipeline.reader import kept_formulas
 
@@ -313,7 +313,7 @@ class _Lookup:
         for claim, _, span in sorted(claims, key=lambda claim: not _touches(claim[2], offset)):
             assert note is not None
             meaning = resolver.resolve(claim, note.names)
-            if not isinstance(meaning, Meaning) or not meaning.text:
+            if not isinstance(meaning, KnownName) or not meaning.text:
                 continue
             path, line = note.names.definitions.get(claim.name, ("", 0))
             text, place = fence("python", meaning.text), None
