@@ -210,14 +210,14 @@ def test_modules_that_a_text_names_are_there() -> None:
         if "/test_" not in named and named != "features/tabs.py"
     ]
     assert len(places) > 100
-    gone = []
+    missing = []
     for path, named in places:
         place = package / (named if named.endswith(".py") else named.replace(".", "/"))
         module = place if place.suffix else place.with_suffix(".py")
         member = module.parent.with_suffix(".py")  # or a package, or a name in a module
         if not (module.exists() or place.is_dir() or _has_name(member, module.stem)):
-            gone.append(f"{path.relative_to(ROOT)}: {named}")
-    assert gone == []
+            missing.append(f"{path.relative_to(ROOT)}: {named}")
+    assert missing == []
 
 
 def _has_name(module: Path, name: str) -> bool:
