@@ -205,18 +205,20 @@ def test_modules_that_a_text_names_are_there() -> None:
         (path, match[1]) for path in texts for match in name.finditer(path.read_text("utf-8"))
     ]
     places = [
-        (path, named)
-        for path, named in places
-        if "/test_" not in named and named != "features/tabs.py"
+        (path, module_name)
+        for path, module_name in places
+        if "/test_" not in module_name and module_name != "features/tabs.py"
     ]
     assert len(places) > 100
     missing = []
-    for path, named in places:
-        place = package / (named if named.endswith(".py") else named.replace(".", "/"))
+    for path, module_name in places:
+        place = package / (
+            module_name if module_name.endswith(".py") else module_name.replace(".", "/")
+        )
         module = place if place.suffix else place.with_suffix(".py")
         member = module.parent.with_suffix(".py")  # or a package, or a name in a module
         if not (module.exists() or place.is_dir() or _has_name(member, module.stem)):
-            missing.append(f"{path.relative_to(ROOT)}: {named}")
+            missing.append(f"{path.relative_to(ROOT)}: {module_name}")
     assert missing == []
 
 
