@@ -238,6 +238,11 @@ REASONS = (
     Reason("a callout without its first line is a quotation", "callout", slip="line lost"),
     Reason("a name that nothing else names", "fence", r"[\w.]*", r".*file=\S+.*"),
     Reason("given by the author: no script prints it", "number", r"[\d.]*", r".*\{given.*"),
+    Reason("another number that the script printed", "number", r"[\d.-]*", r".*\{out.*"),
+    Reason("another name of a source", "number", r"[\w ]*", r".*\{given=.*"),
+    Reason("another number that a quiz may have", "quiz", r"[\d.]*", r".*\d.*"),
+    Reason("a formula that nothing links to", "formula|list", r"[\w-]*", r".*\{#eq:.*"),
+    Reason("a paragraph in another place", ".*", "(?s).*", "(?s).*", "paragraph moved"),
     Reason("a printed number with a digit less, or a zero more", "output", r"\d"),
     Reason("no name, as the author says", "number", r"[a-z]+", r".*\{code\}.*"),
     Reason("a whole number without a unit, as words say one", "digits|emphasis", r"\d+"),
@@ -258,13 +263,19 @@ def find_reason(change: Change, old: str, claims: Iterable[Diagnostic]) -> str:
         if step != "equal"
     )
     is_number = re.fullmatch(r"[\d.,\u2212-]+", letters)
-    for claim in claims if is_number else ():
+    for claim in claims if is_number or "out" in letters or "given" in letters else ():
         span = claim.span
         if span.path == change.path and span.start <= end and start <= span.end:
             return "listed by `check --truth`"
     if is_number and re.fullmatch(r"(?s).*Lessons? (?:[\d.]+ and )?\d+\.\d+", new[:end].rstrip()):
         return "another lesson of the map"
-    line = new[new.rfind("\n", 0, start) + 1 : new.find("\n", end) % (len(new) + 1)]
+    line_start = new.rfind("\n", 0, start) + 1
+    line = new[line_start : new.find("\n", end) % (len(new) + 1)]
+    words = re.finditer(r"(?<![\w.])[A-Za-z]+(?![\w.(])", line)
+    if re.fullmatch("[A-Za-z]+", letters) and change.place in ("code", "list"):
+        at = start - line_start
+        if any(word.start() <= at <= word.end() and _is_in_code(line, at) for word in words):
+            return "a plain word in code: one in twenty of any prose is a letter from some name"
     if change.place == "other block":
         kind = re.findall(r"^[ >]*`{3,} *([^\s`]*)", old[:start], re.MULTILINE)[-1]
         if kind in _QUOTED:
@@ -281,6 +292,10 @@ def find_reason(change: Change, old: str, claims: Iterable[Diagnostic]) -> str:
         if all(re.fullmatch(pattern, text) for pattern, text in pairs):
             return reason.text
     return ""
+
+
+def _is_in_code(line: str, at: int) -> bool:
+    return line.count("`", 0, at) % 2 == 1
 
 
 # --- the run

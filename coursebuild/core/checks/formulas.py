@@ -89,6 +89,9 @@ def _check_letters(tex: Excerpt, commands: frozenset[str]) -> Iterator[Diagnosti
     if (prime := re.search(r"(?:^|[(\[=+,;&-])\s*(')", text)) is not None:
         message, help = "this prime follows nothing", "write the letter before it"
         yield diagnose("math-syntax", tex.span(*prime.span(1)), message, help=help)
+    if (at := text.find("`")) >= 0:
+        message, help = "a backtick would be shown in this formula", "delete it"
+        yield diagnose("math-syntax", tex.span(at, at + 1), message, help=help)
     if _INTERVAL.search(text):
         return
     unmatched: list[int] = []

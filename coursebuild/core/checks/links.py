@@ -28,7 +28,6 @@ from coursebuild.core.model import (
     Link,
     MjcfModel,
     ModelTarget,
-    NumberBinding,
     PageTarget,
     RawInline,
     Target,
@@ -123,24 +122,9 @@ def check_links(course: Course, document: Document, targets: LinkTargets) -> Ite
                 yield from _check_media(
                     "the image ", inline.url, inline.url_span, document, targets
                 )
-            elif isinstance(inline, NumberBinding) and _FILE.fullmatch(inline.source or ""):
-                yield from _check_source(inline, targets)
             elif isinstance(inline, RawInline):
                 yield from _check_html_rules(inline, course)
                 yield from _check_html_links(inline, document, targets)
-
-
-_FILE = re.compile(r"[\w.-]+(?:/[\w.-]+)+\.\w{1,4}")
-
-
-def _check_source(number: NumberBinding, targets: LinkTargets) -> Iterator[Diagnostic]:
-    """Report a number whose source is called a file, and is none."""
-    path = number.source or ""
-    models = {model.source.path for model in targets.models.values()}
-    if path not in {*targets.files, *targets.scripts, *models}:
-        help = did_you_mean(path, [name for name in models if nearest(path, [name])])
-        message = f"the source of `{number.text}` is said to be `{path}`, and there is no such file"
-        yield diagnose("link-file", number.span, message, help=help)
 
 
 def _check_html_rules(html: HtmlBlock | RawInline, course: Course) -> Iterator[Diagnostic]:

@@ -307,6 +307,13 @@ def _mismatch(
             f"`{binding.text}` does not stand in the output of `{path}`",
             help="write it as it is printed, or take `{out}` away",
         )
+    if (stray := bound_text.stray) and replace(bound_text, before="", after="").is_in(lines):
+        return diagnose(
+            "binding-mismatch",
+            binding.text_span,
+            f"`{path}` printed no `{stray}` beside the number in `{binding.text}`",
+            help=f"take the `{stray}` away",
+        )
     label, better = _propose(bound_text, lines, list(map(PrintedLine, before)))
     return diagnose(
         "binding-mismatch",

@@ -26,6 +26,8 @@ from coursebuild.core.scripts.tables import RowCell, table_rows
 from coursebuild.core.text.source import Excerpt, Span
 
 Locate = Callable[[int, int], Span]
+_STRAY = re.compile(r"[-+*/.,:;=_]+")
+"""What beside a number is neither a unit nor a word: `-9.81-` has a slip."""
 
 
 class PrintedLine(Struct, frozen=True, dict=True):
@@ -143,7 +145,13 @@ class BoundText(Struct, frozen=True):
         )
         if any(map(self.has_context, equal_windows)):  # nearly always, so look here first
             return True
-        return any(map(self.shows, self.windows(lines)))
+        return not self.stray and any(map(self.shows, self.windows(lines)))
+
+    @property
+    def stray(self) -> str:
+        """A sign beside the numbers that is neither a unit nor a word, as in `-9.81-`."""
+        texts = (self.before.strip(), self.after.strip())
+        return next(filter(re.compile(r"[-+*/.,;:=_]+").fullmatch, texts), "")
 
     def _windows(self, lines: Iterable[PrintedLine]) -> Iterator[Window]:
         """All runs of as many printed numbers of one line."""

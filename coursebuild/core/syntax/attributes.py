@@ -19,6 +19,7 @@ from coursebuild.core.model import (
     Label,
     Meaning,
     NumberBinding,
+    Text,
     plain_text,
     walk_inlines,
 )
@@ -282,6 +283,14 @@ def check_heading(
     if re.match(r"#+[^\W\d_]", plain_text(children)):
         message, help = "a `#` would be shown before the title", "write all `#` before the blank"
         diagnostics.append(diagnose("markup-unread", span.first_line(), message, help=help))
+    last = children[-1] if children else None
+    braces = re.search(r"(?<=\s)\{[^{}\s]*\}?$", last.text) if isinstance(last, Text) else None
+    if braces is not None and not braces[0].startswith(("{#", "{.", "{:")):
+        at = span.text.rindex(braces[0])
+        message = f"`{braces[0]}` would be shown as written: it is no attribute of the heading"
+        help = "write `{#id .class}`, or `\\{` for braces that readers should see"
+        place = span.source.span(span.start + at, span.start + at + len(braces[0]))
+        diagnostics.append(diagnose("markup-unread", place, message, help=help))
     before = span.source.text[: span.start].rstrip().rpartition("\n")[2]
     if before == "---" and re.fullmatch(r"[a-z][\w-]*: .*\n-+", span.text.strip(), re.DOTALL):
         message, help = "front matter stands in the text, which would show it", "delete it"

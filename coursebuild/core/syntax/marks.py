@@ -1,4 +1,4 @@
-"""Marks of lists and quotations that were lost, doubled or mistyped.
+"""Marks of lists and quotations that were lost, doubled or mistyped, and blocks that were doubled.
 
 Entry points: `check_quotation`, `check_neighbours` of a block and those above it, `check_numbers`
 and `check_item` of a list.
@@ -40,6 +40,11 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
         help = "take one `>` away, or leave a line with nothing but `>` above it"
         place = source.span(at := source.line_start(line), at + len(marks[0].rstrip()))
         yield diagnose("markup-unread", place, message, help=help)
+    lost = line - 1  # the line above, or one of those above it, of which only the blank is left
+    while lost and re.match(r" [^\s>]", source.line_text(lost)):
+        lost -= 1
+    if lost and lost < line - 1 and source.line_text(lost).startswith(">"):
+        yield _diagnose_lost_mark(source, source.line_start(lost + 1) + 1, ">")
     end_line = min(span.end_line + 1, len(source.line_starts))
     for line in range(span.line + 1, end_line + 1):
         slip = _SLIP_OF_MARK.match(source.line_text(line))
@@ -52,7 +57,7 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
 
 
 def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterator[Diagnostic]:
-    """Report a quotation that was surely a part of the callout above it, and lost list marks.
+    """Report a block that is repeated, a quotation torn from its callout, and lost list marks.
 
     A `>` is lost on the empty line between the two where one sentence goes on, or where other
     empty lines of theirs have it.
@@ -61,6 +66,11 @@ def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterat
     if before is None:
         return
     gap = Span(source, before.span.end, block.span.start)
+    text = block.span.text.strip()
+    if isinstance(block, model.Heading | model.Paragraph) and text == before.span.text.strip():
+        kind = "heading" if isinstance(block, model.Heading) else "paragraph"
+        message, help = f"this {kind} stands here twice", "delete it once"
+        yield diagnose("text-repeated", block.span.first_line(), message, help=help)
     if isinstance(before, model.Callout) and isinstance(block, model.BlockQuote):
         last = before.span.text.rstrip(" \t\r\n>")[-1:]
         text = f"{before.span.text}\n{block.span.text}"
@@ -75,11 +85,17 @@ def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterat
             place = block.span.first_line()
             yield diagnose("markup-unread", place, message, help=help)
     elif isinstance(block, model.ListBlock) and isinstance(before, model.Paragraph):
+        number = re.match(r"\d+(?= +\S)", before.span.text)
+        if number is not None and block.start == int(number[0]) + 1:
+            place = source.span(before.span.start, before.span.start + number.end())
+            message = f"`{number[0]}` would be shown as written: no item of a list begins here"
+            help = f"write `{number[0]}.`, as the list below goes on with {block.start}"
+            yield diagnose("markup-unread", place, message, help=help)
         column, list_column = (
             part.start - source.line_start(part.line) for part in (before.span, block.span)
         )
         if column == list_column + 1 and gap.text.count("\n") == 1:
-            yield _diagnose_lost_mark(source, before.span.start)
+            yield _diagnose_lost_mark(source, before.span.start, "-")
 
 
 def check_numbers(spans: Sequence[Span]) -> Iterator[Diagnostic]:
@@ -101,13 +117,23 @@ def check_item(span: Span) -> Iterator[Diagnostic]:
     """Report lines of an item that may have begun others."""
     source = span.source
     prefix = source.text[source.line_start(span.line) : span.start]
-    for line in range(span.line + 1, span.end_line + 1) if span.text[0] in "-*+" else ():
-        if re.match(re.escape(prefix) + r" [A-Z*`$\[]", source.line_text(line)):
-            yield _diagnose_lost_mark(source, source.line_start(line) + len(prefix) + 1)
+    number = re.match(r"\d+", span.text)
+    mark = "-" if number is None else f"{int(number[0]) + 1}."
+    slip = r"--+(?= )" if number is None else rf"{mark[:-1]}(?= )"
+    for line in range(span.line + 1, span.end_line + 1):
+        text, start = source.line_text(line), source.line_start(line) + len(prefix)
+        if number is None and re.match(re.escape(prefix) + r" [A-Z*`$\[]", text):
+            yield _diagnose_lost_mark(source, start + 1, "-")
+        elif found := re.match(rf"{re.escape(prefix)}({slip})", text):
+            place = source.span(start, start + len(found[1]))
+            message = f"`{found[1]}` would be shown as written: no item of a list begins here"
+            help = f"begin the line with `{mark} `"
+            yield diagnose("markup-unread", place, message, help=help)
 
 
-def _diagnose_lost_mark(source: Source, at: int) -> Diagnostic:
+def _diagnose_lost_mark(source: Source, at: int, mark: str) -> Diagnostic:
     place = source.span(at - 1, at + 1)
-    message = "a mark of a list may be lost here: only its blank is left"
-    help = "begin the line with `- `, or take the blank away"
+    container = "list" if mark == "-" else "quotation"
+    message = f"a mark of a {container} may be lost here: only its blank is left"
+    help = f"begin the line with `{mark} `, or take the blank away"
     return diagnose("markup-unread", place, message, help=help)

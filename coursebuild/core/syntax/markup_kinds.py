@@ -133,8 +133,8 @@ FOREIGN = {
         r"^\[(?:source|listing|NOTE|TIP|WARNING|IMPORTANT|CAUTION|stem|latexmath|verse|quote)"
         r"(?:,[^\]\n\0]*)?\]$|^(?:image|include|video|audio|toc|stem)::[^\s\[\0]*\[[^\]\n\0]*\]"
         r"|^#\+[A-Z_]+(?::|\b)|^h[1-6]\. (?=\w)|\{(?:code|panel|info|noformat)(?::[^{}\n\0]*)?\}"
-        r"|(?-i:^[AWTEDQ]> )",
-        "markup of AsciiDoc, Org, Textile or a wiki is not read",
+        r"|(?-i:^[AWTEDQ]> )|^[?!]> (?=\w)",
+        "markup of AsciiDoc, Docsify, Org, Textile or a wiki is not read",
         "write it as Markdown: `## Title`, `![what it shows](x.svg)`, a fence of three backticks",
     ),
     "prompt": MarkupKind(
@@ -155,7 +155,7 @@ BROKEN = {
         rf"(?:`{_NUMBER}[^`{{}}\n\0]{{0,20}}|(?:{_NUMBER})?`?)"
         r"\{[ \t]*(?:out|given)\b[^{}\n\0]*\}?"
         r"|(?<=\0)[A-Za-z]{1,3}\{[A-Za-z]{1,6}\}|(?<=\0)[^\s\0]{0,2}(?:out|given)[)}\]]"
-        r"|(?<=\0)\{\{(?:out|given)[^{}\n\0]*\}+|(?<=\0)\}",
+        r"|(?<=\0)\{\{(?:out|given)[^{}\n\0]*\}+|(?<=\0)(?:[^\s\0{}\"]|\"[^\"\n\0]*\")*\}",
         "only a number in backticks is bound, by braces directly after it",
         "put the number into backticks: `` `4.47`{out} ``",
         "binding-attribute",
@@ -183,6 +183,12 @@ BROKEN = {
         r"(?<![\\\w])\[(?=[^\W\d_]{2})(?![^\[\]]*\])",
         "no link begins here",
         "a link is `[text](address)`; write a backslash before a bracket that is meant to be seen",
+    ),
+    "letter": MarkupKind(
+        r"(?<=\0)(?-i:[a-rt-z])(?![\w'’-])",
+        "it stands directly beside a formula",
+        "move the dollar sign, or write a blank between them",
+        "math-unread",
     ),
     "heading": MarkupKind(
         r"^[ \t]*#{2,6}(?=[^\s#])|^[ \t]*#{7,}(?=\s)"
@@ -222,7 +228,8 @@ BROKEN = {
     ),
     "item": MarkupKind(
         r"^\d{1,2}(?:[.)][.,)]|[,;]) (?=(?-i:[A-Z\0]))|^\d{1,2}[.)](?=(?-i:[A-Z][a-z]))"
-        r"|^-(?=(?-i:[A-Z][a-z]))|^[0=_] (?=(?-i:[A-Z][a-z]{2}|\0\0?[A-Z]))",
+        r"|\A1 (?=(?:[^\n]*\n)+?2\. )|^-(?=(?-i:[A-Z][a-z]))"
+        r"|^[0=_] (?=(?-i:[A-Z][a-z]{2}|\0\0?[A-Z]))",
         "no item of a list begins here",
         "an item is `- text` or `1. text`, with one blank after the mark",
     ),

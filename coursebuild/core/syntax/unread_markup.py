@@ -23,8 +23,8 @@ from coursebuild.core.text.source import Excerpt, Span
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
 _SIGNS = re.compile(
     r"[{}\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f]|[!?=:._']{2}|:\w|[´‘’]{3}"
-    r"|\((?:out|given)\)|\A_\Z|^\d{1,2}[.,;)][^\d\s]|^\d{1,2}[,;] |^-[A-Z]|^[0=_] |^h\d\. |^[A-Z]> "
-    r"|^import |Lesson \d",
+    r"|\((?:out|given)\)|\A_\Z|\A[a-rt-z](?!\w)|^\d{1,2}[.,;)][^\d\s]|^\d{1,2}[,;] |^-[A-Z]"
+    r"|^[0=_] |^h\d\. |^[A-Z?!]> |^1 |^import |Lesson \d",
     re.MULTILINE,
 )
 """What all unread markup has at least once, so that most texts are passed over quickly."""
@@ -133,6 +133,8 @@ def _diagnose(
             return _diagnose_braces(markup, span, before[-1:])
         case "binding" if before.endswith("`") and markup.startswith("{"):
             return _diagnose_braces(markup, span, "`")
+        case "binding" if before == "{" or _is_closing(match):
+            return None
         case "binding" if markup == "}":
             help = "delete it, or write `\\}` for a brace that readers should see"
         case "binding":
@@ -146,6 +148,8 @@ def _diagnose(
         case "emphasis" if markup == "*" and "**" not in before[-1:] + markup + after[:1]:
             if match[0] == "*" and not re.match(r"[^\W\d_]{2}|[aA] ", after):
                 return None
+        case "letter" if before != "$" or whole[: at - 1].endswith("\\"):
+            return None
         case "latex" if markup.startswith("$") and markup[1] != "`":
             return None  # no code stands between the dollars
         case "role" if not after.startswith("`"):
@@ -169,6 +173,12 @@ def _diagnose(
     message = f"`{shorten(markup)}` would be shown as written: {kind.reason}"
     rule = "markup-foreign" if name in FOREIGN else kind.rule
     return diagnose(rule, span, message, help=help)
+
+
+def _is_closing(match: re.Match[str]) -> bool:
+    """Whether what was found is only the brace that closes one before it, as in "{`a`, `b`}"."""
+    braces = re.findall(r"(?<!\0)[{}]", match.string[: match.start()])
+    return match[0][-1] == "}" and "{" not in match[0] and braces[-1:] == ["{"]
 
 
 def _is_escaped(text: str, end: int) -> bool:

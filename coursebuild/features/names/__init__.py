@@ -30,6 +30,8 @@ from coursebuild.features.names.resolve import (
     resolver_of,
 )
 
+_TAIL = re.compile(r"[^\W\d_]+(?!\w)")
+"""Letters directly after code."""
 _HELP = "say `{code}` after it if it is no name, or list it under `names` in `[verify]`"
 
 
@@ -58,6 +60,8 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
             continue
         for claim, code, span in note.claims:
             answer = resolver.resolve(claim, note.names)
+            if claim.kind == "plain" and (tail := _TAIL.match(code.source.text, code.end)):
+                answer = answer or resolver.find_torn(claim.name, tail[0], note.names)
             if not isinstance(answer, Unknown):
                 continue
             text = code.text.strip("` ")

@@ -39,7 +39,8 @@ from coursebuild.features.arithmetic.statements import FormulaSide, read_stateme
 from coursebuild.features.arithmetic.symbol_values import check_formulas
 from coursebuild.features.arithmetic.tex import Expression
 
-_PATH = re.compile(r"[\w.-]+(?:/[\w.-]+)+\.[a-z]+")
+_PATH = re.compile(r"[\w.-]+(?:/[\w.-]+)+\.[a-z]+|(?:content|examples|lib|models|runs)/.*")
+"""A source that is a file, also where its name is misspelt."""
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+(?:_\d{3})*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _SOURCE_UNIT = re.compile(r"\s*([^\W\d][^\d]*|°|%)$")
 
