@@ -284,8 +284,8 @@ def check_heading(
         message, help = "a `#` would be shown before the title", "write all `#` before the blank"
         diagnostics.append(diagnose("markup-unread", span.first_line(), message, help=help))
     last = children[-1] if children else None
-    braces = re.search(r"(?<=\s)\{[^{}\s]*\}?$", last.text) if isinstance(last, Text) else None
-    if braces is not None and not braces[0].startswith(("{#", "{.", "{:")):
+    braces = re.search(r"(?<=\s)\{[^{}\s]{2,}\}?$", last.text) if isinstance(last, Text) else None
+    if braces is not None and not re.match(r"\{[#.:]|\{(?:further|symbol|term)\b", braces[0]):
         at = span.text.rindex(braces[0])
         message = f"`{braces[0]}` would be shown as written: it is no attribute of the heading"
         help = "write `{#id .class}`, or `\\{` for braces that readers should see"

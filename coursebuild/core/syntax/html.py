@@ -214,7 +214,7 @@ def _addresses(text: str, attribute: str, start: int, end: int) -> Iterator[tupl
         yield start, end
 
 
-_ELEMENTS = frozenset(
+ELEMENTS = frozenset(
     "a abbr address article aside audio b bdi bdo big blockquote br caption center cite code col "
     "colgroup data dd del details dfn div dl dt em figcaption figure footer h1 h2 h3 h4 h5 h6 "
     "header hgroup hr i img ins kbd li mark meter nav ol p picture pre progress q rp rt ruby s "
@@ -293,7 +293,7 @@ def _check_html(html: str) -> Iterator[tuple[int, int, str]]:
 
 def _check_tag(html: str, tag: re.Match[str]) -> Iterator[tuple[int, int, str]]:
     element = tag[1].lower()
-    if element not in _ELEMENTS:
+    if element not in ELEMENTS:
         yield *tag.span(), f"`<{tag[1]}>` is not allowed in a page"
         return
     for attribute in _ATTRIBUTES.finditer(html, *tag.span(2)):

@@ -124,9 +124,9 @@ def check_item(span: Span) -> Iterator[Diagnostic]:
         text, start = source.line_text(line), source.line_start(line) + len(prefix)
         if number is None and re.match(re.escape(prefix) + r" [A-Z*`$\[]", text):
             yield _diagnose_lost_mark(source, start + 1, "-")
-        elif found := re.match(rf"{re.escape(prefix)}({slip})", text):
-            place = source.span(start, start + len(found[1]))
-            message = f"`{found[1]}` would be shown as written: no item of a list begins here"
+        elif match := re.match(rf"{re.escape(prefix)}({slip})", text):
+            place = source.span(start, start + len(match[1]))
+            message = f"`{match[1]}` would be shown as written: no item of a list begins here"
             help = f"begin the line with `{mark} `"
             yield diagnose("markup-unread", place, message, help=help)
 

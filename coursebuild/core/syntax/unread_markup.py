@@ -79,7 +79,8 @@ def check_unread_markup(
     kinds, pattern = (IN_HTML, _ANY_IN_HTML) if html else (_KINDS, _ANY_KIND)
     for match in pattern.finditer(masked):
         name = match.lastgroup or ""
-        if name in reported or (dollars and re.match(r"\\[A-Za-z]", match[0])):
+        is_of_formula = name == "letter" or re.match(r"\\[A-Za-z]", match[0])
+        if name in reported or (dollars and is_of_formula):
             continue
         diagnostic = _diagnose(content, name, kinds[name], match)
         if diagnostic is not None:
@@ -148,7 +149,7 @@ def _diagnose(
         case "emphasis" if markup == "*" and "**" not in before[-1:] + markup + after[:1]:
             if match[0] == "*" and not re.match(r"[^\W\d_]{2}|[aA] ", after):
                 return None
-        case "letter" if before != "$" or whole[: at - 1].endswith("\\"):
+        case "letter" if before != "$" or whole[: at - 1].endswith(("\\", "$")):
             return None
         case "latex" if markup.startswith("$") and markup[1] != "`":
             return None  # no code stands between the dollars

@@ -20,9 +20,8 @@ from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.features.names.claims import document_names
-from coursebuild.features.names.engine import EngineTable, engine_names, list_names
+from coursebuild.features.names.engine import EngineTable, KnownName, engine_names, list_names
 from coursebuild.features.names.resolve import (
-    KnownName,
     Resolver,
     Unknown,
     course_names,

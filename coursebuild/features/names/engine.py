@@ -1,7 +1,8 @@
 """The names of the installed MuJoCo, of MJCF, and of the modules that scripts import.
 
 Entry points: `EngineNames`; `engine_names`, the table, which one child process makes for each
-version of MuJoCo and set of modules; `list_names` for another interpreter.
+version of MuJoCo and set of modules; `list_names` for another interpreter; `find_engine_name`,
+`element_href`, what a name means and where MuJoCo's manual has it.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from coursebuild.core.run.script_environment import Interpreter, engine_version,
 from coursebuild.core.text.source import key_of
 from coursebuild.features.names import introspect
 
+_MANUAL = "https://mujoco.readthedocs.io/en/{}/{}"
 _KIND = "names"
 _SECONDS = 30.0
 
@@ -153,3 +155,63 @@ def list_names(python: str, modules: Iterable[str] = ()) -> EngineNames:
         if answer is None:
             raise EffectError(f"listing the names of MuJoCo {child.death()}")
     return msgspec.convert(answer, EngineNames)
+
+
+class KnownName(Struct, frozen=True):
+    """What a name refers to."""
+
+    href: str = ""
+    """Its address: of another site, or that of a line (`#stem.L12`)."""
+    text: str = ""
+    """A declaration or signature, for an editor."""
+    doc: str = ""
+    extent: tuple[str, ...] = ()
+    """The shape of an array."""
+    engine: bool = False
+    """Whether it is a name of MuJoCo or MJCF, which another version may have lost."""
+
+
+def find_engine_name(engine: EngineNames, name: str) -> KnownName | None:
+    """What a single name of MuJoCo means, as C or Python has it."""
+    api = "APIreference/"
+    if name in engine.functions:
+        function = engine.functions[name]
+        page = f"{api}APIfunctions.html#{name.lower().replace('_', '-')}"
+        href = _MANUAL.format(engine.version, page) if name.startswith("mj") else ""
+        return KnownName(href, function.text, function.doc, engine=True)
+    enum = name if name in engine.enums else engine.enum_of.get(name)
+    if enum is not None:
+        href = _MANUAL.format(engine.version, f"{api}APItypes.html#{enum.lower()}")
+        return KnownName(href, name, f"of `{enum}`" if enum != name else "", engine=True)
+    if name in engine.constants:
+        href = _MANUAL.format(engine.version, f"{api}APIglobals.html")
+        return KnownName(href, f"{name} = {engine.constants[name]}", engine=True)
+    for class_name in (name, f"Mj{name[2:]}"):
+        if class_name in engine.classes and name[:2].lower() == "mj":
+            return KnownName(class_href(engine, class_name), name, engine=True)
+    classes = [c for c in engine.classes_of.get(name, ()) if c in ("MjModel", "MjData", "MjOption")]
+    if classes and "_" in name:
+        member = engine.classes[classes[0]][name]
+        href = class_href(engine, classes[0])
+        return KnownName(href, member.text, member.doc, member.extent, engine=True)
+    if name in ("mjtNum", "mjtByte", "mjtSize", "mjtBool"):
+        return KnownName(_MANUAL.format(engine.version, f"{api}APItypes.html#{name.lower()}"), name)
+    return None
+
+
+def class_href(engine: EngineNames, name: str) -> str:
+    """The address of a class in MuJoCo's manual."""
+    page = "python.html" if name.endswith("Views") else f"APIreference/APItypes.html#{name.lower()}"
+    return _MANUAL.format(engine.version, page)
+
+
+def element_href(engine: EngineNames, name: str, attribute: str = "") -> str:
+    """The address of an element of MJCF in MuJoCo's manual, or of an attribute."""
+    places = {p: a for p, a in engine.elements[name].items() if not attribute or attribute in a}
+    places = {p: a for p, a in places.items() if p != "default"} or places
+    parent = next(iter(places), "")
+    if name in ("frame", "replicate", "worldbody") or parent in ("", "mujoco"):
+        parent = ""
+    target = "body" if name == "worldbody" else name
+    anchor = "-".join(filter(None, (parent, target, attribute)))
+    return _MANUAL.format(engine.version, f"XMLreference.html#{anchor}")

@@ -20,39 +20,27 @@ from msgspec import Struct
 from coursebuild.core.model import Course, Document, document_scripts
 from coursebuild.core.model.addresses import line_anchor
 from coursebuild.core.syntax.course_schema import CourseFile
+from coursebuild.core.syntax.html import ELEMENTS
 from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest
 from coursebuild.core.text.rules import HELP
 from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, DocumentNames
-from coursebuild.features.names.engine import EngineName, EngineNames, EngineTable
+from coursebuild.features.names.engine import (
+    EngineName,
+    EngineNames,
+    EngineTable,
+    KnownName,
+    class_href,
+    element_href,
+    find_engine_name,
+)
 from coursebuild.features.names.own_names import known_keys, options_by_command, tables_of
 
-_MANUAL = "https://mujoco.readthedocs.io/en/{}/{}"
 _ROOTS = {"model": "MjModel", "data": "MjData", "opt": "MjOption", "spec": "MjSpec"}
 """The classes of variables by their usual names."""
-_HTML = frozenset(
-    """
-    a abbr article aside audio b blockquote body br button canvas caption cite code col
-    details dfn div dl dt dd em figcaption figure footer form h1 h2 h3 h4 h5 h6 head header hr
-    html i iframe img input kbd label legend li link main map math meta nav object ol optgroup
-    option output p path picture pre q rect s samp script section select small source span
-    strong style sub summary sup svg table tbody td template textarea tfoot th thead time
-    title tr track u ul use var video wbr
-    """.split()
+_HTML = ELEMENTS | frozenset(
+    "body button canvas form head html iframe input label legend link main meta object optgroup "
+    "option output script select style template textarea".split()
 )
-
-
-class KnownName(Struct, frozen=True):
-    """What a name refers to."""
-
-    href: str = ""
-    """Its address: of another site, or that of a line (`#stem.L12`)."""
-    text: str = ""
-    """A declaration or signature, for an editor."""
-    doc: str = ""
-    extent: tuple[str, ...] = ()
-    """The shape of an array."""
-    engine: bool = False
-    """Whether it is a name of MuJoCo or MJCF, which another version may have lost."""
 
 
 class Unknown(Struct, frozen=True):
@@ -194,8 +182,8 @@ class Resolver:
 
     def find_torn(self, name: str, tail: str, names: CodeNames) -> Answer:
         """A name of which a backtick stands before the last letters, as in "`Eule`r"."""
-        whole, known = name + tail, self.plain_words.keys() | names.words
-        if not tail or whole not in known or name in known:
+        whole, words = name + tail, self.plain_words.keys() | names.words
+        if whole not in words or name in words:
             return None
         message = f"`{name}` and the letters after its backtick are the name `{whole}`"
         return Unknown(message, f"did you mean `{whole}`?", name)
@@ -277,7 +265,7 @@ class Resolver:
                 class_name = _ITEMS.get(class_name, "") if "[]" in part else ""
         if member is None:
             return None
-        href = _class_href(self.engine, first_class)
+        href = class_href(self.engine, first_class)
         return KnownName(href, member.text, member.doc, member.extent, engine=True)
 
     def _module_member(self, module: str, parts: list[str], names: CodeNames) -> Answer:
@@ -288,7 +276,7 @@ class Resolver:
             if module == "mujoco":
                 if name in engine.classes:
                     rest = parts[number + 1 :]
-                    href = _class_href(engine, name)
+                    href = class_href(engine, name)
                     return self._member(name, rest) if rest else KnownName(href, name, engine=True)
                 if name in engine.enums and parts[number + 1 :]:
                     return self._path(".".join(parts[number:]), names)
@@ -412,51 +400,6 @@ def names_of(document: Document) -> DocumentNames | None:
 def course_names(course: Course) -> tuple[CodeNames, ...]:
     """Return the names of each document of a course."""
     return tuple(note.names for note in map(names_of, course.documents) if note is not None)
-
-
-def find_engine_name(engine: EngineNames, name: str) -> KnownName | None:
-    """What a single name of MuJoCo means, as C or Python has it."""
-    api = "APIreference/"
-    if name in engine.functions:
-        function = engine.functions[name]
-        page = f"{api}APIfunctions.html#{name.lower().replace('_', '-')}"
-        href = _MANUAL.format(engine.version, page) if name.startswith("mj") else ""
-        return KnownName(href, function.text, function.doc, engine=True)
-    enum = name if name in engine.enums else engine.enum_of.get(name)
-    if enum is not None:
-        href = _MANUAL.format(engine.version, f"{api}APItypes.html#{enum.lower()}")
-        return KnownName(href, name, f"of `{enum}`" if enum != name else "", engine=True)
-    if name in engine.constants:
-        href = _MANUAL.format(engine.version, f"{api}APIglobals.html")
-        return KnownName(href, f"{name} = {engine.constants[name]}", engine=True)
-    for class_name in (name, f"Mj{name[2:]}"):
-        if class_name in engine.classes and name[:2].lower() == "mj":
-            return KnownName(_class_href(engine, class_name), name, engine=True)
-    classes = [c for c in engine.classes_of.get(name, ()) if c in ("MjModel", "MjData", "MjOption")]
-    if classes and "_" in name:
-        member = engine.classes[classes[0]][name]
-        href = _class_href(engine, classes[0])
-        return KnownName(href, member.text, member.doc, member.extent, engine=True)
-    if name in ("mjtNum", "mjtByte", "mjtSize", "mjtBool"):
-        return KnownName(_MANUAL.format(engine.version, f"{api}APItypes.html#{name.lower()}"), name)
-    return None
-
-
-def _class_href(engine: EngineNames, name: str) -> str:
-    page = "python.html" if name.endswith("Views") else f"APIreference/APItypes.html#{name.lower()}"
-    return _MANUAL.format(engine.version, page)
-
-
-def element_href(engine: EngineNames, name: str, attribute: str = "") -> str:
-    """The address of an element of MJCF in MuJoCo's manual, or of an attribute."""
-    places = {p: a for p, a in engine.elements[name].items() if not attribute or attribute in a}
-    places = {p: a for p, a in places.items() if p != "default"} or places
-    parent = next(iter(places), "")
-    if name in ("frame", "replicate", "worldbody") or parent in ("", "mujoco"):
-        parent = ""
-    target = "body" if name == "worldbody" else name
-    anchor = "-".join(filter(None, (parent, target, attribute)))
-    return _MANUAL.format(engine.version, f"XMLreference.html#{anchor}")
 
 
 @functools.lru_cache(maxsize=256)

@@ -34,8 +34,8 @@ from coursebuild.features.glossary.terms import definition_of
 from coursebuild.features.language_server.commands.fields import field_place
 from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
-from coursebuild.features.names.engine import EngineName, engine_names
-from coursebuild.features.names.resolve import KnownName, resolver_of
+from coursebuild.features.names.engine import EngineName, KnownName, engine_names
+from coursebuild.features.names.resolve import resolver_of
 from coursebuild.features.symbols.mathml import declared_symbol, symbols
 from coursebuild.pipeline.reader import kept_formulas
 
