@@ -202,6 +202,8 @@ def _judge_place(change: Change, old: str, new: str, diagnostics: Sequence[Diagn
     for diagnostic, span in spans:
         if span.path == change.path and span.line <= last + 1 and first - 1 <= span.end_line:
             return Outcome(change, "at its place", _describe(diagnostic))
+        if span.path == change.path and diagnostic.rule == "fence-unclosed" and span.line <= last:
+            return Outcome(change, "at its place", _describe(diagnostic))  # where the fence opens
     end = "in its result" if change.place in _RUN_PLACES else "elsewhere"
     return Outcome(change, end, _describe(diagnostics[0]))
 

@@ -35,6 +35,7 @@ _TEX = re.compile(r"\\[A-Za-z]{2,}|[A-Za-z)}\]][_^](?:[0-9]|\{)")
 _LONE_DOLLAR = re.compile(
     r"(?<![\w$])\$(?!(?-i:[A-Z_]{3,})\b)(?:[A-Za-z\\(|{]|[-+][A-Za-z])"
     r"|(?:(?<![A-Za-z])(?<!\d )(?:[a-z]{1,2}|(?-i:[A-Z](?!\$ ?\d)))|[)}])\$(?![\w$])"
+    r"|(?<![\w$])[-+(]*[A-Za-z][\w\\{}().-]*[*/^_=<>+][\w\\{}().*/^_=<>+-]*[0-9]\$(?![\w$])"
     r"|(?<!\$)\$ [A-Za-z](?: ?[=<>+*/^_-] ?[\w.]+)* \$(?!\$)"
 )
 """Dollar signs that were surely meant for a formula, with a character of it."""

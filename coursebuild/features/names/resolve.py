@@ -180,6 +180,16 @@ class Resolver:
         sets = ((common_words, 7), (own_words, 5), (engine_words, 3))
         return {word: length for words, length in sets for word in words}
 
+    @functools.cached_property
+    def long_words(self) -> frozenset[str]:
+        """Names of MuJoCo, and words that the course often has as code."""
+        claims = (claim for names in course_names(self.course) for claim in names.claims)
+        uses = Counter(claim.name for claim in claims if claim.kind == "plain")
+        words = {word for word, count in uses.items() if count > 2}
+        if self.engine is not None and self.has_engine:
+            words |= self.engine.words
+        return frozenset(word for word in words if len(word) > 6)
+
     def find_torn(self, name: str, tail: str, names: CodeNames) -> Answer:
         """A name of which a backtick stands before the last letters, as in "`Eule`r"."""
         whole, words = name + tail, self.plain_words.keys() | names.words
@@ -196,12 +206,12 @@ class Resolver:
         splits = [(name[:n], name[n:]) for n in range(len(name) - 1)]
         swaps = {head + tail[1] + tail[0] + tail[2:] for head, tail in splits}
         near = {word for word in swaps - {name} if len(word) >= lengths.get(word, len(word) + 1)}
-        if self.engine is not None and self.has_engine:
+        if len(name) > 5:
             slips = {head + tail[1:] for head, tail in splits[1:-1]}
             for letter in ascii_lowercase:
                 slips |= {head + letter + tail for head, tail in splits[1:]}
                 slips |= {head + letter + tail[1:] for head, tail in splits[1:-1]}
-            near |= {word for word in slips & self.engine.words if len(word) > 6}
+            near |= slips & self.long_words
         if (likely := min(near, default=None)) is None:
             return None
         message = f"nothing that the course knows is called `{name}`"
