@@ -248,6 +248,7 @@ REASONS = (
     Reason("a printed number with a digit less, or a zero more", "output", r"\d"),
     Reason("no name, as the author says", "number", r"[a-z]+", r".*\{code\}.*"),
     Reason("a whole number without a unit, as words say one", "digits|emphasis", r"\d+"),
+    Reason("a whole number without a unit, as words say one", "number|code", r"\{?(out|given)\}?"),
     Reason("a number in code that names something", "code", r"\d+"),
 )
 _QUOTED = frozenset("bash console html ini json markdown md sh text toml xml yaml".split())

@@ -207,6 +207,11 @@ def _unescape(value: Excerpt) -> Excerpt:
     return Excerpt.join([value.slice(a, b) for a, b in zip(starts, ends, strict=True)])
 
 
+_LANGUAGES = tuple(
+    "bash console cpp css diff html ini javascript json julia markdown matlab python rust sh text "
+    "toml xml yaml".split()
+)
+"""Languages that texts often show."""
 _TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
 """Names of ordinary code and text that no highlighter knows."""
 
@@ -409,7 +414,7 @@ def _find_misspelt(name: str, kinds: Sequence[str]) -> str | None:
         return "lab simlab"
     if name in kinds:
         return name
-    likely = misspelt(name, kinds)
+    likely = misspelt(name, kinds) or misspelt(name, _LANGUAGES)
     return None if likely is None or _is_language(name) else likely
 
 

@@ -212,9 +212,11 @@ class _Reader:
                 factor = self.power()
                 if minus:
                     factor = Expression("-", start, self.at, (factor,))
-                if not sign and (_begins_with_digit(factor) or _is_mixed(product, factor)):
+                begins_with_digit = self.tex[start].isdigit() or self.tex[start] == "."
+                if not sign and (begins_with_digit or _is_mixed(product, factor)):
                     raise factor.not_understood("two numbers stand side by side")
-                if not sign and product.kind == "symbol" and self.tex[start] in "([":
+                is_spaced = self.tex[:start].rstrip().endswith(r"\,")
+                if not (sign or is_spaced) and product.kind == "symbol" and self.tex[start] in "([":
                     _refuse_application(factor)
             is_quotient = sign in ("/", r"\div")
             unit = self.unit() if is_quotient else None
@@ -408,12 +410,6 @@ class _Reader:
         return Expression("^", start, self.at, (value, exponent)) if exponent else value
 
 
-def _begins_with_digit(factor: Expression) -> bool:
-    while factor.kind in ("^", "*") and factor.parts:
-        factor = factor.parts[0]
-    return factor.kind == "number"
-
-
 def _is_mixed(left: Expression, right: Expression) -> bool:
     """Whether this is a mixed number: a number before a fraction of numbers."""
     is_fraction = right.kind == "/" and all(part.kind == "number" for part in right.parts)
@@ -424,6 +420,7 @@ def _is_mixed(left: Expression, right: Expression) -> bool:
 
 def _refuse_application(factor: Expression) -> None:
     """Raise where a symbol before a bracket can be a function of its content."""
+    factor = factor.parts[0] if factor.kind == "^" else factor
     if factor.kind in ("symbol", "number", "/", "*"):
         raise factor.not_understood("it may be a product or a function of this")
 

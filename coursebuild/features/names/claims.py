@@ -39,6 +39,8 @@ _ATTRIBUTES = re.compile(r'\s*([A-Za-z_][\w:-]*)\s*=\s*"[^"]*"')
 _TAG = re.compile(rf"<(/?)([A-Za-z]\w*)((?:{_ATTRIBUTES.pattern[:-7]}\"[^\"]*\")*)\s*/?>")
 _TABLE = re.compile(r"(\[\[?)([a-z][\w.]*)\]\]?(?: (\w+)(?: =.*)?)?")
 _FILE = re.compile(r"(?:content|examples|models)/(?!.*[A-Z]{3})[\w./-]*\w\.[a-z]+")
+_NEAR_FILE = re.compile(r"(?!.*[A-Z]{3})[\w.-]+/[\w./-]*\w\.(?:md|py|toml|xml)")
+"""What is a file of the course only if it is like the name of one."""
 _CODE_WORD = re.compile(
     r"\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
 )
@@ -112,7 +114,10 @@ def document_names(document: model.Document) -> DocumentNames | None:
         # A heading, an option of a quiz and a title may stand in a link or a button.
         may_link = isinstance(block, model.Paragraph | model.Table) and id(block) not in inner
         if isinstance(block, _CODE):
-            words.update(_CODE_WORD.findall(block.span.text))
+            text = block.span.text
+            if isinstance(block, model.FeatureBlock):  # its inline code makes claims of its own
+                text = re.sub(r"(?<!`)`[^`\n]+`(?!`)", "", text)
+            words.update(_CODE_WORD.findall(text))
         if isinstance(block, model.Script):
             _read_script(block, names)
         link_parts: set[int] = set()
@@ -211,7 +216,7 @@ def _find(text: str) -> Iterator[tuple[Kind, str, str]]:
     elif re.fullmatch(rf"(?:{_ATTRIBUTES.pattern})+", text):
         for attribute in _ATTRIBUTES.findall(text):
             yield "attribute", f" {attribute}", attribute
-    elif _FILE.fullmatch(text):
+    elif _FILE.fullmatch(text) or _NEAR_FILE.fullmatch(text):
         yield "file", text, text
     elif not re.search(r"\.(?:py|xml|toml|md|json|js|svg|csv|txt|ya?ml|html|rst|css)\b", text):
         yield from _find_python(text)

@@ -12,7 +12,6 @@ import keyword
 import re
 from collections import Counter
 from collections.abc import Iterable
-from string import ascii_lowercase
 from typing import TypeAlias
 
 from msgspec import Struct
@@ -208,7 +207,7 @@ class Resolver:
         near = {word for word in swaps - {name} if len(word) >= lengths.get(word, len(word) + 1)}
         if len(name) > 5:
             slips = {head + tail[1:] for head, tail in splits[1:-1]}
-            for letter in ascii_lowercase:
+            for letter in "abcdefghijklmnopqrstuvwxyz_":
                 slips |= {head + letter + tail for head, tail in splits[1:]}
                 slips |= {head + letter + tail[1:] for head, tail in splits[1:-1]}
             near |= slips & self.long_words
@@ -380,6 +379,9 @@ class Resolver:
     def _file(self, path: str) -> Answer:
         if path in self.files:
             return KnownName(f"#{path}" if path.startswith("examples/") else "")
+        is_of_course = re.match("(?:content|examples|models)/", path)
+        if is_of_course is None and misspelt(path, self.files) is None:
+            return None
         help = _propose(path, self.files) or "write it, or say `{code}` after the name"
         return Unknown(f"the course has no file `{path}`", help, path)
 

@@ -145,6 +145,9 @@ h = 2.0 \times 10^{-3}
 h = 2\ \mathrm{ms}
 m_\text{eff}/m = m_{\text{eff}}/m = 25\,\%
 \frac{v^2}{2 g \ell} - 1 \approx 0.02\,\%
+\tfrac12g\,(0.1\ \mathrm s)^2 = 49.05\ \mathrm{mm}
+g\,(0.1\ \mathrm s)^2 = 0.0981\ \mathrm m
+2(3)(0.5) = 3
 """
 WRONG = r"""
 T = 2\pi\sqrt{\ell/g} \approx 2.060
@@ -190,6 +193,7 @@ def test_what_is_claimed_of_symbols_and_cannot_be_computed_is_said() -> None:
         ("l/g = 0.1", "`l` has no value here"),
         (r"m x = 0.1", "`x` has no value here"),
         (r"m^T m = 4", "it may be a transpose"),
+        (r"v(2)^2 = 4", "it may be a product or a function of this"),
         (r"(v - 2.43)/m = 1", "a number in it may leave out its unit"),
     ):
         assert [(c.kind, c.message) for c in check_arithmetic(tex, KNOWN)] == [("unread", reason)]
