@@ -181,13 +181,13 @@ class Resolver:
 
     @functools.cached_property
     def long_words(self) -> frozenset[str]:
-        """Names of MuJoCo, and words that the course often has as code."""
+        """Names of MuJoCo, and words that the course often has as code; shorter with a digit."""
         claims = (claim for names in course_names(self.course) for claim in names.claims)
         uses = Counter(claim.name for claim in claims if claim.kind == "plain")
         words = {word for word, count in uses.items() if count > 2}
         if self.engine is not None and self.has_engine:
             words |= self.engine.words
-        return frozenset(word for word in words if len(word) > 6)
+        return frozenset(w for w in words if len(w) > 6 or (re.search("[0-9]", w) and len(w) > 3))
 
     def find_torn(self, name: str, tail: str, names: CodeNames) -> Answer:
         """A name of which a backtick stands before the last letters, as in "`Eule`r"."""
@@ -205,7 +205,7 @@ class Resolver:
         splits = [(name[:n], name[n:]) for n in range(len(name) - 1)]
         swaps = {head + tail[1] + tail[0] + tail[2:] for head, tail in splits}
         near = {word for word in swaps - {name} if len(word) >= lengths.get(word, len(word) + 1)}
-        if len(name) > 5:
+        if len(name) > 5 or re.search("[0-9]", name):
             slips = {head + tail[1:] for head, tail in splits[1:-1]}
             for letter in "abcdefghijklmnopqrstuvwxyz_":
                 slips |= {head + letter + tail for head, tail in splits[1:]}
