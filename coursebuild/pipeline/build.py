@@ -28,6 +28,7 @@ from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.renderer import TemplateFailure
 from coursebuild.core.registry import find_exporter
@@ -104,7 +105,7 @@ def make_files(
     course, results = checked_course.course, checked_course.verification.results
     assets = Assets(template_texts(), Bundle(), prepared_folder())
     try:
-        outputs = make(Library(course, results, assets, checked_course.reports))
+        outputs = make(make_library(course, results, assets, checked_course.reports))
         if course.theme.templates:  # these may fail on any page
             for file in outputs.files:
                 if file.path.endswith(".html"):

@@ -37,7 +37,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.course import TEMPLATES, Theme
 from coursebuild.core.model.vocabulary import CALLOUTS, ENGLISH, Words
-from coursebuild.core.pages.assets import words_for
+from coursebuild.core.pages.materials import words_for
 from coursebuild.core.registry import read_references
 from coursebuild.core.run.script_environment import Interpreter, course_environment, engine_version
 from coursebuild.core.scripts.edit import check_source_parts, shown_files

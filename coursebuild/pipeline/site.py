@@ -39,13 +39,15 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, SiteFile
 from coursebuild.core.pages import meta, urls
-from coursebuild.core.pages.added_files import NotedPage, SiteContext, added_files, compressed_files
+from coursebuild.core.pages.added_files import NotedPage, SiteContext, compressed_files
+from coursebuild.core.pages.assets import Names
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
-from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame, parts_by_mark
+from coursebuild.core.pages.frame import FrameInputs, PageFrame, parts_by_mark
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.links import Reference, has_anchor
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import PageRecord
+from coursebuild.core.registry import features
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.html import find_address
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
@@ -211,7 +213,7 @@ class Site:
     @functools.cached_property
     def files(self) -> tuple[SiteFile, ...]:
         """All files but that list, sorted by path."""
-        course, trial_files = self._library.course, self._library.trials.files
+        course, trial_files = self._library.course, self._library.trial_files
         files: list[SiteFile] = [*self._shared_files[0], *trial_files]
 
         def keep(key: str, make: Callable[[], bytes]) -> bytes:
@@ -252,7 +254,18 @@ class Site:
 
     @functools.cached_property
     def _added_files(self) -> tuple[list[SiteFile], FileList | None]:
-        return added_files(self._context)
+        """The files of all features, and the list of all files, if one makes it."""
+        files: list[SiteFile] = []
+        file_list: FileList | None = None
+        for feature in features():
+            if feature.files is None:
+                continue
+            for file in feature.files(self._context(feature.name)):
+                if isinstance(file, FileList):
+                    file_list = file
+                else:
+                    files.append(file)
+        return files, file_list
 
     def _context(self, feature: str) -> SiteContext:
         """Return what a feature makes its files from."""

@@ -63,7 +63,7 @@ class Files:
     def show(self, library: Library) -> None:
         """Draw pages of this course from now on."""
         self._library = library
-        self._trial_files = {file.path: file for file in library.trials.files}
+        self._trial_files = {file.path: file for file in library.trial_files}
         self._entries = {entry.path: entry for entry in page_list(library)}
         self._last_good = {p: key for p, key in self._last_good.items() if p in self._entries}
         if self._sites:

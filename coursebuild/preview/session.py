@@ -29,6 +29,7 @@ from coursebuild.core.model.results import Reports, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.renderer import TemplateFailure
 from coursebuild.core.registry import publish_trials
 from coursebuild.core.scripts.edit import shown_files
@@ -289,7 +290,7 @@ class Session:
         """Draw pages of this course from now on, with what is known of it."""
         results, trials = self.runs.results(course), self.runs.trials
         self._template_diagnostics = ()
-        self.library = Library(course, results, self._assets, self._reports, trials)
+        self.library = make_library(course, results, self._assets, self._reports, trials)
         self._targets = link_targets(course)
         if self._site:
             self.files.show(self.library)

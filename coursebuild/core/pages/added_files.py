@@ -19,14 +19,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from msgspec import Struct
 
 from coursebuild.core.model import Course, Document
-from coursebuild.core.model.results import CachedFile, FileList, SiteFile
-from coursebuild.core.pages.assets import Assets
+from coursebuild.core.model.results import CachedFile, SiteFile
+from coursebuild.core.pages.assets import Assets, Names
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.frame import Names
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.zips import Archive
-from coursebuild.core.registry import features
 
 
 class NotedPage(Struct, frozen=True):
@@ -78,33 +75,6 @@ class ExportContext(Struct, frozen=True):
     @property
     def course(self) -> Course:
         return self.library.course
-
-
-def page_notes(inputs: PageInputs, page: PageContext | None, body: str) -> dict[str, bytes]:
-    """The notes that features make of a drawn page, by the feature's name.
-
-    `page` is the document on it, if any, `body` its HTML as published.
-    """
-    notes = {f.name: f.note(inputs, page, body) for f in features() if f.note is not None}
-    return {name: note for name, note in notes.items() if note}
-
-
-def added_files(
-    contexts: Callable[[str], SiteContext],
-) -> tuple[list[SiteFile], FileList | None]:
-    """The files of all features, and the list of all files, if one makes it.
-
-    `contexts` returns the context of a feature by its name.
-    """
-    files: list[SiteFile] = []
-    file_list: FileList | None = None
-    for feature in features():
-        for file in feature.files(contexts(feature.name)) if feature.files is not None else ():
-            if isinstance(file, FileList):
-                file_list = file
-            else:
-                files.append(file)
-    return files, file_list
 
 
 _SUFFIXES = (".css", ".js", ".json", ".mjb", ".svg", ".wasm")

@@ -1,7 +1,6 @@
 """The tool's own files: templates, interface texts, and the bundled files for browsers.
 
-Entry points: `Assets`, a value made by who reads the disk; `strings_for`, `words_for`;
-`hashed_name`.
+Entry points: `Assets`, a value made by who reads the disk; `Names`; `hashed_name`.
 
 1. `templates` holds every file of `templates/` as text, `dist` every file of the bundle as bytes,
    by path relative to their folder.
@@ -11,19 +10,11 @@ Entry points: `Assets`, a value made by who reads the disk; `strings_for`, `word
 
 from __future__ import annotations
 
-import functools
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
-from unicodedata import normalize
 
 from msgspec import Struct
-
-from coursebuild.core.model.results import Formula, MathError
-from coursebuild.core.model.vocabulary import ENGLISH, Words
-from coursebuild.core.pages.renderer import Renderer, Texts, templates_of
-from coursebuild.core.pages.strings import DEFAULT_LANGUAGE, Strings, parse_strings
-from coursebuild.core.registry import features
 
 SCRIPTS = {
     "theme.js": "js/theme.js",
@@ -48,16 +39,6 @@ class Assets(Struct, frozen=True):
     compiled_templates: Path | None = None
     """The folder of the compiled templates; see `templates_of`."""
 
-    def renderer(
-        self,
-        language: str,
-        course_templates: Texts = (),
-        formulas: Mapping[Formula, str | MathError] = {},
-    ) -> Renderer:
-        """The renderer of pages in a language, with the templates of a course and of the tool."""
-        templates = templates_of(self.templates, self.compiled_templates, course_templates)
-        return Renderer(strings_for(self.templates, language), templates, formulas)
-
     def template(self, path: str) -> str:
         """The text of a file of `templates/` (`KeyError` where there is none)."""
         return dict(self.templates)[path]
@@ -70,6 +51,29 @@ class Assets(Struct, frozen=True):
         """The bundled files of a folder."""
         paths = (path for path in self.dist if path.startswith(f"{folder}/"))
         return tuple((path, self.dist[path]) for path in paths)
+
+
+class Names(Struct, frozen=True):
+    """Site paths of the files that every page refers to."""
+
+    style: str
+    theme_script: str
+    script: str
+    icon: str
+    credits: str
+    touch_icon: str
+    scripts: tuple[tuple[str, str], ...] = ()
+    """The scripts of parts of pages, each after its mark (`PagePart`)."""
+    logo: str = ""
+    logo_dark: str = ""
+    logo_width: int = 0
+    """In pixels, at the height `frame.LOGO_HEIGHT`."""
+
+    def paths(self) -> frozenset[str]:
+        """All site paths."""
+        values = (getattr(self, field) for field in self.__struct_fields__)
+        single = (path for path in values if isinstance(path, str) and path)
+        return frozenset((*single, *(path for _, path in self.scripts)))
 
 
 def hashed_name(path: str, data: bytes) -> str:
@@ -85,41 +89,3 @@ def page_script(code: bytes) -> bytes:
     Browsers refuse to load modules from a disk, and plain scripts of a page share top-level names.
     """
     return b'"use strict";(()=>{' + code.rstrip() + b"\n})();\n"
-
-
-def strings_for(templates: tuple[tuple[str, str], ...], language: str) -> Strings:
-    """The interface texts of a language: for `pt-BR` its own, then those of `pt`, then English."""
-    feature_texts = (feature.texts.items() for feature in features())
-    return _strings_for(
-        templates, tuple(text for texts in feature_texts for text in texts), language
-    )
-
-
-def words_for(templates: tuple[tuple[str, str], ...], language: str) -> Words:
-    """The words by which texts of a language are read: its own, and the English ones.
-
-    Letters with marks may be typed as one character or as two.
-    """
-    strings, words = strings_for(templates, language), {}
-    for field in Words.__struct_fields__:
-        names = strings(f"words.{field}").split("|")
-        forms = (normalize(form, name) for name in names for form in ("NFC", "NFD"))
-        words[field] = tuple(dict.fromkeys((*forms, *getattr(ENGLISH, field))))
-    return Words(**words)
-
-
-@functools.lru_cache(maxsize=8)
-def _strings_for(
-    templates: tuple[tuple[str, str], ...],
-    feature_texts: tuple[tuple[str, str], ...],
-    language: str,
-) -> Strings:
-    files = [(path, text) for path, text in templates if path.startswith("strings/")]
-    texts = [(path[len("strings/") :].removesuffix(".toml"), text) for path, text in files]
-    strings = Strings({}, language)
-    for name in dict.fromkeys((DEFAULT_LANGUAGE, language.split("-")[0].lower(), language)):
-        for text in (
-            text for file_language, text in (*texts, *feature_texts) if file_language == name
-        ):
-            strings = parse_strings(text, strings, language)
-    return strings

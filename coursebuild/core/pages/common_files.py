@@ -20,9 +20,9 @@ from msgspec import Struct
 from coursebuild.core.model.course import Theme, ThemeFile
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import fonts, styles
-from coursebuild.core.pages.assets import SCRIPTS, Assets, hashed_name, page_script
+from coursebuild.core.pages.assets import SCRIPTS, Assets, Names, hashed_name, page_script
 from coursebuild.core.pages.formulas import FORMULA
-from coursebuild.core.pages.frame import LOGO_HEIGHT, Names, script_words
+from coursebuild.core.pages.frame import LOGO_HEIGHT, script_words
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.theme import picture_size, theme_faces, theme_style
 from coursebuild.core.registry import features

@@ -1,6 +1,7 @@
 """What the writer of HTML needs to know about a page: addresses, formulas, code, special blocks.
 
-Entry point: `PageContext`, the `HtmlWriter` of one document on one page.
+Entry point: `PageContext`, the `HtmlWriter` of one document on one page. `blocks.PageWriter`
+completes it: it draws what is more than Markdown.
 
 Recorded outputs that directly follow their script are drawn as one object with it:
 `script_outputs`. Nothing is drawn in their own place.
@@ -10,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Literal, assert_never
+from typing import Literal
 from urllib.parse import unquote
 
 from markupsafe import Markup
@@ -18,15 +19,9 @@ from msgspec import Struct
 
 from coursebuild.core.model import (
     Block,
-    Callout,
     CodeSpan,
     Document,
     Equation,
-    FeatureBlock,
-    Image,
-    Mjcf,
-    NumberBinding,
-    PlainCode,
     Recording,
     Script,
     Target,
@@ -35,15 +30,13 @@ from coursebuild.core.model import (
     document_blocks,
     sibling_groups,
 )
-from coursebuild.core.pages import blocks, formulas, urls
-from coursebuild.core.pages.document_inputs import file_address
+from coursebuild.core.pages import formulas, urls
 from coursebuild.core.pages.formulas import number_equations
 from coursebuild.core.pages.links import ids_and_addresses
-from coursebuild.core.pages.markup import HtmlWriter, SpecialBlock
+from coursebuild.core.pages.markup import HtmlWriter
 from coursebuild.core.pages.page_inputs import DocumentInputs
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings, direction
-from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.source import Span
 
 
@@ -81,11 +74,7 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
 
     def url(self, url: str) -> str:
         """An address as written; that of a file of the course becomes its place in the site."""
-        return file_address(self.place, self.document.source.path, url)
-
-    def figure(self, image: Image, caption: Markup) -> Markup:
-        """An image with its caption, its script and its data."""
-        return blocks.figure(self, image, caption) + Markup("\n")
+        return urls.file_address(self.place, self.document.source.path, url)
 
     def math(self, tex: str) -> Markup:
         """A formula in a line of text."""
@@ -110,37 +99,6 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     def code_href(self, code: CodeSpan) -> str:
         """The address of what inline code names."""
         return self.inputs.code_links.get(code.span.start, "")
-
-    def code(self, language: str, text: str) -> Markup:
-        """A code block that is only shown, not run."""
-        return blocks.code(self, language, text.rstrip("\n")) + Markup("\n")
-
-    def binding(self, binding: NumberBinding) -> Markup:
-        """A number that was compared with the output of a script."""
-        return blocks.binding(self, binding)
-
-    def block(self, block: SpecialBlock) -> Markup:
-        """A special block, with its line end."""
-        html = self._draw(block)
-        return html + Markup("\n") if html else html
-
-    def _draw(self, block: SpecialBlock) -> Markup:
-        match block:
-            case Callout():
-                return blocks.callout(self, block)
-            case Script():
-                return blocks.script(self, block, self.script_outputs.get(block.span.start, ()))
-            case Recording():
-                follows_script = any(block in group for group in self.script_outputs.values())
-                return Markup() if follows_script else blocks.recording(self, block)
-            case Mjcf():
-                return blocks.mjcf(self, block)
-            case PlainCode():
-                return blocks.plain_code(self, block)
-            case FeatureBlock():
-                return kind_of_block(block).draw(self, block)
-            case _:
-                assert_never(block)
 
     def find_repetition(self, name: str) -> Span:
         """The place of the second block that draws an element with this id.

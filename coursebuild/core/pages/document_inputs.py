@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import assert_never
-from urllib.parse import urlsplit
 
 from msgspec import Struct
 
@@ -27,7 +26,7 @@ from coursebuild.core.pages.page_inputs import (
     ShownRun,
     ShownVerdict,
 )
-from coursebuild.core.registry import code_links, kind_of_block, page_copies
+from coursebuild.core.registry import code_links, kind_of_block, page_copies, page_kind
 from coursebuild.core.text.characters import visible
 
 
@@ -116,7 +115,7 @@ def address(library: Library, place: urls.Place, path: str, target: model.Target
             path = place.path if owner is None else urls.owner_path(owner)
             return place.href(path, f"term:{target.id}")
         case model.UrlTarget():
-            return file_address(place, path, target.url)
+            return urls.file_address(place, path, target.url)
         case _:
             assert_never(target)
 
@@ -141,15 +140,6 @@ def equation_name(library: Library, path: str, target: model.Target) -> str:
     if lesson:
         return library.words("equation.of_lesson", number=number, id=owner.id)
     return library.words("equation.of_page", number=number, title=owner.title)
-
-
-def file_address(place: urls.Place, path: str, url: str) -> str:
-    """An address as written; that of a file of the course becomes its place in the site."""
-    parts = urlsplit(url)
-    if parts.scheme or parts.netloc or not parts.path:
-        return url
-    site_path = urls.file_path(model.local_file(url, path))
-    return place.href(site_path) + url[len(url.split("#", 1)[0].split("?", 1)[0]) :]
 
 
 MAX_LINKS = 12
@@ -186,8 +176,8 @@ def owner_links(place: urls.Place, owners: Sequence[Owner]) -> OwnerLinks:
 
 def added_page(library: Library, place: urls.Place, name: str) -> str:
     """The address of the page of this name that a feature adds; empty if there is none."""
-    kinds = (kind for kind in library.added_pages if kind.name == name)
-    return next((place.href(kind.path) for kind in kinds), "")
+    kind = page_kind(name)
+    return place.href(kind.path) if kind is not None and kind.exists(library) else ""
 
 
 class LessonLink(Struct, frozen=True):

@@ -27,7 +27,7 @@ from coursebuild.core.model import (
     without_links,
 )
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.blocks import numbered_lines
+from coursebuild.core.pages.blocks import PageWriter, numbered_lines
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.graph import drawings
 from coursebuild.core.pages.highlight import highlight_lines
@@ -95,7 +95,7 @@ def _is_wide(block: Block) -> bool:
 
 
 def _docked(block: Block) -> FeatureBlock | None:
-    return block if isinstance(block, FeatureBlock) and block.is_docked() else None
+    return block if isinstance(block, FeatureBlock) and kind_of_block(block).docked(block) else None
 
 
 def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
@@ -147,7 +147,7 @@ def draw(
     values = {name: _draw_value(value, renderer) for name, value in inputs.values.items()}
     head = inputs.head
     if document is not None and inputs.document_inputs is not None:
-        page = PageContext(renderer, inputs.document_inputs, urls.Place(head.path), document)
+        page = PageWriter(renderer, inputs.document_inputs, urls.Place(head.path), document)
         values["contents"] = contents(page, document)
         values["article"] = article(page, document)
         values["title_anchor"] = document.title_anchor

@@ -18,12 +18,13 @@ from msgspec import Struct
 
 from coursebuild.core.features import PageKind, PagePart
 from coursebuild.core.pages import meta, urls
-from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.assets import Assets, Names
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.materials import renderer_for
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.renderer import Texts
 from coursebuild.core.pages.strings import direction
-from coursebuild.core.registry import features, page_copies, page_kind
+from coursebuild.core.registry import added_pages, features, has_copies, page_copies, page_kind
 from coursebuild.core.text.characters import visible
 
 PAGE_WORDS = (
@@ -47,29 +48,6 @@ FRAME_IDS = frozenset(("_words",))
 
 LOGO_HEIGHT = 28
 """Pixels, as in the style sheet."""
-
-
-class Names(Struct, frozen=True):
-    """Site paths of the files that every page refers to."""
-
-    style: str
-    theme_script: str
-    script: str
-    icon: str
-    credits: str
-    touch_icon: str
-    scripts: tuple[tuple[str, str], ...] = ()
-    """The scripts of parts of pages, each after its mark (`PagePart`)."""
-    logo: str = ""
-    logo_dark: str = ""
-    logo_width: int = 0
-    """In pixels, at the height `LOGO_HEIGHT`."""
-
-    def paths(self) -> frozenset[str]:
-        """All site paths."""
-        values = (getattr(self, field) for field in self.__struct_fields__)
-        single = (path for path in values if isinstance(path, str) and path)
-        return frozenset((*single, *(path for _, path in self.scripts)))
 
 
 def policy(json_ld: str, *, form: bool = False) -> str:
@@ -162,7 +140,7 @@ class FrameInputs(Struct, frozen=True):
             licence=course.licence,
             source=course.repository if "{path}" not in course.repository else "",
             menu=tuple((urls.page_path(page), page.title) for page in library.menu),
-            added_pages=tuple((k.path, page_title(library, k)) for k in library.added_pages),
+            added_pages=tuple((k.path, page_title(library, k)) for k in added_pages(library)),
             engine=results.engine,
             python=results.python,
             templates=course.theme.template_texts,
@@ -184,7 +162,7 @@ class PageFrame(Struct, frozen=True):
         first.
         """
         inputs, names, kind = self.inputs, self.inputs.names, page_kind(head.kind)
-        renderer = self.assets.renderer(inputs.language, inputs.templates)
+        renderer = renderer_for(self.assets, inputs.language, inputs.templates)
         place = place_of(inputs.base_url, head.path)
         html = renderer.render(
             "base.html",
@@ -232,7 +210,7 @@ def _logos(place: urls.Place, names: Names) -> tuple[tuple[str, str], ...]:
 
 def _copies(page: str) -> tuple[tuple[str, str], ...]:
     """The media types and addresses of a page's copies, without those of lessons only."""
-    copies = (copy for copy in page_copies() if not copy.lessons and urls.has_copies(page))
+    copies = (copy for copy in page_copies() if not copy.lessons and has_copies(page))
     place = urls.Place(page)
     return tuple((copy.type, place.href(urls.copy_path(page, copy.ending))) for copy in copies)
 

@@ -42,7 +42,7 @@ from coursebuild.core.pages.graph import level_graph
 from coursebuild.core.pages.library import Library, ModelUse
 from coursebuild.core.pages.page_inputs import AddedParts, HighlightedFile, PageHead, PageInputs
 from coursebuild.core.pages.quantities import number
-from coursebuild.core.registry import kind_of_block, model_parts, page_kind
+from coursebuild.core.registry import added_pages, kind_of_block, model_parts, page_kind
 
 
 class PageEntry(Struct, frozen=True):
@@ -93,7 +93,7 @@ def page_list(library: Library) -> Iterator[PageEntry]:
         yield PageEntry(library.gallery, "models")
     for model in course.models:
         yield PageEntry(urls.model_page_path(model.name), "model", model.name)
-    for kind in library.added_pages:
+    for kind in added_pages(library):
         yield PageEntry(kind.path, kind.name)
     for page in course.pages:
         if page.document is not None and not page.is_home:

@@ -33,9 +33,8 @@ from jinja2 import (
 from markupsafe import Markup
 from msgspec import Struct, field
 
-from coursebuild.core.features import Mathml
 from coursebuild.core.model.course import TEMPLATES
-from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.model.results import Formula, MathError, Mathml
 from coursebuild.core.pages.highlight import highlight_lines
 from coursebuild.core.pages.quantities import text_html
 from coursebuild.core.pages.strings import Strings, direction

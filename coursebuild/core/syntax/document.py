@@ -171,9 +171,8 @@ def _check_ids(document: Document) -> Iterator[Diagnostic]:
     reported_places: set[int] = set()
     anchors = sorted(document_anchors(document), key=lambda anchor: anchor[2].start)
     for name, node, span in anchors:
-        if isinstance(node, FeatureBlock) and name in headings.intersection(
-            node.optional_anchors()
-        ):
+        keys = node.progress_keys() if isinstance(node, FeatureBlock) else None
+        if keys is not None and name == keys[0] and name in headings:
             continue
         entry = node, span
         first, first_span = owners.setdefault(name, entry)

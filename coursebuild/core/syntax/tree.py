@@ -31,7 +31,7 @@ from coursebuild.core.syntax.containers import (
     read_head,
     read_table,
 )
-from coursebuild.core.syntax.fence import INDENTED_FENCE, is_known_kind, read_fence
+from coursebuild.core.syntax.fence import INDENTED_FENCE, read_fence
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inlines import read_inlines
 from coursebuild.core.syntax.marks import (
@@ -56,7 +56,7 @@ from coursebuild.core.syntax.recording import (
 )
 from coursebuild.core.syntax.script import read_block
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
-from coursebuild.core.syntax.unread_markup import check_unread_markup
+from coursebuild.core.syntax.unread_markup import check_unread_markup, is_known_kind
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 

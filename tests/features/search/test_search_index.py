@@ -23,7 +23,7 @@ from support.search_shards import read_shard
 @pytest.fixture(scope="module")
 def library(make: Make) -> Library:
     rendered_course = make("Text.")
-    return Library(rendered_course.course, rendered_course.results, rendered_course.assets)
+    return rendered_course.library()
 
 
 class Cache(dict[str, bytes]):
