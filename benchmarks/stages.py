@@ -24,7 +24,7 @@ from markupsafe import Markup
 from msgspec.structs import replace
 
 from coursebuild.core.checks.formulas import course_formulas
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Formula, MathError, Reports, Results
@@ -105,7 +105,7 @@ def measure_typing(root: Path, repeat: int) -> None:
     """The cost of one more word in the longest lesson for the language server: time of one core."""
     from markdown_it import MarkdownIt
 
-    session = Session(Options(root, 1, Memo(root)), site=False)
+    session = Session(Options(root, 1, Store(root)), site=False)
     rebuild = BackgroundRebuild(session, Style())
     session.start()
     rebuild.run_once()
@@ -134,7 +134,7 @@ def measure_typing(root: Path, repeat: int) -> None:
 
 def measure_scripts(root: Path, repeat: int) -> None:
     """Our runner compared with bare Python."""
-    options = Options(root, len(os.sched_getaffinity(0)), Memo(root))
+    options = Options(root, len(os.sched_getaffinity(0)), Store(root))
     course = load(root).value
     assert course is not None
     runnable = extract_scripts(course, options).runnable
@@ -146,7 +146,7 @@ def measure_scripts(root: Path, repeat: int) -> None:
     candidates: dict[str, Callable[[], object]] = {
         "python, one after the other": bare,
         f"coursebuild, {options.jobs} at a time": lambda: run(
-            runnable, options, memory=options.memory(fresh=True)
+            runnable, options, run_store=options.run_store(fresh=True)
         ),
     }
     seconds = time_candidates(candidates, max(2, repeat // 3))
@@ -155,7 +155,7 @@ def measure_scripts(root: Path, repeat: int) -> None:
 
 def measure_stages(course: Course, results: Results, root: Path, repeat: int) -> None:
     """The other stages of a build."""
-    options = Options(root, 1, Memo(root))
+    options = Options(root, 1, Store(root))
 
     def make_files() -> None:
         with Reader(options) as reader:
@@ -169,7 +169,7 @@ def measure_stages(course: Course, results: Results, root: Path, repeat: int) ->
     candidates: dict[str, Callable[[], object]] = {
         "load: read, parse, check": lambda: load(root),
         f"typeset {len(course_formulas(course))} formulas": lambda: typeset(course),
-        "load from the memo and make all files": make_files,
+        "load from the store and make all files": make_files,
     }
     show("stages", time_candidates(candidates, max(2, repeat // 2)), "load: read, parse, check")
 
@@ -238,7 +238,7 @@ def main() -> None:
     measure_scripts(root, arguments.repeat)
     course = load(root).value
     assert course is not None
-    results = verify(course, Options(root, 1, Memo(root))).results
+    results = verify(course, Options(root, 1, Store(root))).results
     results = replace(results, formulas=typeset(course))
     measure_stages(course, results, root, arguments.repeat)
     measure_lessons(course, results, arguments.repeat)

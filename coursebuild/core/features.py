@@ -25,7 +25,7 @@ from typing import Any, Generic, Literal, Protocol, TypeAlias, TypeVar
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.model import Block, Course, Document, FeatureBlock, Inline, MjcfModel, Target
 from coursebuild.core.model.results import (
     CompileResult,
@@ -46,7 +46,7 @@ from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.run.dependencies import Inputs
-from coursebuild.core.run.memory import Memory
+from coursebuild.core.run.run_store import RunStore
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.syntax.fence import Fence
 from coursebuild.core.syntax.texts import TextParser
@@ -274,8 +274,8 @@ class TrialContext(Struct, frozen=True):
     course: Course
     models: Mapping[str, CompileResult]
     """The compiled models of `models/`, by name."""
-    memory: Memory
-    """The memory of earlier trials, which also keeps new results."""
+    run_store: RunStore
+    """Notes of earlier trials; its `store` has their results, and takes new ones."""
     diagnostics: Sequence[Diagnostic] = ()
     """Diagnostics so far: a block with one need not be tried."""
     static: bool = False
@@ -322,7 +322,7 @@ class Feature(Struct, frozen=True, kw_only=True):
     model_part: ModelPart | None = None
     rules: tuple[Rule, ...] = ()
     """Rules of its own, in addition to the catalogue (`coursebuild.core.text.rules`)."""
-    reference: Callable[[Course, Memo, Interpreter | None], Struct | None] | None = None
+    reference: Callable[[Course, Store, Interpreter | None], Struct | None] | None = None
     """What it reads of the environment of the scripts, kept in `course.references`; the interpreter
     is `None` where the one of this tool runs them."""
     code_links: Callable[[Library, Place, Document], Mapping[int, str]] | None = None

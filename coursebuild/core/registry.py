@@ -21,7 +21,7 @@ from typing import Any
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.features import (
     Exporter,
     Feature,
@@ -230,7 +230,7 @@ def summarize(document: Document, mathml: Mathml) -> Parsed[dict[str, Struct]]:
 
 
 def read_references(
-    course: Course, store: Memo, interpreter: Interpreter | None
+    course: Course, store: Store, interpreter: Interpreter | None
 ) -> dict[str, Struct]:
     """What features read of the environment of the scripts, by feature."""
     readers = {f.name: f.reference for f in features() if f.reference is not None}

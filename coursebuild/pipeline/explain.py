@@ -59,7 +59,7 @@ class _Explainer:
     def __init__(self, course: Course, options: Options) -> None:
         self.course = course
         self.root = options.root
-        self.memory = options.for_course(course).memory()
+        self.run_store = options.for_course(course).run_store()
         self.models = {
             model.source.path: existing_files(options.root, model.source.path, model.source.text)
             for model in course.models
@@ -137,33 +137,33 @@ class _Explainer:
         extraction, job = self.scripts[path]
         if extraction.script.norun:
             return RunExplanation("script", path, extraction.owner, "norun")
-        inputs = self.memory.inputs(job, extraction.data)
-        record = self.memory.find_record(inputs)
+        inputs = self.run_store.inputs(job, extraction.data)
+        record = self.run_store.get_record(inputs)
         if record is not None:
             return _describe_run("script", path, extraction.owner, record, ())
-        last, reasons = self.memory.last_record(path), self.memory.reasons(inputs)
+        last, reasons = self.run_store.last_record(path), self.run_store.reasons(inputs)
         return _describe_run("script", path, extraction.owner, last, tuple(reasons))
 
     def _explain_lab(self, name: str) -> RunExplanation:
         inputs, trial = self.labs[name]
-        last = self.memory.last_record(inputs.path)
+        last = self.run_store.last_record(inputs.path)
         holds = last is not None and self._is_lab_remembered(last, inputs)
-        reasons = [] if holds else self.memory.reasons(inputs)
+        reasons = [] if holds else self.run_store.reasons(inputs)
         return _describe_run("lab", name, trial.owner, last, tuple(reasons))
 
     def _is_lab_remembered(self, last: RunRecord, inputs: Inputs) -> bool:
         is_unchanged = not last.reason_forgotten and last.inputs == inputs
-        return is_unchanged and not list(state_changes(last.dependencies, self.memory.states))
+        return is_unchanged and not list(state_changes(last.dependencies, self.run_store.states))
 
     def _find_dependents(self, path: str) -> tuple[RunExplanation, ...]:
         """Find scripts and labs whose last results depend on a file or on its folder's listing."""
         dependents = []
         for script in self.scripts:
-            if script != path and self._depends(self.memory.last_record(script), path):
+            if script != path and self._depends(self.run_store.last_record(script), path):
                 dependents.append(self._explain_script(script))
         for name, (inputs, trial) in self.labs.items():
             models = [f"models/{model}.xml" for model in trial.block.models()]
-            if path in models or self._depends(self.memory.last_record(inputs.path), path):
+            if path in models or self._depends(self.run_store.last_record(inputs.path), path):
                 dependents.append(self._explain_lab(name))
         return tuple(dependents)
 

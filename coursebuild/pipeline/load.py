@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import diagnose_orphan_scenarios
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.course_features import features_digest, load_course_features
 from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.read import read_course, read_sources
@@ -114,7 +114,7 @@ class _Loader:
         self.code = code
         self.has_unknown_code = False
         self.files = read.value
-        self.store = Memo(root)
+        self.store = Store(root)
         self.unreadable = list(read.value.unreadable)
         """Files that cannot be read, or that are too long."""
         self.diagnostics = list(read.diagnostics)

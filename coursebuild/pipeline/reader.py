@@ -29,7 +29,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.checks.formulas import check_formulas, document_formulas
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key, typesetter_digest
 from coursebuild.core.files.resources import prepared_folder, template_texts
 from coursebuild.core.model import Course, Declarations, Document, document_scripts
@@ -421,7 +421,7 @@ def _prepare_to_read(sample: SourceText) -> None:
         start()
 
 
-def kept_formulas(store: Memo, path: str) -> dict[Formula, str]:
+def kept_formulas(store: Store, path: str) -> dict[Formula, str]:
     """The MathML of the formulas that the text at a path had when it was last read."""
     key = _formulas_key(path)
     return store.get(_MATHML, key, lambda data: decode(data, dict[Formula, str])) or {}

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.resources import prepared_file
 from coursebuild.core.model import (
@@ -217,9 +217,7 @@ class Site:
         files: list[SiteFile] = [*self._shared_files[0], *trial_files]
 
         def keep(key: str, make: Callable[[], bytes]) -> bytes:
-            return prepared_file("copies", key) or self._store.get_or_create(
-                "compressed", key, make
-            )
+            return prepared_file("copies", key) or self._store.get_or_make("compressed", key, make)
 
         files += compressed_files(files, keep)
         files += (*self._downloads.files, *self._added_files[0], *self._page_files())
@@ -280,7 +278,7 @@ class Site:
                 if name == feature
             ),
             lambda path: self._load(path).notes[feature],
-            functools.partial(self._store.get_or_create, "parts"),
+            functools.partial(self._store.get_or_make, "parts"),
             self._downloads.archives,
             self._downloads.imports,
         )
@@ -346,7 +344,7 @@ def page_request(entry: PageEntry, library: Library) -> PageRequest:
     )
 
 
-def _cut_font(store: Memo, job: FontJob) -> bytes:
+def _cut_font(store: Store, job: FontJob) -> bytes:
     """Return a cut font: delivered with the tool, stored, or cut now."""
 
     def make() -> bytes:
@@ -354,7 +352,7 @@ def _cut_font(store: Memo, job: FontJob) -> bytes:
 
         return subset_font(job)
 
-    return prepared_file("fonts", job.key) or store.get_or_create("fonts", job.key, make)
+    return prepared_file("fonts", job.key) or store.get_or_make("fonts", job.key, make)
 
 
 def broken_links(course: Course, files: Sequence[SiteFile]) -> Iterator[Diagnostic]:

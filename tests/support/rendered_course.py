@@ -11,7 +11,7 @@ from types import MappingProxyType
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.model import (
     Course,
     Math,
@@ -159,7 +159,7 @@ class RenderedCourse(Struct, frozen=True):
                 (root / path).write_bytes(data)
             course = replace(self.course, files=tuple(files))
             library = replace(self, course=course).library(reports)
-            options = Options(root, 1, Memo(Path(CACHE.name)))
+            options = Options(root, 1, Store(Path(CACHE.name)))
             with Reader(options) as reader:
                 site = Site(library, reader, options)
                 files_by_path = {file.path: file.make() for file in site.files}

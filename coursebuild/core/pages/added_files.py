@@ -51,7 +51,7 @@ class SiteContext(Struct, frozen=True):
     """The pages with a note of this feature, in the order of the site."""
     note: Callable[[str], bytes]
     """Returns the note of a page, by its site path."""
-    get_or_create: Callable[[str, Callable[[], bytes]], bytes]
+    get_or_make: Callable[[str, Callable[[], bytes]], bytes]
     """Returns what was made under a key before, or makes it."""
     archives: Mapping[str, Archive]
     """Archives of scripts by site path."""

@@ -156,7 +156,7 @@ def _sorted_slices(site: SiteContext, plan: IndexPlan, pages: Sequence[NotedPage
     def make() -> bytes:
         return b"\0".join(sort_terms(plan, (text_and_terms(site.note(p.path))[1] for p in pages)))
 
-    return read_slices(plan, site.get_or_create(key, make)) or make().split(b"\0")
+    return read_slices(plan, site.get_or_make(key, make)) or make().split(b"\0")
 
 
 def read_slices(plan: IndexPlan, data: bytes) -> list[bytes] | None:

@@ -29,7 +29,7 @@ def library(make: Make) -> Library:
 class Cache(dict[str, bytes]):
     """A cache in memory."""
 
-    def get_or_create(self, key: str, make: Callable[[], bytes]) -> bytes:
+    def get_or_make(self, key: str, make: Callable[[], bytes]) -> bytes:
         if key not in self:
             self[key] = make()
         return self[key]
@@ -60,7 +60,7 @@ def search_site(
         for path, note in notes.items()
     )
     cache = Cache() if cache is None else cache
-    keep = cache.get_or_create
+    keep = cache.get_or_make
     site = SiteContext(library, None, None, pages, notes.__getitem__, keep, {}, None)  # type: ignore[arg-type]
     return {file.path: file for file in search_files(site)}
 
