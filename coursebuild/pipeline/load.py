@@ -227,7 +227,7 @@ class _Loader:
         """Return the theme with its files."""
         if theme == Theme() and not (self.root / TEMPLATES).is_dir():
             return theme
-        from coursebuild.pipeline.theme import load_theme
+        from coursebuild.pipeline.theme_files import load_theme
 
         parsed_theme = load_theme(self.root, theme)
         self.diagnostics += parsed_theme.diagnostics

@@ -316,7 +316,7 @@ class Reader:
 
     def draw_page(self, request: PageRequest) -> DrawnPage:
         """Draw a page here, and store it."""
-        from coursebuild.core.pages.draw import draw
+        from coursebuild.core.pages.article import draw
 
         with self._lock:
             whole = None if request.text is None else self._whole_document(request.text)
@@ -337,7 +337,7 @@ class Reader:
 
     def page_context(self, request: PageRequest) -> PageContext:
         """Return what is needed to draw parts of a page's document, with all its text."""
-        from coursebuild.core.pages.blocks import PageWriter
+        from coursebuild.core.pages.page_writer import PageWriter
 
         inputs = request.inputs
         assert request.text is not None and inputs.document_inputs is not None
@@ -398,7 +398,7 @@ _UNPACKABLE = (pickle.PicklingError, AttributeError, TypeError, ValueError, Recu
 
 _HEAVY = (
     "coursebuild.core.run.v8",
-    "coursebuild.core.pages.draw",
+    "coursebuild.core.pages.article",
     "coursebuild.core.pages.highlight",
     "coursebuild.core.pages.document_inputs",
     "coursebuild.core.pages.page_list",

@@ -44,7 +44,7 @@ from coursebuild.core.pages.assets import Names
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
 from coursebuild.core.pages.frame import FrameInputs, PageFrame, parts_by_mark
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.links import Reference, has_anchor
+from coursebuild.core.pages.references import Reference, has_anchor
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.registry import features
@@ -360,7 +360,7 @@ def broken_links(course: Course, files: Sequence[SiteFile]) -> Iterator[Diagnost
 
     The place is that of the raw HTML that wrote the link; of other links, the place in the page.
     """
-    from coursebuild.core.pages.links import check_links
+    from coursebuild.core.pages.references import check_links
 
     pages = {
         file.path: file.data if isinstance(file, OutputFile) else file.make()

@@ -39,9 +39,9 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.shown_reports import shown_reports
-from coursebuild.pipeline.theme import template_diagnostic
+from coursebuild.pipeline.theme_files import template_diagnostic
 from coursebuild.pipeline.verify import Verification
-from coursebuild.preview.files import Files
+from coursebuild.preview.site_files import Files
 from coursebuild.preview.run_history import RunHistory, ScriptKey
 
 MAX_SINGLE_READS = 8

@@ -34,7 +34,7 @@ from coursebuild.core.model.results import (
     Verdict,
 )
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.blocks import PageWriter
+from coursebuild.core.pages.page_writer import PageWriter
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.library import Library

@@ -17,7 +17,7 @@ from coursebuild.core.pages import fonts, formulas, styles
 from coursebuild.core.pages.common_files import page_characters
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.frame import FRAME_IDS, parts_of
-from coursebuild.core.pages.links import Reference, ids_and_addresses, merge_line_ids, references
+from coursebuild.core.pages.references import Reference, ids_and_addresses, merge_line_ids, references
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.text.characters import visible
 

@@ -3,7 +3,7 @@
 Entry point: `parse_document`. It never raises, whatever the text:
 
 1. Line ends, NUL and a byte order mark are normalized; front matter is reported and left out.
-2. `tree` reads the blocks and, with `inlines`, their content; other modules read our fences.
+2. `tree` reads the blocks and, with `inline_tree`, their content; other modules read our fences.
 3. Footnotes are read last, in the order of their numbers.
 4. Terms and labels in wrong places are found in the whole document (`_check_placement`), and what
    has the id of something else (`_check_ids`). Where a merge conflict was left, that is all there

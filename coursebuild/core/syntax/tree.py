@@ -33,7 +33,7 @@ from coursebuild.core.syntax.containers import (
 )
 from coursebuild.core.syntax.fence import INDENTED_FENCE, read_fence
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
-from coursebuild.core.syntax.inlines import read_inlines
+from coursebuild.core.syntax.inline_tree import read_inlines
 from coursebuild.core.syntax.marks import (
     check_item,
     check_neighbours,
@@ -54,7 +54,7 @@ from coursebuild.core.syntax.recording import (
     record_fence,
     record_table,
 )
-from coursebuild.core.syntax.script import read_block
+from coursebuild.core.syntax.code_blocks import read_block
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
 from coursebuild.core.syntax.unread_markup import check_unread_markup, is_known_kind
 from coursebuild.core.text.diagnostics import Parsed, diagnose

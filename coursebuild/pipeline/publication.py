@@ -112,7 +112,7 @@ def make_files(
                     file.make()
         report = checked_course.report(outputs.diagnostics)
     except TemplateFailure as failure:
-        from coursebuild.pipeline.theme import template_diagnostic
+        from coursebuild.pipeline.theme_files import template_diagnostic
 
         return checked_course.report((template_diagnostic(course, failure),)), None
     return report, outputs if report.ok else None
