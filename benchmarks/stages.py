@@ -23,17 +23,17 @@ from pathlib import Path
 from markupsafe import Markup
 from msgspec.structs import replace
 
-from coursebuild.core.checks.formulas import course_formulas
+from coursebuild.core.checks.lessons import course_formulas
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Formula, MathError, Reports, Results
 from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages import folding
-from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.article import draw
+from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.folding import find_imports
-from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.record import record
@@ -162,7 +162,7 @@ def measure_stages(course: Course, results: Results, root: Path, repeat: int) ->
             loaded_course = load(root, reader).value
             assert loaded_course is not None
             assets = Assets(template_texts(), Bundle(), prepared_folder())
-            library = Library(loaded_course, results, assets, Reports())
+            library = make_library(loaded_course, results, assets, Reports())
             for file in Site(library, reader, options).files:
                 file.make()
 
@@ -183,7 +183,7 @@ def typeset(course: Course) -> tuple[tuple[Formula, str | MathError], ...]:
 
 def measure_lessons(course: Course, results: Results, repeat: int) -> None:
     """The cost of each step for a lesson: time of one core, without caches between lessons."""
-    library = Library(course, results, Assets(template_texts(), Bundle()))
+    library = make_library(course, results, Assets(template_texts(), Bundle()), Reports())
     pages = [
         (page.inputs(library), document)
         for page in page_list(library)

@@ -48,8 +48,7 @@ from coursebuild.core.pages.urls import Place
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.run_store import RunStore
 from coursebuild.core.run.script_environment import Interpreter
-from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Span

@@ -38,8 +38,7 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
 from coursebuild.core.run.script_environment import Interpreter
-from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Span

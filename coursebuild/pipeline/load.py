@@ -122,7 +122,7 @@ class _Loader:
             self._read_map, self._read_declarations = reader.read_map, reader.read_declarations
             self._read_documents, self._check = reader.read_documents, reader.check
             return
-        from coursebuild.core.checks.course import check_course
+        from coursebuild.core.checks.lessons import check_course
         from coursebuild.core.syntax.coursemap import parse_course_map
         from coursebuild.core.syntax.declarations import parse_declarations
         from coursebuild.core.syntax.document import parse_document

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.checks.formulas import check_formulas, document_formulas
+from coursebuild.core.checks.lessons import check_formulas, document_formulas
 from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key, typesetter_digest
 from coursebuild.core.files.resources import prepared_folder, template_texts
@@ -156,7 +156,7 @@ class Reader:
 
     def check(self, course: Course) -> tuple[Diagnostic, ...]:
         """What `check_course` finds; a course that was found clean is not checked again."""
-        from coursebuild.core.checks.course import check_course
+        from coursebuild.core.checks.lessons import check_course
 
         key = step_key("checked course")
         state = (self.fingerprints(course)[1] or "").encode()

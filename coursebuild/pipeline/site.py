@@ -44,9 +44,9 @@ from coursebuild.core.pages.assets import Names
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
 from coursebuild.core.pages.frame import FrameInputs, PageFrame, parts_by_mark
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.references import Reference, has_anchor
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import PageRecord
+from coursebuild.core.pages.references import Reference, has_anchor
 from coursebuild.core.registry import features
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.html import find_address

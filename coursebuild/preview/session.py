@@ -20,7 +20,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 
 from msgspec.structs import replace
 
-from coursebuild.core.checks.course import check_document
+from coursebuild.core.checks.lessons import check_document
 from coursebuild.core.checks.links import LinkTargets, link_targets
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
@@ -41,8 +41,8 @@ from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.theme_files import template_diagnostic
 from coursebuild.pipeline.verify import Verification
-from coursebuild.preview.site_files import Files
 from coursebuild.preview.run_history import RunHistory, ScriptKey
+from coursebuild.preview.site_files import Files
 
 MAX_SINGLE_READS = 8
 """Documents saved at once that are read one by one; for more, the whole course is read."""

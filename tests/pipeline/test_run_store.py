@@ -12,12 +12,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from coursebuild.cli.explain import Explanation, RunExplanation, explanation_text
 from coursebuild.core.files.trust import seal, unseal
 from coursebuild.core.model.results import Divergence, Outcome, Sign, Trace
 from coursebuild.core.run.dependencies import describe
 from coursebuild.core.run.run_store import longest_first
 from coursebuild.core.scripts.sensitivity import amplification
-from coursebuild.report.explained import Explanation, RunExplanation, explanation_text
 from coursebuild.report.text import Style
 from support.fake_runs import EMPTY_TRACE, JOB, MODEL_TRACE, PATH, SCRIPT, Desk
 from support.poisoned_values import mutations

@@ -34,11 +34,11 @@ from coursebuild.core.model.results import (
     Verdict,
 )
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.page_writer import PageWriter
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.materials import make_library
+from coursebuild.core.pages.page_writer import PageWriter
 from coursebuild.core.pages.renderer import known_mathml
 from coursebuild.core.pages.urls import Place, lesson_path
 from coursebuild.core.registry import summarize

@@ -27,7 +27,6 @@ from coursebuild.core.model import (
     without_links,
 )
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.page_writer import PageWriter, numbered_lines
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.graph import drawings
 from coursebuild.core.pages.highlight import highlight_lines
@@ -38,6 +37,7 @@ from coursebuild.core.pages.page_inputs import (
     PageHead,
     PageInputs,
 )
+from coursebuild.core.pages.page_writer import PageWriter, numbered_lines
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.registry import kind_of_block, model_parts, page_kind
 

@@ -32,9 +32,9 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.pages import formulas, urls
 from coursebuild.core.pages.formulas import number_equations
-from coursebuild.core.pages.references import ids_and_addresses
 from coursebuild.core.pages.markup import HtmlWriter
 from coursebuild.core.pages.page_inputs import DocumentInputs
+from coursebuild.core.pages.references import ids_and_addresses
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings, direction
 from coursebuild.core.text.source import Span

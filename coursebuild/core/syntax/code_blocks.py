@@ -32,6 +32,7 @@ from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import (
     Fence,
     FenceKeys,
+    TextParser,
     Word,
     find_likely_end,
     find_likely_start,
@@ -39,7 +40,6 @@ from coursebuild.core.syntax.fence import (
 )
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
-from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.syntax.unread_markup import check_kind
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span

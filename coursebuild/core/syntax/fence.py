@@ -1,7 +1,9 @@
 """Fences: code blocks of the text, of which other modules make scripts, quizzes and so on.
 
 Entry points: `read_fence`, which makes a `Fence` of a token; `find_likely_end` and
-`find_likely_start`, which guess where a fence was meant to end or begin.
+`find_likely_start`, which guess where a fence was meant to end or begin; `TextParser` and
+`Prose.read`, for the Markdown in fences of features, which shares the footnotes, anchors and rules
+of its document.
 
 Info strings are `kind [name] [key=value | key="value with spaces" | flag]…`: `read_keys`
 compares the words after the kind with the keys that it has (for a `Fence`, call its method `keys`),
@@ -14,12 +16,14 @@ from __future__ import annotations
 import ast
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any, Protocol
 
 from markdown_it.common.utils import unescapeAll
 from msgspec import Struct
 
-from coursebuild.core.model import CodeBlock
+from coursebuild.core.model import Block, CodeBlock, Inline
+from coursebuild.core.syntax.nodes import ArrayNode, Node, StringNode
 from coursebuild.core.syntax.spans import NO_TEXT, PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -344,3 +348,48 @@ def line_prefix(place: Span) -> str:
     prefix = place.source.text[place.source.line_start(place.line) : place.start]
     prefix = re.sub(r"[^>\s]", " ", re.sub(r"\[\^[^\]]*\]", "    ", prefix))
     return prefix + " " if prefix.endswith(">") else prefix
+
+
+class TextParser(Protocol):
+    """Parses Markdown inside another language; the spans of nodes point into the lesson."""
+
+    def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:
+        """The blocks of a text; math between the tags of HTML is math. Never raises."""
+        ...
+
+    def inlines(self, excerpt: Excerpt) -> Parsed[tuple[Inline, ...]]:
+        """The inlines of a text of at most one paragraph; line ends are soft. Never raises."""
+        ...
+
+
+class Prose(Struct, frozen=True):
+    """The Markdown strings inside a quiz or a lab, each parsed once."""
+
+    _content: dict[Node, tuple[Any, ...]]
+    diagnostics: tuple[Diagnostic, ...]
+
+    @classmethod
+    def read(cls, texts: Iterable[tuple[StringNode, str]], parser: TextParser) -> Prose:
+        """Parse each text as `blocks` or `inlines`, but for blank ones."""
+        content: dict[Node, tuple[Any, ...]] = {}
+        diagnostics: list[Diagnostic] = []
+        for node, kind in texts:
+            if node.value.strip():
+                parse = parser.blocks if kind == "blocks" else parser.inlines
+                parsed_text: Parsed[tuple[Any, ...]] = parse(node.excerpt)
+                content[node] = parsed_text.value
+                diagnostics += parsed_text.diagnostics
+        return cls(content, tuple(diagnostics))
+
+    def blocks(self, node: Node | None) -> tuple[Block, ...]:
+        """The blocks of a string; none for a field that is not given."""
+        return () if node is None else self._content.get(node, ())
+
+    def inlines(self, node: Node | None) -> tuple[Inline, ...]:
+        """The inlines of a string; none for a field that is not given."""
+        return () if node is None else self._content.get(node, ())
+
+    def each_item(self, node: Node | None) -> tuple[tuple[Any, ...], ...]:
+        """The blocks or inlines of each string of an array."""
+        items = node.items if isinstance(node, ArrayNode) else ()
+        return tuple(self._content.get(item, ()) for item in items)

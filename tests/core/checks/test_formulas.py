@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coursebuild.core.checks.formulas import check_formulas, course_formulas
+from coursebuild.core.checks.lessons import check_formulas, course_formulas
 from coursebuild.core.model.results import Formula, MathError
 from support.made_courses import make_course, messages, rules_and_texts
 
