@@ -348,13 +348,18 @@ class _Explainer:
 def _uses(document: Document, path: str) -> Iterator[object]:
     """The parts of a document that show a file, link to it, or quote its output."""
     for block in document_blocks(document):
-        if isinstance(block, FeatureBlock) and path in _files_shown_by(block):
-            yield block
+        if isinstance(block, FeatureBlock):
+            mentioned = block.mentioned_models()
+            models = {f"models/{model}.xml" for model in (*block.models(), *mentioned)}
+            if path in models.union(map(BENCH.path, mentioned)):
+                yield block
         for inline in walk_inlines(block_inlines(block)):
             match inline:
                 case Image(url=url) if local_file(url, document.source.path) == path:
                     yield inline
-                case Link(target=UrlTarget(url=url)) if _leads_to(url, document, path):
+                case Link(target=UrlTarget(url=url)) if (
+                    "://" not in url and local_file(url, document.source.path) == path
+                ):
                     yield inline
                 case Link(target=ModelTarget(name=name)) if f"models/{name}.xml" == path:
                     yield inline
@@ -364,17 +369,6 @@ def _uses(document: Document, path: str) -> Iterator[object]:
                     yield inline
                 case _:
                     pass
-
-
-def _files_shown_by(block: FeatureBlock) -> Iterator[str]:
-    """The files of models that a block shows or is about, and of reports on the latter."""
-    for model in (*block.models(), *block.mentioned_models()):
-        yield f"models/{model}.xml"
-    yield from map(BENCH.path, block.mentioned_models())
-
-
-def _leads_to(url: str, document: Document, path: str) -> bool:
-    return "://" not in url and local_file(url, document.source.path) == path
 
 
 def _describe_run(

@@ -104,20 +104,19 @@ def serve(
     try:
         live_course.start()
         server.start()
-        _announce(server.links, browse=browse, draw=options.progress.live)
+        links = server.links
+        draw = options.progress.live
+        first, *other_links = links
+        print(f"serving {first} (stop with Ctrl-C)", file=sys.stderr, flush=True)
+        for link in other_links:
+            print(f"     or {link}", file=sys.stderr, flush=True)
+        if draw and "?" in links[-1]:
+            segno.make(links[-1]).terminal(sys.stderr, compact=True)
+        if browse:  # in a thread, since some browsers only return when their window is open
+            threading.Thread(
+                target=webbrowser.open, args=(first,), name="open", daemon=True
+            ).start()
         live_course.rebuild()
     finally:
         server.stop()
         live_course.close()
-
-
-def _announce(links: list[str], *, browse: bool, draw: bool) -> None:
-    """Print the addresses of the preview; draw one that a phone's camera can read."""
-    first, *other_links = links
-    print(f"serving {first} (stop with Ctrl-C)", file=sys.stderr, flush=True)
-    for link in other_links:
-        print(f"     or {link}", file=sys.stderr, flush=True)
-    if draw and "?" in links[-1]:
-        segno.make(links[-1]).terminal(sys.stderr, compact=True)
-    if browse:  # in a thread, since some browsers only return when their window is open
-        threading.Thread(target=webbrowser.open, args=(first,), name="open", daemon=True).start()

@@ -205,7 +205,14 @@ def _select(
     """Select the scripts to run, and the trials."""
     extractions, trials = runnable, feature_trials(course)
     if documents is not None:
-        quoted_scripts = _quoted_scripts(course, documents)
+        quoted_scripts: set[str] = set()
+        for document in course.documents:
+            if document.source.path in documents:
+                quoted_scripts |= {
+                    b.script for b in document_bindings(document) if b.script is not None
+                }
+                for block in find_blocks(document, FeatureBlock):
+                    quoted_scripts |= {script for script, _ in block.quoted_lines()}
         extractions = [
             e for e in extractions if e.document in documents or e.path in quoted_scripts
         ]
@@ -216,17 +223,6 @@ def _select(
         extractions = [e for e in extractions if e.path in only]
         trials = {name: pair for name, pair in trials.items() if name in only}
     return extractions, tuple(trials.values())
-
-
-def _quoted_scripts(course: Course, documents: Collection[str]) -> set[str]:
-    """Find the scripts, of any lesson, whose output these documents quote."""
-    paths: set[str] = set()
-    for document in course.documents:
-        if document.source.path in documents:
-            paths |= {b.script for b in document_bindings(document) if b.script is not None}
-            for block in find_blocks(document, FeatureBlock):
-                paths |= {script for script, _ in block.quoted_lines()}
-    return paths
 
 
 # --- models

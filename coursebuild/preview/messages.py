@@ -38,7 +38,7 @@ from coursebuild.core.scripts.bindings import document_bindings
 from coursebuild.core.scripts.diff import diff_rows
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
+from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.recordings import read_recorded
 from coursebuild.preview.session import Session
@@ -152,16 +152,15 @@ def _describe_mistake(diagnostic: Diagnostic, document_path: str) -> dict[str, A
         "message": diagnostic.message,
         "label": diagnostic.label,
         "help": diagnostic.help,
-        "notes": [_note(note) for note in diagnostic.notes],
+        "notes": [
+            (note.message if note.span is None else f"{location(note.span)}: {note.message}")
+            for note in diagnostic.notes
+        ],
         "line": line,
         "start": span.column - 1,
         "end": max(end, span.column - 1),
         "inPlace": span.path == document_path and diagnostic.rule in _IN_PLACE,
     }
-
-
-def _note(note: Note) -> str:
-    return note.message if note.span is None else f"{location(note.span)}: {note.message}"
 
 
 # --- scripts and outputs

@@ -50,10 +50,33 @@ def check_document(
 def _check_core_rules(
     course: Course, document: Document, targets: LinkTargets
 ) -> Iterator[Diagnostic]:
-    yield from _check_empty_lesson(course, document)
-    yield from _check_title(course, document)
+    source = document.source
+    for lesson in course.lessons:
+        if lesson.document is not document or not is_blank(document_blocks(document)):
+            continue
+        help = 'say `status = "planned"` in the map and remove the file'
+        if lesson.status == "complete":
+            message = f"lesson {lesson.id} is complete, but there is nothing to read in it"
+            help = f'write it, say `status = "draft"` in the map, or {help}'
+            yield diagnose("lesson-empty", source.span(0, 0), message, help=help)
+        elif not document.blocks:
+            message = f"lesson {lesson.id} is a draft, and its file is empty"
+            yield diagnose("draft-empty", source.span(0, 0), message, help=f"begin it, or {help}")
+    span = title_line(document.source)
+    for page in course.pages:
+        if page.document is document and span is not None and span.text != page.title:
+            message = f"the course map calls this page `{page.title}`"
+            yield diagnose("heading-top", span, message, help="give it one title in both")
     yield from check_links(course, document, targets)
-    yield from _check_terms(document, targets.terms)
+    for term in find_inlines(document, Term):
+        first = targets.terms.get(term.id)
+        if first is None or (first.path, first.start) == (term.span.path, term.span.start):
+            continue
+        message = f"the term `{term.id}` is defined twice"
+        help = "leave one definition, and link to it from here: "
+        help += f'`[…](term:{term.id})`; or name this one by `{{term="…"}}`'
+        notes = [Note("the first one is here", first)]
+        yield diagnose("term-repeated", term.span, message, help=help, notes=notes)
 
 
 def _check_features(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:
@@ -80,22 +103,6 @@ def _find_failing(
     return ""
 
 
-def _check_empty_lesson(course: Course, document: Document) -> Iterator[Diagnostic]:
-    """Report a lesson without anything to read; a draft may have headings at least."""
-    source = document.source
-    for lesson in course.lessons:
-        if lesson.document is not document or not is_blank(document_blocks(document)):
-            continue
-        help = 'say `status = "planned"` in the map and remove the file'
-        if lesson.status == "complete":
-            message = f"lesson {lesson.id} is complete, but there is nothing to read in it"
-            help = f'write it, say `status = "draft"` in the map, or {help}'
-            yield diagnose("lesson-empty", source.span(0, 0), message, help=help)
-        elif not document.blocks:
-            message = f"lesson {lesson.id} is a draft, and its file is empty"
-            yield diagnose("draft-empty", source.span(0, 0), message, help=f"begin it, or {help}")
-
-
 def _check_unproven(course: Course) -> Iterator[Diagnostic]:
     """Report scripts that the map lets pass unproven and that are not there, or always run."""
     scripts = {s.path: s for document in course.documents for s in document_scripts(document)}
@@ -114,28 +121,6 @@ def _check_unproven(course: Course) -> Iterator[Diagnostic]:
         elif not (script.norun or script.requires):
             message = f"`{entry.path}` always runs: it says neither `norun` nor `requires`"
             yield diagnose("unproven-name", entry.span, message, help="remove it")
-
-
-def _check_title(course: Course, document: Document) -> Iterator[Diagnostic]:
-    """Report a page that begins with another title than it has in the map."""
-    span = title_line(document.source)
-    for page in course.pages:
-        if page.document is document and span is not None and span.text != page.title:
-            message = f"the course map calls this page `{page.title}`"
-            yield diagnose("heading-top", span, message, help="give it one title in both")
-
-
-def _check_terms(document: Document, definitions: Mapping[str, Span]) -> Iterator[Diagnostic]:
-    """Report terms that have an earlier definition; `definitions` has the first of each."""
-    for term in find_inlines(document, Term):
-        first = definitions.get(term.id)
-        if first is None or (first.path, first.start) == (term.span.path, term.span.start):
-            continue
-        message = f"the term `{term.id}` is defined twice"
-        help = "leave one definition, and link to it from here: "
-        help += f'`[…](term:{term.id})`; or name this one by `{{term="…"}}`'
-        notes = [Note("the first one is here", first)]
-        yield diagnose("term-repeated", term.span, message, help=help, notes=notes)
 
 
 _WORDS = re.compile(

@@ -124,23 +124,19 @@ def check_links(course: Course, document: Document, targets: LinkTargets) -> Ite
                     "the image ", inline.url, inline.url_span, document, targets
                 )
             elif isinstance(inline, NumberBinding) and _FILE.fullmatch(inline.source or ""):
-                yield from _check_source(inline, targets)
+                path = inline.source or ""
+                models = {model.source.path for model in targets.models.values()}
+                if path not in {*targets.files, *targets.scripts, *models}:
+                    help = did_you_mean(path, [name for name in models if nearest(path, [name])])
+                    message = f"the source of `{inline.text}` is said to be `{path}`, "
+                    message += "and there is no such file"
+                    yield diagnose("link-file", inline.span, message, help=help)
             elif isinstance(inline, RawInline):
                 yield from _check_html_rules(inline, course)
                 yield from _check_html_links(inline, document, targets)
 
 
 _FILE = re.compile(r"[\w.-]+(?:/[\w.-]+)+\.\w{1,4}")
-
-
-def _check_source(number: NumberBinding, targets: LinkTargets) -> Iterator[Diagnostic]:
-    """Report a number whose source is called a file, and is none."""
-    path = number.source or ""
-    models = {model.source.path for model in targets.models.values()}
-    if path not in {*targets.files, *targets.scripts, *models}:
-        help = did_you_mean(path, [name for name in models if nearest(path, [name])])
-        message = f"the source of `{number.text}` is said to be `{path}`, and there is no such file"
-        yield diagnose("link-file", number.span, message, help=help)
 
 
 def _check_html_rules(html: HtmlBlock | RawInline, course: Course) -> Iterator[Diagnostic]:
@@ -177,11 +173,25 @@ def _check_link(
         return
     rule, name, names, missing = _look_up(link, target, targets)
     if name not in names:
-        help = _suggest_other_kind(target, targets) or _suggest_lesson(target, targets)
-        help = help or did_you_mean(name, names)
+        if isinstance(target, LessonTarget) and target.id in targets.levels:
+            help = f"{target.id} is a level: {_link_help('level', target.id)}"
+        elif isinstance(target, LevelTarget) and target.id in targets.lessons:
+            help = f"{target.id} is a lesson: {_link_help('lesson', target.id)}"
+        else:
+            help = _suggest_lesson(target, targets) or did_you_mean(name, names)
         yield diagnose(rule, span, missing, help=help)
     elif isinstance(target, ModelTarget):
-        yield from _check_model_anchor(span, target, targets)
+        if target.anchor:
+            # The ids that `templates/model.html` writes. Only scenarios that `models/NAME.toml`
+            # declares have one, as others are unknown before they are measured.
+            source = targets.models[target.name].source
+            ids = {
+                *model_anchors(targets.scenarios.get(target.name, ())),
+                listing_anchor(source.path),
+            }
+            listings = {source.path: source.text.rstrip()}
+            page_name = f"the page of the model `{target.name}`"
+            yield from _check_anchor(span, target.anchor, page_name, ids, listings)
     elif isinstance(target, LessonTarget):
         lesson = targets.lessons[target.id]
         yield from _check_document_anchor(span, target.anchor, lesson, f"lesson {target.id}")
@@ -197,17 +207,6 @@ def _link_help(kind: str, id: str) -> str:
     if kind == "lesson":
         return f"write `Lesson {id}` in the text, or link to `lesson:{id}`"
     return f"link to `{kind}:{id}`"
-
-
-def _suggest_other_kind(target: _NamedTarget, targets: LinkTargets) -> str:
-    """A help text where a lesson is called a level, or a level a lesson; else empty."""
-    if isinstance(target, LessonTarget) and target.id in targets.levels:
-        kind = "level"
-    elif isinstance(target, LevelTarget) and target.id in targets.lessons:
-        kind = "lesson"
-    else:
-        return ""
-    return f"{target.id} is a {kind}: {_link_help(kind, target.id)}"
 
 
 _LESSON_NAME = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")
@@ -263,22 +262,6 @@ def _check_document_anchor(
     elif anchor and document is not None:
         listings = {script.path: script.code.text for script in document_scripts(document)}
         yield from _check_anchor(span, anchor, page_name, anchors(document), listings)
-
-
-def _check_model_anchor(
-    span: Span, target: ModelTarget, targets: LinkTargets
-) -> Iterator[Diagnostic]:
-    """Check the anchor of a link `model:NAME#anchor`.
-
-    The ids are those that `templates/model.html` writes. Only scenarios that `models/NAME.toml`
-    declares have one, as others are unknown before they are measured.
-    """
-    if target.anchor:
-        source = targets.models[target.name].source
-        ids = {*model_anchors(targets.scenarios.get(target.name, ())), listing_anchor(source.path)}
-        listings = {source.path: source.text.rstrip()}
-        page_name = f"the page of the model `{target.name}`"
-        yield from _check_anchor(span, target.anchor, page_name, ids, listings)
 
 
 def _check_anchor(

@@ -46,28 +46,29 @@ def feature_block_ids(document: Document) -> frozenset[int]:
 
 def display_formulas(document: Document) -> tuple[DisplayFormula, ...]:
     """The formulas of a document in the order of the text, footnotes last."""
-    return computed_once(document, "display_formulas", lambda: _find_display_formulas(document))
 
+    def find() -> tuple[DisplayFormula, ...]:
+        if "$$" not in document.source.text:
+            return ()
+        in_features = feature_block_ids(document)
+        candidates = [
+            (formula, isinstance(block, Heading) or id(block) in in_features)
+            for block, formula in find_formulas(document)
+            if formula.display
+        ]
+        used_ids = {formula.label.id for formula, _ in candidates if formula.label is not None}
+        counts = Counter[str]()
+        formulas: list[DisplayFormula] = []
+        for formula, has_no_id in candidates:
+            label, id_ = formula.label, ""
+            if not has_no_id:
+                tex = formula.tex.text
+                id_ = label.id if label is not None else _make_id(tex, used_ids, counts)
+                used_ids.add(id_)
+            formulas.append(DisplayFormula(formula.span.start, formula.tex.text, label, id_))
+        return tuple(formulas)
 
-def _find_display_formulas(document: Document) -> tuple[DisplayFormula, ...]:
-    if "$$" not in document.source.text:
-        return ()
-    in_features = feature_block_ids(document)
-    candidates = [
-        (formula, isinstance(block, Heading) or id(block) in in_features)
-        for block, formula in find_formulas(document)
-        if formula.display
-    ]
-    used_ids = {formula.label.id for formula, _ in candidates if formula.label is not None}
-    counts = Counter[str]()
-    formulas: list[DisplayFormula] = []
-    for formula, has_no_id in candidates:
-        label, id_ = formula.label, ""
-        if not has_no_id:
-            id_ = label.id if label is not None else _make_id(formula.tex.text, used_ids, counts)
-            used_ids.add(id_)
-        formulas.append(DisplayFormula(formula.span.start, formula.tex.text, label, id_))
-    return tuple(formulas)
+    return computed_once(document, "display_formulas", find)
 
 
 def _make_id(tex: str, used_ids: set[str], counts: Counter[str]) -> str:

@@ -5,8 +5,6 @@ Entry points: `draw(inputs, document, renderer)`; `article`, the text of a docum
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
@@ -59,21 +57,21 @@ def article(page: PageContext, document: Document) -> Markup:
     parts: list[Markup] = []
     for further, blocks in main_and_further(document.blocks):
         heading = page.blocks(blocks[:1]) if further else None
-        text = Markup("\n").join(_text(page, blocks[1:] if further else blocks))
+        texts: list[Markup] = []
+        for group in _groups(blocks[1:] if further else blocks):
+            if group.docked is None:
+                texts.append(page.blocks(group.before))
+            else:
+                before, after = page.blocks(group.before), page.blocks(group.after)
+                docked = page.block(group.docked)
+                texts.append(
+                    page.template("partials/dock.html", before=before, docked=docked, after=after)
+                )
+        text = Markup("\n").join(texts)
         parts.append(
             page.template("partials/further.html", heading=heading, text=text) if further else text
         )
     return Markup("\n").join((*parts, page.footnotes()))
-
-
-def _text(page: PageContext, blocks: tuple[Block, ...]) -> Iterator[Markup]:
-    for group in _groups(blocks):
-        if group.docked is None:
-            yield page.blocks(group.before)
-        else:
-            before, after = page.blocks(group.before), page.blocks(group.after)
-            docked = page.block(group.docked)
-            yield page.template("partials/dock.html", before=before, docked=docked, after=after)
 
 
 class _Group(Struct, frozen=True):

@@ -76,17 +76,27 @@ def common_files(
     part_scripts = tuple(shared.add_part_scripts(facts.parts))
     icon, touch_icon = shared.add_icons(theme)
     sheet = rules.encode() + assets.file("css/site.css") + style.encode()
+    logo = theme.logo or theme.logo_dark
+    size = picture_size(logo) if logo is not None else None
+    licences = [
+        (path.removeprefix("licences/").removesuffix(".txt"), data.decode())
+        for path, data in assets.files("licences")
+    ]
+    for family in theme.fonts:
+        files = (file.path.rpartition("/")[2] for file in family.files)
+        licences.append((", ".join(files), family.licence.text))
+    parts = [f"{name}\n{'=' * len(name)}\n\n{text.strip()}\n" for name, text in licences]
     names = Names(
         style=shared.add("site.css", sheet),
         theme_script=shared.add_script("theme.js"),
         script=shared.add_script("site.js"),
         icon=icon,
-        credits=shared.add("licences.txt", _licences(assets, theme)),
+        credits=shared.add("licences.txt", "\n\n".join(parts).encode()),
         touch_icon=touch_icon,
         scripts=part_scripts,
         logo=shared.add_picture("logo", theme.logo),
         logo_dark=shared.add_picture("logo-dark", theme.logo_dark),
-        logo_width=_logo_width(theme.logo or theme.logo_dark),
+        logo_width=round(LOGO_HEIGHT * size[0] / size[1]) if size else 0,
     )
     return tuple(shared.files), names
 
@@ -149,21 +159,3 @@ class _SharedFiles:
             self.add_picture("icon", theme.icon or theme.touch_icon),
             self.add_picture("icon-touch", theme.touch_icon),
         )
-
-
-def _logo_width(logo: ThemeFile | None) -> int:
-    size = picture_size(logo) if logo is not None else None
-    return round(LOGO_HEIGHT * size[0] / size[1]) if size else 0
-
-
-def _licences(assets: Assets, theme: Theme) -> bytes:
-    """The licences of fonts and libraries that the site ships."""
-    licences = [
-        (path.removeprefix("licences/").removesuffix(".txt"), data.decode())
-        for path, data in assets.files("licences")
-    ]
-    for family in theme.fonts:
-        files = (file.path.rpartition("/")[2] for file in family.files)
-        licences.append((", ".join(files), family.licence.text))
-    parts = [f"{name}\n{'=' * len(name)}\n\n{text.strip()}\n" for name, text in licences]
-    return "\n\n".join(parts).encode()

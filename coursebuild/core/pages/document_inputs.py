@@ -269,10 +269,17 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
 def stub_inputs(library: Library, lesson: Lesson) -> PageInputs:
     """The inputs of the page of a planned lesson, with the lessons to read meanwhile."""
     place = urls.Place(urls.lesson_path(lesson))
+    ids: set[str] = set()  # of all lessons that it builds on
+    stack = list(lesson.prerequisites)
+    while stack:
+        need = stack.pop()
+        if need not in ids:
+            ids.add(need)
+            stack += library.lessons[need].prerequisites
     readable = tuple(
         lesson_link(library, place, need)
-        for need in _ancestors(library, lesson)
-        if need.document is not None
+        for need in library.order
+        if need.id in ids and need.document is not None
     )
     values = {**_common(library, place, lesson), "readable": readable}
     head = PageHead(place.path, "stub", lesson.title, lesson.summary, indexed=False)
@@ -296,18 +303,6 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
         if position + 1 < len(order)
         else None,
     }
-
-
-def _ancestors(library: Library, lesson: Lesson) -> tuple[Lesson, ...]:
-    """All lessons that a lesson builds on, in the order of the course."""
-    ids: set[str] = set()
-    stack = list(lesson.prerequisites)
-    while stack:
-        need = stack.pop()
-        if need not in ids:
-            ids.add(need)
-            stack += library.lessons[need].prerequisites
-    return tuple(ancestor for ancestor in library.order if ancestor.id in ids)
 
 
 def edit_address(library: Library, path: str) -> str | None:

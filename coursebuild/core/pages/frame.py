@@ -164,6 +164,8 @@ class PageFrame(Struct, frozen=True):
         inputs, names, kind = self.inputs, self.inputs.names, page_kind(head.kind)
         renderer = renderer_for(self.assets, inputs.language, inputs.templates)
         place = place_of(inputs.base_url, head.path)
+        looks = ("figure-light", "figure-dark") if names.logo and names.logo_dark else ("", "")
+        logos = zip((names.logo, names.logo_dark), looks, strict=True)
         html = renderer.render(
             "base.html",
             frame=inputs,
@@ -188,7 +190,7 @@ class PageFrame(Struct, frozen=True):
             part_scripts=_part_scripts(place, names, parts),
             manifest=place.href(urls.MANIFEST),
             touch_icon=place.href(names.touch_icon) if names.touch_icon else "",
-            logos=_logos(place, names),
+            logos=tuple((place.href(path), look) for path, look in logos if path),
             logo_size=(names.logo_width, LOGO_HEIGHT) if names.logo_width else (),
             home=place.href(urls.HOME),
             credits=place.href(names.credits),
@@ -197,15 +199,6 @@ class PageFrame(Struct, frozen=True):
             page_words=script_words(renderer.words.texts, parts),
         )
         return f"{visible(html)}\n"
-
-
-def _logos(place: urls.Place, names: Names) -> tuple[tuple[str, str], ...]:
-    """The address of the logo with its class, or two if dark pages have their own."""
-    if names.logo and names.logo_dark:
-        light, dark = place.href(names.logo), place.href(names.logo_dark)
-        return (light, "figure-light"), (dark, "figure-dark")
-    only = names.logo or names.logo_dark
-    return ((place.href(only), ""),) if only else ()
 
 
 def _copies(page: str) -> tuple[tuple[str, str], ...]:

@@ -167,8 +167,17 @@ class Library(Struct, frozen=True, dict=True):
         script knows, without loading the lesson, how many questions it has, whether all were
         answered right, and where to find one to review.
         """
-        texts = ((d.source.path, " ".join(_quizzes(d))) for d in self.course.documents)
-        return {path: text for path, text in texts if text}
+        index: dict[str, str] = {}
+        for document in self.course.documents:
+            keys_of_blocks = (b.progress_keys() for b in find_blocks(document, FeatureBlock))
+            entries = (
+                f"{quote(progress[0], safe='')}:{','.join(progress[1])}"
+                for progress in keys_of_blocks
+                if progress is not None
+            )
+            if text := " ".join(entries):
+                index[document.source.path] = text
+        return index
 
     def summaries(self, feature: str) -> Iterator[tuple[Owner, Any]]:
         """A feature's summaries of documents (`Feature.summary`), in the order of the course."""
@@ -226,13 +235,6 @@ class Library(Struct, frozen=True, dict=True):
         return CalloutKind(name, label, kind.promise or default_promise)
 
 
-def _quizzes(document: Document) -> Iterator[str]:
-    for block in find_blocks(document, FeatureBlock):
-        if (progress := block.progress_keys()) is not None:
-            id, keys = progress
-            yield f"{quote(id, safe='')}:{','.join(keys)}"
-
-
 def _place(block: Recording | FeatureBlock) -> tuple[str, int]:
     """The path and offset of a block, by which the results of running it are found."""
     return block.span.path, block.span.start
@@ -273,16 +275,16 @@ def models_named(script: Script) -> frozenset[str]:
 
 def _named_models(document: Document) -> Mapping[str, tuple[str, ...]]:
     """The names in a document that may be models, with the ways in which it uses them."""
-    return computed_once(document, "models", lambda: _group(_model_names(document)))
 
+    def uses() -> Iterator[tuple[str, str]]:
+        for block in document_blocks(document):
+            if isinstance(block, FeatureBlock):
+                yield from ((name, BY_LAB) for name in block.models())
+                yield from ((name, BY_LINK) for name in block.mentioned_models())
+            elif isinstance(block, Script):
+                yield from ((name, BY_SCRIPT) for name in models_named(block))
+        for link in find_inlines(document, Link):
+            if isinstance(link.target, ModelTarget):
+                yield link.target.name, BY_LINK
 
-def _model_names(document: Document) -> Iterator[tuple[str, str]]:
-    for block in document_blocks(document):
-        if isinstance(block, FeatureBlock):
-            yield from ((name, BY_LAB) for name in block.models())
-            yield from ((name, BY_LINK) for name in block.mentioned_models())
-        elif isinstance(block, Script):
-            yield from ((name, BY_SCRIPT) for name in models_named(block))
-    for link in find_inlines(document, Link):
-        if isinstance(link.target, ModelTarget):
-            yield link.target.name, BY_LINK
+    return computed_once(document, "models", lambda: _group(uses()))

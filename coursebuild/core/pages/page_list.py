@@ -188,11 +188,16 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
     course = library.course
     place = urls.Place(urls.HOME)
     written_lessons = [lesson for lesson in library.order if lesson.document is not None]
+    galleries = []
+    for page in library.menu:
+        pictures = _pictures_of(library, place, page)
+        if len(pictures) > 1:
+            galleries.append(Gallery(page.title, place.href(urls.page_path(page)), pictures))
     values = {
         "title": course.title,
         "summary": course.summary,
-        "cards": _lesson_cards(library, place),
-        "galleries": _list_galleries(library, place),
+        "cards": tuple(_lesson_card(library, place, lesson) for lesson in written_lessons),
+        "galleries": tuple(galleries),
         "levels": tuple(level_view(library, place, level, whole=True) for level in course.levels),
         "start": lesson_link(library, place, written_lessons[0]) if written_lessons else None,
         "total": len(library.order),
@@ -221,30 +226,11 @@ def _pictures_of(library: Library, place: urls.Place, owner: Owner) -> tuple[Pic
     return tuple(links)
 
 
-def _lesson_cards(library: Library, place: urls.Place) -> tuple[LessonCard, ...]:
-    """The cards of the written lessons, in the order of the course."""
-    return tuple(
-        _lesson_card(library, place, lesson)
-        for lesson in library.order
-        if lesson.document is not None
-    )
-
-
 def _lesson_card(library: Library, place: urls.Place, lesson: Lesson) -> LessonCard:
     pictures = _pictures_of(library, place, lesson)
     link = lesson_link(library, place, lesson, whole=True)
     level = library.levels[lesson.level].title
     return LessonCard(link, level, pictures[0] if pictures else None)
-
-
-def _list_galleries(library: Library, place: urls.Place) -> tuple[Gallery, ...]:
-    """The pages in the menu that have more than one picture."""
-    galleries = []
-    for page in library.menu:
-        pictures = _pictures_of(library, place, page)
-        if len(pictures) > 1:
-            galleries.append(Gallery(page.title, place.href(urls.page_path(page)), pictures))
-    return tuple(galleries)
 
 
 def level_inputs(library: Library, level: Level) -> PageInputs:

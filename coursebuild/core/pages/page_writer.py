@@ -67,10 +67,21 @@ class Receipt(Struct, frozen=True):
 
 def script(page: PageContext, block: Script, recordings: tuple[Recording, ...]) -> Markup:
     """A script and the outputs that belong to it, as one object."""
+    text = block.code.text.rstrip("\n")
+    lines = highlight_lines("python", text)
+    parts = (Part(1, len(lines), folded=True),) if block.figures else fold(text)
     return page.template(
         "blocks/script.html",
         script=block,
-        parts=_parts(page, block),
+        parts=tuple(
+            CodePart(
+                numbered_lines(lines[part.first - 1 : part.last], block.path, part.first),
+                part.first,
+                part.folded,
+                _fold_label(page.words, part),
+            )
+            for part in parts
+        ),
         anchor=listing_anchor(block.path),
         href=page.place.href(block.path),
         command=shlex.join(("python", block.path, *block.args)),
@@ -207,7 +218,13 @@ def _describe_comparison(words: Strings, comparison: Comparison) -> str:
         case Mode.DIGITS:
             text = words("receipt.digits")
         case Mode.TOLERANCE:
-            text = _tolerance(words, comparison.rtol, comparison.atol)
+            rtol, atol = short(comparison.rtol), short(comparison.atol)
+            if comparison.rtol and comparison.atol:
+                text = words("receipt.rtol_atol", rtol=rtol, atol=atol)
+            elif comparison.rtol:
+                text = words("receipt.rtol", rtol=rtol)
+            else:
+                text = words("receipt.atol", atol=atol)
         case _:
             assert_never(comparison.mode)
     if comparison.ellipsis:
@@ -215,13 +232,6 @@ def _describe_comparison(words: Strings, comparison: Comparison) -> str:
     if comparison.volatile:
         text += f"; {words('receipt.varies', pattern=comparison.volatile)}"
     return text
-
-
-def _tolerance(words: Strings, rtol: Decimal, atol: Decimal) -> str:
-    relative, absolute = short(rtol), short(atol)
-    if rtol and atol:
-        return words("receipt.rtol_atol", rtol=relative, atol=absolute)
-    return words("receipt.rtol", rtol=relative) if rtol else words("receipt.atol", atol=absolute)
 
 
 def short(value: Decimal) -> str:
@@ -251,22 +261,6 @@ def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
 
 
 # --- code
-
-
-def _parts(page: PageContext, block: Script) -> tuple[CodePart, ...]:
-    """The parts of a script; one that draws is folded whole, since its figure says enough."""
-    text = block.code.text.rstrip("\n")
-    lines = highlight_lines("python", text)
-    parts = (Part(1, len(lines), folded=True),) if block.figures else fold(text)
-    return tuple(
-        CodePart(
-            numbered_lines(lines[part.first - 1 : part.last], block.path, part.first),
-            part.first,
-            part.folded,
-            _fold_label(page.words, part),
-        )
-        for part in parts
-    )
 
 
 def numbered_lines(lines: Iterable[Markup], path: str, first: int = 1) -> Markup:

@@ -75,6 +75,10 @@ def record(
     html = visible(html)
     ids, addresses, repeated_ids = ids_and_addresses(html)
     repeated_ids |= ids & FRAME_IDS
+    places: dict[str, tuple[int, int]] = {}
+    if page is not None:
+        spans = ((name, page.find_repetition(name)) for name in repeated_ids)
+        places = {name: (span.start, span.end) for name, span in spans}
     page_record = PageRecord(
         kind=head.kind,
         title=head.title,
@@ -84,15 +88,10 @@ def record(
         declarations=tuple(sorted(declarations)),
         ids=tuple(sorted(merge_line_ids(ids))),
         references=tuple(sorted(references(head.path, addresses, base_url))),
-        repeated_ids=tuple((name, *_place(name, page)) for name in sorted(repeated_ids)),
+        repeated_ids=tuple((name, *places.get(name, (0, 0))) for name in sorted(repeated_ids)),
         parts=parts_of(html, head.kind),
     )
     return page_record, html
-
-
-def _place(name: str, page: PageContext | None) -> tuple[int, int]:
-    span = None if page is None else page.find_repetition(name)
-    return (0, 0) if span is None else (span.start, span.end)
 
 
 # --- inline styles
@@ -138,7 +137,9 @@ def _without_style(tag: str) -> tuple[str, str]:
     names = {name.lower(): value for name, value in _ATTRIBUTE.findall(tag)}
     if "style" not in names:
         return f"<{tag}>", ""
-    declaration = _normal(unescape(names["style"].strip("\"'")))
+    text = " ".join(unescape(names["style"].strip("\"'")).split()).strip("; ")
+    quotes = text.count('"') % 2 or text.count("'") % 2
+    declaration = "" if quotes or re.search(r"[{}<\\]|/\*", text) else text
     classes = [unescape(names.get("class", "").strip("\"'"))]
     if declaration:
         classes.append(class_name(declaration))
@@ -157,13 +158,6 @@ def style_rules(declarations: Iterable[str]) -> str:
         f".{class_name(declaration)}{{{declaration}}}" for declaration in set(declarations)
     )
     return "".join(f"{rule}\n" for rule in rules)
-
-
-def _normal(declaration: str) -> str:
-    """Normalize a declaration; empty for one that would break out of its rule."""
-    text = " ".join(declaration.split()).strip("; ")
-    quotes = text.count('"') % 2 or text.count("'") % 2
-    return "" if quotes or re.search(r"[{}<\\]|/\*", text) else text
 
 
 def _with_class(tag: str, value: str) -> str:

@@ -165,7 +165,12 @@ def _files(
     files |= _models(library, surroundings, scripts)
     if "matplotlib" in foreign:
         files |= {file.path: file.data for file in surroundings.style}
-    files["requirements.txt"] = _requirements(library, surroundings.packages, foreign)
+    lines_by_module = {
+        package.module: f"{package.name}=={package.version}" for package in surroundings.packages
+    }
+    lines_by_module.setdefault("mujoco", f"mujoco=={library.results.engine}")
+    lines = (lines_by_module.get(name, name) for name in foreign)
+    files["requirements.txt"] = "".join(f"{line}\n" for line in sorted(lines)).encode()
     first = scripts[0].path
     readme = library.words("zip.readme", title=library.course.title, script=first)
     files["README.md"] = f"{readme.strip()}\n".encode()
@@ -190,14 +195,6 @@ def _models(
                 if (data := sources.get(path, model_files.get(path))) is not None:
                     model_data[path] = data
     return model_data
-
-
-def _requirements(library: Library, packages: Iterable[Package], modules: Iterable[str]) -> bytes:
-    """A line for each imported package, with its exact version if known."""
-    lines_by_module = {package.module: f"{package.name}=={package.version}" for package in packages}
-    lines_by_module.setdefault("mujoco", f"mujoco=={library.results.engine}")
-    lines = (lines_by_module.get(name, name) for name in modules)
-    return "".join(f"{line}\n" for line in sorted(lines)).encode()
 
 
 def pack_files(files: Mapping[str, bytes]) -> bytes:
