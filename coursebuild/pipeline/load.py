@@ -258,7 +258,14 @@ class _Loader:
         What has run once at the user's command may run whenever the course is read.
         """
         if self.code == "refuse":
-            _refuse_code(self.root, course)
+            paths = [feature.path for feature in course.features]
+            paths += [TEMPLATES] if (self.root / TEMPLATES).exists() else []
+            if paths:
+                raise EffectError(
+                    f"`--sandbox` is around scripts alone, and `{paths[0]}` is code that the tool "
+                    "would run",
+                    help="look at what it does, and run the command without `--sandbox`",
+                )
         if self.code == "none":
             return
         if course.features:
@@ -382,18 +389,6 @@ class _Loader:
         texts = (source.path for source in (*self.files.lessons, *self.files.pages))
         excluded = {MAP, *texts, *(page.path for page in course.pages), *models}
         return tuple(path for path in self.files.files if path not in excluded)
-
-
-def _refuse_code(root: Path, course: Course) -> None:
-    """Refuse a course whose own features or templates would run as part of the tool."""
-    paths = [feature.path for feature in course.features]
-    paths += [TEMPLATES] if (root / TEMPLATES).exists() else []
-    if paths:
-        raise EffectError(
-            f"`--sandbox` is around scripts alone, and `{paths[0]}` is code that the tool would "
-            "run",
-            help="look at what it does, and run the command without `--sandbox`",
-        )
 
 
 def _check_unlisted_files(course: Course) -> Iterator[Diagnostic]:

@@ -130,7 +130,10 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
         "numbers": [],
     }
     if document is not None and library is not None:
-        news["scripts"] = list(_scripts(library, document))
+        news["scripts"] = [
+            {"path": script.path, "state": _state(library.runs.get(script.path))}
+            for script in document_scripts(document)
+        ]
         news["outputs"] = list(_outputs(session, library, document))
         news["figures"] = list(_figures(session, library, document))
         news["numbers"] = list(_numbers(document, report.diagnostics))
@@ -164,11 +167,6 @@ def _describe_mistake(diagnostic: Diagnostic, document_path: str) -> dict[str, A
 
 
 # --- scripts and outputs
-
-
-def _scripts(library: Library, document: Document) -> Iterator[dict[str, str]]:
-    for script in document_scripts(document):
-        yield {"path": script.path, "state": _state(library.runs.get(script.path))}
 
 
 def _state(run: ScriptRun | None) -> str:

@@ -272,21 +272,15 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
             if values is not None and len(values) != count:
                 message = f"{subject} has {len(values)} numbers, and the model has {count} {noun}"
                 yield diagnose(_RULE, scenario.place(name), message)
-        yield from _check_measure(scenario, facts)
+        if (measure := scenario.observable) is not None:
+            kinds = {"body": facts.body_names, "site": facts.sites, "sensor": facts.sensors}
+            if measure.name not in (known := kinds[measure.kind]):
+                message = f"the model has no {measure.kind} `{measure.name}`"
+                help = did_you_mean(measure.name, [name for name in known if name])
+                yield diagnose(_RULE, scenario.place("measure"), message, help=help)
         yield from _check_timestep(scenario, facts)
     for sweep in declarations.sweeps:
         yield from _check_sweep(sweep, declarations.scenarios, facts)
-
-
-def _check_measure(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
-    measure = scenario.observable
-    if measure is None:
-        return
-    names = {"body": facts.body_names, "site": facts.sites, "sensor": facts.sensors}[measure.kind]
-    if measure.name not in names:
-        message = f"the model has no {measure.kind} `{measure.name}`"
-        help = did_you_mean(measure.name, [name for name in names if name])
-        yield diagnose(_RULE, scenario.place("measure"), message, help=help)
 
 
 def _check_timestep(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:

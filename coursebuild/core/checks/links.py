@@ -302,7 +302,8 @@ def _check_url(
         return
     if not parts.path:
         route = _ROUTE.fullmatch(unquote(parts.fragment))
-        if route is not None and (ids := _ids_of_kind(route[1], targets)) and route[2] in ids:
+        ids = {"lesson": targets.lessons, "level": targets.levels, "page": targets.pages}
+        if route is not None and route[2] in ids[route[1]]:
             message = f"`{url}` is an address of another tool"
             help = _link_help(route[1], route[2])
             yield diagnose("link-anchor", span, message, help=help)
@@ -316,10 +317,6 @@ def _check_url(
 
 _ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
 """The fragment by which a site of a single page names a lesson, as in `#/lesson/4.2`."""
-
-
-def _ids_of_kind(kind: str, targets: LinkTargets) -> Collection[str]:
-    return {"lesson": targets.lessons, "level": targets.levels, "page": targets.pages}[kind]
 
 
 def _suggest_file(path: str, targets: LinkTargets) -> str:

@@ -9,7 +9,7 @@ Recorded outputs that directly follow their script are drawn as one object with 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Literal
 from urllib.parse import unquote
@@ -51,7 +51,18 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     @cached_property
     def script_outputs(self) -> Mapping[int, tuple[Recording, ...]]:
         """The recordings drawn together with a script, by the script's offset."""
-        return dict(_outputs_of_scripts(self.document))
+        outputs: dict[int, tuple[Recording, ...]] = {}
+        for siblings in sibling_groups(self.document):
+            for number, block in enumerate(siblings):
+                if not isinstance(block, Script):
+                    continue
+                following: list[Recording] = []
+                for sibling in siblings[number + 1 :]:
+                    if not isinstance(sibling, Recording) or sibling.script != block.path:
+                        break
+                    following.append(sibling)
+                outputs[block.span.start] = tuple(following)
+        return outputs
 
     @cached_property
     def equations(self) -> Mapping[int, Equation]:
@@ -132,17 +143,3 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     def template(self, name: str, **values: object) -> Markup:
         """A filled-in template."""
         return self.renderer.render(name, **values)
-
-
-def _outputs_of_scripts(document: Document) -> Iterator[tuple[int, tuple[Recording, ...]]]:
-    """The offset of each script, and the recordings that directly follow it."""
-    for siblings in sibling_groups(document):
-        for number, block in enumerate(siblings):
-            if not isinstance(block, Script):
-                continue
-            following: list[Recording] = []
-            for sibling in siblings[number + 1 :]:
-                if not isinstance(sibling, Recording) or sibling.script != block.path:
-                    break
-                following.append(sibling)
-            yield block.span.start, tuple(following)

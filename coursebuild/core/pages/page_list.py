@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
-from coursebuild.core.features import ModelPart, PageKind
+from coursebuild.core.features import ModelPart
 from coursebuild.core.model import (
     Document,
     FeatureBlock,
@@ -58,7 +58,15 @@ class PageEntry(Struct, frozen=True):
     def inputs(self, library: Library) -> PageInputs:
         """The inputs of the page; summaries of documents are enough."""
         kind = page_kind(self.kind)
-        return _course_inputs(self, library) if kind is None else _added_inputs(kind, library)
+        if kind is None:
+            return _course_inputs(self, library)
+        key = f"{kind.name}.description"
+        description = library.words(key) if library.words.has(key) else ""
+        title, home = page_title(library, kind), urls.Place(kind.path).href(urls.HOME)
+        values = {"home": home, **kind.values(library)}
+        template = "added.html" if kind.draw is not None else f"{kind.name}.html"
+        head = PageHead(kind.path, kind.name, title, description, indexed=kind.indexed)
+        return PageInputs(head, template, values)
 
     def may_show_notes(self, library: Library) -> bool:
         """Whether its inputs may depend on summaries by features (`Feature.summary`)."""
@@ -99,16 +107,6 @@ def page_list(library: Library) -> Iterator[PageEntry]:
         if page.document is not None and not page.is_home:
             yield PageEntry(urls.page_path(page), "page", page.id)
     yield PageEntry(urls.NOT_FOUND, "notfound")
-
-
-def _added_inputs(kind: PageKind, library: Library) -> PageInputs:
-    key = f"{kind.name}.description"
-    description = library.words(key) if library.words.has(key) else ""
-    title, home = page_title(library, kind), urls.Place(kind.path).href(urls.HOME)
-    values = {"home": home, **kind.values(library)}
-    template = "added.html" if kind.draw is not None else f"{kind.name}.html"
-    head = PageHead(kind.path, kind.name, title, description, indexed=kind.indexed)
-    return PageInputs(head, template, values)
 
 
 def _course_inputs(entry: PageEntry, library: Library) -> PageInputs:

@@ -144,9 +144,18 @@ def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
 
     A colour without a pair keeps its hue, but its lightness is inverted.
     """
+    from PIL import ImageColor
 
     def dark(match: re.Match[str]) -> str:
-        return f"{match['name']}{match['is']}{_dark_colour(match['value'], paired_colours)}"
+        value = match["value"]
+        try:
+            red, green, blue = ImageColor.getrgb(value.strip())[:3]
+        except ValueError:  # `none`, a reference, or an unknown name
+            return match[0]
+        light = f"#{red:02x}{green:02x}{blue:02x}"
+        shift = round(255 - 2 * (0.2126 * red + 0.7152 * green + 0.0722 * blue))
+        inverted = bytes(min(max(channel + shift, 0), 255) for channel in (red, green, blue))
+        return f"{match['name']}{match['is']}{paired_colours.get(light) or f'#{inverted.hex()}'}"
 
     return _COLOUR.sub(dark, _ROOT.sub(_with_fill, svg, count=1))
 
@@ -154,16 +163,3 @@ def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
 def _with_fill(root: re.Match[str]) -> str:
     """The root element, with the default colour of shapes made explicit."""
     return root[0] if " fill=" in root[0] else f'<svg fill="#000000"{root[0][4:]}'
-
-
-def _dark_colour(value: str, paired_colours: Mapping[str, str]) -> str:
-    from PIL import ImageColor
-
-    try:
-        red, green, blue = ImageColor.getrgb(value.strip())[:3]
-    except ValueError:  # `none`, a reference, or an unknown name
-        return value
-    light = f"#{red:02x}{green:02x}{blue:02x}"
-    shift = round(255 - 2 * (0.2126 * red + 0.7152 * green + 0.0722 * blue))
-    inverted = (min(max(channel + shift, 0), 255) for channel in (red, green, blue))
-    return paired_colours.get(light) or "#" + "".join(f"{channel:02x}" for channel in inverted)

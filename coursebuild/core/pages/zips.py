@@ -97,7 +97,15 @@ def make_archives(library: Library, surroundings: Surroundings) -> Iterator[Arch
     for lesson in library.order:
         scripts = document_scripts(lesson.document) if lesson.document is not None else ()
         if scripts:
-            lesson_scripts = _with_imported_scripts(by_module, surroundings, scripts)
+            scripts_by_path: dict[str, Script] = {}
+            stack = list(scripts)
+            while stack:
+                script = stack.pop()
+                if script.path not in scripts_by_path:
+                    scripts_by_path[script.path] = script
+                    names = surroundings.imports(script.code.text)
+                    stack += [by_module[name] for name in names if name in by_module]
+            lesson_scripts = tuple(scripts_by_path[path] for path in sorted(scripts_by_path))
             files = _files(
                 library, surroundings, lesson_scripts, f"{lesson.id}-{lesson.slug}", by_module
             )
@@ -135,20 +143,6 @@ def _follow_imports(
 
 def _module(path: str) -> str:
     return path.removeprefix("examples/").removesuffix(".py").partition("/")[0]
-
-
-def _with_imported_scripts(
-    by_module: Mapping[str, Script], surroundings: Surroundings, scripts: Iterable[Script]
-) -> tuple[Script, ...]:
-    scripts_by_path: dict[str, Script] = {}
-    stack = list(scripts)
-    while stack:
-        script = stack.pop()
-        if script.path not in scripts_by_path:
-            scripts_by_path[script.path] = script
-            names = surroundings.imports(script.code.text)
-            stack += [by_module[name] for name in names if name in by_module]
-    return tuple(scripts_by_path[path] for path in sorted(scripts_by_path))
 
 
 def _files(

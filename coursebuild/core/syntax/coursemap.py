@@ -87,7 +87,12 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
         *check_settings(root, decoding),
     ]
     unusable = bool(diagnostics)
-    diagnostics += _check_levels(root, decoding)
+    for level, level_node in zip(levels, root.objects("level"), strict=True):
+        for node, table in decoding.find_structs(LessonTable, level_node.objects("lesson")):
+            if level.id and not table.id.startswith(f"{level.id}."):
+                message = f"the lesson `{table.id}` is in the level `{shorten(level.id)}`"
+                help = f"an id in this level begins with `{shorten(level.id)}.`"
+                diagnostics.append(diagnose("field-value", node.place("id"), message, help=help))
     diagnostics += _check_prerequisites(
         lessons, [name for node in nodes if (name := _read_id(node.get("id")))]
     )
@@ -204,17 +209,6 @@ def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diag
                 message = f"the {kind} ids `{shorten(first)}` and `{shorten(name)}` {differ}"
             notes = (Note("the first one is here", span),)
             yield diagnose("id-repeated", node.span, message, notes=notes)
-
-
-def _check_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
-    """Check that each lesson is in the level that its id begins with."""
-    for level in root.objects("level"):
-        name = _read_id(level.get("id"))
-        for node, fields in decoding.find_structs(LessonTable, level.objects("lesson")):
-            if name and not fields.id.startswith(f"{name}."):
-                message = f"the lesson `{fields.id}` is in the level `{shorten(name)}`"
-                help = f"an id in this level begins with `{shorten(name)}.`"
-                yield diagnose("field-value", node.place("id"), message, help=help)
 
 
 def _check_files(decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:

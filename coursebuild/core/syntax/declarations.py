@@ -76,8 +76,15 @@ def parse_declarations(source: Source) -> Parsed[Declarations | None]:
         *decoding.diagnostics,
         *_check_scenarios(decoding),
         *_check_sweeps(decoding),
-        *_check_names(decoding),
     ]
+    for table, field, message in (
+        (ScenarioTable, "name", "two scenarios have the name `{}`"),
+        (SweepTable, "name", "two sweeps have the name `{}`"),
+        (KeepTable, "finding", "the finding `{}` is kept twice"),
+    ):
+        structs = decoding.find_structs(table)
+        names = [(getattr(struct, field), node.place(field)) for node, struct in structs]
+        diagnostics += check_unique(names, "field-value", message)
     if diagnostics or decoding.value is None:
         return Parsed(None, sort_diagnostics(diagnostics))
     fields = decoding.value
@@ -116,17 +123,6 @@ def _build_sweep(node: ObjectNode, table: SweepTable) -> DeclaredSweep:
 
 
 # ---------------------------------------------------------------------------------------- checks
-
-
-def _check_names(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
-    for table, field, message in (
-        (ScenarioTable, "name", "two scenarios have the name `{}`"),
-        (SweepTable, "name", "two sweeps have the name `{}`"),
-        (KeepTable, "finding", "the finding `{}` is kept twice"),
-    ):
-        structs = decoding.find_structs(table)
-        names = [(getattr(struct, field), node.place(field)) for node, struct in structs]
-        yield from check_unique(names, "field-value", message)
 
 
 def _check_sweeps(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:

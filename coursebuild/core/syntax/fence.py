@@ -262,18 +262,18 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
         body = Excerpt(base.source, body.text + "\n", body.pieces)
     span = base.span(token.start, token.end)
     head = base.span(token.start, info_start + len(token.info.rstrip()))
-    body_span, prefix = (body.span(), "") if nested else _body_lines(span, head, is_closed)
-    inner = _find_inner_opening(body, token.markup)
+    body_span, prefix = body.span(), ""
+    if not nested:  # the whole lines between the marks, and what new ones need before them
+        source = span.source
+        start = source.line_start(head.line + 1)
+        end = source.line_start(span.end_line if is_closed else span.end_line + 1)
+        body_span, prefix = Span(source, start, max(start, end)), line_prefix(head)
+    inner = None
+    if (marks := token.markup) in body.text:
+        opening = rf"^ {{0,3}}({re.escape(marks[0])}{{{len(marks)},}} *\w[^`\n]*)$"
+        if (match := re.search(opening, body.text, re.MULTILINE)) is not None:
+            inner = body.span(*match.span(1))
     return Fence(span, head, info, body, body_span, prefix, is_closed, nested, inner)
-
-
-def _find_inner_opening(body: Excerpt, marks: str) -> Span | None:
-    """The first line that would begin a fence of these marks if it were not inside one."""
-    if marks not in body.text:
-        return None
-    opening = re.compile(rf"^ {{0,3}}({re.escape(marks[0])}{{{len(marks)},}} *\w[^`\n]*)$", re.M)
-    match = opening.search(body.text)
-    return None if match is None else body.span(match.start(1), match.end(1))
 
 
 _MOST_LINES = 300
@@ -333,14 +333,6 @@ def _is_python(text: str) -> bool:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return False
     return True
-
-
-def _body_lines(span: Span, head: Span, is_closed: bool) -> tuple[Span, str]:
-    """The whole lines between the fences, and the prefix that new ones need."""
-    source, last = span.source, span.end_line
-    start = source.line_start(head.line + 1)
-    end = source.line_start(last if is_closed else last + 1)
-    return Span(source, start, max(start, end)), line_prefix(head)
 
 
 def line_prefix(place: Span) -> str:
