@@ -38,9 +38,8 @@ from coursebuild.core.model.results import (
     SiteFile,
     TrialResult,
 )
-from coursebuild.core.pages.added_files import ExportContext, SiteContext
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.context import ExportContext, PageContext, SiteContext
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.renderer import Renderer

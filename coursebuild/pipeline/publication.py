@@ -31,9 +31,8 @@ from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Document
 from coursebuild.core.model.results import SiteFile
-from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.context import ExportContext, PageContext
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_list import page_list

@@ -39,9 +39,9 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, SiteFile
 from coursebuild.core.pages import meta, urls
-from coursebuild.core.pages.added_files import NotedPage, SiteContext, compressed_files
-from coursebuild.core.pages.assets import Names
+from coursebuild.core.pages.assets import Names, compressed_files
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
+from coursebuild.core.pages.context import NotedPage, SiteContext
 from coursebuild.core.pages.frame import FrameInputs, PageFrame, parts_by_mark
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list

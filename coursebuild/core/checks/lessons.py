@@ -152,11 +152,6 @@ def _formula_uses(document: Document) -> Iterator[tuple[Formula, Excerpt]]:
             yield Formula(formula.tex.text, formula.display), formula.tex
 
 
-def course_formulas(course: Course) -> tuple[Formula, ...]:
-    """Each different formula of the course, in order of first use."""
-    return tuple(dict.fromkeys(f for d in course.documents for f in document_formulas(d)))
-
-
 def document_formulas(document: Document) -> tuple[Formula, ...]:
     """Each different formula of one document, in order of first use."""
     return tuple(dict.fromkeys(formula for formula, _ in _formula_uses(document)))

@@ -171,7 +171,7 @@ def _check_link(
     if isinstance(target, UrlTarget):
         yield from _check_url(span, target.url, document, targets)
         return
-    rule, name, names, missing = _look_up(link, target, targets)
+    rule, name, names, missing = _look_up(target, targets)
     if name not in names:
         if isinstance(target, LessonTarget) and target.id in targets.levels:
             help = f"{target.id} is a level: {_link_help('level', target.id)}"
@@ -231,9 +231,7 @@ def _suggest_lesson(target: _NamedTarget, targets: LinkTargets) -> str:
     )
 
 
-def _look_up(
-    link: Link, target: _NamedTarget, targets: LinkTargets
-) -> tuple[str, str, Collection[str], str]:
+def _look_up(target: _NamedTarget, targets: LinkTargets) -> tuple[str, str, Collection[str], str]:
     """The rule of a link, the name of its target, all names of this kind, and the message."""
     lacks = "is not in the course map"
     match target:

@@ -1,7 +1,8 @@
-"""What the writer of HTML needs to know about a page: addresses, formulas, code, special blocks.
+"""What features are given: a page to draw on, and a course to make files of.
 
-Entry point: `PageContext`, the `HtmlWriter` of one document on one page. `blocks.PageWriter`
-completes it: it draws what is more than Markdown.
+Entry points: `PageContext`, the `HtmlWriter` of one document on one page (`page_writer.PageWriter`
+completes it: it draws what is more than Markdown); `SiteContext` and `ExportContext`, what features
+make files from.
 
 Recorded outputs that directly follow their script are drawn as one object with it:
 `script_outputs`. Nothing is drawn in their own place.
@@ -9,7 +10,7 @@ Recorded outputs that directly follow their script are drawn as one object with 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Literal
 from urllib.parse import unquote
@@ -20,6 +21,7 @@ from msgspec import Struct
 from coursebuild.core.model import (
     Block,
     CodeSpan,
+    Course,
     Document,
     Equation,
     Recording,
@@ -30,13 +32,17 @@ from coursebuild.core.model import (
     document_blocks,
     sibling_groups,
 )
+from coursebuild.core.model.results import SiteFile
 from coursebuild.core.pages import formulas, urls
+from coursebuild.core.pages.assets import Assets, Names
 from coursebuild.core.pages.formulas import number_equations
+from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.markup import HtmlWriter
 from coursebuild.core.pages.page_inputs import DocumentInputs
 from coursebuild.core.pages.references import ids_and_addresses
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings, direction
+from coursebuild.core.pages.zips import Archive
 from coursebuild.core.text.source import Span
 
 
@@ -143,3 +149,54 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     def template(self, name: str, **values: object) -> Markup:
         """A filled-in template."""
         return self.renderer.render(name, **values)
+
+
+class NotedPage(Struct, frozen=True):
+    """A page that a feature has made a note of."""
+
+    path: str
+    """Its site path."""
+    kind: str
+    """See `PageHead`."""
+    id: str
+    """The id of its lesson, level, model or page."""
+    title: str
+    digest: str
+    """The digest of the note."""
+
+
+class SiteContext(Struct, frozen=True):
+    """What a feature makes files of a site from."""
+
+    library: Library
+    assets: Assets
+    names: Names
+    """The names of the files that all pages share."""
+    pages: tuple[NotedPage, ...]
+    """The pages with a note of this feature, in the order of the site."""
+    note: Callable[[str], bytes]
+    """Returns the note of a page, by its site path."""
+    get_or_make: Callable[[str, Callable[[], bytes]], bytes]
+    """Returns what was made under a key before, or makes it."""
+    archives: Mapping[str, Archive]
+    """Archives of scripts by site path."""
+    imports: Callable[[str], frozenset[str]]
+    """Returns the modules that a Python text imports."""
+
+
+class ExportContext(Struct, frozen=True):
+    """A course without errors, and what an export can be made from."""
+
+    library: Library
+    """The course with its results, words and templates. Its documents are summaries."""
+    assets: Assets
+    site: Callable[[], Mapping[str, SiteFile]]
+    """The files of its site by path, collected on the first call."""
+    page: Callable[[Document], PageContext]
+    """A document with its whole text on its page, ready to be drawn."""
+    read: Callable[[str], bytes]
+    """A file of the course, by its path."""
+
+    @property
+    def course(self) -> Course:
+        return self.library.course

@@ -59,7 +59,7 @@ class PageRecord(Struct, frozen=True, array_like=True):
     parts: tuple[str, ...] = ()
     """See `parts_of`."""
     notes: tuple[tuple[str, str], ...] = ()
-    """The features' notes of the page: a feature's name and a digest; see `added_files`."""
+    """The features' notes of the page: a feature's name and a digest; see `SiteContext`."""
 
 
 def record(

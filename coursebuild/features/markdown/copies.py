@@ -21,8 +21,7 @@ from urllib.parse import urlsplit
 from coursebuild.core.model import Lesson
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.added_files import SiteContext
-from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.context import PageContext, SiteContext
 from coursebuild.core.pages.document_inputs import LessonLink, LevelView
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import code_span, escape_line, guard_lines, link

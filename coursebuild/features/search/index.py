@@ -28,7 +28,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from msgspec import Struct
 
 from coursebuild.core.model.results import CachedFile
-from coursebuild.core.pages.added_files import NotedPage, SiteContext
+from coursebuild.core.pages.context import NotedPage, SiteContext
 from coursebuild.features.search.page import LEAD_ONLY, as_json, script, text_and_terms
 from coursebuild.features.search.words import is_fuzzy, shelf_of
 

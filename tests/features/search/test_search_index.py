@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model.results import CachedFile
-from coursebuild.core.pages.added_files import NotedPage, SiteContext
+from coursebuild.core.pages.context import NotedPage, SiteContext
 from coursebuild.core.pages.library import Library
 from coursebuild.features.search import index
 from coursebuild.features.search.index import IndexPlan, search_files
