@@ -274,9 +274,9 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
                 yield diagnose(_RULE, scenario.place(name), message)
         if (measure := scenario.observable) is not None:
             kinds = {"body": facts.body_names, "site": facts.sites, "sensor": facts.sensors}
-            if measure.name not in (names := kinds[measure.kind]):
+            if measure.name not in (model_names := kinds[measure.kind]):
                 message = f"the model has no {measure.kind} `{measure.name}`"
-                help = did_you_mean(measure.name, [name for name in names if name])
+                help = did_you_mean(measure.name, [name for name in model_names if name])
                 yield diagnose(_RULE, scenario.place("measure"), message, help=help)
         yield from _check_timestep(scenario, facts)
     for sweep in declarations.sweeps:
