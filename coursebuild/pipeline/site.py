@@ -38,11 +38,11 @@ from coursebuild.core.model import (
     document_inlines,
 )
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, SiteFile
-from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Names, compressed_files
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
 from coursebuild.core.pages.context import NotedPage, SiteContext
-from coursebuild.core.pages.frame import FrameInputs, PageFrame, parts_by_mark
+from coursebuild.core.pages.frame import FrameInputs, PageFrame, parts_by_mark, robots, sitemap
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import PageRecord
@@ -221,10 +221,10 @@ class Site:
 
         files += compressed_files(files, keep)
         files += (*self._downloads.files, *self._added_files[0], *self._page_files())
-        files.append(OutputFile(urls.ROBOTS, meta.robots(course)))
+        files.append(OutputFile(urls.ROBOTS, robots(course)))
         if course.base_url:
             indexed = (path for path, entry in self._pages.items() if entry.record.indexed)
-            files.append(OutputFile(urls.SITEMAP, meta.sitemap(course, indexed)))
+            files.append(OutputFile(urls.SITEMAP, sitemap(course, indexed)))
         return tuple(sorted(files, key=lambda file: file.path))
 
     @functools.cached_property

@@ -15,8 +15,9 @@ from msgspec import Struct
 from coursebuild.core import model
 from coursebuild.core.model import Document, Lesson, Level, Owner, document_scripts
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages import urls
 from coursebuild.core.pages.formulas import equations_of
+from coursebuild.core.pages.frame import lesson_data
 from coursebuild.core.pages.graph import neighbourhood
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import (
@@ -257,7 +258,7 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
         ),
         "edit": edit_address(library, lesson.path),
     }
-    data = meta.lesson_data(library, lesson)
+    data = lesson_data(library, lesson)
     return PageInputs(
         PageHead(place.path, "lesson", lesson.title, lesson.summary, data),
         "lesson.html",

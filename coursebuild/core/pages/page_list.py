@@ -27,7 +27,7 @@ from coursebuild.core.model import (
     listing_anchor,
 )
 from coursebuild.core.model.results import ModelFacts
-from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages import urls
 from coursebuild.core.pages.document_inputs import (
     LessonLink,
     document_inputs,
@@ -37,7 +37,7 @@ from coursebuild.core.pages.document_inputs import (
     level_view,
     stub_inputs,
 )
-from coursebuild.core.pages.frame import page_title, place_of
+from coursebuild.core.pages.frame import course_data, page_title, place_of
 from coursebuild.core.pages.graph import level_graph
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import AddedParts, HighlightedFile, PageHead, PageInputs
@@ -212,7 +212,7 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
         "scripts": len(library.scripts),
         "scripts_zip": place.href(urls.EXAMPLES_ZIP) if library.scripts else None,
     }
-    head = PageHead(urls.HOME, "home", course.title, course.summary, meta.course_data(library))
+    head = PageHead(urls.HOME, "home", course.title, course.summary, course_data(library))
     inputs = None if document is None else document_inputs(library, place, document)
     return PageInputs(head, "home.html", values, inputs)
 

@@ -37,8 +37,8 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.model.blocks import title_line
-from coursebuild.core.model.equations import DisplayFormula, feature_block_ids
 from coursebuild.core.model.vocabulary import ENGLISH, Words
+from coursebuild.core.model.walk import DisplayFormula, feature_block_ids
 from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import ILLUSTRATION
