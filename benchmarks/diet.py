@@ -13,7 +13,7 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.features.bench.commands.diet import diet
 from coursebuild.numerics.reports.diet_report import DietReport
 from coursebuild.pipeline.options import Options
@@ -65,7 +65,7 @@ def main() -> None:
         (root / "models" / "arm.xml").write_text(arm().replace("RUBBLE", ""))
         field = arm().replace("RUBBLE", rubble(arguments.pieces))
         (root / "models" / "rubble.xml").write_text(field)
-        measurement = diet(Options(root, 1, Memo(root)))
+        measurement = diet(Options(root, 1, Store(root)))
     for report in measurement.reports:
         show(report)
 

@@ -23,22 +23,22 @@ from pathlib import Path
 from markupsafe import Markup
 from msgspec.structs import replace
 
-from coursebuild.core.checks.formulas import course_formulas
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.checks.lessons import document_formulas
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Formula, MathError, Reports, Results
 from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages import folding
+from coursebuild.core.pages.article import draw
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.draw import draw
 from coursebuild.core.pages.folding import find_imports
-from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.record import record
 from coursebuild.core.run.v8 import MathEngine
-from coursebuild.core.syntax import script
+from coursebuild.core.syntax import code_blocks
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.values import encode
 from coursebuild.features.language_server.commands.diagnosis import current_diagnostics
@@ -105,7 +105,7 @@ def measure_typing(root: Path, repeat: int) -> None:
     """The cost of one more word in the longest lesson for the language server: time of one core."""
     from markdown_it import MarkdownIt
 
-    session = Session(Options(root, 1, Memo(root)), site=False)
+    session = Session(Options(root, 1, Store(root)), site=False)
     rebuild = BackgroundRebuild(session, Style())
     session.start()
     rebuild.run_once()
@@ -134,7 +134,7 @@ def measure_typing(root: Path, repeat: int) -> None:
 
 def measure_scripts(root: Path, repeat: int) -> None:
     """Our runner compared with bare Python."""
-    options = Options(root, len(os.sched_getaffinity(0)), Memo(root))
+    options = Options(root, len(os.sched_getaffinity(0)), Store(root))
     course = load(root).value
     assert course is not None
     runnable = extract_scripts(course, options).runnable
@@ -146,7 +146,7 @@ def measure_scripts(root: Path, repeat: int) -> None:
     candidates: dict[str, Callable[[], object]] = {
         "python, one after the other": bare,
         f"coursebuild, {options.jobs} at a time": lambda: run(
-            runnable, options, memory=options.memory(fresh=True)
+            runnable, options, run_store=options.run_store(fresh=True)
         ),
     }
     seconds = time_candidates(candidates, max(2, repeat // 3))
@@ -155,35 +155,35 @@ def measure_scripts(root: Path, repeat: int) -> None:
 
 def measure_stages(course: Course, results: Results, root: Path, repeat: int) -> None:
     """The other stages of a build."""
-    options = Options(root, 1, Memo(root))
+    options = Options(root, 1, Store(root))
 
     def make_files() -> None:
         with Reader(options) as reader:
             loaded_course = load(root, reader).value
             assert loaded_course is not None
             assets = Assets(template_texts(), Bundle(), prepared_folder())
-            library = Library(loaded_course, results, assets, Reports())
+            library = make_library(loaded_course, results, assets, Reports())
             for file in Site(library, reader, options).files:
                 file.make()
 
     candidates: dict[str, Callable[[], object]] = {
         "load: read, parse, check": lambda: load(root),
-        f"typeset {len(course_formulas(course))} formulas": lambda: typeset(course),
-        "load from the memo and make all files": make_files,
+        "typeset all formulas": lambda: typeset(course),
+        "load from the store and make all files": make_files,
     }
     show("stages", time_candidates(candidates, max(2, repeat // 2)), "load: read, parse, check")
 
 
 def typeset(course: Course) -> tuple[tuple[Formula, str | MathError], ...]:
     """The formulas of a course with their MathML, from a fresh engine."""
-    formulas = course_formulas(course)
+    formulas = tuple(dict.fromkeys(f for d in course.documents for f in document_formulas(d)))
     with MathEngine() as engine:
         return tuple(zip(formulas, engine.typeset(formulas), strict=True))
 
 
 def measure_lessons(course: Course, results: Results, repeat: int) -> None:
     """The cost of each step for a lesson: time of one core, without caches between lessons."""
-    library = Library(course, results, Assets(template_texts(), Bundle()))
+    library = make_library(course, results, Assets(template_texts(), Bundle()), Reports())
     pages = [
         (page.inputs(library), document)
         for page in page_list(library)
@@ -202,7 +202,7 @@ def measure_lessons(course: Course, results: Results, repeat: int) -> None:
         return [find_imports(script) for script in scripts]
 
     def parses() -> list[object]:
-        script._compile_error.cache_clear()
+        code_blocks._compile_error.cache_clear()
         return [parse_document(d.source, kinds, lesson=True) for d in documents]
 
     drafts = draws()
@@ -238,7 +238,7 @@ def main() -> None:
     measure_scripts(root, arguments.repeat)
     course = load(root).value
     assert course is not None
-    results = verify(course, Options(root, 1, Memo(root))).results
+    results = verify(course, Options(root, 1, Store(root))).results
     results = replace(results, formulas=typeset(course))
     measure_stages(course, results, root, arguments.repeat)
     measure_lessons(course, results, arguments.repeat)

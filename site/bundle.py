@@ -60,7 +60,6 @@ _PREPARING = (
     "site/prepare_sbom.py",
     "site/prepare_templates.py",
     "coursebuild/core/pages/assets.py",
-    "coursebuild/core/pages/added_files.py",
     "coursebuild/core/pages/theme.py",
     "coursebuild/core/pages/fonts.py",
     "coursebuild/core/pages/renderer.py",

@@ -13,8 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages.added_files import compressed_files
-from coursebuild.core.pages.assets import SCRIPTS, page_script
+from coursebuild.core.pages.assets import SCRIPTS, compressed_files, page_script
 
 LABS = ("js/lab.js", "js/lab-worker.js")
 

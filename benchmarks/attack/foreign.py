@@ -16,7 +16,7 @@ from pathlib import Path
 import msgspec
 
 from benchmarks.attack.grounds import EDITED_LESSON, SECRET, Grounds, Try, Victim, all_files
-from coursebuild.core.engine.memo import HASH
+from coursebuild.core.engine.store import HASH
 from coursebuild.core.files.trust import seal, store_key, unseal
 from coursebuild.core.files.write import FileChange, journal_path
 from support.mortal_commands import Mortals

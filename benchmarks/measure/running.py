@@ -36,13 +36,13 @@ print(total)
 RUNNER = """
 import pathlib, sys, time
 from coursebuild.core.run.script_server import ScriptServer
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scripts import extract_scripts, run
 root = pathlib.Path.cwd()
 with ScriptServer() as server:
-    store = Memo(root, fresh=True)
+    store = Store(root, fresh=True)
     options = Options(root, int(sys.argv[1]), store, run_all=server.run)
     chosen = extract_scripts(load(root).value, options).runnable
     for _ in range(2):

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from coursebuild.cli.output import CLEAN, FAILURE, terminal_style, write
 from coursebuild.cli.unchanged import Watcher, identify_command
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.registry import package_paths
 from coursebuild.core.run.sandbox import find_sandbox
 from coursebuild.pipeline.options import Options, find_course, open_store
@@ -32,7 +32,7 @@ def options_of(arguments: argparse.Namespace) -> Options:
         fresh = arguments.no_cache
         store = open_store(root, arguments.cache, arguments.cache_size, fresh=fresh)
     else:
-        store = Memo(root)
+        store = Store(root)
     sandbox = find_sandbox(root) if getattr(arguments, "sandbox", False) else None
     quiet, long, verbose, strict = (
         getattr(arguments, name, False) for name in ("quiet", "long", "verbose", "strict")

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from coursebuild.cli.arguments import add_running, add_sandbox, add_strict, run_unless_unchanged
-from coursebuild.pipeline.build import build
+from coursebuild.pipeline.publication import build
 
 EXAMPLES = """\
 examples:

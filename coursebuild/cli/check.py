@@ -106,7 +106,7 @@ def _special_options(arguments: argparse.Namespace) -> list[str]:
 
 def _compare_with_version(arguments: argparse.Namespace) -> int:
     """Say what the scripts do with another version of MuJoCo; no difference is a mistake."""
-    from coursebuild.pipeline.against import compare_with_version
+    from coursebuild.pipeline.other_version import compare_with_version
     from coursebuild.report.against import comparison_json, comparison_text
 
     conflicts = [] if arguments.format in ("text", "json") else [f"--format {arguments.format}"]

@@ -60,11 +60,6 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.line:
         return write(_SCRIPTS[arguments.shell], CLEAN)
     directory, words = split_directory(arguments.line)
-    return write("".join(f"{word}\n" for word in _candidates(directory, words)), CLEAN)
-
-
-def _candidates(directory: str | None, words: list[str]) -> list[str]:
-    """The completions of the last word, sorted."""
     *before, last = words or [""]
     commands = known_commands()
     if not before or before == ["help"]:
@@ -73,7 +68,8 @@ def _candidates(directory: str | None, words: list[str]) -> list[str]:
         candidates = ()
     else:
         candidates = _command_candidates(parser_of(commands[before[0]]), before, last, directory)
-    return sorted({word for word in candidates if word.startswith(last)})
+    completions = sorted({word for word in candidates if word.startswith(last)})
+    return write("".join(f"{word}\n" for word in completions), CLEAN)
 
 
 def _command_candidates(

@@ -1,18 +1,176 @@
-"""`coursebuild explain`: say what a rule means, or why something would run again."""
+"""`coursebuild explain`: say what a rule means, or why something would run again.
+
+Of a path it says whether it would run again, why, and what depends on it. The lessons are read and
+parsed; nothing is run, compiled or written, and neither NumPy nor MuJoCo is imported.
+"""
 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
+import time
+from collections.abc import Iterator
+from typing import Literal
+
+from msgspec import Struct
 
 from coursebuild.cli.arguments import add_format, options_of, style_of
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.resources import rules_page
-from coursebuild.core.registry import installed_features
-from coursebuild.core.text.rules import RULES
-from coursebuild.pipeline.explain import explain
-from coursebuild.report.explained import explanation_text, rule_text
-from coursebuild.report.values import json_text, plain
+from coursebuild.core.model import (
+    Course,
+    Document,
+    ExampleTarget,
+    FeatureBlock,
+    Image,
+    Lesson,
+    Link,
+    ModelTarget,
+    NumberBinding,
+    UrlTarget,
+    block_inlines,
+    document_blocks,
+    local_file,
+    walk_inlines,
+)
+from coursebuild.core.registry import feature_trials, installed_features
+from coursebuild.core.run.dependencies import (
+    Inputs,
+    Kind,
+    describe,
+    sought_files,
+    state_changes,
+)
+from coursebuild.core.run.mjcf import existing_files
+from coursebuild.core.run.run_record import RunRecord
+from coursebuild.core.scripts.extract import extract, jobs
+from coursebuild.core.text.diagnostics import nearest
+from coursebuild.core.text.rules import RULES, Rule
+from coursebuild.numerics.reports.records import BENCH
+from coursebuild.pipeline.load import load_course
+from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
+from coursebuild.report.text import BOLD, FAINT, GREEN, YELLOW, Style, visible
+from coursebuild.report.values import json_text, plain, plural
+
+State = Literal["remembered", "would run", "norun"]
+
+
+class RunExplanation(Struct, frozen=True):
+    """Whether a script or a lab would run now, and why."""
+
+    kind: Literal["script", "lab"]
+    name: str
+    """A script's path, or a lab's name."""
+    owner: str
+    """Id of its lesson or page."""
+    state: State
+    reasons: tuple[str, ...] = ()
+    """Why it would run, each a clause."""
+    depends: tuple[str, ...] = ()
+    """What its last result depends on, a line for each."""
+    made: int | None = None
+    """When its last result was made, in seconds since 1970."""
+    seconds: float | None = None
+    outcome: str = ""
+    """How its last run ended; empty where there was none."""
+
+
+class Explanation(Struct, frozen=True):
+    """What is known of a path."""
+
+    path: str
+    kind: Literal["script", "lab", "lesson", "page", "model", "file"]
+    runs: tuple[RunExplanation, ...]
+    """Those of the script or lab, or of all scripts and labs of a lesson or page."""
+    dependents: tuple[RunExplanation, ...] = ()
+    """Scripts and labs whose results depend on it."""
+    files: tuple[str, ...] = ()
+    """The other files of which a model consists."""
+    part_of: tuple[str, ...] = ()
+    """The models that include it."""
+    shown_in: tuple[str, ...] = ()
+    """Files of the lessons and pages that show it, link to it or quote its output."""
+
+
+def rule_text(rule: Rule, page: str) -> str:
+    """What a rule means: its section of the page of rules, or else its summary."""
+    section = re.search(rf"^## {rule.name}\n+(.*?)\s*(?=^## |\Z)", page, re.DOTALL | re.MULTILINE)
+    text = section[1] if section else f"{rule.severity.capitalize()}. {rule.summary}"
+    return f"{rule.name}\n\n{text}\n"
+
+
+def explanation_text(explanation: Explanation, style: Style) -> str:
+    """Return an explanation as text for people."""
+    e = explanation
+    parts: list[str] = []
+    if e.kind in ("script", "lab"):
+        parts += ["\n".join(_full_text(run, style)) for run in e.runs]
+    else:
+        parts.append(style.paint(_heading(e), BOLD))
+        parts += ["\n".join(_short_text(run, style)) for run in e.runs]
+    if e.files:
+        parts.append(_block("consists also of", e.files))
+    if e.part_of:
+        parts.append(_block("is a part of", e.part_of))
+    if e.dependents:
+        lines = [line for run in e.dependents for line in _short_text(run, style)]
+        parts.append("\n".join(["depending on it:", *(f"  {line}" for line in lines)]))
+    elif e.kind in ("model", "file"):
+        parts.append("no result of a script or lab depends on it")
+    if e.shown_in:
+        parts.append(_block("shown, linked or quoted in", e.shown_in))
+    return "\n\n".join(parts) + "\n"
+
+
+def _heading(e: Explanation) -> str:
+    if e.kind in ("model", "file"):
+        return visible(e.path)
+    count = sum(run.state == "would run" for run in e.runs)
+    if not e.runs:
+        return f"{visible(e.path)} has no scripts and no labs"
+    verdict = "none would run" if not count else f"{count} would run"
+    scripts = sum(run.kind == "script" for run in e.runs)
+    labs = len(e.runs) - scripts
+    counts = [plural(scripts, "script")] if scripts else []
+    counts += [plural(labs, "lab")] if labs else []
+    return f"{visible(e.path)}: {' and '.join(counts)}, of which {verdict}"
+
+
+def _block(head: str, lines: tuple[str, ...]) -> str:
+    return "\n".join([f"{head}:", *(f"  {visible(line)}" for line in lines)])
+
+
+def _verdict(run: RunExplanation, style: Style) -> str:
+    match run.state:
+        case "remembered":
+            return style.paint("is remembered", GREEN)
+        case "norun":
+            return "is never run: its lesson says `norun`"
+        case "would run":
+            suffix = " again" if run.made is not None else ""
+            verb = "run" if run.kind == "script" else "be tried"
+            return style.paint(f"would {verb}{suffix}", YELLOW)
+
+
+def _full_text(run: RunExplanation, style: Style) -> list[str]:
+    lines = [f"{style.paint(visible(run.name), BOLD)} {_verdict(run, style)}"]
+    lines += [f"  because {visible(reason)}" for reason in run.reasons]
+    last = "not run yet on this machine"
+    if run.made is not None and run.seconds is not None:
+        time_text = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(run.made))
+        last = f"last run {time_text}, {run.seconds:.2f} s: {run.outcome}"
+    lines.append(style.paint(f"  of {run.owner}, {last}", FAINT))
+    if run.depends:
+        lines += ["", "its last result depends on:"]
+        lines += [f"  {visible(line)}" for line in run.depends]
+    return lines
+
+
+def _short_text(run: RunExplanation, style: Style) -> list[str]:
+    line = f"{visible(run.name)} {_verdict(run, style)}"
+    return [line, *(f"  because {visible(reason)}" for reason in run.reasons)]
+
 
 EXAMPLES = """\
 examples:
@@ -43,3 +201,196 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.format == "json":
         return write(json_text(plain(explanation, runs="own", shown_in="shown")), CLEAN)
     return write(explanation_text(explanation, style_of(sys.stdout)), CLEAN)
+
+
+def explain(options: Options, name: str) -> Explanation:
+    """What is known of a script, lab, lesson, page, model, or any file of the project.
+
+    Raises:
+        UsageError: the course cannot be read, or nothing in it is called so.
+    """
+    return _Explainer(load_course(options.root), options).explain(name)
+
+
+class _Explainer:
+    """Knows a course and its last results."""
+
+    def __init__(self, course: Course, options: Options) -> None:
+        self.course = course
+        self.root = options.root
+        self.run_store = options.for_course(course).run_store()
+        self.models = {
+            model.source.path: existing_files(options.root, model.source.path, model.source.text)
+            for model in course.models
+        }
+        extractions = extract(course).value
+        self.documents = documents_by_name(course)
+        self.scripts = {
+            extraction.path: (extraction, job)
+            for extraction, job in zip(extractions, jobs(extractions), strict=True)
+        }
+        trials = feature_trials(course).items()
+        inputs = ((name, kind.inputs(trial), trial) for name, (kind, trial) in trials)
+        self.labs = {
+            name: (trial_inputs, trial)
+            for name, trial_inputs, trial in inputs
+            if trial_inputs is not None
+        }
+
+    def explain(self, name: str) -> Explanation:
+        path = path_from_root(name, self.root)
+        for candidate in (name, path):
+            explanation = self._find_by_name(candidate)
+            if explanation is not None:
+                return explanation
+        dependents = self._find_dependents(path)
+        whole = self._models_with(path)
+        if not dependents and not whole and not (self.root / path).exists():
+            closest = nearest(name, [*self.scripts, *self.labs, *self.documents, *RULES])
+            help = f"did you mean `{closest}`?" if closest is not None else ""
+            raise UsageError(f"nothing of this course is called `{name}`", help=help)
+        return self._explain_file(path, "file", dependents)
+
+    def _find_by_name(self, name: str) -> Explanation | None:
+        if name in self.scripts:
+            dependents = self._find_dependents(name)
+            explanation = self._explain_script(name)
+            return Explanation(
+                name, "script", (explanation,), dependents, shown_in=self._documents_using(name)
+            )
+        if name in self.labs:
+            return Explanation(name, "lab", (self._explain_lab(name),))
+        part = self.documents.get(name)
+        if part is not None:
+            scripts = [
+                self._explain_script(p)
+                for p, (e, _) in self.scripts.items()
+                if e.document == part.path
+            ]
+            labs = [
+                self._explain_lab(name)
+                for name, (_, trial) in self.labs.items()
+                if trial.block.span.path == part.path
+            ]
+            kind: Literal["lesson", "page"] = "lesson" if isinstance(part, Lesson) else "page"
+            return Explanation(part.path, kind, (*scripts, *labs))
+        for model in self.course.models:
+            path = model.source.path
+            if name in (model.name, path):
+                return self._explain_file(path, "model", self._find_dependents(path))
+        return None
+
+    def _explain_file(
+        self, path: str, kind: Literal["model", "file"], dependents: tuple[RunExplanation, ...]
+    ) -> Explanation:
+        files = self.models.get(path, ())
+        whole, documents = self._models_with(path), self._documents_using(path)
+        return Explanation(path, kind, (), dependents, files, whole, documents)
+
+    def _models_with(self, path: str) -> tuple[str, ...]:
+        return tuple(model for model, files in self.models.items() if path in files)
+
+    # --- scripts and labs
+
+    def _explain_script(self, path: str) -> RunExplanation:
+        extraction, job = self.scripts[path]
+        if extraction.script.norun:
+            return RunExplanation("script", path, extraction.owner, "norun")
+        inputs = self.run_store.inputs(job, extraction.data)
+        record = self.run_store.get_record(inputs)
+        if record is not None:
+            return _describe_run("script", path, extraction.owner, record, ())
+        last, reasons = self.run_store.last_record(path), self.run_store.reasons(inputs)
+        return _describe_run("script", path, extraction.owner, last, tuple(reasons))
+
+    def _explain_lab(self, name: str) -> RunExplanation:
+        inputs, trial = self.labs[name]
+        last = self.run_store.last_record(inputs.path)
+        holds = last is not None and self._is_lab_remembered(last, inputs)
+        reasons = [] if holds else self.run_store.reasons(inputs)
+        return _describe_run("lab", name, trial.owner, last, tuple(reasons))
+
+    def _is_lab_remembered(self, last: RunRecord, inputs: Inputs) -> bool:
+        is_unchanged = not last.reason_forgotten and last.inputs == inputs
+        return is_unchanged and not list(state_changes(last.dependencies, self.run_store.states))
+
+    def _find_dependents(self, path: str) -> tuple[RunExplanation, ...]:
+        """Find scripts and labs whose last results depend on a file or on its folder's listing."""
+        dependents = []
+        for script in self.scripts:
+            if script != path and self._depends(self.run_store.last_record(script), path):
+                dependents.append(self._explain_script(script))
+        for name, (inputs, trial) in self.labs.items():
+            models = [f"models/{model}.xml" for model in trial.block.models()]
+            if path in models or self._depends(self.run_store.last_record(inputs.path), path):
+                dependents.append(self._explain_lab(name))
+        return tuple(dependents)
+
+    def _depends(self, last: RunRecord | None, path: str) -> bool:
+        folder = path.rpartition("/")[0]
+        return last is not None and any(
+            (d.kind is Kind.FILE and d.name == path)
+            or (d.kind is Kind.LISTING and d.name in (path, folder))
+            or (d.kind is Kind.SOUGHT and path in sought_files(d.name))
+            for d in last.dependencies
+        )
+
+    # --- pages
+
+    def _documents_using(self, path: str) -> tuple[str, ...]:
+        return tuple(
+            document.source.path
+            for document in self.course.documents
+            if any(True for _ in _uses(document, path))
+        )
+
+
+def _uses(document: Document, path: str) -> Iterator[object]:
+    """The parts of a document that show a file, link to it, or quote its output."""
+    for block in document_blocks(document):
+        if isinstance(block, FeatureBlock):
+            mentioned = block.mentioned_models()
+            models = {f"models/{model}.xml" for model in (*block.models(), *mentioned)}
+            if path in models.union(map(BENCH.path, mentioned)):
+                yield block
+        for inline in walk_inlines(block_inlines(block)):
+            match inline:
+                case Image(url=url) if local_file(url, document.source.path) == path:
+                    yield inline
+                case Link(target=UrlTarget(url=url)) if (
+                    "://" not in url and local_file(url, document.source.path) == path
+                ):
+                    yield inline
+                case Link(target=ModelTarget(name=name)) if f"models/{name}.xml" == path:
+                    yield inline
+                case Link(target=ExampleTarget(path=example)) if example == path:
+                    yield inline
+                case NumberBinding(script=script) if script == path:
+                    yield inline
+                case _:
+                    pass
+
+
+def _describe_run(
+    kind: Literal["script", "lab"],
+    name: str,
+    owner: str,
+    record: RunRecord | None,
+    reasons: tuple[str, ...],
+) -> RunExplanation:
+    state: State = "would run" if reasons else "remembered"
+    if record is None:
+        return RunExplanation(kind, name, owner, state, reasons)
+    depends = [describe(dependency) for dependency in record.dependencies]
+    depends += [f"{subject}: {value}" for subject, value in record.inputs.conditions]
+    return RunExplanation(
+        kind,
+        name,
+        owner,
+        state,
+        reasons,
+        tuple(depends),
+        record.timestamp,
+        record.stored_run.seconds,
+        record.stored_run.outcome.value,
+    )

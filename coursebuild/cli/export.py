@@ -7,7 +7,7 @@ from pathlib import Path
 
 from coursebuild.cli.arguments import add_running, options_of, print_report
 from coursebuild.core.registry import features
-from coursebuild.pipeline.build import export
+from coursebuild.pipeline.publication import export
 
 EXAMPLES = """\
 examples:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from coursebuild.cli.arguments import add_quiet, options_of, print_report
-from coursebuild.pipeline.update import extract
+from coursebuild.pipeline.outputs import extract
 
 EXAMPLES = """\
 examples:

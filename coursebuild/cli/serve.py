@@ -1,14 +1,28 @@
-"""`coursebuild serve`: preview."""
+"""`coursebuild serve`: the course as a site in memory that follows every save.
+
+1. The course is read; its pages are drawn on demand.
+2. A thread takes saves (`live_course`): the page that was saved is new within milliseconds.
+3. The main thread does the rest in the background (`rebuild`): scripts, labs, fonts, whole checks.
+
+While something is wrong, the last good page stays, with the mistakes shown over it.
+"""
 
 from __future__ import annotations
 
 import argparse
 import re
 import sys
+import threading
+import webbrowser
 from typing import NoReturn
 
+import segno
+
 from coursebuild.cli.arguments import add_running, options_of, style_of
-from coursebuild.preview.serve import serve
+from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.preview.live_course import LiveCourse
+from coursebuild.preview.server import PreviewServer
+from coursebuild.report import Style
 
 EXAMPLES = """\
 examples:
@@ -65,3 +79,44 @@ def _parse_origin(text: str) -> str:
     if not re.fullmatch(r"[a-z][a-z0-9+.-]*:(//[\w.*\[\]:-]+)?", text):
         raise argparse.ArgumentTypeError(f"{text!r} is not an origin, such as https://example.org")
     return text
+
+
+def serve(
+    options: Options,
+    host: str,
+    port: int,
+    embed: tuple[str, ...],
+    style: Style,
+    *,
+    browse: bool,
+) -> NoReturn:
+    """Serve until interrupted.
+
+    `embed`: origins whose pages may show the preview in a frame. `style`: how mistakes are printed.
+    `browse`: open a browser.
+    """
+    live_course = LiveCourse(options, style)
+    try:
+        server = PreviewServer(host, port, live_course.session, embed)
+    except OSError as error:
+        reason = error.strerror or error
+        raise UsageError(f"port {port} of {host} cannot be used: {reason}") from None
+    try:
+        live_course.start()
+        server.start()
+        links = server.links
+        draw = options.progress.live
+        first, *other_links = links
+        print(f"serving {first} (stop with Ctrl-C)", file=sys.stderr, flush=True)
+        for link in other_links:
+            print(f"     or {link}", file=sys.stderr, flush=True)
+        if draw and "?" in links[-1]:
+            segno.make(links[-1]).terminal(sys.stderr, compact=True)
+        if browse:  # in a thread, since some browsers only return when their window is open
+            threading.Thread(
+                target=webbrowser.open, args=(first,), name="open", daemon=True
+            ).start()
+        live_course.rebuild()
+    finally:
+        server.stop()
+        live_course.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from coursebuild.cli.arguments import add_lessons, add_long, add_running, options_of, print_report
-from coursebuild.pipeline.update import update
+from coursebuild.pipeline.outputs import update
 
 EXAMPLES = """\
 examples:

@@ -9,66 +9,50 @@ points `coursebuild.features` of any installed package, or in a file that the co
 docs/how-to/features.md says how to write one.
 
 What the core asks of a parsed block are methods of `FeatureBlock` (`core.model`), so that a parsed
-course can be used without loading its features.
+course can be used without loading its features. What pages and other features ask of it stands in
+its `FenceKind`.
+
+All that features are given is defined below this module: `Fence`, `Library`, `PageContext` and so
+on know no feature. What asks features, from parsing a fence to listing pages, is above `registry`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, NewType, Protocol, TypeAlias, TypeVar
+from typing import Any, Generic, Literal, Protocol, TypeAlias, TypeVar
 
 from markupsafe import Markup
 from msgspec import Struct
 
+from coursebuild.core.engine.store import Store
 from coursebuild.core.model import Block, Course, Document, FeatureBlock, Inline, MjcfModel, Target
 from coursebuild.core.model.results import (
     CompileResult,
     FileList,
+    Mathml,
     ModelFacts,
-    OutputFile,
+    PublishedTrials,
     Results,
     ScriptRun,
     SiteFile,
     TrialResult,
 )
+from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.context import ExportContext, PageContext, SiteContext
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.core.pages.renderer import Renderer
+from coursebuild.core.pages.urls import Place
+from coursebuild.core.run.dependencies import Inputs
+from coursebuild.core.run.run_store import RunStore
+from coursebuild.core.run.script_environment import Interpreter
+from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.rules import Rule
-
-if TYPE_CHECKING:  # types of the layers above, which functions of features take
-    from coursebuild.core.engine.memo import Memo
-    from coursebuild.core.pages.added_files import ExportContext, SiteContext
-    from coursebuild.core.pages.assets import Assets
-    from coursebuild.core.pages.context import PageContext
-    from coursebuild.core.pages.library import Library
-    from coursebuild.core.pages.page_inputs import PageInputs
-    from coursebuild.core.pages.renderer import Renderer
-    from coursebuild.core.pages.urls import Place
-    from coursebuild.core.run.dependencies import Inputs
-    from coursebuild.core.run.memory import Memory
-    from coursebuild.core.run.script_environment import Interpreter
-    from coursebuild.core.syntax.fence import Fence
-    from coursebuild.core.syntax.texts import TextParser
-else:  # names that `help` can show, without importing these layers
-    Assets = NewType("Assets", object)
-    ExportContext = NewType("ExportContext", object)
-    Fence = NewType("Fence", object)
-    Inputs = NewType("Inputs", object)
-    Interpreter = NewType("Interpreter", object)
-    Library = NewType("Library", object)
-    Memo = NewType("Memo", object)
-    Memory = NewType("Memory", object)
-    PageContext = NewType("PageContext", object)
-    PageInputs = NewType("PageInputs", object)
-    Place = NewType("Place", object)
-    Renderer = NewType("Renderer", object)
-    SiteContext = NewType("SiteContext", object)
-    TextParser = NewType("TextParser", object)
+from coursebuild.core.text.source import Span
 
 B = TypeVar("B", bound=FeatureBlock)
-
-Mathml: TypeAlias = Callable[[str, bool], str]
-"""Typesets a formula, given whether on a line of its own; empty for one with an error."""
 
 
 class IndexReader(Protocol):
@@ -158,8 +142,14 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """A picture of the block for lists of lessons, given the published value of its trial."""
     wide: bool = True
     """Whether it takes the whole width of the text, so that no block can be docked beside it."""
+    docked: Callable[[B], bool] = lambda block: False
+    """Whether it stands beside the text on a wide screen."""
     index: Callable[[IndexReader, B], None] = lambda reader, block: None
     """Adds what the search can find of the block."""
+    scopes: Callable[[B], tuple[Span, ...]] = lambda block: (block.span,)
+    """Parts that stand for themselves, as questions do: what one assumes holds in it alone."""
+    tasks: Callable[[B], int] = lambda block: 0
+    """How many tasks it gives a reader."""
 
 
 class PageKind(Struct, frozen=True, kw_only=True):
@@ -282,8 +272,8 @@ class TrialContext(Struct, frozen=True):
     course: Course
     models: Mapping[str, CompileResult]
     """The compiled models of `models/`, by name."""
-    memory: Memory
-    """The memory of earlier trials, which also keeps new results."""
+    run_store: RunStore
+    """Notes of earlier trials; its `store` has their results, and takes new ones."""
     diagnostics: Sequence[Diagnostic] = ()
     """Diagnostics so far: a block with one need not be tried."""
     static: bool = False
@@ -302,14 +292,6 @@ class TrialRun(Protocol):
 
     def stop(self) -> None:
         """Called from another thread: end the running trial, and start no other."""
-
-
-class PublishedTrials(Struct, frozen=True):
-    """The results of trials as a site needs them."""
-
-    values: Mapping[str, Struct] = {}
-    """The value that the page of a block shows, by the trial's name."""
-    files: tuple[OutputFile, ...] = ()
 
 
 class Trials(Struct, frozen=True, kw_only=True):
@@ -338,7 +320,7 @@ class Feature(Struct, frozen=True, kw_only=True):
     model_part: ModelPart | None = None
     rules: tuple[Rule, ...] = ()
     """Rules of its own, in addition to the catalogue (`coursebuild.core.text.rules`)."""
-    reference: Callable[[Course, Memo, Interpreter | None], Struct | None] | None = None
+    reference: Callable[[Course, Store, Interpreter | None], Struct | None] | None = None
     """What it reads of the environment of the scripts, kept in `course.references`; the interpreter
     is `None` where the one of this tool runs them."""
     code_links: Callable[[Library, Place, Document], Mapping[int, str]] | None = None

@@ -16,38 +16,32 @@ from contextlib import contextmanager
 from importlib.metadata import EntryPoint, entry_points
 from inspect import isgenerator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.engine.store import Store
 from coursebuild.core.features import (
     Exporter,
     Feature,
     FenceKind,
-    Mathml,
     ModelPart,
     PageCopy,
     PageKind,
-    PublishedTrials,
     Trial,
     Trials,
 )
 from coursebuild.core.model import Course, Document, FeatureBlock
-from coursebuild.core.model.results import Results, ScriptRun
+from coursebuild.core.model.results import Mathml, PublishedTrials, Results, ScriptRun
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.library import Library
+from coursebuild.core.run.script_environment import Interpreter
+from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Span
-
-if TYPE_CHECKING:
-    from coursebuild.core.engine.memo import Memo
-    from coursebuild.core.pages.assets import Assets
-    from coursebuild.core.pages.library import Library
-    from coursebuild.core.pages.urls import Place
-    from coursebuild.core.run.script_environment import Interpreter
-    from coursebuild.core.syntax.fence import Fence
-    from coursebuild.core.syntax.texts import TextParser
-
 
 GROUP = "coursebuild.features"
 """The group of entry points under which packages offer features."""
@@ -182,6 +176,11 @@ def missing_package(name: str) -> str:
     return "" if name in _by_fence() else _INSTALLED_BY.get(name, "")
 
 
+def added_pages(library: Library) -> tuple[PageKind, ...]:
+    """The pages that features add to a course, in the order of menus."""
+    return tuple(kind for kind in page_kinds() if kind.exists(library))
+
+
 @functools.cache
 def page_kinds() -> tuple[PageKind, ...]:
     """The pages that features add, in the order of menus."""
@@ -198,6 +197,12 @@ def model_parts() -> dict[str, ModelPart]:
     """What features add to the pages of models, by the name of the feature."""
     parts = ((feature.name, feature.model_part) for feature in features())
     return {name: part for name, part in parts if part is not None}
+
+
+def has_copies(page: str) -> bool:
+    """Whether there are copies of a page; pages filled in by scripts have none."""
+    filled = (kind.path for kind in page_kinds() if not kind.indexed)
+    return page != urls.NOT_FOUND and page not in filled
 
 
 def page_copies() -> tuple[PageCopy, ...]:
@@ -224,7 +229,7 @@ def summarize(document: Document, mathml: Mathml) -> Parsed[dict[str, Struct]]:
 
 
 def read_references(
-    course: Course, store: Memo, interpreter: Interpreter | None
+    course: Course, store: Store, interpreter: Interpreter | None
 ) -> dict[str, Struct]:
     """What features read of the environment of the scripts, by feature."""
     readers = {f.name: f.reference for f in features() if f.reference is not None}
@@ -238,7 +243,7 @@ def losses_against(course: Course, python: str) -> tuple[Diagnostic, ...]:
     return tuple(diagnostic for find in finders for diagnostic in find(course, python))
 
 
-def code_links(library: Library, place: Place, document: Document) -> dict[int, str]:
+def code_links(library: Library, place: urls.Place, document: Document) -> dict[int, str]:
     """The addresses of what inline code in a document names, by the offset of the code."""
     finders = (feature.code_links for feature in features() if feature.code_links is not None)
     links: dict[int, str] = {}

@@ -14,7 +14,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.engine.digests import file_state
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model.addresses import recorded_figures
@@ -42,7 +42,7 @@ class Downloads(Struct, frozen=True):
 
     @classmethod
     def of(
-        cls, library: Library, assets: Assets, reader: Reader, root: Path, store: Memo
+        cls, library: Library, assets: Assets, reader: Reader, root: Path, store: Store
     ) -> Downloads:
         """The downloads of a course whose documents were read."""
         imports = _make_imports(library, reader)
@@ -85,7 +85,7 @@ def _make_dark_drawing(assets: Assets, read: Callable[[], bytes]) -> bytes:
 
 
 def _find_surroundings(
-    library: Library, root: Path, store: Memo, imports: Callable[[str], frozenset[str]]
+    library: Library, root: Path, store: Store, imports: Callable[[str], frozenset[str]]
 ) -> zips.Surroundings:
     """What scripts need to run elsewhere: packages, modules, models' files and a style."""
     if not library.scripts:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import diagnose_orphan_scenarios
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.course_features import features_digest, load_course_features
 from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.read import read_course, read_sources
@@ -37,7 +37,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.course import TEMPLATES, Theme
 from coursebuild.core.model.vocabulary import CALLOUTS, ENGLISH, Words
-from coursebuild.core.pages.assets import words_for
+from coursebuild.core.pages.materials import words_for
 from coursebuild.core.registry import read_references
 from coursebuild.core.run.script_environment import Interpreter, course_environment, engine_version
 from coursebuild.core.scripts.edit import check_source_parts, shown_files
@@ -114,7 +114,7 @@ class _Loader:
         self.code = code
         self.has_unknown_code = False
         self.files = read.value
-        self.store = Memo(root)
+        self.store = Store(root)
         self.unreadable = list(read.value.unreadable)
         """Files that cannot be read, or that are too long."""
         self.diagnostics = list(read.diagnostics)
@@ -122,7 +122,7 @@ class _Loader:
             self._read_map, self._read_declarations = reader.read_map, reader.read_declarations
             self._read_documents, self._check = reader.read_documents, reader.check
             return
-        from coursebuild.core.checks.course import check_course
+        from coursebuild.core.checks.lessons import check_course
         from coursebuild.core.syntax.coursemap import parse_course_map
         from coursebuild.core.syntax.declarations import parse_declarations
         from coursebuild.core.syntax.document import parse_document
@@ -227,7 +227,7 @@ class _Loader:
         """Return the theme with its files."""
         if theme == Theme() and not (self.root / TEMPLATES).is_dir():
             return theme
-        from coursebuild.pipeline.theme import load_theme
+        from coursebuild.pipeline.theme_files import load_theme
 
         parsed_theme = load_theme(self.root, theme)
         self.diagnostics += parsed_theme.diagnostics
@@ -258,7 +258,14 @@ class _Loader:
         What has run once at the user's command may run whenever the course is read.
         """
         if self.code == "refuse":
-            _refuse_code(self.root, course)
+            paths = [feature.path for feature in course.features]
+            paths += [TEMPLATES] if (self.root / TEMPLATES).exists() else []
+            if paths:
+                raise EffectError(
+                    f"`--sandbox` is around scripts alone, and `{paths[0]}` is code that the tool "
+                    "would run",
+                    help="look at what it does, and run the command without `--sandbox`",
+                )
         if self.code == "none":
             return
         if course.features:
@@ -382,18 +389,6 @@ class _Loader:
         texts = (source.path for source in (*self.files.lessons, *self.files.pages))
         excluded = {MAP, *texts, *(page.path for page in course.pages), *models}
         return tuple(path for path in self.files.files if path not in excluded)
-
-
-def _refuse_code(root: Path, course: Course) -> None:
-    """Refuse a course whose own features or templates would run as part of the tool."""
-    paths = [feature.path for feature in course.features]
-    paths += [TEMPLATES] if (root / TEMPLATES).exists() else []
-    if paths:
-        raise EffectError(
-            f"`--sandbox` is around scripts alone, and `{paths[0]}` is code that the tool would "
-            "run",
-            help="look at what it does, and run the command without `--sandbox`",
-        )
 
 
 def _check_unlisted_files(course: Course) -> Iterator[Diagnostic]:

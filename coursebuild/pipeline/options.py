@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from coursebuild.core.engine.memo import SIZE, Memo
+from coursebuild.core.engine.store import SIZE, Store
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.errors import UsageError as UsageError
 from coursebuild.core.files.read import find_root
 from coursebuild.core.files.trust import FOLDER, FOREIGN
 from coursebuild.core.files.write import undo_changes
 from coursebuild.core.model import Course, Lesson, Owner
-from coursebuild.core.run.memory import Memory
+from coursebuild.core.run.run_store import RunStore
 from coursebuild.core.run.script_environment import course_environment
 from coursebuild.core.text.diagnostics import did_you_mean, nearest
 from coursebuild.pipeline.progress import Progress
@@ -38,7 +38,7 @@ class Options(Struct, frozen=True):
     """Absolute, links resolved."""
     jobs: int
     """How many scripts run at a time."""
-    store: Memo
+    store: Store
     """Results made before."""
     progress: Progress = field(default_factory=lambda: Progress(quiet=True))
     """Says what is done; by default nothing."""
@@ -59,9 +59,9 @@ class Options(Struct, frozen=True):
         """The same options, with the environment that the map names for scripts, if it works."""
         return replace(self, interpreter=course_environment(self.root, course).value)
 
-    def memory(self, *, fresh: bool = False) -> Memory:
+    def run_store(self, *, fresh: bool = False) -> RunStore:
         """The remembered results of scripts; `fresh`: all scripts are to run again."""
-        return Memory(self.root, self.store, fresh=fresh, interpreter=self.interpreter)
+        return RunStore(self.root, self.store, fresh=fresh, interpreter=self.interpreter)
 
 
 def find_course(directory: str | None) -> Path:
@@ -92,7 +92,7 @@ def check_path(root: Path) -> None:
         raise UsageError(f"the path of the course is not UTF-8: {path_text}") from None
 
 
-def open_store(root: Path, location: str | None, size: str | None, *, fresh: bool = False) -> Memo:
+def open_store(root: Path, location: str | None, size: str | None, *, fresh: bool = False) -> Store:
     """Open the store of results: here, and at a shared place.
 
     What the command line does not set (`None`), the environment may: `COURSEBUILD_CACHE` the place,
@@ -118,14 +118,14 @@ def open_store(root: Path, location: str | None, size: str | None, *, fresh: boo
         raise UsageError("--cache names no place")
     shared = None
     if location is not None:
-        from coursebuild.core.engine.shared_cache import shared_cache
+        from coursebuild.core.engine.shared_place import shared_place
 
         try:
             key = os.environ.get("COURSEBUILD_CACHE_KEY", "").encode("utf-8", "surrogateescape")
-            shared = shared_cache(location, key)
+            shared = shared_place(location, key)
         except EffectError as error:
             raise UsageError(error.message, help=error.help) from None
-    store = Memo(root, shared=shared, size=limit, fresh=fresh)
+    store = Store(root, shared=shared, size=limit, fresh=fresh)
     if store.set_aside not in ("", FOREIGN):
         Progress().say(f"warning: {FOLDER} {store.set_aside}; it is set aside")
     return store

@@ -28,8 +28,8 @@ from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.checks.formulas import check_formulas, document_formulas
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.checks.lessons import check_formulas, document_formulas
+from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key, typesetter_digest
 from coursebuild.core.files.resources import prepared_folder, template_texts
 from coursebuild.core.model import Course, Declarations, Document, document_scripts
@@ -39,10 +39,11 @@ from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.formulas import equations_of
+from coursebuild.core.pages.materials import renderer_for
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.renderer import Renderer, Texts, known_mathml
 from coursebuild.core.pages.urls import Place
-from coursebuild.core.registry import summarize
+from coursebuild.core.registry import features, summarize
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode, encode
@@ -155,7 +156,7 @@ class Reader:
 
     def check(self, course: Course) -> tuple[Diagnostic, ...]:
         """What `check_course` finds; a course that was found clean is not checked again."""
-        from coursebuild.core.checks.course import check_course
+        from coursebuild.core.checks.lessons import check_course
 
         key = step_key("checked course")
         state = (self.fingerprints(course)[1] or "").encode()
@@ -315,16 +316,19 @@ class Reader:
 
     def draw_page(self, request: PageRequest) -> DrawnPage:
         """Draw a page here, and store it."""
-        from coursebuild.core.pages.added_files import page_notes
-        from coursebuild.core.pages.draw import draw
+        from coursebuild.core.pages.article import draw
 
         with self._lock:
             whole = None if request.text is None else self._whole_document(request.text)
             document = None if whole is None else whole.document
             renderer = self._renderer_for(request.language, request.templates, whole)
-            head, html, context = draw(request.inputs, document, renderer)
+            inputs = request.inputs
+            head, html, context = draw(inputs, document, renderer)
             page_record, body = record(head, html, request.base_url, context)
-            notes = page_notes(request.inputs, context, body)
+            all_notes = {
+                f.name: f.note(inputs, context, body) for f in features() if f.note is not None
+            }
+            notes = {name: note for name, note in all_notes.items() if note}
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
             page_record = replace(page_record, notes=tuple(digests))
             page = DrawnPage(head, page_record, notes, body.encode())
@@ -333,16 +337,14 @@ class Reader:
 
     def page_context(self, request: PageRequest) -> PageContext:
         """Return what is needed to draw parts of a page's document, with all its text."""
-        from coursebuild.core.pages.context import PageContext
+        from coursebuild.core.pages.page_writer import PageWriter
 
         inputs = request.inputs
         assert request.text is not None and inputs.document_inputs is not None
         with self._lock:
             whole = self._whole_document(request.text)
             renderer = self._renderer_for(request.language, request.templates, whole)
-        return PageContext(
-            renderer, inputs.document_inputs, Place(inputs.head.path), whole.document
-        )
+        return PageWriter(renderer, inputs.document_inputs, Place(inputs.head.path), whole.document)
 
     def _renderer_for(
         self, language: str, templates: Texts, whole: _WholeDocument | None
@@ -350,7 +352,7 @@ class Reader:
         """Return a renderer with words, templates, and the formulas of a document."""
         if (language, templates) not in self._renderers:
             assets = Assets(template_texts(), {}, prepared_folder())
-            self._renderers = {(language, templates): assets.renderer(language, templates)}
+            self._renderers = {(language, templates): renderer_for(assets, language, templates)}
         renderer = self._renderers[language, templates]
         return renderer if whole is None else replace(renderer, formulas=whole.formulas)
 
@@ -396,7 +398,7 @@ _UNPACKABLE = (pickle.PicklingError, AttributeError, TypeError, ValueError, Recu
 
 _HEAVY = (
     "coursebuild.core.run.v8",
-    "coursebuild.core.pages.draw",
+    "coursebuild.core.pages.article",
     "coursebuild.core.pages.highlight",
     "coursebuild.core.pages.document_inputs",
     "coursebuild.core.pages.page_list",
@@ -419,7 +421,7 @@ def _prepare_to_read(sample: SourceText) -> None:
         start()
 
 
-def kept_formulas(store: Memo, path: str) -> dict[Formula, str]:
+def kept_formulas(store: Store, path: str) -> dict[Formula, str]:
     """The MathML of the formulas that the text at a path had when it was last read."""
     key = _formulas_key(path)
     return store.get(_MATHML, key, lambda data: decode(data, dict[Formula, str])) or {}

@@ -39,8 +39,8 @@ from coursebuild.core.run.dependencies import (
     inputs_of,
     state_changes,
 )
-from coursebuild.core.run.memory import States
 from coursebuild.core.run.run_record import RunRecord, record_of
+from coursebuild.core.run.run_store import States
 from coursebuild.core.run.script_environment import machine
 from coursebuild.core.scripts.extract import Extraction, jobs
 from coursebuild.core.scripts.figures import SVG_HELP, describe_difference, prepare_figure
@@ -235,7 +235,7 @@ def check_drawings(course: Course, options: Options) -> Iterator[Diagnostic]:
                 return drawing.encode() if isinstance(drawing, str) else b""
 
             key = step_key("drawing", hashlib.sha256(data).hexdigest())
-            fault = options.store.get_or_create("drawings", key, find_fault)
+            fault = options.store.get_or_make("drawings", key, find_fault)
             if fault:
                 message = f"`{path}` {fault.decode()}"
                 help = f'{SVG_HELP}, unless the map says `html = "trusted"`'

@@ -21,7 +21,7 @@ from coursebuild.core.model import Course, Recording, find_blocks
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
 from coursebuild.core.model.sensitivity import HALVED_RUN, RUNS, Sensitivity
 from coursebuild.core.run.dependencies import Inputs
-from coursebuild.core.run.memory import Memory, longest_first
+from coursebuild.core.run.run_store import RunStore, longest_first
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
 from coursebuild.core.scripts.failures import is_lost
 from coursebuild.core.scripts.findings import count_unproven
@@ -106,30 +106,30 @@ def run(
     scripts: Iterable[Extraction],
     options: Options,
     stage: str = "running scripts",
-    memory: Memory | None = None,
+    run_store: RunStore | None = None,
     perturbation: int = 0,
     known_runs: Mapping[str, ScriptRun] | None = None,
 ) -> tuple[ScriptRun, ...]:
     """Return the results of scripts: remembered ones, and those of the others, which run now.
 
-    `memory` replaces that of the options. `perturbation`: with initial states moved, in the
+    `run_store` replaces that of the options. `perturbation`: with initial states moved, in the
     direction of this number. `known_runs`: results, by path, that are known to hold.
     """
     extractions = tuple(scripts)
-    memory = options.memory() if memory is None else memory
+    run_store = options.run_store() if run_store is None else run_store
     all_jobs = jobs(extractions, perturbation)
     norun = (script.path for script in extractions if script.script.norun)
     runs = {path: ScriptRun(path, Outcome.NORUN, 0, "", "", 0.0) for path in norun}
     runs |= {**(known_runs or {}), **recorded_runs(extractions, options)}
     inputs = {
-        job.path: memory.inputs(job, extraction.data)
+        job.path: run_store.inputs(job, extraction.data)
         for job, extraction in zip(all_jobs, extractions, strict=True)
         if job.path not in runs
     }
     if inputs:
-        runs |= memory.recall(tuple(inputs.values()))
+        runs |= run_store.get_runs(tuple(inputs.values()))
     jobs_to_run = [job for job in all_jobs if job.path not in runs]
-    for script_run in _run(jobs_to_run, inputs, options, stage, memory):
+    for script_run in _run(jobs_to_run, inputs, options, stage, run_store):
         runs[script_run.path] = script_run
     return tuple(runs[job.path] for job in all_jobs)
 
@@ -139,7 +139,7 @@ def _run(
     inputs: Mapping[str, Inputs],
     options: Options,
     stage: str,
-    memory: Memory,
+    run_store: RunStore,
 ) -> tuple[ScriptRun, ...]:
     """Run scripts, the longest first, and remember what they did."""
     if not jobs_to_run:
@@ -147,21 +147,21 @@ def _run(
     from coursebuild.core.run.script_server import ScriptServer
 
     progress = options.progress
-    last_runs = (memory.last_record(job.path) for job in jobs_to_run)
+    last_runs = (run_store.last_record(job.path) for job in jobs_to_run)
     seconds = {last.inputs.path: last.stored_run.seconds for last in last_runs if last is not None}
 
     def on_start(path: str) -> None:
-        memory.note_start(path)
+        run_store.note_start(path)
         progress.start(path)
 
     def on_finish(script_run: ScriptRun) -> None:
-        memory.keep(inputs[script_run.path], script_run)
+        run_store.put_run(inputs[script_run.path], script_run)
         progress.finish(script_run.path, script_run.outcome.value, script_run.seconds)
 
     if options.verbose:
         for job in jobs_to_run:
-            progress.say(f"{job.path}: {'; '.join(memory.reasons(inputs[job.path]))}")
-    memory.begin()
+            progress.say(f"{job.path}: {'; '.join(run_store.reasons(inputs[job.path]))}")
+    run_store.begin()
     with ScriptServer(sandbox=options.sandbox) as server, progress.stage(stage, len(jobs_to_run)):
         run_all = options.run_all or server.run
         return run_all(
@@ -265,12 +265,12 @@ def _run_perturbed(
         return runs
     from coursebuild.core.run.script_server import ScriptServer
 
-    memory = options.memory()
+    run_store = options.run_store()
     with ScriptServer(sandbox=options.sandbox) as server:
         server_options = replace(options, run_all=server.run)
         for number in numbers:
             halving = number == HALVED_RUN
             stage = "halving timesteps" if halving else f"moving initial states, {number} of {RUNS}"
-            for script_run in run(scripts, server_options, stage, memory, perturbation=number):
+            for script_run in run(scripts, server_options, stage, run_store, perturbation=number):
                 runs[script_run.path].append(script_run)
     return runs

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.resources import prepared_file
 from coursebuild.core.model import (
@@ -38,14 +38,16 @@ from coursebuild.core.model import (
     document_inlines,
 )
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, SiteFile
-from coursebuild.core.pages import meta, urls
-from coursebuild.core.pages.added_files import NotedPage, SiteContext, added_files, compressed_files
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.assets import Names, compressed_files
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
-from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame, parts_by_mark
+from coursebuild.core.pages.context import NotedPage, SiteContext
+from coursebuild.core.pages.frame import FrameInputs, PageFrame, parts_by_mark, robots, sitemap
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.links import Reference, has_anchor
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import PageRecord
+from coursebuild.core.pages.references import Reference, has_anchor
+from coursebuild.core.registry import features
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.html import find_address
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
@@ -211,20 +213,18 @@ class Site:
     @functools.cached_property
     def files(self) -> tuple[SiteFile, ...]:
         """All files but that list, sorted by path."""
-        course, trial_files = self._library.course, self._library.trials.files
+        course, trial_files = self._library.course, self._library.trial_files
         files: list[SiteFile] = [*self._shared_files[0], *trial_files]
 
         def keep(key: str, make: Callable[[], bytes]) -> bytes:
-            return prepared_file("copies", key) or self._store.get_or_create(
-                "compressed", key, make
-            )
+            return prepared_file("copies", key) or self._store.get_or_make("compressed", key, make)
 
         files += compressed_files(files, keep)
         files += (*self._downloads.files, *self._added_files[0], *self._page_files())
-        files.append(OutputFile(urls.ROBOTS, meta.robots(course)))
+        files.append(OutputFile(urls.ROBOTS, robots(course)))
         if course.base_url:
             indexed = (path for path, entry in self._pages.items() if entry.record.indexed)
-            files.append(OutputFile(urls.SITEMAP, meta.sitemap(course, indexed)))
+            files.append(OutputFile(urls.SITEMAP, sitemap(course, indexed)))
         return tuple(sorted(files, key=lambda file: file.path))
 
     @functools.cached_property
@@ -252,7 +252,18 @@ class Site:
 
     @functools.cached_property
     def _added_files(self) -> tuple[list[SiteFile], FileList | None]:
-        return added_files(self._context)
+        """The files of all features, and the list of all files, if one makes it."""
+        files: list[SiteFile] = []
+        file_list: FileList | None = None
+        for feature in features():
+            if feature.files is None:
+                continue
+            for file in feature.files(self._context(feature.name)):
+                if isinstance(file, FileList):
+                    file_list = file
+                else:
+                    files.append(file)
+        return files, file_list
 
     def _context(self, feature: str) -> SiteContext:
         """Return what a feature makes its files from."""
@@ -267,7 +278,7 @@ class Site:
                 if name == feature
             ),
             lambda path: self._load(path).notes[feature],
-            functools.partial(self._store.get_or_create, "parts"),
+            functools.partial(self._store.get_or_make, "parts"),
             self._downloads.archives,
             self._downloads.imports,
         )
@@ -333,7 +344,7 @@ def page_request(entry: PageEntry, library: Library) -> PageRequest:
     )
 
 
-def _cut_font(store: Memo, job: FontJob) -> bytes:
+def _cut_font(store: Store, job: FontJob) -> bytes:
     """Return a cut font: delivered with the tool, stored, or cut now."""
 
     def make() -> bytes:
@@ -341,7 +352,7 @@ def _cut_font(store: Memo, job: FontJob) -> bytes:
 
         return subset_font(job)
 
-    return prepared_file("fonts", job.key) or store.get_or_create("fonts", job.key, make)
+    return prepared_file("fonts", job.key) or store.get_or_make("fonts", job.key, make)
 
 
 def broken_links(course: Course, files: Sequence[SiteFile]) -> Iterator[Diagnostic]:
@@ -349,7 +360,7 @@ def broken_links(course: Course, files: Sequence[SiteFile]) -> Iterator[Diagnost
 
     The place is that of the raw HTML that wrote the link; of other links, the place in the page.
     """
-    from coursebuild.core.pages.links import check_links
+    from coursebuild.core.pages.references import check_links
 
     pages = {
         file.path: file.data if isinstance(file, OutputFile) else file.make()

@@ -34,7 +34,7 @@ from coursebuild.core.model.results import (
     Verdict,
 )
 from coursebuild.core.registry import check_runs, feature_trials
-from coursebuild.core.run.memory import Memory
+from coursebuild.core.run.run_store import RunStore
 from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.core.scripts.bindings import BindingEvidence, document_bindings
 from coursebuild.core.scripts.compare import repeat_findings
@@ -91,11 +91,13 @@ def verify(
     extracted_scripts = extract_scripts(course, options)
     extractions, trials = _select(course, extracted_scripts.runnable, documents, shard)
     models, model_diagnostics = compile_models(course, options)
-    memory = options.memory()
-    run_scripts = functools.partial(run, extractions, options, memory=memory, known_runs=known_runs)
-    trial_memory = Memory(options.root, options.store)  # another thread uses it
+    run_store = options.run_store()
+    run_scripts = functools.partial(
+        run, extractions, options, run_store=run_store, known_runs=known_runs
+    )
+    trial_runs = RunStore(options.root, options.store)  # another thread uses it
     context = TrialContext(
-        options.root, course, dict(models), trial_memory, model_diagnostics, static
+        options.root, course, dict(models), trial_runs, model_diagnostics, static
     )
     runs, (trial_results, trial_diagnostics) = _run_with_trials(
         run_scripts, trials, context, options.progress
@@ -118,7 +120,7 @@ def verify(
             second_runs,
             [f"models/{name}.xml" for name, model in models if model.error],
         ),
-        *repeat_findings(course, extractions, memory.differing_runs),
+        *repeat_findings(course, extractions, run_store.differing_runs),
         *check_runs(course, runs),
         *_diagnose_nothing(course, () if shard is not None else runs),
         *figure_findings(course, runs, functools.partial(read_recorded, options.root)),
@@ -172,8 +174,8 @@ def _repeat_drifted(
     scripts = [e for e in extractions if e.path in drifted_paths & quick and not e.script.once]
     if not scripts:
         return {}
-    memory = options.memory(fresh=True)
-    repeated_runs = run(scripts, options, "running again what differs", memory)
+    run_store = options.run_store(fresh=True)
+    repeated_runs = run(scripts, options, "running again what differs", run_store)
     return {script_run.path: script_run for script_run in repeated_runs}
 
 
@@ -203,7 +205,14 @@ def _select(
     """Select the scripts to run, and the trials."""
     extractions, trials = runnable, feature_trials(course)
     if documents is not None:
-        quoted_scripts = _quoted_scripts(course, documents)
+        quoted_scripts: set[str] = set()
+        for document in course.documents:
+            if document.source.path in documents:
+                quoted_scripts |= {
+                    b.script for b in document_bindings(document) if b.script is not None
+                }
+                for block in find_blocks(document, FeatureBlock):
+                    quoted_scripts |= {script for script, _ in block.quoted_lines()}
         extractions = [
             e for e in extractions if e.document in documents or e.path in quoted_scripts
         ]
@@ -214,17 +223,6 @@ def _select(
         extractions = [e for e in extractions if e.path in only]
         trials = {name: pair for name, pair in trials.items() if name in only}
     return extractions, tuple(trials.values())
-
-
-def _quoted_scripts(course: Course, documents: Collection[str]) -> set[str]:
-    """Find the scripts, of any lesson, whose output these documents quote."""
-    paths: set[str] = set()
-    for document in course.documents:
-        if document.source.path in documents:
-            paths |= {b.script for b in document_bindings(document) if b.script is not None}
-            for block in find_blocks(document, FeatureBlock):
-                paths |= {script for script, _ in block.quoted_lines()}
-    return paths
 
 
 # --- models

@@ -29,7 +29,8 @@ from urllib.parse import parse_qsl, unquote, urlencode, urlsplit
 from msgspec import Struct
 
 from coursebuild.core.files.resources import Bundle, template_texts
-from coursebuild.core.pages.assets import page_script, strings_for
+from coursebuild.core.pages.assets import page_script
+from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.pages.strings import DEFAULT_LANGUAGE, Strings
 from coursebuild.preview.session import Session
 

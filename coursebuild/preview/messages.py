@@ -38,7 +38,7 @@ from coursebuild.core.scripts.bindings import document_bindings
 from coursebuild.core.scripts.diff import diff_rows
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
+from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.recordings import read_recorded
 from coursebuild.preview.session import Session
@@ -130,7 +130,10 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
         "numbers": [],
     }
     if document is not None and library is not None:
-        news["scripts"] = list(_scripts(library, document))
+        news["scripts"] = [
+            {"path": script.path, "state": _state(library.runs.get(script.path))}
+            for script in document_scripts(document)
+        ]
         news["outputs"] = list(_outputs(session, library, document))
         news["figures"] = list(_figures(session, library, document))
         news["numbers"] = list(_numbers(document, report.diagnostics))
@@ -152,7 +155,10 @@ def _describe_mistake(diagnostic: Diagnostic, document_path: str) -> dict[str, A
         "message": diagnostic.message,
         "label": diagnostic.label,
         "help": diagnostic.help,
-        "notes": [_note(note) for note in diagnostic.notes],
+        "notes": [
+            (note.message if note.span is None else f"{location(note.span)}: {note.message}")
+            for note in diagnostic.notes
+        ],
         "line": line,
         "start": span.column - 1,
         "end": max(end, span.column - 1),
@@ -160,16 +166,7 @@ def _describe_mistake(diagnostic: Diagnostic, document_path: str) -> dict[str, A
     }
 
 
-def _note(note: Note) -> str:
-    return note.message if note.span is None else f"{location(note.span)}: {note.message}"
-
-
 # --- scripts and outputs
-
-
-def _scripts(library: Library, document: Document) -> Iterator[dict[str, str]]:
-    for script in document_scripts(document):
-        yield {"path": script.path, "state": _state(library.runs.get(script.path))}
 
 
 def _state(run: ScriptRun | None) -> str:

@@ -248,9 +248,9 @@ class BackgroundRebuild:
         scripts = [script for script in extract(course).value if script.path in paths]
         if scripts:
             self._begin_step("running scripts again")
-            memory = options.memory(fresh=True)
+            run_store = options.run_store(fresh=True)
             server_options = replace(options, run_all=self._run_unless_edited(course))
-            runs = run(scripts, server_options, "running scripts again", memory)
+            runs = run(scripts, server_options, "running scripts again", run_store)
             with session.condition:
                 session.runs.take_second_runs(runs)
                 session.notify()

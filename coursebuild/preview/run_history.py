@@ -11,9 +11,8 @@ from typing import TypeAlias
 
 from msgspec.structs import replace
 
-from coursebuild.core.features import PublishedTrials
 from coursebuild.core.model import Course
-from coursebuild.core.model.results import Outcome, Results, ScriptJob, ScriptRun
+from coursebuild.core.model.results import Outcome, PublishedTrials, Results, ScriptJob, ScriptRun
 from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import extract, jobs

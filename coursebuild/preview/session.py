@@ -20,7 +20,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 
 from msgspec.structs import replace
 
-from coursebuild.core.checks.course import check_document
+from coursebuild.core.checks.lessons import check_document
 from coursebuild.core.checks.links import LinkTargets, link_targets
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
@@ -29,6 +29,7 @@ from coursebuild.core.model.results import Reports, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.renderer import TemplateFailure
 from coursebuild.core.registry import publish_trials
 from coursebuild.core.scripts.edit import shown_files
@@ -38,10 +39,10 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.shown_reports import shown_reports
-from coursebuild.pipeline.theme import template_diagnostic
+from coursebuild.pipeline.theme_files import template_diagnostic
 from coursebuild.pipeline.verify import Verification
-from coursebuild.preview.files import Files
 from coursebuild.preview.run_history import RunHistory, ScriptKey
+from coursebuild.preview.site_files import Files
 
 MAX_SINGLE_READS = 8
 """Documents saved at once that are read one by one; for more, the whole course is read."""
@@ -289,7 +290,7 @@ class Session:
         """Draw pages of this course from now on, with what is known of it."""
         results, trials = self.runs.results(course), self.runs.trials
         self._template_diagnostics = ()
-        self.library = Library(course, results, self._assets, self._reports, trials)
+        self.library = make_library(course, results, self._assets, self._reports, trials)
         self._targets = link_targets(course)
         if self._site:
             self.files.show(self.library)

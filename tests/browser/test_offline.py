@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.pipeline.options import Options
 from coursebuild.preview.answers import PREFIX, Answers
 from coursebuild.preview.server import PreviewServer
@@ -363,7 +363,7 @@ def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
     host = Host(tmp_path / "site")
     page, _ = settled_page(context, host)
     host.stop()
-    session = FolderSession(Options(host.folder, 1, Memo(host.folder)))
+    session = FolderSession(Options(host.folder, 1, Store(host.folder)))
     preview = PreviewServer("127.0.0.1", int(host.url.split(":")[2].strip("/")), session)
     preview.answers = OneScript(session, script)
     preview.start()

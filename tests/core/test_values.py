@@ -23,8 +23,8 @@ from coursebuild.core.model import (
     Table,
     Text,
 )
-from coursebuild.core.model.equations import DisplayFormula
 from coursebuild.core.model.results import Outcome
+from coursebuild.core.model.walk import DisplayFormula
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.values import decode, encode, fingerprint

@@ -19,7 +19,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.syntax.coursemap import parse_course_map
@@ -237,7 +237,7 @@ class _Client:
             (root / path).parent.mkdir(parents=True, exist_ok=True)
             (root / path).write_text(text)
         self.root = root
-        self.session = Session(Options(root, 1, Memo(root)), site=False)
+        self.session = Session(Options(root, 1, Store(root)), site=False)
         self.session.read()
         self.server = Server(self.session)
         self.protocol = self.server.client.protocol

@@ -16,8 +16,8 @@ import msgspec
 from msgspec import Struct
 
 from coursebuild.core.engine.manifest import KIND, MARKER
-from coursebuild.core.engine.memo import Memo
 from coursebuild.core.engine.publish import publish
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.trust import FOLDER, seal, store_key
 from coursebuild.core.files.write import journal_path, undo_changes
@@ -197,7 +197,7 @@ def manifest(data: bytes) -> None:
         root.mkdir()
         Path(top, "beside").write_text("beside")
         publish(root, out, _site("one"))
-        folder = Memo(root).folder / KIND
+        folder = Store(root).folder / KIND
         (file,) = folder.iterdir()
         ((_, entry_parts), *_) = msgspec.json.decode(file.read_bytes()[32:]).items()
         words = zip((b"DIGEST", b"SIZE", b"TIME", b"INODE"), entry_parts[1:], strict=True)

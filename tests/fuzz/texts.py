@@ -13,7 +13,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from coursebuild.core.checks.course import check_course
+from coursebuild.core.checks.lessons import check_course
 from coursebuild.core.model import Course, Document, Filter
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import update_body

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.model.results import CachedFile
-from coursebuild.pipeline.build import build, make_files
+from coursebuild.pipeline.publication import build, make_files
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.site import Site
 from support.scratch_course import Folder, block

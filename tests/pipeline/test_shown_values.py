@@ -15,6 +15,7 @@ from coursebuild.core.files.resources import Bundle, prepared_folder, template_t
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.record import PageRecord
@@ -49,7 +50,7 @@ def read_library(folder: Folder, reader: Reader) -> Library:
     assert not isinstance(checked_course, Report) and checked_course.report().ok
     assets = Assets(template_texts(), Bundle(), prepared_folder())
     results = checked_course.verification.results
-    return Library(checked_course.course, results, assets, checked_course.reports)
+    return make_library(checked_course.course, results, assets, checked_course.reports)
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +71,7 @@ def test_no_page_stays_when_a_value_changes_that_it_is_made_of(
     stale, broken = [], set()
     values = library.course, library.results, library.reports
     for name, (course, results, reports) in changes(values).items():
-        changed = Library(course, results, library.assets, reports)
+        changed = make_library(course, results, library.assets, reports)
         try:
             keys = {e.path: page_request(e, changed).key for e in page_list(changed)}
         except (KeyError, StopIteration):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.checks.compiled import mjcf_texts
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.registry import check_runs, feature_trials
@@ -63,7 +63,7 @@ def test_course_of_summaries_tells_what_the_whole_course_tells(tmp_path: Path) -
         folder.write(f"content/lessons/1.{n}-l.md", path.read_bytes())
     (diagnostics, *whole) = parts_of(load(tmp_path))
     for _ in range(2):
-        with Reader(Options(tmp_path, 1, Memo(tmp_path))) as reader:
+        with Reader(Options(tmp_path, 1, Store(tmp_path))) as reader:
             (diagnostics_of_summaries, *parts_of_summaries) = parts_of(load(tmp_path, reader))
         assert isinstance(diagnostics_of_summaries, set) and isinstance(diagnostics, set)
         assert len(diagnostics) > 1000

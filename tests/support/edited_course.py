@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from coursebuild.pipeline.build import make_files
+from coursebuild.pipeline.publication import make_files
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.site import Site
 from support.scratch_course import Folder, block

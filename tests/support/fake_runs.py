@@ -8,10 +8,10 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.shared_cache import shared_cache
+from coursebuild.core.engine.shared_place import shared_place
+from coursebuild.core.engine.store import Store
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Trace
-from coursebuild.core.run.memory import Memory
+from coursebuild.core.run.run_store import RunStore
 
 SCRIPT = b"print('hello')\n"
 PATH = "examples/a.py"
@@ -48,16 +48,16 @@ class Desk:
             time.sleep(0.001)
             probe.touch()
 
-    def memory(self) -> Memory:
-        """Return the memory of a new command."""
-        shared = None if self.shared is None else shared_cache(self.shared)
-        store = Memo(self.root, fresh=self.fresh, shared=shared)
+    def run_store(self) -> RunStore:
+        """Return the results of a new command."""
+        shared = None if self.shared is None else shared_place(self.shared)
+        store = Store(self.root, fresh=self.fresh, shared=shared)
         store.listen(self.messages.append)
-        return Memory(self.root, store)
+        return RunStore(self.root, store)
 
-    def recall(self, job: ScriptJob = JOB, text: bytes = SCRIPT) -> ScriptRun | None:
-        memory = self.memory()
-        return memory.recall([memory.inputs(job, text)]).get(job.path)
+    def find_run(self, job: ScriptJob = JOB, text: bytes = SCRIPT) -> ScriptRun | None:
+        run_store = self.run_store()
+        return run_store.get_runs([run_store.inputs(job, text)]).get(job.path)
 
     def run(
         self,
@@ -66,20 +66,20 @@ class Desk:
         text: bytes = SCRIPT,
         during: object = None,
         **fields: object,
-    ) -> Memory:
-        """Record a run with this trace; return the memory that holds it."""
-        memory = self.memory()
-        memory.begin()
-        memory.note_start(job.path)
+    ) -> RunStore:
+        """Record a run with this trace; return the store that has it."""
+        run_store = self.run_store()
+        run_store.begin()
+        run_store.note_start(job.path)
         if callable(during):
             self.settle()
             during()
         run = ScriptRun(job.path, Outcome.OK, 0, "hello\n", "", 0.5, trace=trace)
-        memory.keep(memory.inputs(job, text), replace(run, **fields))
-        memory.store.close()
-        return memory
+        run_store.put_run(run_store.inputs(job, text), replace(run, **fields))
+        run_store.store.close()
+        return run_store
 
     def rerun_reason(self) -> str:
-        last = self.memory().last_record(PATH)
+        last = self.run_store().last_record(PATH)
         assert last is not None
         return last.reason_forgotten

@@ -41,9 +41,9 @@ KILLED_STATUS = 137
 READY = (
     "argparse",
     "coursebuild.pipeline.site",
-    "coursebuild.pipeline.update",
+    "coursebuild.pipeline.outputs",
     "coursebuild.core.syntax.document",
-    "coursebuild.core.pages.draw",
+    "coursebuild.core.pages.article",
     "coursebuild.core.pages.document_inputs",
     "coursebuild.core.pages.page_list",
     "coursebuild.features.authoring.commands.rename",

@@ -9,7 +9,7 @@ from typing import Any
 from coursebuild.core.features import TrialContext, TrialOutcome
 from coursebuild.core.model import Course, find_blocks
 from coursebuild.core.model.results import CompileResult
-from coursebuild.core.run.memory import Memory
+from coursebuild.core.run.run_store import RunStore
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
@@ -56,8 +56,8 @@ def try_labs(
     seconds: float | None = None,
 ) -> TrialOutcome:
     """Run the trials of a course's labs, or of those in some documents, without static forms."""
-    memory = Memory(options.root, options.store)
-    context = TrialContext(options.root, course, models or {}, memory, diagnostics)
+    run_store = RunStore(options.root, options.store)
+    context = TrialContext(options.root, course, models or {}, run_store, diagnostics)
     trials = [t for t in lab_trials(course) if documents is None or t.block.span.path in documents]
     return LabTrials(context, engines, seconds).run(trials)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.measurement import CannotMeasureError
 from coursebuild.features.bench.commands.measuring import CompiledScene
@@ -79,7 +79,7 @@ def write(path: Path, text: str) -> None:
 
 
 def options(root: Path, **fields: Any) -> Options:
-    return Options(root, 1, Memo(root, **fields))
+    return Options(root, 1, Store(root, **fields))
 
 
 def take_calls(fake: Fake) -> list[str]:

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.model import (
     Course,
     Math,
@@ -37,7 +37,11 @@ from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.materials import make_library
+from coursebuild.core.pages.page_writer import PageWriter
+from coursebuild.core.pages.renderer import known_mathml
 from coursebuild.core.pages.urls import Place, lesson_path
+from coursebuild.core.registry import summarize
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.options import Options
@@ -126,14 +130,18 @@ class RenderedCourse(Struct, frozen=True):
     results: Results
     assets: Assets
 
+    def library(self, reports: Reports | None = None) -> Library:
+        """The course as its pages look it up."""
+        return make_library(self.course, self.results, self.assets, reports or Reports())
+
     def page(self, lesson: str = "0.1") -> PageContext:
         """The context of a lesson's page."""
-        library = Library(self.course, self.results, self.assets)
+        library = self.library()
         entry = library.lessons[lesson]
         assert entry.document is not None
         place = Place(lesson_path(entry))
         inputs = document_inputs(library, place, entry.document)
-        return PageContext(library.renderer, inputs, place, entry.document)
+        return PageWriter(library.renderer, inputs, place, entry.document)
 
     def html(self, lesson: str = "0.1") -> str:
         """The text of a lesson as HTML."""
@@ -150,8 +158,8 @@ class RenderedCourse(Struct, frozen=True):
                 (root / path).parent.mkdir(parents=True, exist_ok=True)
                 (root / path).write_bytes(data)
             course = replace(self.course, files=tuple(files))
-            library = Library(course, self.results, self.assets, reports or Reports())
-            options = Options(root, 1, Memo(Path(CACHE.name)))
+            library = replace(self, course=course).library(reports)
+            options = Options(root, 1, Store(Path(CACHE.name)))
             with Reader(options) as reader:
                 site = Site(library, reader, options)
                 files_by_path = {file.path: file.make() for file in site.files}
@@ -187,9 +195,16 @@ class Make(Struct, frozen=True):
         map_result = parse_course_map(Source("content/course.toml", course))
         assert map_result.value is not None and not map_result.diagnostics, map_result.diagnostics
         texts = {"0.1": text, "1.1": "Text.", "about": "About it.", **texts}
-        rendered = with_documents(map_result.value, documents_of(map_result.value, texts))
+        documents = documents_of(map_result.value, texts)
+        rendered = with_documents(map_result.value, documents)
         rendered = replace(rendered, models=(MjcfModel("box", Source("models/box.xml", BOX)),))
-        return RenderedCourse(rendered, results_of(rendered, runs or {}, status), self.assets)
+        results = results_of(rendered, runs or {}, status)
+        typeset = known_mathml(dict(results.formulas))
+        summarized = {
+            id: replace(document, summaries=summarize(document, typeset).value)
+            for id, document in documents.items()
+        }
+        return RenderedCourse(with_documents(rendered, summarized), results, self.assets)
 
 
 def results_of(course: Course, runs: Mapping[str, ScriptRun], status: str) -> Results:

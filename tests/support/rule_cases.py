@@ -27,8 +27,8 @@ from typing import Any, Self
 
 from msgspec.structs import replace
 
-from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.shared_cache import shared_cache
+from coursebuild.core.engine.shared_place import shared_place
+from coursebuild.core.engine.store import Store
 from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.lab.engines.browser import LabEngine
@@ -175,7 +175,7 @@ class Workshop:
     """What checks of many small courses share: results, the process of scripts, both engines."""
 
     def __init__(self, folder: Path) -> None:
-        self._results = shared_cache(str(folder / "results"))
+        self._results = shared_place(str(folder / "results"))
         self._scripts = ScriptServer()
         self._engines = OpenEngines(folder)
 
@@ -188,7 +188,7 @@ class Workshop:
 
     def options(self, root: Path, *, fresh: bool = False) -> Options:
         """For a command on a course; `fresh`: all is to be made again."""
-        store = Memo(root, shared=self._results, fresh=fresh)
+        store = Store(root, shared=self._results, fresh=fresh)
         return Options(root, 1, store, run_all=self._scripts.run)
 
     def try_labs(
@@ -202,7 +202,7 @@ class Workshop:
         engines = copy.copy(self._engines)
         engines.browser = wrap(engines.browser)
         # What labs did is not shared: it would not be tried by another engine.
-        unshared = replace(options, store=Memo(root))
+        unshared = replace(options, store=Store(root))
         _, lab_diagnostics = try_labs(
             course_load.value, unshared, engines, dict(models), model_diagnostics
         )

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coursebuild.cli import main
-from coursebuild.core.engine.memo import HASH, Memo
+from coursebuild.core.engine.store import HASH, Store
 from coursebuild.core.files.trust import make_store
 from coursebuild.pipeline.options import Options
 
@@ -146,7 +146,7 @@ class Folder:
     def options(self, jobs: int = 1) -> Options:
         """To call a command as a function."""
         root = self.root.resolve()
-        return Options(root, jobs, Memo(root))
+        return Options(root, jobs, Store(root))
 
     def main(self, *arguments: str, cwd: Path | None = None) -> CommandResult:
         """Run a command in this process."""

@@ -95,7 +95,12 @@ def check_compiled(
         for name in block.models()
     }
     diagnostics: list[Diagnostic] = []
-    included = _included_models(course, models) - lesson_models
+    paths = {path for result in models.values() if result.facts for path in result.facts.includes}
+    included = {
+        model.name
+        for model in course.models
+        if model.source.path in paths or INCLUDED_ROOT.match(model.source.text)
+    } - lesson_models
     for model in course.models:
         result = models[model.name]
         if result.error and model.name not in included:
@@ -153,16 +158,6 @@ def diagnose_orphan_scenarios(source: Source, models: Collection[str]) -> Diagno
 def _block_key(block: Mjcf | FeatureBlock) -> tuple[str, int]:
     """A key for a block: features may hold another object for the same one."""
     return block.span.path, block.span.start
-
-
-def _included_models(course: Course, models: Mapping[str, CompileResult]) -> set[str]:
-    """Names of the files in models/ that are meant to be included by others."""
-    paths = {path for result in models.values() if result.facts for path in result.facts.includes}
-    return {
-        model.name
-        for model in course.models
-        if model.source.path in paths or INCLUDED_ROOT.match(model.source.text)
-    }
 
 
 def line_span(code: Excerpt, line: int | None, lines_before: int, fallback: Span) -> Span:
@@ -258,48 +253,34 @@ _RULE = "scenario-model"
 def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[Diagnostic]:
     """Yield everything in which the scenarios do not fit the model."""
     for scenario in declarations.scenarios:
-        yield from _check_keyframe(scenario, facts)
-        yield from _check_lengths(scenario, facts)
-        yield from _check_measure(scenario, facts)
+        keyframe, place = scenario.keyframe, scenario.place("keyframe")
+        count = len(facts.keyframes)
+        if isinstance(keyframe, int) and keyframe >= count:
+            have = f"it has {count}" if count else "it has none"
+            message = f"the model has no keyframe {keyframe}: {have}, counted from 0"
+            yield diagnose(_RULE, place, message)
+        if isinstance(keyframe, str) and keyframe not in facts.keyframes:
+            names = [name for name in facts.keyframes if name]
+            message = f"the model has no keyframe `{keyframe}`"
+            yield diagnose(_RULE, place, message, help=did_you_mean(keyframe, names))
+        rows = (
+            ("qpos", "`qpos`", scenario.qpos or None, facts.nq, "positions (`nq`)"),
+            ("qvel", "`qvel`", scenario.qvel or None, facts.nv, "velocities (`nv`)"),
+            ("controls", "a command", next(iter(scenario.controls), None), facts.nu, "actuators"),
+        )
+        for name, subject, values, count, noun in rows:
+            if values is not None and len(values) != count:
+                message = f"{subject} has {len(values)} numbers, and the model has {count} {noun}"
+                yield diagnose(_RULE, scenario.place(name), message)
+        if (measure := scenario.observable) is not None:
+            kinds = {"body": facts.body_names, "site": facts.sites, "sensor": facts.sensors}
+            if measure.name not in (model_names := kinds[measure.kind]):
+                message = f"the model has no {measure.kind} `{measure.name}`"
+                help = did_you_mean(measure.name, [name for name in model_names if name])
+                yield diagnose(_RULE, scenario.place("measure"), message, help=help)
         yield from _check_timestep(scenario, facts)
     for sweep in declarations.sweeps:
         yield from _check_sweep(sweep, declarations.scenarios, facts)
-
-
-def _check_keyframe(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
-    keyframe, place = scenario.keyframe, scenario.place("keyframe")
-    count = len(facts.keyframes)
-    if isinstance(keyframe, int) and keyframe >= count:
-        have = f"it has {count}" if count else "it has none"
-        message = f"the model has no keyframe {keyframe}: {have}, counted from 0"
-        yield diagnose(_RULE, place, message)
-    if isinstance(keyframe, str) and keyframe not in facts.keyframes:
-        names = [name for name in facts.keyframes if name]
-        message = f"the model has no keyframe `{keyframe}`"
-        yield diagnose(_RULE, place, message, help=did_you_mean(keyframe, names))
-
-
-def _check_lengths(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
-    rows = (
-        ("qpos", "`qpos`", scenario.qpos or None, facts.nq, "positions (`nq`)"),
-        ("qvel", "`qvel`", scenario.qvel or None, facts.nv, "velocities (`nv`)"),
-        ("controls", "a command", next(iter(scenario.controls), None), facts.nu, "actuators"),
-    )
-    for name, subject, values, count, noun in rows:
-        if values is not None and len(values) != count:
-            message = f"{subject} has {len(values)} numbers, and the model has {count} {noun}"
-            yield diagnose(_RULE, scenario.place(name), message)
-
-
-def _check_measure(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
-    measure = scenario.observable
-    if measure is None:
-        return
-    names = {"body": facts.body_names, "site": facts.sites, "sensor": facts.sensors}[measure.kind]
-    if measure.name not in names:
-        message = f"the model has no {measure.kind} `{measure.name}`"
-        help = did_you_mean(measure.name, [name for name in names if name])
-        yield diagnose(_RULE, scenario.place("measure"), message, help=help)
 
 
 def _check_timestep(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:

@@ -159,13 +159,27 @@ def _check_link(
     if isinstance(target, UrlTarget):
         yield from _check_url(span, target.url, document, targets)
         return
-    rule, name, names, missing = _look_up(link, target, targets)
+    rule, name, names, missing = _look_up(target, targets)
     if name not in names:
-        help = _suggest_other_kind(target, targets) or _suggest_lesson(target, targets)
-        help = help or did_you_mean(name, names)
+        if isinstance(target, LessonTarget) and target.id in targets.levels:
+            help = f"{target.id} is a level: {_link_help('level', target.id)}"
+        elif isinstance(target, LevelTarget) and target.id in targets.lessons:
+            help = f"{target.id} is a lesson: {_link_help('lesson', target.id)}"
+        else:
+            help = _suggest_lesson(target, targets) or did_you_mean(name, names)
         yield diagnose(rule, span, missing, help=help)
     elif isinstance(target, ModelTarget):
-        yield from _check_model_anchor(span, target, targets)
+        if target.anchor:
+            # The ids that `templates/model.html` writes. Only scenarios that `models/NAME.toml`
+            # declares have one, as others are unknown before they are measured.
+            source = targets.models[target.name].source
+            ids = {
+                *model_anchors(targets.scenarios.get(target.name, ())),
+                listing_anchor(source.path),
+            }
+            listings = {source.path: source.text.rstrip()}
+            page_name = f"the page of the model `{target.name}`"
+            yield from _check_anchor(span, target.anchor, page_name, ids, listings)
     elif isinstance(target, LessonTarget):
         lesson = targets.lessons[target.id]
         yield from _check_document_anchor(span, target.anchor, lesson, f"lesson {target.id}")
@@ -181,17 +195,6 @@ def _link_help(kind: str, id: str) -> str:
     if kind == "lesson":
         return f"write `Lesson {id}` in the text, or link to `lesson:{id}`"
     return f"link to `{kind}:{id}`"
-
-
-def _suggest_other_kind(target: _NamedTarget, targets: LinkTargets) -> str:
-    """A help text where a lesson is called a level, or a level a lesson; else empty."""
-    if isinstance(target, LessonTarget) and target.id in targets.levels:
-        kind = "level"
-    elif isinstance(target, LevelTarget) and target.id in targets.lessons:
-        kind = "lesson"
-    else:
-        return ""
-    return f"{target.id} is a {kind}: {_link_help(kind, target.id)}"
 
 
 _LESSON_NAME = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")
@@ -216,9 +219,7 @@ def _suggest_lesson(target: _NamedTarget, targets: LinkTargets) -> str:
     )
 
 
-def _look_up(
-    link: Link, target: _NamedTarget, targets: LinkTargets
-) -> tuple[str, str, Collection[str], str]:
+def _look_up(target: _NamedTarget, targets: LinkTargets) -> tuple[str, str, Collection[str], str]:
     """The rule of a link, the name of its target, all names of this kind, and the message."""
     lacks = "is not in the course map"
     match target:
@@ -247,22 +248,6 @@ def _check_document_anchor(
     elif anchor and document is not None:
         listings = {script.path: script.code.text for script in document_scripts(document)}
         yield from _check_anchor(span, anchor, page_name, anchors(document), listings)
-
-
-def _check_model_anchor(
-    span: Span, target: ModelTarget, targets: LinkTargets
-) -> Iterator[Diagnostic]:
-    """Check the anchor of a link `model:NAME#anchor`.
-
-    The ids are those that `templates/model.html` writes. Only scenarios that `models/NAME.toml`
-    declares have one, as others are unknown before they are measured.
-    """
-    if target.anchor:
-        source = targets.models[target.name].source
-        ids = {*model_anchors(targets.scenarios.get(target.name, ())), listing_anchor(source.path)}
-        listings = {source.path: source.text.rstrip()}
-        page_name = f"the page of the model `{target.name}`"
-        yield from _check_anchor(span, target.anchor, page_name, ids, listings)
 
 
 def _check_anchor(
@@ -303,7 +288,8 @@ def _check_url(
         return
     if not parts.path:
         route = _ROUTE.fullmatch(unquote(parts.fragment))
-        if route is not None and (ids := _ids_of_kind(route[1], targets)) and route[2] in ids:
+        ids = {"lesson": targets.lessons, "level": targets.levels, "page": targets.pages}
+        if route is not None and route[2] in ids[route[1]]:
             message = f"`{url}` is an address of another tool"
             help = _link_help(route[1], route[2])
             yield diagnose("link-anchor", span, message, help=help)
@@ -317,10 +303,6 @@ def _check_url(
 
 _ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
 """The fragment by which a site of a single page names a lesson, as in `#/lesson/4.2`."""
-
-
-def _ids_of_kind(kind: str, targets: LinkTargets) -> Collection[str]:
-    return {"lesson": targets.lessons, "level": targets.levels, "page": targets.pages}[kind]
 
 
 def _suggest_file(path: str, targets: LinkTargets) -> str:

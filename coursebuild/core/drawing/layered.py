@@ -155,13 +155,10 @@ def _order_rows(
         for level in order:
             fixed_row = rows[level - 1] if down else rows[level + 1]
             places = {point: float(position) for position, point in enumerate(fixed_row)}
-            means = {
-                point: _mean(
-                    [places[neighbour] for neighbour in fixed_neighbours.get(point, ())],
-                    float(position),
-                )
-                for position, point in enumerate(rows[level])
-            }
+            means: dict[_Point, float] = {}
+            for position, point in enumerate(rows[level]):
+                near = [places[neighbour] for neighbour in fixed_neighbours.get(point, ())]
+                means[point] = sum(near) / len(near) if near else float(position)
             rows[level].sort(key=means.__getitem__)
         crossings = _crossings(rows, children)
         if crossings < fewest:
@@ -250,7 +247,3 @@ def _isotonic_regression(values: Sequence[float]) -> list[float]:
             total, count = total + pool_total, count + members
         pools.append((total, count))
     return [total / count for total, count in pools for _ in range(count)]
-
-
-def _mean(values: Sequence[float], otherwise: float) -> float:
-    return sum(values) / len(values) if values else otherwise

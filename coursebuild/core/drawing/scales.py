@@ -58,18 +58,13 @@ def ticks(low: float, high: float, count: int = 5) -> list[float]:
     span = high - low
     if not (span > 0 and math.isfinite(span)):
         return [low]
-    step = _step(span, count)
+    raw = span / count
+    power = 10.0 ** math.floor(math.log10(raw))
+    step = next(power * m for m in (1, 2, 2.5, 5, 10) if power * m >= raw * 0.999)
     first = math.ceil(low / step - 1e-9)
     last = math.floor(high / step + 1e-9)
     # Rounded, as the product has the rounding error of the step.
     return [float(f"{i * step:.15g}") for i in range(first, last + 1)] or [low]
-
-
-def _step(span: float, count: int) -> float:
-    """The distance of the ticks: 1, 2, 2.5 or 5 times a power of ten."""
-    raw = span / count
-    power = 10.0 ** math.floor(math.log10(raw))
-    return next(power * m for m in (1, 2, 2.5, 5, 10) if power * m >= raw * 0.999)
 
 
 def tick_texts(values: Sequence[float]) -> list[str]:
@@ -146,14 +141,9 @@ def _decades(low: int, high: int, most: int) -> list[int]:
     """
     step = 1
     while high // step - -(-low // step) + 1 > max(most, 1):
-        step = _wider(step)
+        power: int = 10 ** (len(str(step)) - 1)
+        step = next(power * m for m in (2, 3, 5, 10) if power * m > step)
     return list(range(-(-low // step) * step, high + 1, step)) or [low]
-
-
-def _wider(step: int) -> int:
-    """The next greater step between decades."""
-    power: int = 10 ** (len(str(step)) - 1)
-    return next(power * m for m in (2, 3, 5, 10) if power * m > step)
 
 
 def number_text(value: float) -> str:

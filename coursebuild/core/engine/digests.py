@@ -16,7 +16,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import reason
 from coursebuild.core.files.trust import make_store
 
@@ -98,7 +98,7 @@ class Clock:
     Where the store lies elsewhere, the system's clock has to do.
     """
 
-    def __init__(self, store: Memo) -> None:
+    def __init__(self, store: Store) -> None:
         self._store = store
         self._path = store.folder / "clock"
 

@@ -4,7 +4,7 @@ Entry points: `Manifest.read(root, place)`, `Manifest.write`; `marker`, the list
 site itself carries; `holds` and `foreign_files`, which keep publishing from overwriting the files
 of others.
 
-The manifest is an entry of the course's `Memo`, not a file of the site, since it changes from build
+The manifest is an entry of the course's store, not a file of the site, since it changes from build
 to build. It is believed only of a file that is, by size, modification time and inode, the one that
 was written. Where it is missing or damaged, everything is made again.
 """
@@ -20,10 +20,10 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 
 KIND = "published"
-"""The kind of a manifest's memo entry."""
+"""The kind of a manifest's entry."""
 MARKER = ".coursebuild-site"
 """A file in every site: a line that says what it is, then the path of every file of the site."""
 _HEADER = "site built by coursebuild; every file listed here may be replaced"
@@ -68,7 +68,7 @@ class Manifest(Struct, frozen=True):
     @classmethod
     def read(cls, root: Path, place: Path) -> Manifest:
         """The manifest of the site at this place; an empty one where none can be read."""
-        entries = Memo(root).get_value(KIND, _key(root, place), dict[str, ManifestEntry])
+        entries = Store(root).get_value(KIND, _key(root, place), dict[str, ManifestEntry])
         return cls(place, entries or {})
 
     def entry(self, path: str, key: str) -> ManifestEntry | None:
@@ -86,7 +86,7 @@ class Manifest(Struct, frozen=True):
 
     def write(self, root: Path) -> None:
         """Keep the manifest for the next build; failing to write it only costs time."""
-        Memo(root).put_value(KIND, _key(root, self.place), self.entries)
+        Store(root).put_value(KIND, _key(root, self.place), self.entries)
 
 
 def _key(root: Path, place: Path) -> str:

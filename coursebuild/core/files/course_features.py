@@ -38,7 +38,14 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
         except EffectError as error:
             tell(entry, error.message, "write it, as `coursebuild new feature NAME` does")
             continue
-        imports |= _imported_modules(code)
+        modules: set[str] = set()
+        with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+            for node in ast.walk(ast.parse(code)):
+                if isinstance(node, ast.Import):
+                    modules.update(alias.name.partition(".")[0] for alias in node.names)
+                elif isinstance(node, ast.ImportFrom) and node.module:
+                    modules.add(node.module.partition(".")[0])
+        imports |= modules
         # An unchanged file is not run again: that would define its classes anew, and blocks read
         # earlier would no longer be instances of them.
         last = _last.get(entry.path)
@@ -63,18 +70,6 @@ def features_digest(root: Path, course: Course) -> str:
         with contextlib.suppress(EffectError):
             digest.update(entry.path.encode() + b"\0" + read_bytes(root, entry.path) + b"\0")
     return digest.hexdigest()
-
-
-def _imported_modules(code: bytes) -> set[str]:
-    """The top-level modules that a file imports anywhere; none if it does not parse."""
-    modules: set[str] = set()
-    with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-        for node in ast.walk(ast.parse(code)):
-            if isinstance(node, ast.Import):
-                modules.update(alias.name.partition(".")[0] for alias in node.names)
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                modules.add(node.module.partition(".")[0])
-    return modules
 
 
 _last: dict[str, tuple[bytes, Feature | str]] = {}

@@ -30,7 +30,6 @@ from coursebuild.core.model.blocks import (
     Script,
 )
 from coursebuild.core.model.course import Course
-from coursebuild.core.model.equations import DisplayFormula, display_formulas
 from coursebuild.core.model.inlines import (
     Image,
     Inline,
@@ -42,7 +41,9 @@ from coursebuild.core.model.inlines import (
     UrlTarget,
 )
 from coursebuild.core.model.walk import (
+    DisplayFormula,
     block_inlines,
+    display_formulas,
     document_blocks,
     document_scripts,
     find_blocks,

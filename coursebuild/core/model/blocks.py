@@ -308,20 +308,15 @@ class FeatureBlock(Struct, frozen=True):
         """The lines of Markdown in it, outside its child blocks."""
         return ()
 
-    def scopes(self) -> tuple[Span, ...]:
-        """Parts that stand for themselves, as questions do: what one assumes holds in it alone."""
-        return (self.span,)
-
     def summary(self) -> FeatureBlock | None:
         """The block without what only its own page shows; `None` if nothing is left."""
         return None
 
     def anchors(self) -> tuple[str, ...]:
-        """The ids that it has on its page, where nothing else has them; links may name them."""
-        return ()
+        """The ids that it has on its page, where nothing else has them; links may name them.
 
-    def optional_anchors(self) -> tuple[str, ...]:
-        """Those of its anchors that it leaves to a heading or title which has the same."""
+        The one under which progress is kept it leaves to a heading or title which has the same.
+        """
         return ()
 
     def quoted_lines(self) -> tuple[tuple[str, int], ...]:
@@ -340,17 +335,9 @@ class FeatureBlock(Struct, frozen=True):
         """The text of a whole model in it, which is compiled with those of the course."""
         return None
 
-    def is_docked(self) -> bool:
-        """Whether it stands beside the text on a wide screen."""
-        return False
-
     def progress_keys(self) -> tuple[str, tuple[str, ...]] | None:
         """What a reader's progress is recorded for: an id, unique in the course, and its keys."""
         return None
-
-    def tasks(self) -> int:
-        """How many tasks it gives a reader."""
-        return 0
 
 
 Block: TypeAlias = (

@@ -234,6 +234,10 @@ class MathError(Struct, frozen=True):
     position: int | None
 
 
+Mathml: TypeAlias = Callable[[str, bool], str]
+"""Typesets a formula, given whether on a line of its own; empty for one with an error."""
+
+
 class CompileResult(Struct, frozen=True):
     """The result of compiling a piece of MJCF; `error` is empty if it compiled."""
 
@@ -327,6 +331,14 @@ class CachedFile(Struct, frozen=True):
 
 
 SiteFile: TypeAlias = OutputFile | CachedFile
+
+
+class PublishedTrials(Struct, frozen=True):
+    """The results of trials as a site needs them."""
+
+    values: Mapping[str, Struct] = {}
+    """The value that the page of a block shows, by the trial's name."""
+    files: tuple[OutputFile, ...] = ()
 
 
 class FileFacts(Struct, frozen=True):

@@ -2,7 +2,10 @@
 
 Entry points: `document_blocks`, `document_inlines`; `find_blocks`, `find_inlines` for those of one
 type; `find_formulas`; `document_scripts`, `output_numbers`, `sibling_groups`; `walk_blocks`,
-`walk_inlines` and `block_formulas`; `is_blank`, `is_comment`.
+`walk_inlines` and `block_formulas`; `is_blank`, `is_comment`; `display_formulas`, those on lines of
+their own. A formula has the id that its author gives it, or one made from its TeX, which stays the
+same when the text around it changes. A formula in a heading, a quiz or a lab has none, since those
+are shown on other pages too.
 
 `without_prose(document)` is what the rest of a course must know of a document, as a document of the
 same type. Walking it meets, in the same order, everything that other pages or checks look at, and
@@ -19,8 +22,9 @@ pictures, raw HTML.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import TypeVar, assert_never
+from typing import NamedTuple, TypeVar, assert_never
 
 from msgspec.structs import replace
 
@@ -48,6 +52,7 @@ from coursebuild.core.model.inlines import (
     Emphasis,
     Image,
     Inline,
+    Label,
     Link,
     Math,
     NumberBinding,
@@ -56,7 +61,7 @@ from coursebuild.core.model.inlines import (
     Strong,
     Term,
 )
-from coursebuild.core.text.source import Span
+from coursebuild.core.text.source import Span, key_of
 
 Value = TypeVar("Value")
 AnyBlock = TypeVar("AnyBlock", bound=Block)
@@ -298,3 +303,62 @@ def _summary_inlines(block: Block) -> tuple[Inline, ...]:
         for inline in walk_inlines(block_inlines(block))
         if type(inline) in _SUMMARY_INLINES
     )
+
+
+class DisplayFormula(NamedTuple):
+    """A formula on a line of its own."""
+
+    start: int
+    """Its offset in the document."""
+    tex: str
+    label: Label | None
+    id: str
+    """Empty where it has none."""
+
+
+def feature_block_ids(document: Document) -> frozenset[int]:
+    """The Python ids of the blocks of features and of all blocks inside them."""
+    return frozenset(
+        id(block)
+        for holder in find_blocks(document, FeatureBlock)
+        for block in (holder, *walk_blocks(child_blocks(holder)))
+    )
+
+
+def display_formulas(document: Document) -> tuple[DisplayFormula, ...]:
+    """The formulas of a document in the order of the text, footnotes last."""
+
+    def find() -> tuple[DisplayFormula, ...]:
+        if "$$" not in document.source.text:
+            return ()
+        in_features = feature_block_ids(document)
+        candidates = [
+            (formula, isinstance(block, Heading) or id(block) in in_features)
+            for block, formula in find_formulas(document)
+            if formula.display
+        ]
+        used_ids = {formula.label.id for formula, _ in candidates if formula.label is not None}
+        counts = Counter[str]()
+        formulas: list[DisplayFormula] = []
+        for formula, has_no_id in candidates:
+            label, id_ = formula.label, ""
+            if not has_no_id:
+                tex = formula.tex.text
+                id_ = label.id if label is not None else _make_id(tex, used_ids, counts)
+                used_ids.add(id_)
+            formulas.append(DisplayFormula(formula.span.start, formula.tex.text, label, id_))
+        return tuple(formulas)
+
+    return computed_once(document, "display_formulas", find)
+
+
+def _make_id(tex: str, used_ids: set[str], counts: Counter[str]) -> str:
+    """Make the id of a formula without a label; a repeated formula gets a number.
+
+    `counts` has the last number given to each.
+    """
+    base = id = f"eq:{key_of(' '.join(tex.split()))[:8]}"
+    while id in used_ids:
+        counts[base] = max(2, counts[base] + 1)
+        id = f"{base}-{counts[base]}"
+    return id

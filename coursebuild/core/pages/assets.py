@@ -1,29 +1,28 @@
 """The tool's own files: templates, interface texts, and the bundled files for browsers.
 
-Entry points: `Assets`, a value made by who reads the disk; `strings_for`, `words_for`;
-`hashed_name`.
+Entry points: `Assets`, a value made by who reads the disk; `Names`; `hashed_name`.
 
 1. `templates` holds every file of `templates/` as text, `dist` every file of the bundle as bytes,
    by path relative to their folder.
 2. A file that a page refers to is published under a name with a hash of its content, so that a
    browser may keep it for ever.
+3. Each asset of a compressible kind gets `NAME.br` and `NAME.gz` (`compressed_files`). A server
+   configured for it (nginx's `brotli_static` and `gzip_static`, Caddy's `precompressed`) sends the
+   one that the browser accepts. Pages change with every build, and small files gain little, so
+   compressing these is left to the server. The same bytes give the same copies, which hold no time.
 """
 
 from __future__ import annotations
 
 import functools
+import gzip
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from unicodedata import normalize
 
 from msgspec import Struct
 
-from coursebuild.core.model.results import Formula, MathError
-from coursebuild.core.model.vocabulary import ENGLISH, Words
-from coursebuild.core.pages.renderer import Renderer, Texts, templates_of
-from coursebuild.core.pages.strings import DEFAULT_LANGUAGE, Strings, parse_strings
-from coursebuild.core.registry import features
+from coursebuild.core.model.results import CachedFile, SiteFile
 
 SCRIPTS = {
     "theme.js": "js/theme.js",
@@ -48,16 +47,6 @@ class Assets(Struct, frozen=True):
     compiled_templates: Path | None = None
     """The folder of the compiled templates; see `templates_of`."""
 
-    def renderer(
-        self,
-        language: str,
-        course_templates: Texts = (),
-        formulas: Mapping[Formula, str | MathError] = {},
-    ) -> Renderer:
-        """The renderer of pages in a language, with the templates of a course and of the tool."""
-        templates = templates_of(self.templates, self.compiled_templates, course_templates)
-        return Renderer(strings_for(self.templates, language), templates, formulas)
-
     def template(self, path: str) -> str:
         """The text of a file of `templates/` (`KeyError` where there is none)."""
         return dict(self.templates)[path]
@@ -70,6 +59,29 @@ class Assets(Struct, frozen=True):
         """The bundled files of a folder."""
         paths = (path for path in self.dist if path.startswith(f"{folder}/"))
         return tuple((path, self.dist[path]) for path in paths)
+
+
+class Names(Struct, frozen=True):
+    """Site paths of the files that every page refers to."""
+
+    style: str
+    theme_script: str
+    script: str
+    icon: str
+    credits: str
+    touch_icon: str
+    scripts: tuple[tuple[str, str], ...] = ()
+    """The scripts of parts of pages, each after its mark (`PagePart`)."""
+    logo: str = ""
+    logo_dark: str = ""
+    logo_width: int = 0
+    """In pixels, at the height `frame.LOGO_HEIGHT`."""
+
+    def paths(self) -> frozenset[str]:
+        """All site paths."""
+        values = (getattr(self, field) for field in self.__struct_fields__)
+        single = (path for path in values if isinstance(path, str) and path)
+        return frozenset((*single, *(path for _, path in self.scripts)))
 
 
 def hashed_name(path: str, data: bytes) -> str:
@@ -87,39 +99,41 @@ def page_script(code: bytes) -> bytes:
     return b'"use strict";(()=>{' + code.rstrip() + b"\n})();\n"
 
 
-def strings_for(templates: tuple[tuple[str, str], ...], language: str) -> Strings:
-    """The interface texts of a language: for `pt-BR` its own, then those of `pt`, then English."""
-    feature_texts = (feature.texts.items() for feature in features())
-    return _strings_for(
-        templates, tuple(text for texts in feature_texts for text in texts), language
-    )
+# --- compressed copies
+
+_SUFFIXES = (".css", ".js", ".json", ".mjb", ".svg", ".wasm")
+_SMALLEST = 8 << 10
+"""Bytes; a copy of a smaller file saves too little to be a file, let alone two of each."""
+_LARGE = 2 << 20
+"""Bytes; for larger files, the best quality would take a quarter of a minute."""
+Keep = Callable[[str, Callable[[], bytes]], bytes]
+"""Returns what was made under a key before, or makes it."""
 
 
-def words_for(templates: tuple[tuple[str, str], ...], language: str) -> Words:
-    """The words by which texts of a language are read: its own, and the English ones.
+def compressed_files(files: Iterable[SiteFile], keep: Keep) -> tuple[CachedFile, ...]:
+    """The copies of all assets among the files that are worth compressing."""
+    copies: list[CachedFile] = []
+    for file in files:
+        if not file.path.startswith("assets/") or not file.path.endswith(_SUFFIXES):
+            continue
+        data = file.make()
+        if len(data) < _SMALLEST:
+            continue
+        # Quality 11 would save two percent more of small files in twice the time.
+        quality = 9 if len(data) >= _LARGE else 10
+        compressors = {
+            "br": functools.partial(_brotli, data, quality),
+            "gz": functools.partial(gzip.compress, data, 9, mtime=0),
+        }
+        for suffix, compress in compressors.items():
+            key = hashlib.sha256(f"{suffix}/{quality}\0".encode() + data).hexdigest()
+            make = functools.partial(keep, key, compress)
+            copies.append(CachedFile(f"{file.path}.{suffix}", key, make))
+    return tuple(copies)
 
-    Letters with marks may be typed as one character or as two.
-    """
-    strings, words = strings_for(templates, language), {}
-    for field in Words.__struct_fields__:
-        names = strings(f"words.{field}").split("|")
-        forms = (normalize(form, name) for name in names for form in ("NFC", "NFD"))
-        words[field] = tuple(dict.fromkeys((*forms, *getattr(ENGLISH, field))))
-    return Words(**words)
 
+def _brotli(data: bytes, quality: int) -> bytes:
+    import brotli  # needed only by a build with a new asset
 
-@functools.lru_cache(maxsize=8)
-def _strings_for(
-    templates: tuple[tuple[str, str], ...],
-    feature_texts: tuple[tuple[str, str], ...],
-    language: str,
-) -> Strings:
-    files = [(path, text) for path, text in templates if path.startswith("strings/")]
-    texts = [(path[len("strings/") :].removesuffix(".toml"), text) for path, text in files]
-    strings = Strings({}, language)
-    for name in dict.fromkeys((DEFAULT_LANGUAGE, language.split("-")[0].lower(), language)):
-        for text in (
-            text for file_language, text in (*texts, *feature_texts) if file_language == name
-        ):
-            strings = parse_strings(text, strings, language)
-    return strings
+    packed: bytes = brotli.compress(data, quality=quality)
+    return packed

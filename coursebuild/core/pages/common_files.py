@@ -1,7 +1,7 @@
 """The files that every page refers to: fonts, the style sheet, the page's script, the icon.
 
-Entry points: `common_files`, with `needed_fonts`; `page_characters(html)` and
-`common_characters(library)`, the characters that fonts must have.
+Entry points: `common_files`, with `needed_fonts`; `common_characters(library)`, the characters that
+fonts must have besides those of pages (`record.page_characters`).
 
 The fonts are cut down to the characters that the pages use, and the style sheet holds the fonts'
 names and the styles taken out of single elements. A changed page therefore changes these files only
@@ -11,19 +11,17 @@ if it is the first or the last one with some character or style.
 from __future__ import annotations
 
 import functools
-import re
-from collections.abc import Callable, Iterable, Iterator
-from html import unescape
+from collections.abc import Callable, Iterator
 
 from msgspec import Struct
 
 from coursebuild.core.model.course import Theme, ThemeFile
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
-from coursebuild.core.pages import fonts, styles
-from coursebuild.core.pages.assets import SCRIPTS, Assets, hashed_name, page_script
-from coursebuild.core.pages.formulas import FORMULA
-from coursebuild.core.pages.frame import LOGO_HEIGHT, Names, script_words
+from coursebuild.core.pages import fonts
+from coursebuild.core.pages.assets import SCRIPTS, Assets, Names, hashed_name, page_script
+from coursebuild.core.pages.frame import LOGO_HEIGHT, script_words
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.record import style_rules
 from coursebuild.core.pages.theme import picture_size, theme_faces, theme_style
 from coursebuild.core.registry import features
 
@@ -39,25 +37,6 @@ class PageFacts(Struct, frozen=True):
     """Styles taken out of its elements."""
     parts: frozenset[str]
     """See `parts_of`."""
-
-
-_TEXT = re.compile(">([^<]+)")
-_FOREIGN = re.compile(r"[^\x00-\x7f]")
-
-
-def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:
-    """The characters outside ASCII of a page's text and of its formulas; see `PageFacts`."""
-    parts = FORMULA.split(html)
-    text, mathematics = _characters(parts[::2]), _characters(parts[1::2])
-    return text, mathematics | {" "} if len(parts) > 1 else mathematics
-
-
-def _characters(parts: Iterable[str]) -> frozenset[str]:
-    """The characters outside ASCII of the text of pieces of HTML."""
-    html = ">" + "\n".join(parts)
-    texts = _TEXT.findall(html)
-    texts.append(html.rpartition(">")[2])  # with a tag that nothing ends
-    return frozenset(_FOREIGN.findall(unescape("\n".join(texts))))
 
 
 def common_characters(library: Library, parts: frozenset[str]) -> frozenset[str]:
@@ -92,22 +71,32 @@ def common_files(
         (job, shared.add_font(job, cut_font)) for job in needed_fonts(assets, facts, theme)
     ]
     rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in cut_fonts)
-    style = styles.style_rules(facts.declarations) + "".join(f.style for f in features())
+    style = style_rules(facts.declarations) + "".join(f.style for f in features())
     style += theme_style(theme)
     part_scripts = tuple(shared.add_part_scripts(facts.parts))
     icon, touch_icon = shared.add_icons(theme)
     sheet = rules.encode() + assets.file("css/site.css") + style.encode()
+    logo = theme.logo or theme.logo_dark
+    size = picture_size(logo) if logo is not None else None
+    licences = [
+        (path.removeprefix("licences/").removesuffix(".txt"), data.decode())
+        for path, data in assets.files("licences")
+    ]
+    for family in theme.fonts:
+        files = (file.path.rpartition("/")[2] for file in family.files)
+        licences.append((", ".join(files), family.licence.text))
+    parts = [f"{name}\n{'=' * len(name)}\n\n{text.strip()}\n" for name, text in licences]
     names = Names(
         style=shared.add("site.css", sheet),
         theme_script=shared.add_script("theme.js"),
         script=shared.add_script("site.js"),
         icon=icon,
-        credits=shared.add("licences.txt", _licences(assets, theme)),
+        credits=shared.add("licences.txt", "\n\n".join(parts).encode()),
         touch_icon=touch_icon,
         scripts=part_scripts,
         logo=shared.add_picture("logo", theme.logo),
         logo_dark=shared.add_picture("logo-dark", theme.logo_dark),
-        logo_width=_logo_width(theme.logo or theme.logo_dark),
+        logo_width=round(LOGO_HEIGHT * size[0] / size[1]) if size else 0,
     )
     return tuple(shared.files), names
 
@@ -170,21 +159,3 @@ class _SharedFiles:
             self.add_picture("icon", theme.icon or theme.touch_icon),
             self.add_picture("icon-touch", theme.touch_icon),
         )
-
-
-def _logo_width(logo: ThemeFile | None) -> int:
-    size = picture_size(logo) if logo is not None else None
-    return round(LOGO_HEIGHT * size[0] / size[1]) if size else 0
-
-
-def _licences(assets: Assets, theme: Theme) -> bytes:
-    """The licences of fonts and libraries that the site ships."""
-    licences = [
-        (path.removeprefix("licences/").removesuffix(".txt"), data.decode())
-        for path, data in assets.files("licences")
-    ]
-    for family in theme.fonts:
-        files = (file.path.rpartition("/")[2] for file in family.files)
-        licences.append((", ".join(files), family.licence.text))
-    parts = [f"{name}\n{'=' * len(name)}\n\n{text.strip()}\n" for name, text in licences]
-    return "\n\n".join(parts).encode()

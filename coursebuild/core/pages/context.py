@@ -1,6 +1,8 @@
-"""What the writer of HTML needs to know about a page: addresses, formulas, code, special blocks.
+"""What features are given: a page to draw on, and a course to make files of.
 
-Entry point: `PageContext`, the `HtmlWriter` of one document on one page.
+Entry points: `PageContext`, the `HtmlWriter` of one document on one page (`page_writer.PageWriter`
+completes it: it draws what is more than Markdown); `SiteContext` and `ExportContext`, what features
+make files from.
 
 Recorded outputs that directly follow their script are drawn as one object with it:
 `script_outputs`. Nothing is drawn in their own place.
@@ -8,9 +10,9 @@ Recorded outputs that directly follow their script are drawn as one object with 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Literal, assert_never
+from typing import Literal
 from urllib.parse import unquote
 
 from markupsafe import Markup
@@ -18,15 +20,10 @@ from msgspec import Struct
 
 from coursebuild.core.model import (
     Block,
-    Callout,
     CodeSpan,
+    Course,
     Document,
     Equation,
-    FeatureBlock,
-    Image,
-    Mjcf,
-    NumberBinding,
-    PlainCode,
     Recording,
     Script,
     Target,
@@ -35,15 +32,17 @@ from coursebuild.core.model import (
     document_blocks,
     sibling_groups,
 )
-from coursebuild.core.pages import blocks, formulas, urls
-from coursebuild.core.pages.document_inputs import file_address
+from coursebuild.core.model.results import SiteFile
+from coursebuild.core.pages import formulas, urls
+from coursebuild.core.pages.assets import Assets, Names
 from coursebuild.core.pages.formulas import number_equations
-from coursebuild.core.pages.links import ids_and_addresses
-from coursebuild.core.pages.markup import HtmlWriter, SpecialBlock
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.markup import HtmlWriter
 from coursebuild.core.pages.page_inputs import DocumentInputs
+from coursebuild.core.pages.references import ids_and_addresses
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings, direction
-from coursebuild.core.registry import kind_of_block
+from coursebuild.core.pages.zips import Archive
 from coursebuild.core.text.source import Span
 
 
@@ -58,7 +57,18 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     @cached_property
     def script_outputs(self) -> Mapping[int, tuple[Recording, ...]]:
         """The recordings drawn together with a script, by the script's offset."""
-        return dict(_outputs_of_scripts(self.document))
+        outputs: dict[int, tuple[Recording, ...]] = {}
+        for siblings in sibling_groups(self.document):
+            for number, block in enumerate(siblings):
+                if not isinstance(block, Script):
+                    continue
+                following: list[Recording] = []
+                for sibling in siblings[number + 1 :]:
+                    if not isinstance(sibling, Recording) or sibling.script != block.path:
+                        break
+                    following.append(sibling)
+                outputs[block.span.start] = tuple(following)
+        return outputs
 
     @cached_property
     def equations(self) -> Mapping[int, Equation]:
@@ -81,11 +91,7 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
 
     def url(self, url: str) -> str:
         """An address as written; that of a file of the course becomes its place in the site."""
-        return file_address(self.place, self.document.source.path, url)
-
-    def figure(self, image: Image, caption: Markup) -> Markup:
-        """An image with its caption, its script and its data."""
-        return blocks.figure(self, image, caption) + Markup("\n")
+        return urls.file_address(self.place, self.document.source.path, url)
 
     def math(self, tex: str) -> Markup:
         """A formula in a line of text."""
@@ -110,37 +116,6 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     def code_href(self, code: CodeSpan) -> str:
         """The address of what inline code names."""
         return self.inputs.code_links.get(code.span.start, "")
-
-    def code(self, language: str, text: str) -> Markup:
-        """A code block that is only shown, not run."""
-        return blocks.code(self, language, text.rstrip("\n")) + Markup("\n")
-
-    def binding(self, binding: NumberBinding) -> Markup:
-        """A number that was compared with the output of a script."""
-        return blocks.binding(self, binding)
-
-    def block(self, block: SpecialBlock) -> Markup:
-        """A special block, with its line end."""
-        html = self._draw(block)
-        return html + Markup("\n") if html else html
-
-    def _draw(self, block: SpecialBlock) -> Markup:
-        match block:
-            case Callout():
-                return blocks.callout(self, block)
-            case Script():
-                return blocks.script(self, block, self.script_outputs.get(block.span.start, ()))
-            case Recording():
-                follows_script = any(block in group for group in self.script_outputs.values())
-                return Markup() if follows_script else blocks.recording(self, block)
-            case Mjcf():
-                return blocks.mjcf(self, block)
-            case PlainCode():
-                return blocks.plain_code(self, block)
-            case FeatureBlock():
-                return kind_of_block(block).draw(self, block)
-            case _:
-                assert_never(block)
 
     def find_repetition(self, name: str) -> Span:
         """The place of the second block that draws an element with this id.
@@ -176,15 +151,52 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
         return self.renderer.render(name, **values)
 
 
-def _outputs_of_scripts(document: Document) -> Iterator[tuple[int, tuple[Recording, ...]]]:
-    """The offset of each script, and the recordings that directly follow it."""
-    for siblings in sibling_groups(document):
-        for number, block in enumerate(siblings):
-            if not isinstance(block, Script):
-                continue
-            following: list[Recording] = []
-            for sibling in siblings[number + 1 :]:
-                if not isinstance(sibling, Recording) or sibling.script != block.path:
-                    break
-                following.append(sibling)
-            yield block.span.start, tuple(following)
+class NotedPage(Struct, frozen=True):
+    """A page that a feature has made a note of."""
+
+    path: str
+    """Its site path."""
+    kind: str
+    """See `PageHead`."""
+    id: str
+    """The id of its lesson, level, model or page."""
+    title: str
+    digest: str
+    """The digest of the note."""
+
+
+class SiteContext(Struct, frozen=True):
+    """What a feature makes files of a site from."""
+
+    library: Library
+    assets: Assets
+    names: Names
+    """The names of the files that all pages share."""
+    pages: tuple[NotedPage, ...]
+    """The pages with a note of this feature, in the order of the site."""
+    note: Callable[[str], bytes]
+    """Returns the note of a page, by its site path."""
+    get_or_make: Callable[[str, Callable[[], bytes]], bytes]
+    """Returns what was made under a key before, or makes it."""
+    archives: Mapping[str, Archive]
+    """Archives of scripts by site path."""
+    imports: Callable[[str], frozenset[str]]
+    """Returns the modules that a Python text imports."""
+
+
+class ExportContext(Struct, frozen=True):
+    """A course without errors, and what an export can be made from."""
+
+    library: Library
+    """The course with its results, words and templates. Its documents are summaries."""
+    assets: Assets
+    site: Callable[[], Mapping[str, SiteFile]]
+    """The files of its site by path, collected on the first call."""
+    page: Callable[[Document], PageContext]
+    """A document with its whole text on its page, ready to be drawn."""
+    read: Callable[[str], bytes]
+    """A file of the course, by its path."""
+
+    @property
+    def course(self) -> Course:
+        return self.library.course

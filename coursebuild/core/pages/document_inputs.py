@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import assert_never
-from urllib.parse import urlsplit
 
 from msgspec import Struct
 
 from coursebuild.core import model
 from coursebuild.core.model import Document, Lesson, Level, Owner, document_scripts
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages import urls
 from coursebuild.core.pages.formulas import equations_of
+from coursebuild.core.pages.frame import lesson_data
 from coursebuild.core.pages.graph import neighbourhood
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import (
@@ -27,7 +27,7 @@ from coursebuild.core.pages.page_inputs import (
     ShownRun,
     ShownVerdict,
 )
-from coursebuild.core.registry import code_links, kind_of_block, page_copies
+from coursebuild.core.registry import code_links, kind_of_block, page_copies, page_kind
 from coursebuild.core.text.characters import visible
 
 
@@ -116,7 +116,7 @@ def address(library: Library, place: urls.Place, path: str, target: model.Target
             path = place.path if owner is None else urls.owner_path(owner)
             return place.href(path, f"term:{target.id}")
         case model.UrlTarget():
-            return file_address(place, path, target.url)
+            return urls.file_address(place, path, target.url)
         case _:
             assert_never(target)
 
@@ -141,15 +141,6 @@ def equation_name(library: Library, path: str, target: model.Target) -> str:
     if lesson:
         return library.words("equation.of_lesson", number=number, id=owner.id)
     return library.words("equation.of_page", number=number, title=owner.title)
-
-
-def file_address(place: urls.Place, path: str, url: str) -> str:
-    """An address as written; that of a file of the course becomes its place in the site."""
-    parts = urlsplit(url)
-    if parts.scheme or parts.netloc or not parts.path:
-        return url
-    site_path = urls.file_path(model.local_file(url, path))
-    return place.href(site_path) + url[len(url.split("#", 1)[0].split("?", 1)[0]) :]
 
 
 MAX_LINKS = 12
@@ -186,8 +177,8 @@ def owner_links(place: urls.Place, owners: Sequence[Owner]) -> OwnerLinks:
 
 def added_page(library: Library, place: urls.Place, name: str) -> str:
     """The address of the page of this name that a feature adds; empty if there is none."""
-    kinds = (kind for kind in library.added_pages if kind.name == name)
-    return next((place.href(kind.path) for kind in kinds), "")
+    kind = page_kind(name)
+    return place.href(kind.path) if kind is not None and kind.exists(library) else ""
 
 
 class LessonLink(Struct, frozen=True):
@@ -267,7 +258,7 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
         ),
         "edit": edit_address(library, lesson.path),
     }
-    data = meta.lesson_data(library, lesson)
+    data = lesson_data(library, lesson)
     return PageInputs(
         PageHead(place.path, "lesson", lesson.title, lesson.summary, data),
         "lesson.html",
@@ -279,10 +270,17 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
 def stub_inputs(library: Library, lesson: Lesson) -> PageInputs:
     """The inputs of the page of a planned lesson, with the lessons to read meanwhile."""
     place = urls.Place(urls.lesson_path(lesson))
+    ids: set[str] = set()  # of all lessons that it builds on
+    stack = list(lesson.prerequisites)
+    while stack:
+        need = stack.pop()
+        if need not in ids:
+            ids.add(need)
+            stack += library.lessons[need].prerequisites
     readable = tuple(
         lesson_link(library, place, need)
-        for need in _ancestors(library, lesson)
-        if need.document is not None
+        for need in library.order
+        if need.id in ids and need.document is not None
     )
     values = {**_common(library, place, lesson), "readable": readable}
     head = PageHead(place.path, "stub", lesson.title, lesson.summary, indexed=False)
@@ -306,18 +304,6 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
         if position + 1 < len(order)
         else None,
     }
-
-
-def _ancestors(library: Library, lesson: Lesson) -> tuple[Lesson, ...]:
-    """All lessons that a lesson builds on, in the order of the course."""
-    ids: set[str] = set()
-    stack = list(lesson.prerequisites)
-    while stack:
-        need = stack.pop()
-        if need not in ids:
-            ids.add(need)
-            stack += library.lessons[need].prerequisites
-    return tuple(ancestor for ancestor in library.order if ancestor.id in ids)
 
 
 def edit_address(library: Library, path: str) -> str | None:

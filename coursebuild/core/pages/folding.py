@@ -56,24 +56,14 @@ def find_imports(code: str) -> frozenset[str]:
 @functools.lru_cache(maxsize=1024)
 def _analyse(code: str) -> tuple[tuple[Part, ...], frozenset[str]]:
     """The parts and the modules; both are needed, as a lesson is read and as it is drawn."""
-    body = _statements(code)
-    lines = code.removesuffix("\n").split("\n")
-    parts = _fold_long(body, lines) if len(lines) > LONG else (Part(1, len(lines), folded=False),)
-    return parts, _modules(body)
-
-
-def _statements(code: str) -> list[ast.stmt]:
-    """The statements of a text; none if it does not parse."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return ast.parse(code).body
+            body = ast.parse(code).body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return []
-
-
-def _modules(body: list[ast.stmt]) -> frozenset[str]:
-    """The top-level modules that statements import by name."""
+        body = []
+    lines = code.removesuffix("\n").split("\n")
+    parts = _fold_long(body, lines) if len(lines) > LONG else (Part(1, len(lines), folded=False),)
     modules: set[str] = set()
     stack: list[ast.AST] = [*body]
     while stack:
@@ -86,7 +76,7 @@ def _modules(body: list[ast.stmt]) -> frozenset[str]:
         else:
             for name in ("body", "orelse", "finalbody", "handlers", "cases"):
                 stack += getattr(node, name, None) or ()
-    return frozenset(modules)
+    return parts, frozenset(modules)
 
 
 def _fold_long(body: list[ast.stmt], lines: list[str]) -> tuple[Part, ...]:
@@ -115,7 +105,9 @@ def _fold_rest(body: list[ast.stmt], cuts: list[int], lines: list[str]) -> tuple
     shown_count = 1
     while shown_count < len(body) and cuts[shown_count + 1] - first <= SHOWN_LINES:
         shown_count += 1
-    has_guard = shown_count < len(body) and _is_guard(body[-1]) and total - cuts[-2] < TAIL
+    last = body[-1]
+    is_guard = isinstance(last, ast.If) and "__name__" in ast.dump(last.test)
+    has_guard = shown_count < len(body) and is_guard and total - cuts[-2] < TAIL
     stop = len(body) - 1 if has_guard else len(body)
     end = cuts[shown_count] - 1
     while end > first and not lines[end - 1].strip():
@@ -133,7 +125,15 @@ def _fold_rest(body: list[ast.stmt], cuts: list[int], lines: list[str]) -> tuple
 def _folded_part(first: int, last: int, body: list[ast.stmt]) -> Part:
     docstring = _is_docstring(body[0]) if first == 1 else False
     imports = any(isinstance(statement, ast.Import | ast.ImportFrom) for statement in body)
-    return Part(first, last, True, docstring, imports, _names(body))
+    names: list[str] = []
+    for statement in body:
+        if isinstance(statement, _DEFINITIONS):
+            names.append(statement.name)
+        elif isinstance(statement, ast.Assign):
+            names += [target.id for target in statement.targets if isinstance(target, ast.Name)]
+        elif isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+            names.append(statement.target.id)
+    return Part(first, last, True, docstring, imports, tuple(names))
 
 
 def _start(statement: ast.stmt) -> int:
@@ -169,19 +169,3 @@ def _is_docstring(statement: ast.stmt) -> bool:
     if not isinstance(statement, ast.Expr) or not isinstance(statement.value, ast.Constant):
         return False
     return isinstance(statement.value.value, str)
-
-
-def _is_guard(statement: ast.stmt) -> bool:
-    return isinstance(statement, ast.If) and "__name__" in ast.dump(statement.test)
-
-
-def _names(body: list[ast.stmt]) -> tuple[str, ...]:
-    names: list[str] = []
-    for statement in body:
-        if isinstance(statement, _DEFINITIONS):
-            names.append(statement.name)
-        elif isinstance(statement, ast.Assign):
-            names += [target.id for target in statement.targets if isinstance(target, ast.Name)]
-        elif isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
-            names.append(statement.target.id)
-    return tuple(names)

@@ -24,9 +24,9 @@ import re
 from collections.abc import Iterator
 from html import escape, unescape
 
-from coursebuild.core.features import Mathml
 from coursebuild.core.model import Document, Equation
-from coursebuild.core.model.equations import display_formulas
+from coursebuild.core.model.results import Mathml
+from coursebuild.core.model.walk import display_formulas
 
 LONG = 20
 """Characters; a shorter formula is not split."""

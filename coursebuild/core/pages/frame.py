@@ -1,7 +1,8 @@
-"""The frame of pages: head, site navigation, foot.
+"""The frame of pages: head, site navigation, foot; and what search engines read.
 
 Entry points: `FrameInputs`, what frames show of a course; `PageFrame`, whose `render` puts the
-frame around the body of a page.
+frame around the body of a page; `course_data` and `lesson_data`, structured data; `sitemap`,
+`robots`. Whatever needs the site's full address is left out if the course does not give that.
 
 Pages are drawn in two steps because a page's head refers to the style sheet by a hash of its
 content, and the style sheet names the fonts, which depend on the characters of all pages.
@@ -11,19 +12,24 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 from collections.abc import Collection, Iterable
+from html import escape
+from typing import TypeAlias
 
 from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.features import PageKind, PagePart
-from coursebuild.core.pages import meta, urls
-from coursebuild.core.pages.assets import Assets
+from coursebuild.core.model import Course, Lesson
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.assets import Assets, Names
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.materials import renderer_for
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.renderer import Texts
 from coursebuild.core.pages.strings import direction
-from coursebuild.core.registry import features, page_copies, page_kind
+from coursebuild.core.registry import added_pages, features, has_copies, page_copies, page_kind
 from coursebuild.core.text.characters import visible
 
 PAGE_WORDS = (
@@ -47,29 +53,6 @@ FRAME_IDS = frozenset(("_words",))
 
 LOGO_HEIGHT = 28
 """Pixels, as in the style sheet."""
-
-
-class Names(Struct, frozen=True):
-    """Site paths of the files that every page refers to."""
-
-    style: str
-    theme_script: str
-    script: str
-    icon: str
-    credits: str
-    touch_icon: str
-    scripts: tuple[tuple[str, str], ...] = ()
-    """The scripts of parts of pages, each after its mark (`PagePart`)."""
-    logo: str = ""
-    logo_dark: str = ""
-    logo_width: int = 0
-    """In pixels, at the height `LOGO_HEIGHT`."""
-
-    def paths(self) -> frozenset[str]:
-        """All site paths."""
-        values = (getattr(self, field) for field in self.__struct_fields__)
-        single = (path for path in values if isinstance(path, str) and path)
-        return frozenset((*single, *(path for _, path in self.scripts)))
 
 
 def policy(json_ld: str, *, form: bool = False) -> str:
@@ -162,7 +145,7 @@ class FrameInputs(Struct, frozen=True):
             licence=course.licence,
             source=course.repository if "{path}" not in course.repository else "",
             menu=tuple((urls.page_path(page), page.title) for page in library.menu),
-            added_pages=tuple((k.path, page_title(library, k)) for k in library.added_pages),
+            added_pages=tuple((k.path, page_title(library, k)) for k in added_pages(library)),
             engine=results.engine,
             python=results.python,
             templates=course.theme.template_texts,
@@ -184,16 +167,18 @@ class PageFrame(Struct, frozen=True):
         first.
         """
         inputs, names, kind = self.inputs, self.inputs.names, page_kind(head.kind)
-        renderer = self.assets.renderer(inputs.language, inputs.templates)
+        renderer = renderer_for(self.assets, inputs.language, inputs.templates)
         place = place_of(inputs.base_url, head.path)
+        looks = ("figure-light", "figure-dark") if names.logo and names.logo_dark else ("", "")
+        logos = zip((names.logo, names.logo_dark), looks, strict=True)
         html = renderer.render(
             "base.html",
             frame=inputs,
             body=Markup(body),
             policy=policy(head.json_ld, form=kind is not None and kind.form),
-            head_title=meta.head_title(inputs.title, head.title, head.kind),
+            head_title=head_title(inputs.title, head.title, head.kind),
             description=head.description,
-            social=meta.social(inputs.title, inputs.base_url, head),
+            social=social(inputs.title, inputs.base_url, head),
             canonical=""
             if head.path == urls.NOT_FOUND
             else urls.absolute(inputs.base_url, head.path),
@@ -210,7 +195,7 @@ class PageFrame(Struct, frozen=True):
             part_scripts=_part_scripts(place, names, parts),
             manifest=place.href(urls.MANIFEST),
             touch_icon=place.href(names.touch_icon) if names.touch_icon else "",
-            logos=_logos(place, names),
+            logos=tuple((place.href(path), look) for path, look in logos if path),
             logo_size=(names.logo_width, LOGO_HEIGHT) if names.logo_width else (),
             home=place.href(urls.HOME),
             credits=place.href(names.credits),
@@ -221,18 +206,9 @@ class PageFrame(Struct, frozen=True):
         return f"{visible(html)}\n"
 
 
-def _logos(place: urls.Place, names: Names) -> tuple[tuple[str, str], ...]:
-    """The address of the logo with its class, or two if dark pages have their own."""
-    if names.logo and names.logo_dark:
-        light, dark = place.href(names.logo), place.href(names.logo_dark)
-        return (light, "figure-light"), (dark, "figure-dark")
-    only = names.logo or names.logo_dark
-    return ((place.href(only), ""),) if only else ()
-
-
 def _copies(page: str) -> tuple[tuple[str, str], ...]:
     """The media types and addresses of a page's copies, without those of lessons only."""
-    copies = (copy for copy in page_copies() if not copy.lessons and urls.has_copies(page))
+    copies = (copy for copy in page_copies() if not copy.lessons and has_copies(page))
     place = urls.Place(page)
     return tuple((copy.type, place.href(urls.copy_path(page, copy.ending))) for copy in copies)
 
@@ -261,3 +237,107 @@ def script_words(keys: Collection[str], parts: Iterable[str]) -> tuple[str, ...]
 def _links(place: urls.Place, pages: Iterable[tuple[str, str]]) -> tuple[NavLink, ...]:
     """Links to pages, given by path and title."""
     return tuple(NavLink(place.href(path), title, path == place.path) for path, title in pages)
+
+
+Json: TypeAlias = "str | int | list[Json] | dict[str, Json]"
+
+
+def head_title(course_title: str, title: str, kind: str) -> str:
+    """The title for the browser's tab: the page, then the course."""
+    return title if kind == "home" or title == course_title else f"{title} · {course_title}"
+
+
+def social(course_title: str, base_url: str, head: PageHead) -> tuple[tuple[str, str], ...]:
+    """Open Graph properties."""
+    pairs = (
+        ("og:type", "article" if head.kind == "lesson" else "website"),
+        ("og:site_name", course_title),
+        ("og:title", head.title),
+        ("og:description", head.description),
+        ("og:url", urls.absolute(base_url, head.path)),
+    )
+    return tuple((name, value) for name, value in pairs if value)
+
+
+def course_data(library: Library) -> Markup:
+    """Structured data of the home page: the course and its written lessons."""
+    course = library.course
+    parts: list[Json] = [
+        _resource(library, lesson) for lesson in course.lessons if lesson.status != "planned"
+    ]
+    return _script({**_context("Course"), **_course(course), "hasPart": parts})
+
+
+def lesson_data(library: Library, lesson: Lesson) -> Markup:
+    """Structured data of a lesson."""
+    return _script(
+        {
+            **_context("LearningResource"),
+            **_resource(library, lesson),
+            "isPartOf": {"@type": "Course", **_course(library.course)},
+        }
+    )
+
+
+def _context(kind: str) -> dict[str, Json]:
+    return {"@context": "https://schema.org", "@type": kind}
+
+
+def _course(course: Course) -> dict[str, Json]:
+    address = urls.absolute(course.base_url, urls.HOME)
+    return _filled(
+        {
+            "name": course.title,
+            "description": course.summary,
+            "inLanguage": course.language,
+            "url": address,
+        }
+    )
+
+
+def _resource(library: Library, lesson: Lesson) -> dict[str, Json]:
+    needs: list[Json] = [library.lessons[need].title for need in lesson.prerequisites]
+    return _filled(
+        {
+            "@type": "LearningResource",
+            "name": lesson.title,
+            "description": lesson.summary,
+            "url": urls.absolute(library.course.base_url, urls.lesson_path(lesson)),
+            "inLanguage": library.course.language,
+            "learningResourceType": "lesson",
+            "teaches": list(lesson.objectives),
+            "competencyRequired": needs,
+            "timeRequired": f"PT{lesson.minutes}M" if lesson.minutes else "",
+            "license": library.course.licence,
+        }
+    )
+
+
+def _filled(data: dict[str, Json]) -> dict[str, Json]:
+    return {key: value for key, value in data.items() if value not in ("", [])}
+
+
+def _script(data: dict[str, Json]) -> Markup:
+    """JSON for a `script` element, with nothing in it that could end the element."""
+    text = visible(json.dumps(data, ensure_ascii=False, separators=(",", ":")))
+    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
+
+
+def sitemap(course: Course, paths: Iterable[str]) -> bytes:
+    """The sitemap of the given pages; the course must have a base address."""
+    rows = "".join(
+        f"<url><loc>{escape(urls.absolute(course.base_url, path), quote=False)}</loc></url>\n"
+        for path in paths
+    )
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n'
+        '<urlset xmlns="http://www.sitemaps.org/schemas/sitemap/0.9">\n' + rows + "</urlset>\n"
+    ).encode()
+
+
+def robots(course: Course) -> bytes:
+    """A robots.txt that allows everything and names the sitemap."""
+    lines = ["User-agent: *", "Allow: /"]
+    if course.base_url:
+        lines.append(f"Sitemap: {urls.absolute(course.base_url, urls.SITEMAP)}")
+    return ("\n".join(lines) + "\n").encode()

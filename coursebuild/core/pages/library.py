@@ -1,6 +1,6 @@
 """The library: a course, its results, words and templates, arranged for pages to look up.
 
-Entry point: `Library`, made once for a site and only read afterwards.
+Entry point: `Library`, made once for a site (`materials.make_library`) and only read afterwards.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from urllib.parse import quote
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import PageKind, PublishedTrials
 from coursebuild.core.model import (
     CalloutKind,
     Course,
@@ -39,12 +38,18 @@ from coursebuild.core.model import (
     find_inlines,
     resolve,
 )
-from coursebuild.core.model.results import ModelFacts, Reports, Results, ScriptRun, Verdict
+from coursebuild.core.model.results import (
+    ModelFacts,
+    OutputFile,
+    Reports,
+    Results,
+    ScriptRun,
+    Verdict,
+)
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.assets import Assets, strings_for
+from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.renderer import Renderer, known_mathml
 from coursebuild.core.pages.strings import Strings
-from coursebuild.core.registry import feature_trials, page_kinds, publish_trials, summarize
 
 Value = TypeVar("Value")
 
@@ -66,10 +71,13 @@ class Library(Struct, frozen=True, dict=True):
     course: Course
     results: Results
     assets: Assets
+    renderer: Renderer
     reports: Reports = Reports()
     """The reports on models and hard cases that fit the course."""
-    published_trials: PublishedTrials | None = None
-    """The published results of trials, if they are known already."""
+    trial_values: Mapping[tuple[str, int], Struct] = {}
+    """What pages show of the trials of blocks, by the path and offset of the block."""
+    trial_files: tuple[OutputFile, ...] = ()
+    """The files of the site that trials have made."""
 
     # --- the course
 
@@ -100,11 +108,6 @@ class Library(Struct, frozen=True, dict=True):
     def menu(self) -> tuple[Page, ...]:
         """The pages in the menu of every page, besides the home page."""
         return tuple(page for page in self.course.pages if page.menu and not page.is_home)
-
-    @cached_property
-    def added_pages(self) -> tuple[PageKind, ...]:
-        """The pages that features add to this course, in their order."""
-        return tuple(kind for kind in page_kinds() if kind.exists(self))
 
     @property
     def gallery(self) -> str:
@@ -164,17 +167,24 @@ class Library(Struct, frozen=True, dict=True):
         script knows, without loading the lesson, how many questions it has, whether all were
         answered right, and where to find one to review.
         """
-        texts = ((d.source.path, " ".join(_quizzes(d))) for d in self.course.documents)
-        return {path: text for path, text in texts if text}
+        index: dict[str, str] = {}
+        for document in self.course.documents:
+            keys_of_blocks = (b.progress_keys() for b in find_blocks(document, FeatureBlock))
+            entries = (
+                f"{quote(progress[0], safe='')}:{','.join(progress[1])}"
+                for progress in keys_of_blocks
+                if progress is not None
+            )
+            if text := " ".join(entries):
+                index[document.source.path] = text
+        return index
 
     def summaries(self, feature: str) -> Iterator[tuple[Owner, Any]]:
         """A feature's summaries of documents (`Feature.summary`), in the order of the course."""
         for owner, document in self.course.owned_documents:
-            values = document.summaries
-            if values is None:
-                values = summarize(document, self.mathml).value
-            if feature in values:
-                yield owner, values[feature]
+            summaries = document.summaries or {}
+            if feature in summaries:
+                yield owner, summaries[feature]
 
     # --- its results
 
@@ -196,35 +206,15 @@ class Library(Struct, frozen=True, dict=True):
         """The verdict on a recorded output; `None` if it was not compared."""
         return self._verdicts.get(_place(recording))
 
-    @cached_property
-    def trials(self) -> PublishedTrials:
-        """The results of trials as a site needs them."""
-        return self.published_trials or publish_trials(self.results, self.assets)
-
-    @cached_property
-    def _trial_values(self) -> Mapping[tuple[str, int], Struct]:
-        values = self.trials.values
-        trials = feature_trials(self.course) if values else {}
-        return {
-            _place(trial.block): values[name]
-            for name, (_, trial) in trials.items()
-            if name in values
-        }
-
     def trial_value(self, block: FeatureBlock) -> Struct | None:
         """The value that a feature publishes of the trial of a block."""
-        return self._trial_values.get(_place(block))
+        return self.trial_values.get(_place(block))
 
     # --- its words and looks
 
-    @cached_property
+    @property
     def words(self) -> Strings:
-        return strings_for(self.assets.templates, self.course.language)
-
-    @cached_property
-    def renderer(self) -> Renderer:
-        course, formulas = self.course, dict(self.results.formulas)
-        return self.assets.renderer(course.language, course.theme.template_texts, formulas)
+        return self.renderer.words
 
     def render(self, template: str, **values: object) -> Markup:
         """A filled-in template; see `Renderer`."""
@@ -243,13 +233,6 @@ class Library(Struct, frozen=True, dict=True):
         )
         label = kind.label or default_label or name.capitalize()
         return CalloutKind(name, label, kind.promise or default_promise)
-
-
-def _quizzes(document: Document) -> Iterator[str]:
-    for block in find_blocks(document, FeatureBlock):
-        if (progress := block.progress_keys()) is not None:
-            id, keys = progress
-            yield f"{quote(id, safe='')}:{','.join(keys)}"
 
 
 def _place(block: Recording | FeatureBlock) -> tuple[str, int]:
@@ -292,16 +275,16 @@ def models_named(script: Script) -> frozenset[str]:
 
 def _named_models(document: Document) -> Mapping[str, tuple[str, ...]]:
     """The names in a document that may be models, with the ways in which it uses them."""
-    return computed_once(document, "models", lambda: _group(_model_names(document)))
 
+    def uses() -> Iterator[tuple[str, str]]:
+        for block in document_blocks(document):
+            if isinstance(block, FeatureBlock):
+                yield from ((name, BY_LAB) for name in block.models())
+                yield from ((name, BY_LINK) for name in block.mentioned_models())
+            elif isinstance(block, Script):
+                yield from ((name, BY_SCRIPT) for name in models_named(block))
+        for link in find_inlines(document, Link):
+            if isinstance(link.target, ModelTarget):
+                yield link.target.name, BY_LINK
 
-def _model_names(document: Document) -> Iterator[tuple[str, str]]:
-    for block in document_blocks(document):
-        if isinstance(block, FeatureBlock):
-            yield from ((name, BY_LAB) for name in block.models())
-            yield from ((name, BY_LINK) for name in block.mentioned_models())
-        elif isinstance(block, Script):
-            yield from ((name, BY_SCRIPT) for name in models_named(block))
-    for link in find_inlines(document, Link):
-        if isinstance(link.target, ModelTarget):
-            yield link.target.name, BY_LINK
+    return computed_once(document, "models", lambda: _group(uses()))

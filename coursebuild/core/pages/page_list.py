@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
-from coursebuild.core.features import ModelPart, PageKind
+from coursebuild.core.features import ModelPart
 from coursebuild.core.model import (
     Document,
     FeatureBlock,
@@ -27,7 +27,7 @@ from coursebuild.core.model import (
     listing_anchor,
 )
 from coursebuild.core.model.results import ModelFacts
-from coursebuild.core.pages import meta, urls
+from coursebuild.core.pages import urls
 from coursebuild.core.pages.document_inputs import (
     LessonLink,
     document_inputs,
@@ -37,12 +37,12 @@ from coursebuild.core.pages.document_inputs import (
     level_view,
     stub_inputs,
 )
-from coursebuild.core.pages.frame import page_title, place_of
+from coursebuild.core.pages.frame import course_data, page_title, place_of
 from coursebuild.core.pages.graph import level_graph
-from coursebuild.core.pages.library import Library, ModelUse
+from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import AddedParts, HighlightedFile, PageHead, PageInputs
 from coursebuild.core.pages.quantities import number
-from coursebuild.core.registry import kind_of_block, model_parts, page_kind
+from coursebuild.core.registry import added_pages, kind_of_block, model_parts, page_kind
 
 
 class PageEntry(Struct, frozen=True):
@@ -58,7 +58,15 @@ class PageEntry(Struct, frozen=True):
     def inputs(self, library: Library) -> PageInputs:
         """The inputs of the page; summaries of documents are enough."""
         kind = page_kind(self.kind)
-        return _course_inputs(self, library) if kind is None else _added_inputs(kind, library)
+        if kind is None:
+            return _course_inputs(self, library)
+        key = f"{kind.name}.description"
+        description = library.words(key) if library.words.has(key) else ""
+        title, home = page_title(library, kind), urls.Place(kind.path).href(urls.HOME)
+        values = {"home": home, **kind.values(library)}
+        template = "added.html" if kind.draw is not None else f"{kind.name}.html"
+        head = PageHead(kind.path, kind.name, title, description, indexed=kind.indexed)
+        return PageInputs(head, template, values)
 
     def may_show_notes(self, library: Library) -> bool:
         """Whether its inputs may depend on summaries by features (`Feature.summary`)."""
@@ -93,22 +101,12 @@ def page_list(library: Library) -> Iterator[PageEntry]:
         yield PageEntry(library.gallery, "models")
     for model in course.models:
         yield PageEntry(urls.model_page_path(model.name), "model", model.name)
-    for kind in library.added_pages:
+    for kind in added_pages(library):
         yield PageEntry(kind.path, kind.name)
     for page in course.pages:
         if page.document is not None and not page.is_home:
             yield PageEntry(urls.page_path(page), "page", page.id)
     yield PageEntry(urls.NOT_FOUND, "notfound")
-
-
-def _added_inputs(kind: PageKind, library: Library) -> PageInputs:
-    key = f"{kind.name}.description"
-    description = library.words(key) if library.words.has(key) else ""
-    title, home = page_title(library, kind), urls.Place(kind.path).href(urls.HOME)
-    values = {"home": home, **kind.values(library)}
-    template = "added.html" if kind.draw is not None else f"{kind.name}.html"
-    head = PageHead(kind.path, kind.name, title, description, indexed=kind.indexed)
-    return PageInputs(head, template, values)
 
 
 def _course_inputs(entry: PageEntry, library: Library) -> PageInputs:
@@ -188,11 +186,21 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
     course = library.course
     place = urls.Place(urls.HOME)
     written_lessons = [lesson for lesson in library.order if lesson.document is not None]
+    cards, galleries = [], []
+    for lesson in written_lessons:
+        pictures = _pictures_of(library, place, lesson)
+        link = lesson_link(library, place, lesson, whole=True)
+        level = library.levels[lesson.level].title
+        cards.append(LessonCard(link, level, pictures[0] if pictures else None))
+    for page in library.menu:
+        pictures = _pictures_of(library, place, page)
+        if len(pictures) > 1:
+            galleries.append(Gallery(page.title, place.href(urls.page_path(page)), pictures))
     values = {
         "title": course.title,
         "summary": course.summary,
-        "cards": _lesson_cards(library, place),
-        "galleries": _list_galleries(library, place),
+        "cards": tuple(cards),
+        "galleries": tuple(galleries),
         "levels": tuple(level_view(library, place, level, whole=True) for level in course.levels),
         "start": lesson_link(library, place, written_lessons[0]) if written_lessons else None,
         "total": len(library.order),
@@ -204,7 +212,7 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
         "scripts": len(library.scripts),
         "scripts_zip": place.href(urls.EXAMPLES_ZIP) if library.scripts else None,
     }
-    head = PageHead(urls.HOME, "home", course.title, course.summary, meta.course_data(library))
+    head = PageHead(urls.HOME, "home", course.title, course.summary, course_data(library))
     inputs = None if document is None else document_inputs(library, place, document)
     return PageInputs(head, "home.html", values, inputs)
 
@@ -219,32 +227,6 @@ def _pictures_of(library: Library, place: urls.Place, owner: Owner) -> tuple[Pic
             href = place.href(urls.owner_path(owner), picture.anchor)
             links.append(PictureLink(src, picture.width, picture.height, picture.title, href))
     return tuple(links)
-
-
-def _lesson_cards(library: Library, place: urls.Place) -> tuple[LessonCard, ...]:
-    """The cards of the written lessons, in the order of the course."""
-    return tuple(
-        _lesson_card(library, place, lesson)
-        for lesson in library.order
-        if lesson.document is not None
-    )
-
-
-def _lesson_card(library: Library, place: urls.Place, lesson: Lesson) -> LessonCard:
-    pictures = _pictures_of(library, place, lesson)
-    link = lesson_link(library, place, lesson, whole=True)
-    level = library.levels[lesson.level].title
-    return LessonCard(link, level, pictures[0] if pictures else None)
-
-
-def _list_galleries(library: Library, place: urls.Place) -> tuple[Gallery, ...]:
-    """The pages in the menu that have more than one picture."""
-    galleries = []
-    for page in library.menu:
-        pictures = _pictures_of(library, place, page)
-        if len(pictures) > 1:
-            galleries.append(Gallery(page.title, place.href(urls.page_path(page)), pictures))
-    return tuple(galleries)
 
 
 def level_inputs(library: Library, level: Level) -> PageInputs:
@@ -273,28 +255,20 @@ def _level_link(library: Library, place: urls.Place, level: Level) -> NamedLink:
 
 def gallery_inputs(library: Library) -> PageInputs:
     """The inputs of the page of all models."""
-    place = urls.Place(library.gallery)
-    values = {
-        "home": place.href(urls.HOME),
-        "models": tuple(_model_card(library, place, model) for model in library.course.models),
-    }
+    place, cards = urls.Place(library.gallery), []
+    for model in library.course.models:
+        href = place.href(urls.model_page_path(model.name))
+        pictures = (part.picture(library, model) for part in model_parts().values())
+        view, picture = next(filter(None, pictures), None), None
+        if view is not None:
+            src = place.href(view.path)
+            picture = PictureLink(src, view.width, view.height, model.name, href)
+        owners = [use.owner for use in library.uses[model.name]]
+        lessons = tuple(lesson_link(library, place, o) for o in owners if isinstance(o, Lesson))
+        cards.append(ModelCard(model.name, model.description, href, picture, lessons))
+    values = {"home": place.href(urls.HOME), "models": tuple(cards)}
     head = PageHead(place.path, "models", library.words("models.title"), "")
     return PageInputs(head, "models.html", values)
-
-
-def _model_card(library: Library, place: urls.Place, model: MjcfModel) -> ModelCard:
-    href = place.href(urls.model_page_path(model.name))
-    pictures = (part.picture(library, model) for part in model_parts().values())
-    view = next(filter(None, pictures), None)
-    picture = None
-    if view is not None:
-        src = place.href(view.path)
-        picture = PictureLink(src, view.width, view.height, model.name, href)
-    owners = [use.owner for use in library.uses[model.name]]
-    lessons = tuple(
-        lesson_link(library, place, owner) for owner in owners if isinstance(owner, Lesson)
-    )
-    return ModelCard(model.name, model.description, href, picture, lessons)
 
 
 def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
@@ -305,6 +279,13 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
     parts = {} if facts is None else model_parts()
     further_facts = [fact for part in parts.values() for fact in part.facts(library, model)]
     values_by_part = {name: part.values(library, place, model) for name, part in parts.items()}
+    words, uses = library.words, []
+    for use in library.uses[model.name]:
+        text = use.owner.title
+        if isinstance(use.owner, Lesson):
+            text = f"{words('lesson.label', id=use.owner.id)}: {text}"
+        href = place.href(urls.owner_path(use.owner))
+        uses.append(NamedLink(href, text, ", ".join(map(words, use.ways))))
     values = {
         "home": place.href(urls.HOME),
         "gallery": place.href(library.gallery) if library.gallery else "",
@@ -318,7 +299,7 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
         "about": model.description,
         "opening": _added_parts(parts, values_by_part, opens=True),
         "added": _added_parts(parts, values_by_part, opens=False),
-        "uses": tuple(_use_link(library, place, use) for use in library.uses[model.name]),
+        "uses": tuple(uses),
     }
     return PageInputs(PageHead(place.path, "model", title, model.description), "model.html", values)
 
@@ -349,14 +330,6 @@ def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
         (words("model.includes"), ", ".join(facts.includes)),
     )
     return tuple((label, value) for label, value in rows if value)
-
-
-def _use_link(library: Library, place: urls.Place, use: ModelUse) -> NamedLink:
-    words, owner = library.words, use.owner
-    text = owner.title
-    if isinstance(owner, Lesson):
-        text = f"{words('lesson.label', id=owner.id)}: {owner.title}"
-    return NamedLink(place.href(urls.owner_path(owner)), text, ", ".join(map(words, use.ways)))
 
 
 def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:

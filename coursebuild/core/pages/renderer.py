@@ -33,10 +33,8 @@ from jinja2 import (
 from markupsafe import Markup
 from msgspec import Struct, field
 
-from coursebuild.core.features import Mathml
 from coursebuild.core.model.course import TEMPLATES
-from coursebuild.core.model.results import Formula, MathError
-from coursebuild.core.pages.highlight import highlight_lines
+from coursebuild.core.model.results import Formula, MathError, Mathml
 from coursebuild.core.pages.quantities import text_html
 from coursebuild.core.pages.strings import Strings, direction
 
@@ -155,6 +153,9 @@ class Renderer(Struct, frozen=True):
 
     def highlight(self, language: str, code: str) -> Markup:
         """Code with its syntax highlighted."""
+        # The package is built, its templates compiled, where no highlighter is installed.
+        from coursebuild.core.pages.highlight import highlight_lines
+
         return Markup("\n".join(highlight_lines(language, code)))
 
     def mathml(self, tex: str, display: bool) -> Markup:

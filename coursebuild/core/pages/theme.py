@@ -86,8 +86,10 @@ def theme_faces(theme: Theme) -> list[tuple[Face, bytes]]:
 
 def theme_style(theme: Theme) -> str:
     """The rules at the end of the style sheet."""
-    css = (f"{file.text.rstrip()}\n" for file in theme.css)
-    return "".join((_accent(theme), _synthesis(theme), *css))
+    css = "".join(f"{file.text.rstrip()}\n" for file in theme.css)
+    light, dark = accents(theme)
+    accent = f"@media screen{{:root{{--accent:light-dark({light},{dark})}}}}\n"
+    return ("" if (light, dark) == _ACCENT else accent) + _synthesis(theme) + css
 
 
 def accents(theme: Theme) -> tuple[str, str]:
@@ -96,13 +98,6 @@ def accents(theme: Theme) -> tuple[str, str]:
         return _ACCENT
     light = theme.accent or _ACCENT[0]
     return light, theme.accent_dark or legible(light, GROUNDS_DARK, RECOMMENDED_CONTRAST)
-
-
-def _accent(theme: Theme) -> str:
-    light, dark = accents(theme)
-    if (light, dark) == _ACCENT:
-        return ""
-    return f"@media screen{{:root{{--accent:light-dark({light},{dark})}}}}\n"
 
 
 def _synthesis(theme: Theme) -> str:
@@ -149,9 +144,18 @@ def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
 
     A colour without a pair keeps its hue, but its lightness is inverted.
     """
+    from PIL import ImageColor
 
     def dark(match: re.Match[str]) -> str:
-        return f"{match['name']}{match['is']}{_dark_colour(match['value'], paired_colours)}"
+        value = match["value"]
+        try:
+            red, green, blue = ImageColor.getrgb(value.strip())[:3]
+        except ValueError:  # `none`, a reference, or an unknown name
+            return match[0]
+        light = f"#{red:02x}{green:02x}{blue:02x}"
+        shift = round(255 - 2 * (0.2126 * red + 0.7152 * green + 0.0722 * blue))
+        inverted = bytes(min(max(channel + shift, 0), 255) for channel in (red, green, blue))
+        return f"{match['name']}{match['is']}{paired_colours.get(light) or f'#{inverted.hex()}'}"
 
     return _COLOUR.sub(dark, _ROOT.sub(_with_fill, svg, count=1))
 
@@ -159,20 +163,3 @@ def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
 def _with_fill(root: re.Match[str]) -> str:
     """The root element, with the default colour of shapes made explicit."""
     return root[0] if " fill=" in root[0] else f'<svg fill="#000000"{root[0][4:]}'
-
-
-def _dark_colour(value: str, paired_colours: Mapping[str, str]) -> str:
-    from PIL import ImageColor
-
-    try:
-        red, green, blue = ImageColor.getrgb(value.strip())[:3]
-    except ValueError:  # `none`, a reference, or an unknown name
-        return value
-    light = f"#{red:02x}{green:02x}{blue:02x}"
-    return paired_colours.get(light) or _invert_lightness(red, green, blue)
-
-
-def _invert_lightness(*channels: int) -> str:
-    red, green, blue = channels
-    shift = round(255 - 2 * (0.2126 * red + 0.7152 * green + 0.0722 * blue))
-    return "#" + "".join(f"{min(max(channel + shift, 0), 255):02x}" for channel in channels)

@@ -18,8 +18,7 @@ from urllib.parse import quote, unquote, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.core.model import Lesson, Level, Owner, Page
-from coursebuild.core.registry import page_kinds
+from coursebuild.core.model import Lesson, Level, Owner, Page, local_file
 
 HOME = "index.html"
 NOT_FOUND = "404.html"
@@ -49,12 +48,6 @@ def lesson_zip_path(lesson: Lesson) -> str:
 def copy_path(page: str, ending: str) -> str:
     """`lessons/4.2-mass-and-inertia.md`: a copy of a page, by the ending of its name."""
     return page.removesuffix(".html") + ending
-
-
-def has_copies(page: str) -> bool:
-    """Whether there are copies of a page; pages filled in by scripts have none."""
-    filled = (kind.path for kind in page_kinds() if not kind.indexed)
-    return page != NOT_FOUND and page not in filled
 
 
 def level_path(level: Level) -> str:
@@ -151,6 +144,15 @@ class Place(Struct, frozen=True):
         if parts.path.endswith("/"):
             path = posixpath.join(path, "index.html")
         return (None, "") if path.startswith(("../", "/")) else (path, unquote(parts.fragment))
+
+
+def file_address(place: Place, path: str, url: str) -> str:
+    """An address as written; that of a file of the course becomes its place in the site."""
+    parts = urlsplit(url)
+    if parts.scheme or parts.netloc or not parts.path:
+        return url
+    site_path = file_path(local_file(url, path))
+    return place.href(site_path) + url[len(url.split("#", 1)[0].split("?", 1)[0]) :]
 
 
 def _relative(path: str, start: str) -> str:

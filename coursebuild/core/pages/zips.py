@@ -97,7 +97,15 @@ def make_archives(library: Library, surroundings: Surroundings) -> Iterator[Arch
     for lesson in library.order:
         scripts = document_scripts(lesson.document) if lesson.document is not None else ()
         if scripts:
-            lesson_scripts = _with_imported_scripts(by_module, surroundings, scripts)
+            scripts_by_path: dict[str, Script] = {}
+            stack = list(scripts)
+            while stack:
+                script = stack.pop()
+                if script.path not in scripts_by_path:
+                    scripts_by_path[script.path] = script
+                    names = surroundings.imports(script.code.text)
+                    stack += [by_module[name] for name in names if name in by_module]
+            lesson_scripts = tuple(scripts_by_path[path] for path in sorted(scripts_by_path))
             files = _files(
                 library, surroundings, lesson_scripts, f"{lesson.id}-{lesson.slug}", by_module
             )
@@ -137,20 +145,6 @@ def _module(path: str) -> str:
     return path.removeprefix("examples/").removesuffix(".py").partition("/")[0]
 
 
-def _with_imported_scripts(
-    by_module: Mapping[str, Script], surroundings: Surroundings, scripts: Iterable[Script]
-) -> tuple[Script, ...]:
-    scripts_by_path: dict[str, Script] = {}
-    stack = list(scripts)
-    while stack:
-        script = stack.pop()
-        if script.path not in scripts_by_path:
-            scripts_by_path[script.path] = script
-            names = surroundings.imports(script.code.text)
-            stack += [by_module[name] for name in names if name in by_module]
-    return tuple(scripts_by_path[path] for path in sorted(scripts_by_path))
-
-
 def _files(
     library: Library,
     surroundings: Surroundings,
@@ -165,7 +159,12 @@ def _files(
     files |= _models(library, surroundings, scripts)
     if "matplotlib" in foreign:
         files |= {file.path: file.data for file in surroundings.style}
-    files["requirements.txt"] = _requirements(library, surroundings.packages, foreign)
+    lines_by_module = {
+        package.module: f"{package.name}=={package.version}" for package in surroundings.packages
+    }
+    lines_by_module.setdefault("mujoco", f"mujoco=={library.results.engine}")
+    lines = (lines_by_module.get(name, name) for name in foreign)
+    files["requirements.txt"] = "".join(f"{line}\n" for line in sorted(lines)).encode()
     first = scripts[0].path
     readme = library.words("zip.readme", title=library.course.title, script=first)
     files["README.md"] = f"{readme.strip()}\n".encode()
@@ -190,14 +189,6 @@ def _models(
                 if (data := sources.get(path, model_files.get(path))) is not None:
                     model_data[path] = data
     return model_data
-
-
-def _requirements(library: Library, packages: Iterable[Package], modules: Iterable[str]) -> bytes:
-    """A line for each imported package, with its exact version if known."""
-    lines_by_module = {package.module: f"{package.name}=={package.version}" for package in packages}
-    lines_by_module.setdefault("mujoco", f"mujoco=={library.results.engine}")
-    lines = (lines_by_module.get(name, name) for name in modules)
-    return "".join(f"{line}\n" for line in sorted(lines)).encode()
 
 
 def pack_files(files: Mapping[str, bytes]) -> bytes:

@@ -28,7 +28,7 @@ from xml.parsers import expat
 import msgspec
 
 from coursebuild.core.engine.digests import SPECIAL, file_state
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.model import Limits
 from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.run import compile_main, mujoco_files
@@ -77,7 +77,7 @@ def compile_all(
 
 def compile_or_recall(
     root: Path,
-    store: Memo,
+    store: Store,
     texts: Sequence[tuple[str, str]],
     stage: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext,
     limits: Limits = LIMITS,

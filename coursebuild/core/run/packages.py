@@ -43,7 +43,7 @@ import msgspec
 
 from coursebuild.core.engine.digests import file_state
 from coursebuild.core.engine.lifetime import bound_command
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import folder_lock
 from coursebuild.core.files.trust import TEMPORARY, state_folder
@@ -64,7 +64,7 @@ def site_folders() -> tuple[str, ...]:
 class InstalledPackages:
     """The packages that are installed for the interpreter that runs the scripts."""
 
-    def __init__(self, store: Memo, folders: Sequence[str] | None = None) -> None:
+    def __init__(self, store: Store, folders: Sequence[str] | None = None) -> None:
         self._folders = site_folders() if folders is None else tuple(folders)
         self._distributions = functools.cache(lambda: _map_distributions(store, self._folders))
         self.version = functools.cache(self._version)
@@ -92,7 +92,7 @@ def _content(spec: ModuleSpec) -> str:
 
 
 def distributions(
-    store: Memo, modules: Iterable[str], folders: Sequence[str] | None = None
+    store: Store, modules: Iterable[str], folders: Sequence[str] | None = None
 ) -> tuple[tuple[str, str, str], ...]:
     """(module, distribution, version) of each top-level module that an installed package provides.
 
@@ -134,7 +134,7 @@ def _spec(module: str, folders: Sequence[str]) -> ModuleSpec | None:
     return None
 
 
-def _map_distributions(store: Memo, folders: Sequence[str]) -> Mapping[str, str]:
+def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str]:
     """The distributions, with versions, of each top-level module in these folders."""
     key = hashlib.sha256(repr((sys.version, *map(_names, folders))).encode()).hexdigest()
     # It is no result of the course, so that `--no-cache` does not make it again.

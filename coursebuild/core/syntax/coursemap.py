@@ -87,7 +87,12 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
         *check_settings(root, decoding),
     ]
     unusable = bool(diagnostics)
-    diagnostics += _check_levels(root, decoding)
+    for level, level_node in zip(levels, root.objects("level"), strict=True):
+        for node, table in decoding.find_structs(LessonTable, level_node.objects("lesson")):
+            if level.id and not table.id.startswith(f"{level.id}."):
+                message = f"the lesson `{table.id}` is in the level `{shorten(level.id)}`"
+                help = f"an id in this level begins with `{shorten(level.id)}.`"
+                diagnostics.append(diagnose("field-value", node.place("id"), message, help=help))
     diagnostics += _check_prerequisites(
         lessons, [name for node in nodes if (name := _read_id(node.get("id")))]
     )
@@ -157,16 +162,19 @@ def _read_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[L
     for node in root.objects("level"):
         name = _read_id(node.get("id"))
         inner = decoding.find_structs(LessonTable, node.objects("lesson"))
-        lessons = tuple(_build_lesson(*lesson, name) for lesson in inner)
+        lessons = tuple(
+            Lesson(
+                **asdict(table),
+                span=lesson.span,
+                prerequisite_spans=tuple(item.span for item in lesson.items("prerequisites")),
+                level=name,
+                document=None,
+            )
+            for lesson, table in inner
+        )
         fields = decoding.structs.get(node)
         texts = (fields.title, fields.summary) if isinstance(fields, LevelTable) else ("", "")
         yield Level(node.span, name, *texts, lessons)
-
-
-def _build_lesson(node: ObjectNode, table: LessonTable, level: str) -> Lesson:
-    spans = tuple(item.span for item in node.items("prerequisites"))
-    fields = asdict(table)
-    return Lesson(**fields, span=node.span, prerequisite_spans=spans, level=level, document=None)
 
 
 def _read_id(node: Node | None) -> str:
@@ -201,17 +209,6 @@ def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diag
                 message = f"the {kind} ids `{shorten(first)}` and `{shorten(name)}` {differ}"
             notes = (Note("the first one is here", span),)
             yield diagnose("id-repeated", node.span, message, notes=notes)
-
-
-def _check_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
-    """Check that each lesson is in the level that its id begins with."""
-    for level in root.objects("level"):
-        name = _read_id(level.get("id"))
-        for node, fields in decoding.find_structs(LessonTable, level.objects("lesson")):
-            if name and not fields.id.startswith(f"{name}."):
-                message = f"the lesson `{fields.id}` is in the level `{shorten(name)}`"
-                help = f"an id in this level begins with `{shorten(name)}.`"
-                yield diagnose("field-value", node.place("id"), message, help=help)
 
 
 def _check_files(decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
@@ -304,9 +301,21 @@ _CALLOUT = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
     """Check what the types of these tables cannot say."""
     for node, fields in decoding.find_structs(VerifyTable):
-        yield from _check_verify(node, fields)
+        tolerances = [m for name in ("rtol", "atol") if (m := node.members.get(name)) is not None]
+        if fields.compare == "rtol" and not tolerances:
+            message = '`compare = "rtol"` needs `rtol` or `atol`'
+            yield diagnose("field-missing", node.place("compare"), message)
+        if fields.compare in ("exact", "digits"):
+            for member in tolerances:
+                message = f'`{member.key.value}` counts only with `compare = "rtol"`'
+                yield diagnose("field-value", member.key.span, message)
     for node, filter in decoding.find_structs(Filter):
-        yield from _check_filter(node, filter)
+        if (mistake := pattern_mistake(filter.pattern)) is not None:
+            message = f"the pattern does not compile: {mistake[0]}"
+            yield diagnose("field-value", _place(node, "pattern", mistake[1]), message)
+        elif (mistake := pattern_mistake(filter.pattern, filter.replacement)) is not None:
+            message = f"the replacement cannot be used: {mistake[0]}"
+            yield diagnose("field-value", _place(node, "replacement", mistake[1]), message)
     for name, member in root.object("verify").object("env").members.items():
         if not _VARIABLE.fullmatch(name):
             message = f"{format_name(name)} cannot be set for scripts"
@@ -318,18 +327,18 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
             help = "expected: lower-case letters and digits in words joined by single hyphens"
             yield diagnose("field-value", member.key.span, message, help=help)
     for node, silence in decoding.find_structs(Silence):
-        yield from _check_silence(node, silence)
-
-
-def _check_verify(node: ObjectNode, fields: VerifyTable) -> Iterator[Diagnostic]:
-    tolerances = [m for name in ("rtol", "atol") if (m := node.members.get(name)) is not None]
-    if fields.compare == "rtol" and not tolerances:
-        message = '`compare = "rtol"` needs `rtol` or `atol`'
-        yield diagnose("field-missing", node.place("compare"), message)
-    if fields.compare in ("exact", "digits"):
-        for member in tolerances:
-            message = f'`{member.key.value}` counts only with `compare = "rtol"`'
-            yield diagnose("field-value", member.key.span, message)
+        rule = RULES.get(silence.rule)
+        if rule is None:
+            warning_names = [name for name, entry in RULES.items() if entry.severity == "warning"]
+            message = f"there is no rule {format_name(silence.rule)}"
+            help = did_you_mean(silence.rule, warning_names)
+            yield diagnose("silence-rule", node.place("rule"), message, help=help)
+        elif rule.severity == "error":
+            message = f"`{silence.rule}` is an error; only warnings can be silenced"
+            yield diagnose("silence-rule", node.place("rule"), message)
+        if not silence.reason.strip():
+            message, help = "the silence gives no reason", 'say why: `reason = "…"`'
+            yield diagnose("silence-rule", node.place("reason"), message, help=help)
 
 
 def comparison(node: ObjectNode, fields: VerifyTable) -> Comparison:
@@ -348,15 +357,6 @@ def _decimal(node: ObjectNode, name: str) -> Decimal | None:
     return Decimal(value.raw) if isinstance(value.value, float) else Decimal(value.value)
 
 
-def _check_filter(node: ObjectNode, fields: Filter) -> Iterator[Diagnostic]:
-    if (mistake := pattern_mistake(fields.pattern)) is not None:
-        message = f"the pattern does not compile: {mistake[0]}"
-        yield diagnose("field-value", _place(node, "pattern", mistake[1]), message)
-    elif (mistake := pattern_mistake(fields.pattern, fields.replacement)) is not None:
-        message = f"the replacement cannot be used: {mistake[0]}"
-        yield diagnose("field-value", _place(node, "replacement", mistake[1]), message)
-
-
 def _place(node: ObjectNode, name: str, at: int | None) -> Span:
     """The character at an offset of a string, or the whole string."""
     value = node.get(name)
@@ -372,18 +372,3 @@ def callout_kinds(tables: Mapping[str, str | CalloutTable]) -> tuple[CalloutKind
         texts = (table,) if isinstance(table, str) else (table.label, table.promise)
         kinds[name] = CalloutKind(name, *texts)
     return tuple(kinds.values())
-
-
-def _check_silence(node: ObjectNode, fields: Silence) -> Iterator[Diagnostic]:
-    rule = RULES.get(fields.rule)
-    if rule is None:
-        warning_names = [name for name, entry in RULES.items() if entry.severity == "warning"]
-        message = f"there is no rule {format_name(fields.rule)}"
-        help = did_you_mean(fields.rule, warning_names)
-        yield diagnose("silence-rule", node.place("rule"), message, help=help)
-    elif rule.severity == "error":
-        message = f"`{fields.rule}` is an error; only warnings can be silenced"
-        yield diagnose("silence-rule", node.place("rule"), message)
-    if not fields.reason.strip():
-        message, help = "the silence gives no reason", 'say why: `reason = "…"`'
-        yield diagnose("silence-rule", node.place("reason"), message, help=help)

@@ -28,7 +28,6 @@ from coursebuild.core.model.scenarios import (
     KeepTable,
     ScenarioTable,
     SweepTable,
-    SweepValue,
     Variation,
     is_multiple,
 )
@@ -43,7 +42,7 @@ from coursebuild.core.text.diagnostics import (
     did_you_mean,
     sort_diagnostics,
 )
-from coursebuild.core.text.source import Source, Span
+from coursebuild.core.text.source import Source
 
 MOST_SAMPLES = 100_000
 """The most samples of the state in a scenario."""
@@ -77,55 +76,7 @@ def parse_declarations(source: Source) -> Parsed[Declarations | None]:
         *decoding.diagnostics,
         *_check_scenarios(decoding),
         *_check_sweeps(decoding),
-        *_check_names(decoding),
     ]
-    if diagnostics or decoding.value is None:
-        return Parsed(None, sort_diagnostics(diagnostics))
-    return Parsed(_build_declarations(source, root, decoding.value), ())
-
-
-# ---------------------------------------------------------------------------------------- values
-
-
-def _build_declarations(source: Source, root: ObjectNode, fields: ModelFile) -> Declarations:
-    keeps = zip(root.objects("keep"), fields.keep, strict=True)
-    return Declarations(
-        model=source.path.removeprefix("models/").removesuffix(".toml"),
-        source=source,
-        scenarios=tuple(map(_build_scenario, root.objects("scenario"), fields.scenario)),
-        keep=tuple(
-            Keep(**asdict(table), finding_span=node.place("finding")) for node, table in keeps
-        ),
-        bench=fields.bench or BenchTable(),
-        sweeps=tuple(map(_build_sweep, root.objects("sweep"), fields.sweep)),
-    )
-
-
-def _build_sweep(node: ObjectNode, table: SweepTable) -> DeclaredSweep:
-    members = node.object("vary").members
-    variations = (
-        _build_variation(name, values, members[name].key.mark)
-        for name, values in table.vary.items()
-    )
-    return DeclaredSweep(**asdict(table), variations=tuple(variations))
-
-
-def _build_variation(name: str, values: tuple[SweepValue, ...] | str, span: Span) -> Variation:
-    if not isinstance(values, str):
-        return Variation(name, values, relative=False, span=span)
-    share = float(values.strip("± %")) / 100
-    return Variation(name, (1 - share, 1 + share), relative=True, span=span)
-
-
-def _build_scenario(node: ObjectNode, table: ScenarioTable) -> DeclaredScenario:
-    places = tuple((name, member.value.mark) for name, member in node.members.items())
-    return DeclaredScenario(**asdict(table), span=node.mark, places=places)
-
-
-# ---------------------------------------------------------------------------------------- checks
-
-
-def _check_names(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
     for table, field, message in (
         (ScenarioTable, "name", "two scenarios have the name `{}`"),
         (SweepTable, "name", "two sweeps have the name `{}`"),
@@ -133,7 +84,45 @@ def _check_names(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
     ):
         structs = decoding.find_structs(table)
         names = [(getattr(struct, field), node.place(field)) for node, struct in structs]
-        yield from check_unique(names, "field-value", message)
+        diagnostics += check_unique(names, "field-value", message)
+    if diagnostics or decoding.value is None:
+        return Parsed(None, sort_diagnostics(diagnostics))
+    fields = decoding.value
+    scenarios = []
+    for node, scenario in zip(root.objects("scenario"), fields.scenario, strict=True):
+        places = tuple((name, member.value.mark) for name, member in node.members.items())
+        scenarios.append(DeclaredScenario(**asdict(scenario), span=node.mark, places=places))
+    keeps = zip(root.objects("keep"), fields.keep, strict=True)
+    declarations = Declarations(
+        model=source.path.removeprefix("models/").removesuffix(".toml"),
+        source=source,
+        scenarios=tuple(scenarios),
+        keep=tuple(
+            Keep(**asdict(table), finding_span=node.place("finding")) for node, table in keeps
+        ),
+        bench=fields.bench or BenchTable(),
+        sweeps=tuple(map(_build_sweep, root.objects("sweep"), fields.sweep)),
+    )
+    return Parsed(declarations, ())
+
+
+# ---------------------------------------------------------------------------------------- values
+
+
+def _build_sweep(node: ObjectNode, table: SweepTable) -> DeclaredSweep:
+    members = node.object("vary").members
+    variations = []
+    for name, values in table.vary.items():
+        relative = isinstance(values, str)
+        if isinstance(values, str):
+            share = float(values.strip("± %")) / 100
+            values = (1 - share, 1 + share)
+        span = members[name].key.mark
+        variations.append(Variation(name, values, relative=relative, span=span))
+    return DeclaredSweep(**asdict(table), variations=tuple(variations))
+
+
+# ---------------------------------------------------------------------------------------- checks
 
 
 def _check_sweeps(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
@@ -156,9 +145,39 @@ def _check_sweeps(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
 def _check_scenarios(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
     for node, table in decoding.find_structs(ScenarioTable):
         yield from _check_times(node, table)
-        yield from _check_timesteps(node, table)
-        yield from _check_controls(node, table)
-        yield from _check_reference(node, table)
+        spans = [item.mark for item in node.items("timesteps")]
+        pairs = list(zip(table.timesteps, spans, strict=True))
+        for (length, name), (step, span) in itertools.product(_checked_lengths(table), pairs):
+            if not is_multiple(length, step):
+                message = f"the timestep {step:g} s does not divide `{name}` ({length:g} s)"
+                help = "every timestep must end at the same times, or errors cannot be compared"
+                yield diagnose("field-value", span, message, help=help)
+        yield from check_unique(pairs, "field-value", "the timestep {} s is named twice")
+        if table.hold is not None and not table.controls:
+            help = "`controls` are the commands, each held for so long"
+            yield diagnose("field-missing", node.place("hold"), "`controls` is missing", help=help)
+        if len(table.controls) > 1 and table.hold is None:
+            help = "`hold`: seconds for which each command holds"
+            yield diagnose("field-missing", node.mark, "`hold` is missing", help=help)
+        for item, row in zip(node.items("controls"), table.controls, strict=True):
+            first = len(table.controls[0])
+            if len(row) != first:
+                message = f"this command has {len(row)} numbers, and the first one has {first}"
+                help = "give one number for every actuator"
+                yield diagnose("field-value", item.mark, message, help=help)
+        hold, duration = table.hold, table.duration
+        if hold is not None and duration is not None and len(table.controls) > 1:
+            used_commands = -(-duration * (1 - _TOLERANCE) // hold)
+            if used_commands < len(table.controls):
+                message = (
+                    f"only {used_commands:g} of {len(table.controls)} commands come before the end"
+                )
+                help = "make `duration` longer, or leave the others out"
+                yield diagnose("field-value", node.place("controls"), message, help=help)
+        if table.closed_form and table.closed_form not in CLOSED_FORMS:
+            message = f"no hard case with a closed form is called `{shorten(table.closed_form)}`"
+            help = did_you_mean(table.closed_form, CLOSED_FORMS)
+            yield diagnose("field-value", node.place("reference"), message, help=help)
 
 
 def _check_times(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
@@ -176,51 +195,9 @@ def _check_times(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]
         yield diagnose("field-value", node.place("sample"), message, help=help)
 
 
-def _check_timesteps(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
-    spans = [item.mark for item in node.items("timesteps")]
-    pairs = list(zip(table.timesteps, spans, strict=True))
-    for (length, name), (step, span) in itertools.product(_checked_lengths(table), pairs):
-        if not is_multiple(length, step):
-            message = f"the timestep {step:g} s does not divide `{name}` ({length:g} s)"
-            help = "every timestep must end at the same times, or errors cannot be compared"
-            yield diagnose("field-value", span, message, help=help)
-    yield from check_unique(pairs, "field-value", "the timestep {} s is named twice")
-
-
 def _checked_lengths(table: ScenarioTable) -> Sequence[tuple[float, str]]:
     """The times that a timestep must divide, with their names; the sample divides the others."""
     if table.sample is not None:
         return ((table.sample, "sample"),)
     lengths = ((table.hold, "hold"), (table.duration, "duration"))
     return [(length, name) for length, name in lengths if length is not None]
-
-
-def _check_controls(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
-    if table.hold is not None and not table.controls:
-        help = "`controls` are the commands, each held for so long"
-        yield diagnose("field-missing", node.place("hold"), "`controls` is missing", help=help)
-    if len(table.controls) > 1 and table.hold is None:
-        help = "`hold`: seconds for which each command holds"
-        yield diagnose("field-missing", node.mark, "`hold` is missing", help=help)
-    for item, row in zip(node.items("controls"), table.controls, strict=True):
-        first = len(table.controls[0])
-        if len(row) != first:
-            message = f"this command has {len(row)} numbers, and the first one has {first}"
-            help = "give one number for every actuator"
-            yield diagnose("field-value", item.mark, message, help=help)
-    hold, duration = table.hold, table.duration
-    if hold is not None and duration is not None and len(table.controls) > 1:
-        used_commands = -(-duration * (1 - _TOLERANCE) // hold)
-        if used_commands < len(table.controls):
-            message = (
-                f"only {used_commands:g} of {len(table.controls)} commands come before the end"
-            )
-            help = "make `duration` longer, or leave the others out"
-            yield diagnose("field-value", node.place("controls"), message, help=help)
-
-
-def _check_reference(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
-    if table.closed_form and table.closed_form not in CLOSED_FORMS:
-        message = f"no hard case with a closed form is called `{shorten(table.closed_form)}`"
-        help = did_you_mean(table.closed_form, CLOSED_FORMS)
-        yield diagnose("field-value", node.place("reference"), message, help=help)

@@ -365,7 +365,9 @@ def require_one_of(
     members = [
         member for name in names if (member := node.members.get(name)) and has_value(node, name)
     ]
-    if not members and not _has_misspelling(node, type, names):
+    foreign = node.members.keys() - set(type.__struct_fields__)
+    # A field that is surely a misspelling of one of the names was already reported.
+    if not members and not any(nearest(key, names) for key in foreign):
         choice = ", ".join(f"`{name}`" for name in names[:-1]) + f" or `{names[-1]}`"
         yield diagnose("field-missing", node.mark, f"{choice} is missing")
     for second in members[1:] if only else ():
@@ -373,11 +375,6 @@ def require_one_of(
         notes = (Note("the other one is here", first.span),)
         message = f"`{first.value}` and `{second.key.value}` exclude each other"
         yield diagnose("field-value", second.key.span, message, help=help, notes=notes)
-
-
-def _has_misspelling(node: ObjectNode, type: type[Struct], names: tuple[str, ...]) -> bool:
-    """Whether an unknown field is surely a misspelling of one of the names, already reported."""
-    return any(nearest(key, names) for key in node.members if key not in type.__struct_fields__)
 
 
 def check_unique(

@@ -3,7 +3,7 @@
 Entry point: `parse_document`. It never raises, whatever the text:
 
 1. Line ends, NUL and a byte order mark are normalized; front matter is reported and left out.
-2. `tree` reads the blocks and, with `inlines`, their content; other modules read our fences.
+2. `tree` reads the blocks and, with `inline_tree`, their content; other modules read our fences.
 3. Footnotes are read last, in the order of their numbers.
 4. Terms and labels in wrong places are found in the whole document (`_check_placement`), and what
    has the id of something else (`_check_ids`). Where a merge conflict was left, that is all there
@@ -37,8 +37,8 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.model.blocks import title_line
-from coursebuild.core.model.equations import DisplayFormula, feature_block_ids
 from coursebuild.core.model.vocabulary import ENGLISH, Words
+from coursebuild.core.model.walk import DisplayFormula, feature_block_ids
 from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import ILLUSTRATION
@@ -171,9 +171,8 @@ def _check_ids(document: Document) -> Iterator[Diagnostic]:
     reported_places: set[int] = set()
     anchors = sorted(document_anchors(document), key=lambda anchor: anchor[2].start)
     for name, node, span in anchors:
-        if isinstance(node, FeatureBlock) and name in headings.intersection(
-            node.optional_anchors()
-        ):
+        keys = node.progress_keys() if isinstance(node, FeatureBlock) else None
+        if keys is not None and name == keys[0] and name in headings:
             continue
         entry = node, span
         first, first_span = owners.setdefault(name, entry)

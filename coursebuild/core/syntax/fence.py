@@ -1,7 +1,9 @@
 """Fences: code blocks of the text, of which other modules make scripts, quizzes and so on.
 
-Entry points: `read_fence`, which makes a `Fence` of a token; `check_kind`, which reports kinds that
-look misspelt or need a feature that is not installed.
+Entry points: `read_fence`, which makes a `Fence` of a token; `find_likely_end` and
+`find_likely_start`, which guess where a fence was meant to end or begin; `TextParser` and
+`Prose.read`, for the Markdown in fences of features, which shares the footnotes, anchors and rules
+of its document.
 
 Info strings are `kind [name] [key=value | key="value with spaces" | flag]…`: `read_keys`
 compares the words after the kind with the keys that it has (for a `Fence`, call its method `keys`),
@@ -14,13 +16,14 @@ from __future__ import annotations
 import ast
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any, Protocol
 
 from markdown_it.common.utils import unescapeAll
 from msgspec import Struct
 
-from coursebuild.core.model import CodeBlock
-from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
+from coursebuild.core.model import Block, CodeBlock, Inline
+from coursebuild.core.syntax.nodes import ArrayNode, Node, StringNode
 from coursebuild.core.syntax.spans import NO_TEXT, PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -28,7 +31,6 @@ from coursebuild.core.text.diagnostics import (
     Parsed,
     diagnose,
     did_you_mean,
-    misspelt,
 )
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -207,19 +209,6 @@ def _unescape(value: Excerpt) -> Excerpt:
     return Excerpt.join([value.slice(a, b) for a, b in zip(starts, ends, strict=True)])
 
 
-_LANGUAGES = tuple(
-    "bash console cpp css diff html ini javascript json julia markdown matlab python rust sh text "
-    "toml xml yaml".split()
-)
-"""Languages that texts often show."""
-_TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
-"""Names of ordinary code and text that no highlighter knows."""
-
-_FOREIGN = {"math": "a formula on a line of its own stands between two `$$`"}
-"""Kinds of blocks that other tools read, with what to write here."""
-
-_OBJECT = re.compile(r'\s*\{\s*"[^"\n]*"\s*:[\s\S]*\}\s*\Z')
-"""A JSON object, perhaps with mistakes."""
 INDENTED_FENCE = re.compile(r"\s*(`{3,}|~{3,})[ \t]*([\w+-]*)[^`\n]*")
 """The first line of an indented block that was surely meant to be a fence."""
 
@@ -261,11 +250,6 @@ class Fence(Struct, frozen=True):
         return CodeBlock(self.span, unescapeAll(self.kind), unescapeAll(self.info.text), self.body)
 
 
-def is_known_kind(kind: str) -> bool:
-    """Whether a block of a kind is more than code to be shown."""
-    return kind in CORE_FENCES or kind in fence_names()
-
-
 def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
     """The fence of a `fence` token of the text `base`."""
     info_start = token.start + len(token.markup)
@@ -278,18 +262,18 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
         body = Excerpt(base.source, body.text + "\n", body.pieces)
     span = base.span(token.start, token.end)
     head = base.span(token.start, info_start + len(token.info.rstrip()))
-    body_span, prefix = (body.span(), "") if nested else _body_lines(span, head, is_closed)
-    inner = _find_inner_opening(body, token.markup)
+    body_span, prefix = body.span(), ""
+    if not nested:  # the whole lines between the marks, and what new ones need before them
+        source = span.source
+        start = source.line_start(head.line + 1)
+        end = source.line_start(span.end_line if is_closed else span.end_line + 1)
+        body_span, prefix = Span(source, start, max(start, end)), line_prefix(head)
+    inner = None
+    if (marks := token.markup) in body.text:
+        opening = rf"^ {{0,3}}({re.escape(marks[0])}{{{len(marks)},}} *\w[^`\n]*)$"
+        if (match := re.search(opening, body.text, re.MULTILINE)) is not None:
+            inner = body.span(*match.span(1))
     return Fence(span, head, info, body, body_span, prefix, is_closed, nested, inner)
-
-
-def _find_inner_opening(body: Excerpt, marks: str) -> Span | None:
-    """The first line that would begin a fence of these marks if it were not inside one."""
-    if marks not in body.text:
-        return None
-    opening = re.compile(rf"^ {{0,3}}({re.escape(marks[0])}{{{len(marks)},}} *\w[^`\n]*)$", re.M)
-    match = opening.search(body.text)
-    return None if match is None else body.span(match.start(1), match.end(1))
 
 
 _MOST_LINES = 300
@@ -351,14 +335,6 @@ def _is_python(text: str) -> bool:
     return True
 
 
-def _body_lines(span: Span, head: Span, is_closed: bool) -> tuple[Span, str]:
-    """The whole lines between the fences, and the prefix that new ones need."""
-    source, last = span.source, span.end_line
-    start = source.line_start(head.line + 1)
-    end = source.line_start(last if is_closed else last + 1)
-    return Span(source, start, max(start, end)), line_prefix(head)
-
-
 def line_prefix(place: Span) -> str:
     """The prefix that further lines of a block need, such as `> `; `place` is its first line."""
     prefix = place.source.text[place.source.line_start(place.line) : place.start]
@@ -366,76 +342,46 @@ def line_prefix(place: Span) -> str:
     return prefix + " " if prefix.endswith(">") else prefix
 
 
-def check_kind(fence: Fence) -> Iterator[Diagnostic]:
-    """Report what looks wrong with the kind of a block that is shown as code."""
-    package = missing_package(fence.kind)
-    if package:
-        message = f"nothing that is installed reads a block of kind `{fence.kind}`"
-        yield diagnose("feature-missing", fence.head, message, help=f"install {package}")
-    kind = kind_of(fence.info)
-    name, kinds = kind.text.lower(), (*CORE_FENCES, *fence_names())
-    words = split_words(fence.info).value
-    yield from (diagnostic for word in words if (diagnostic := check_foreign_key(kind.text, word)))
-    if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
-        message = f"a block of kind `{kind.text}` is shown but never run, and this one has a `file`"
-        help = "a script is a block of kind `python`"
-        yield diagnose("script-kind", kind.span(), message, help=help)
-    elif name in _FOREIGN or name.startswith("{"):
-        message = f"a block of kind `{kind.text}` is shown as code here"
-        yield diagnose("markup-foreign", kind.span(), message, help=_help_with_foreign(name))
-    elif "=" in name:
-        message = f"the kind of this block is missing before `{kind.text}`"
-        help = "the first word says what a block is, as in ```` ```python file=examples/a.py ````"
-        yield diagnose("fence-info", kind.span(), message, help=help)
-    elif (likely := _find_misspelt(name, kinds)) is not None:
-        message = f"`{kind.text}` is not a known kind of block"
-        help = f"did you mean `{likely}`?"
-        yield diagnose("fence-kind-near", kind.span(), message, help=help)
-    elif not package and (diagnostic := _check_unread_json(fence)) is not None:
-        yield diagnostic
+class TextParser(Protocol):
+    """Parses Markdown inside another language; the spans of nodes point into the lesson."""
+
+    def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:
+        """The blocks of a text; math between the tags of HTML is math. Never raises."""
+        ...
+
+    def inlines(self, excerpt: Excerpt) -> Parsed[tuple[Inline, ...]]:
+        """The inlines of a text of at most one paragraph; line ends are soft. Never raises."""
+        ...
 
 
-def _help_with_foreign(name: str) -> str:
-    """What to write in place of a kind that other tools read."""
-    language = name.strip("{}=. ")
-    if name in _FOREIGN:
-        return _FOREIGN[name]
-    if is_known_kind(language):
-        example = " file=examples/….py" if language == "python" else ""
-        return f"write ```` ```{language}{example} ````"
-    if language and _is_language(language):
-        return f"code to be shown is of kind `{language}`; scripts are in Python"
-    return "a callout is a quotation: `> [!note]`, and `> ` before each line"
+class Prose(Struct, frozen=True):
+    """The Markdown strings inside a quiz or a lab, each parsed once."""
 
+    _content: dict[Node, tuple[Any, ...]]
+    diagnostics: tuple[Diagnostic, ...]
 
-def _find_misspelt(name: str, kinds: Sequence[str]) -> str | None:
-    """The kind for which a name was surely meant; no name of a language is taken for another."""
-    if name == "simlab":
-        return "lab simlab"
-    if name in kinds:
-        return name
-    likely = misspelt(name, kinds) or misspelt(name, _LANGUAGES)
-    return None if likely is None or _is_language(name) else likely
+    @classmethod
+    def read(cls, texts: Iterable[tuple[StringNode, str]], parser: TextParser) -> Prose:
+        """Parse each text as `blocks` or `inlines`, but for blank ones."""
+        content: dict[Node, tuple[Any, ...]] = {}
+        diagnostics: list[Diagnostic] = []
+        for node, kind in texts:
+            if node.value.strip():
+                parse = parser.blocks if kind == "blocks" else parser.inlines
+                parsed_text: Parsed[tuple[Any, ...]] = parse(node.excerpt)
+                content[node] = parsed_text.value
+                diagnostics += parsed_text.diagnostics
+        return cls(content, tuple(diagnostics))
 
+    def blocks(self, node: Node | None) -> tuple[Block, ...]:
+        """The blocks of a string; none for a field that is not given."""
+        return () if node is None else self._content.get(node, ())
 
-def _check_unread_json(fence: Fence) -> Diagnostic | None:
-    """Report a JSON object in a block without a kind, or of one that no highlighter knows."""
-    if not _OBJECT.match(fence.body.text) or (fence.kind and _is_language(fence.kind)):
-        return None
-    help = "a lab is of kind `lab`, a quiz of kind `quiz`; JSON to be shown is of kind `json`"
-    if not fence.kind:
-        message = "nothing reads a block without a kind, and this one holds JSON"
-        return diagnose("fence-unread", fence.head, message, help=help)
-    message = f"nothing reads a block of kind `{fence.kind}`: its JSON is shown as code"
-    return diagnose("fence-unread", kind_of(fence.info).span(), message, help=help)
+    def inlines(self, node: Node | None) -> tuple[Inline, ...]:
+        """The inlines of a string; none for a field that is not given."""
+        return () if node is None else self._content.get(node, ())
 
-
-def _is_language(name: str) -> bool:
-    """Whether a kind is a language that is highlighted, or plain text."""
-    from pygments.lexers import find_lexer_class_by_name  # slow to import, and rarely needed
-    from pygments.util import ClassNotFound
-
-    try:
-        return find_lexer_class_by_name(name) is not None
-    except ClassNotFound:
-        return name.lower() in _TEXTS
+    def each_item(self, node: Node | None) -> tuple[tuple[Any, ...], ...]:
+        """The blocks or inlines of each string of an array."""
+        items = node.items if isinstance(node, ArrayNode) else ()
+        return tuple(self._content.get(item, ()) for item in items)

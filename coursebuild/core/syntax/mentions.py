@@ -151,7 +151,13 @@ def text_inlines(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
 
 def link_mentions(run: Sequence[TextPiece], content: Excerpt, words: Words) -> list[Inline]:
     """The run as texts, soft line ends, and links where it mentions lessons and levels."""
-    chars = _characters(run)
+    chars = [
+        TextPiece(char, piece.start + i, piece.start + i + 1)
+        if piece.literal
+        else piece._replace(text=char)
+        for piece in run
+        for i, char in enumerate(piece.text)
+    ]
     text = "".join([char.text for char in chars])
     inlines: list[Inline] = []
     position = 0
@@ -167,14 +173,3 @@ def link_mentions(run: Sequence[TextPiece], content: Excerpt, words: Words) -> l
             inlines.append(Link(span, target, place, "", tuple(children), mention=True))
             position = end
     return inlines + text_inlines(chars[position:], content)
-
-
-def _characters(run: Sequence[TextPiece]) -> list[TextPiece]:
-    """The run as pieces of one character; those of an entity have the place of the whole."""
-    return [
-        TextPiece(char, piece.start + i, piece.start + i + 1)
-        if piece.literal
-        else piece._replace(text=char)
-        for piece in run
-        for i, char in enumerate(piece.text)
-    ]

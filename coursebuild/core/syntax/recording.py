@@ -24,8 +24,9 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.blocks import volatile_pattern
 from coursebuild.core.model.vocabulary import Words
-from coursebuild.core.syntax.fence import Fence, FenceKeys, Word, is_known_kind
+from coursebuild.core.syntax.fence import Fence, FenceKeys, Word
 from coursebuild.core.syntax.parsing_state import ParsingState
+from coursebuild.core.syntax.unread_markup import is_known_kind
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, misspelt
 from coursebuild.core.text.patterns import matches_empty_text, pattern_mistake
 from coursebuild.core.text.source import Excerpt, Span

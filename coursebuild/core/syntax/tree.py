@@ -26,20 +26,19 @@ from coursebuild.core.syntax.attributes import (
     read_label,
 )
 from coursebuild.core.syntax.block_parser import TOO_DEEP, References, block_tokens
+from coursebuild.core.syntax.code_blocks import read_block
 from coursebuild.core.syntax.containers import (
     Head,
-    read_head,
-    read_table,
-)
-from coursebuild.core.syntax.fence import INDENTED_FENCE, is_known_kind, read_fence
-from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
-from coursebuild.core.syntax.inlines import read_inlines
-from coursebuild.core.syntax.marks import (
     check_item,
     check_neighbours,
     check_numbers,
     check_quotation,
+    read_head,
+    read_table,
 )
+from coursebuild.core.syntax.fence import INDENTED_FENCE, read_fence
+from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
+from coursebuild.core.syntax.inline_tree import read_inlines
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
@@ -54,9 +53,8 @@ from coursebuild.core.syntax.recording import (
     record_fence,
     record_table,
 )
-from coursebuild.core.syntax.script import read_block
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
-from coursebuild.core.syntax.unread_markup import check_unread_markup
+from coursebuild.core.syntax.unread_markup import check_unread_markup, is_known_kind
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 

@@ -1,7 +1,8 @@
 """Markup that readers would see as it is written: broken markup of ours, and that of other tools.
 
 Entry points: `check_unread_markup`, for a block's content; `check_inline_code`, for code in a line
-that another tool would compute.
+that another tool would compute; `check_kind`, for a fence of a kind that looks misspelt or needs a
+feature that is not installed.
 
 Only texts of the parsed content are searched, neither code nor formulas nor escaped characters, so
 a backslash or backticks say that markup is meant to be seen. Everything else is NUL in the searched
@@ -14,10 +15,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from coursebuild.core.syntax.fence import is_known_kind
+from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
+from coursebuild.core.syntax.fence import Fence, check_foreign_key, kind_of, split_words
 from coursebuild.core.syntax.markup_kinds import BROKEN, FOREIGN, IN_HTML, ONCE, MarkupKind
 from coursebuild.core.syntax.nodes import shorten
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, misspelt, nearest
 from coursebuild.core.text.source import Excerpt, Span
 
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
@@ -284,3 +286,100 @@ def _mask(text: str) -> str:
     if _ESCAPED_BRACKETS.fullmatch(text):
         return text
     return "\n".join("\0" * len(line) for line in text.split("\n"))
+
+
+# --- fences
+
+_LANGUAGES = tuple(
+    "bash console cpp css diff html ini javascript json julia markdown matlab python rust sh text "
+    "toml xml yaml".split()
+)
+"""Languages that texts often show."""
+_PLAIN_TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
+"""Names of ordinary code and text that no highlighter knows."""
+
+_FOREIGN_KINDS = {"math": "a formula on a line of its own stands between two `$$`"}
+"""Kinds of blocks that other tools read, with what to write here."""
+
+_OBJECT = re.compile(r'\s*\{\s*"[^"\n]*"\s*:[\s\S]*\}\s*\Z')
+"""A JSON object, perhaps with mistakes."""
+
+
+def is_known_kind(kind: str) -> bool:
+    """Whether a block of a kind is more than code to be shown."""
+    return kind in CORE_FENCES or kind in fence_names()
+
+
+def check_kind(fence: Fence) -> Iterator[Diagnostic]:
+    """Report what looks wrong with the kind of a block that is shown as code."""
+    package = missing_package(fence.kind)
+    if package:
+        message = f"nothing that is installed reads a block of kind `{fence.kind}`"
+        yield diagnose("feature-missing", fence.head, message, help=f"install {package}")
+    kind = kind_of(fence.info)
+    name, kinds = kind.text.lower(), (*CORE_FENCES, *fence_names())
+    words = split_words(fence.info).value
+    yield from (diagnostic for word in words if (diagnostic := check_foreign_key(kind.text, word)))
+    if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
+        message = f"a block of kind `{kind.text}` is shown but never run, and this one has a `file`"
+        help = "a script is a block of kind `python`"
+        yield diagnose("script-kind", kind.span(), message, help=help)
+    elif name in _FOREIGN_KINDS or name.startswith("{"):
+        message = f"a block of kind `{kind.text}` is shown as code here"
+        yield diagnose("markup-foreign", kind.span(), message, help=_help_with_foreign(name))
+    elif "=" in name:
+        message = f"the kind of this block is missing before `{kind.text}`"
+        help = "the first word says what a block is, as in ```` ```python file=examples/a.py ````"
+        yield diagnose("fence-info", kind.span(), message, help=help)
+    elif (likely := _find_misspelt(name, kinds)) is not None:
+        message = f"`{kind.text}` is not a known kind of block"
+        help = f"did you mean `{likely}`?"
+        yield diagnose("fence-kind-near", kind.span(), message, help=help)
+    elif not package and (diagnostic := _check_unread_json(fence)) is not None:
+        yield diagnostic
+
+
+def _help_with_foreign(name: str) -> str:
+    """What to write in place of a kind that other tools read."""
+    language = name.strip("{}=. ")
+    if name in _FOREIGN_KINDS:
+        return _FOREIGN_KINDS[name]
+    if is_known_kind(language):
+        example = " file=examples/….py" if language == "python" else ""
+        return f"write ```` ```{language}{example} ````"
+    if language and _is_language(language):
+        return f"code to be shown is of kind `{language}`; scripts are in Python"
+    return "a callout is a quotation: `> [!note]`, and `> ` before each line"
+
+
+def _find_misspelt(name: str, kinds: Sequence[str]) -> str | None:
+    """The kind for which a name was surely meant; no name of a language is taken for another."""
+    if name == "simlab":
+        return "lab simlab"
+    if name in kinds:
+        return name
+    likely = misspelt(name, kinds) or misspelt(name, _LANGUAGES)
+    return None if likely is None or _is_language(name) else likely
+
+
+def _check_unread_json(fence: Fence) -> Diagnostic | None:
+    """Report a JSON object in a block without a kind, or of one that no highlighter knows."""
+    if not _OBJECT.match(fence.body.text) or (fence.kind and _is_language(fence.kind)):
+        return None
+    help = "a lab is of kind `lab`, a quiz of kind `quiz`; JSON to be shown is of kind `json`"
+    if not fence.kind:
+        message = "nothing reads a block without a kind, and this one holds JSON"
+        return diagnose("fence-unread", fence.head, message, help=help)
+    message = f"nothing reads a block of kind `{fence.kind}`: its JSON is shown as code"
+    return diagnose("fence-unread", kind_of(fence.info).span(), message, help=help)
+
+
+def _is_language(name: str) -> bool:
+    """Whether a kind is a language that is highlighted, or plain text."""
+    from pygments.lexers import find_lexer_class_by_name  # slow to import, and rarely needed
+    from pygments.util import ClassNotFound
+
+    try:
+        return find_lexer_class_by_name(name) is not None
+    except ClassNotFound:
+        return name.lower() in _PLAIN_TEXTS

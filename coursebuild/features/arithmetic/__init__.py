@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
 
-from coursebuild.core.features import Feature, Mathml
+from coursebuild.core.features import Feature
 from coursebuild.core.model import Course, Document, find_formulas
-from coursebuild.core.model.results import ScriptRun
+from coursebuild.core.model.results import Mathml, ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Excerpt, Span

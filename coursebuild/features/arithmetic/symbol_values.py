@@ -23,6 +23,7 @@ from msgspec.structs import replace
 
 from coursebuild.core import model
 from coursebuild.core.pages.quantities import unit_length
+from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 from coursebuild.core.text.units import Unit, find_unit
@@ -216,7 +217,11 @@ def _read_places(document: model.Document) -> Iterator[_Place]:
         (part.start, part.end)
         for block in blocks
         if isinstance(block, model.Callout | model.FeatureBlock)
-        for part in (block.scopes() if isinstance(block, model.FeatureBlock) else (block.span,))
+        for part in (
+            kind_of_block(block).scopes(block)
+            if isinstance(block, model.FeatureBlock)
+            else (block.span,)
+        )
     )
     for block in blocks:
         inlines = tuple(model.walk_inlines(model.block_inlines(block)))

@@ -17,9 +17,8 @@ from urllib.parse import unquote
 from coursebuild.core.model import Course, Document, FeatureBlock, find_blocks
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.model.scenarios import keyframe_scenarios
-from coursebuild.core.syntax.fence import Fence, Word, kind_of
+from coursebuild.core.syntax.fence import Fence, TextParser, Word, kind_of
 from coursebuild.core.syntax.spans import trim
-from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
 

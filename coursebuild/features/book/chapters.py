@@ -14,7 +14,7 @@ from msgspec import Struct
 
 from coursebuild.core.model import Lesson
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.added_files import ExportContext
+from coursebuild.core.pages.context import ExportContext
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
 
 _DROPPED_ELEMENTS = frozenset(

@@ -29,7 +29,7 @@ from msgspec import Struct
 from coursebuild.core.model import Lesson, Level
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.added_files import ExportContext
+from coursebuild.core.pages.context import ExportContext
 from coursebuild.core.pages.fonts import COURSE
 from coursebuild.core.pages.html_tree import to_xml
 from coursebuild.core.pages.strings import direction

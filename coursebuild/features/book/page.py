@@ -16,7 +16,7 @@ from markupsafe import Markup
 from coursebuild.core.model import Lesson, Level
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.added_files import ExportContext
+from coursebuild.core.pages.context import ExportContext
 from coursebuild.core.pages.html_tree import to_html
 from coursebuild.core.pages.strings import direction
 from coursebuild.core.text.characters import visible

@@ -19,7 +19,6 @@ from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core import model
-from coursebuild.core.features import Mathml
 from coursebuild.core.model import (
     Block,
     Document,
@@ -34,6 +33,7 @@ from coursebuild.core.model import (
     walk_inlines,
     without_links,
 )
+from coursebuild.core.model.results import Mathml
 from coursebuild.core.pages import formulas
 from coursebuild.core.pages.formulas import number_equations
 from coursebuild.core.pages.markup import HtmlWriter

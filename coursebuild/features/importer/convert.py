@@ -21,7 +21,7 @@ from typing import Any
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import FileChange, change_files
@@ -99,7 +99,7 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     return ConvertedCourse(dict(sorted(out.items())), tuple(leftovers), context.notebook_outputs)
 
 
-def write_course(course: ConvertedCourse, target: Path, files: SourceFiles, store: Memo) -> None:
+def write_course(course: ConvertedCourse, target: Path, files: SourceFiles, store: Store) -> None:
     """Write all files of a new course, or none.
 
     Those that an import of the same course wrote before, and nobody has edited since, are made what
@@ -129,7 +129,7 @@ def write_course(course: ConvertedCourse, target: Path, files: SourceFiles, stor
     change_files(target, changes)
 
 
-def change_tried_lessons(target: Path, changes: Sequence[FileChange], store: Memo) -> None:
+def change_tried_lessons(target: Path, changes: Sequence[FileChange], store: Store) -> None:
     """Change lessons to what trying their scripts has shown, so that `write_course` knows them."""
     for change in changes:
         store.put(TRIED, fingerprint((change.path, change.old, change.new)), b"")

@@ -12,9 +12,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from msgspec import Struct
 
 from coursebuild.core.model import FeatureBlock, Inline
-from coursebuild.core.syntax.fence import Fence
+from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.syntax.spans import trim
-from coursebuild.core.syntax.texts import TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Excerpt, Span
 

@@ -60,6 +60,8 @@ FEATURE = Feature(
             markdown=lab_markdown,
             index=index_lab,
             picture=lab_picture,
+            docked=lambda lab: lab.fields.dock,
+            tasks=lambda lab: 1,
         ),
     ),
     model_part=ModelPart(values=model_view, draw=draw_model, opens=True, picture=model_picture),

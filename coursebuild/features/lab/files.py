@@ -14,8 +14,7 @@ from typing import Any
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import PublishedTrials
-from coursebuild.core.model.results import OutputFile, Results
+from coursebuild.core.model.results import OutputFile, PublishedTrials, Results
 from coursebuild.core.pages.assets import Assets, hashed_name
 
 _FOLDER = "assets/labs"

@@ -82,10 +82,6 @@ class Lab(FeatureBlock, frozen=True):
         key = f"goal-{key_of(condition)[:8]}"
         return key, (key,)
 
-    def tasks(self) -> int:
-        """One: to try it."""
-        return 1
-
     def summary(self) -> Lab:
         """The lab without its Markdown."""
         return replace(self, note=(), goal=())
@@ -97,7 +93,3 @@ class Lab(FeatureBlock, frozen=True):
     def mjcf(self) -> Excerpt | None:
         """The model that it holds, if it holds one."""
         return self.xml
-
-    def is_docked(self) -> bool:
-        """Whether its author wants it beside the text."""
-        return self.fields.dock

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -28,7 +28,6 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import BY_LAB, Library
-from coursebuild.core.pages.qr import qr_svg
 from coursebuild.core.pages.quantities import number
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
@@ -281,3 +280,18 @@ def draw_model(renderer: Renderer, view: LabView) -> Markup:
 def model_picture(library: Library, model: MjcfModel) -> Picture | None:
     """Return the picture of a model's lab."""
     return lab_picture(*_find_lab(library, model))
+
+
+def qr_svg(text: str, label: str) -> Markup:
+    """The QR code of a text as an `svg` element with a label; empty for a text that is too long.
+
+    Up to a seventh of the code may be damaged (level M), or more if that takes no more room.
+    """
+    import segno  # only pages with labs need it
+
+    try:
+        code = segno.make_qr(text, error="m", boost_error=True)
+    except segno.DataOverflowError:  # more than 2,331 bytes
+        return Markup()
+    svg = code.svg_inline(omitsize=True, svgclass="qr", lineclass=None)
+    return Markup(svg.replace("<svg", f'<svg role="img" aria-label="{escape(label)}"', 1))

@@ -18,10 +18,9 @@ from msgspec import Struct, ValidationError, convert
 
 from coursebuild.core.model.fields import Positive
 from coursebuild.core.syntax.decode import decode
-from coursebuild.core.syntax.fence import Fence, Word, kind_of
+from coursebuild.core.syntax.fence import Fence, Prose, TextParser, Word, kind_of
 from coursebuild.core.syntax.json_text import parse_json, to_one_line
 from coursebuild.core.syntax.nodes import JSON, ArrayNode, Node, ObjectNode, StringNode
-from coursebuild.core.syntax.texts import Prose, TextParser
 from coursebuild.core.text.diagnostics import Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.lab.model import MJCF, SIMLAB, START, Entry, Lab

@@ -162,7 +162,7 @@ def _find_model(context: TrialContext, name: str) -> Source | None:
 
 def _save_model(context: TrialContext, native: NativeEngine, model: Source) -> bytes:
     """Return a model as an MJB file; from the store if nothing in it has changed."""
-    store, key = context.memory.store, model_key(context.root, model.path, model.text)
+    store, key = context.run_store.store, model_key(context.root, model.path, model.text)
     mjb = store.get("mjb", key, bytes)
     if mjb is None:
         mjb = native.save(model.path, model.text)
@@ -195,7 +195,7 @@ class _LabTrial(Struct, frozen=True):
 
     def run(self) -> tuple[TrialResult, list[Diagnostic]]:
         """Run the trial, or read the reply of an earlier one, and evaluate it."""
-        lab, store = self.lab, self.context.memory.store
+        lab, store = self.lab, self.context.run_store.store
         module = compile_lab(lab, self.trial.name)
         inputs = inputs_of(lab, module)
         try:
@@ -214,7 +214,7 @@ class _LabTrial(Struct, frozen=True):
         reply, failures = evaluation.reply, evaluation.failures
         export = LabExport(None) if failures else self._export(reply)
         files = model_files(self.context.root, self.model.path, self.model.text)
-        self.context.memory.note_trial(
+        self.context.run_store.note_trial(
             inputs,
             (*((self.model.path,) if lab.xml is None else ()), *files),
             ok=not failures,
@@ -308,7 +308,7 @@ class _LabTrial(Struct, frozen=True):
         reply["made"] = int(time.time())
         data = reply_bytes(reply)
         if _is_lasting(read_reply(data)):
-            self.context.memory.store.put("labs", key, data, shared=True)
+            self.context.run_store.store.put("labs", key, data, shared=True)
         return data
 
     def _compare_natively(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any]:
@@ -342,8 +342,8 @@ class _LabTrial(Struct, frozen=True):
         from coursebuild.features.lab.picture.static import draw_picture
 
         picture_key = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
-        store = self.context.memory.store
-        return store.get_or_create("pictures", picture_key, lambda: draw_picture(self.lab, main))
+        store = self.context.run_store.store
+        return store.get_or_make("pictures", picture_key, lambda: draw_picture(self.lab, main))
 
 
 def _add_camera(config: dict[str, Any], main: MainRun | None) -> dict[str, Any]:

@@ -21,13 +21,13 @@ from urllib.parse import urlsplit
 from coursebuild.core.model import Lesson
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.added_files import SiteContext
-from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.context import PageContext, SiteContext
 from coursebuild.core.pages.document_inputs import LessonLink, LevelView
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import code_span, escape_line, guard_lines, link
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.strings import Strings
+from coursebuild.core.registry import has_copies
 from coursebuild.core.text.characters import visible
 from coursebuild.features.markdown.from_html import html_to_markdown
 from coursebuild.features.markdown.writer import DocumentWriter
@@ -48,7 +48,7 @@ def markdown_files(site: SiteContext) -> Iterator[SiteFile]:
 
 def note_markdown(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
     """Return the text of a page; empty if it has no copy."""
-    if not urls.has_copies(inputs.head.path):
+    if not has_copies(inputs.head.path):
         return b""
     if page is not None and inputs.head.kind != "home":
         text = _document_copy(inputs, page)
@@ -61,7 +61,7 @@ def note_markdown(inputs: PageInputs, page: PageContext | None, body: str) -> by
 def markdown_href(place: urls.Place, href: str) -> str:
     """Return the address for a link in a page's copy: links to pages lead to their copies."""
     path, _ = place.target(href)
-    if path is None or path.startswith("files/") or not urls.has_copies(path):
+    if path is None or path.startswith("files/") or not has_copies(path):
         return href
     parts = urlsplit(href)
     if not parts.path.endswith(".html"):

@@ -16,10 +16,10 @@ from typing import assert_never
 from markupsafe import Markup
 
 from coursebuild.core import model
-from coursebuild.core.pages.blocks import output_receipt, script_receipt
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.marks import block_quote, code_span, escape_marks, fence, link
 from coursebuild.core.pages.markup import SpecialBlock
+from coursebuild.core.pages.page_writer import output_receipt, script_receipt
 from coursebuild.core.registry import kind_of_block
 from coursebuild.features.markdown.blocks import BlockWriter
 from coursebuild.features.markdown.from_html import html_to_markdown

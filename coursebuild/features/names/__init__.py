@@ -11,7 +11,7 @@ import re
 from collections.abc import Collection, Iterator
 from fnmatch import fnmatchcase
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.features import Feature
 from coursebuild.core.model import Course, Document
 from coursebuild.core.pages import urls
@@ -34,7 +34,7 @@ _TAIL = re.compile(r"[^\W\d_]+(?!\w)")
 _HELP = "say `{code}` after it if it is no name, or list it under `names` in `[verify]`"
 
 
-def reference(course: Course, store: Memo, interpreter: Interpreter | None) -> EngineTable | None:
+def reference(course: Course, store: Store, interpreter: Interpreter | None) -> EngineTable | None:
     """Return the names of the installed MuJoCo, if the course names anything."""
     documents = course_names(course)
     paths = {"mujoco.x", "numpy.x"}

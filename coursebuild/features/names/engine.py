@@ -15,7 +15,7 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.child import JsonChild
 from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
@@ -109,7 +109,7 @@ def _decode(data: bytes) -> EngineNames:
 
 
 def engine_names(
-    store: Memo, interpreter: Interpreter | None, modules: Iterable[str]
+    store: Store, interpreter: Interpreter | None, modules: Iterable[str]
 ) -> EngineTable:
     """The names of the MuJoCo that the scripts use, and of modules that they import.
 
@@ -134,7 +134,7 @@ def _code() -> str:
 _in_memory: dict[str, bytes] = {}
 
 
-def _recall(store: Memo, python: str, key: str, modules: tuple[str, ...]) -> bytes:
+def _recall(store: Store, python: str, key: str, modules: tuple[str, ...]) -> bytes:
     """The names from this process, the store or a child."""
     data = _in_memory.get(key) or store.get(_KIND, key, bytes)
     if data is None:

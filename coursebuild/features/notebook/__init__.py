@@ -43,8 +43,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import CachedFile, Outcome
 from coursebuild.core.pages import urls, zips
-from coursebuild.core.pages.added_files import SiteContext
-from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.context import PageContext, SiteContext
 from coursebuild.core.pages.marks import code_span, escape_marks, hang, link
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.features.markdown.copies import head

@@ -25,9 +25,8 @@ from coursebuild.core.model import Course
 from coursebuild.core.model.course import ThemeFile
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.added_files import SiteContext
-from coursebuild.core.pages.assets import Assets, hashed_name, page_script
-from coursebuild.core.pages.frame import Names
+from coursebuild.core.pages.assets import Assets, Names, hashed_name, page_script
+from coursebuild.core.pages.context import SiteContext
 from coursebuild.core.pages.strings import direction
 from coursebuild.core.pages.theme import picture_size
 

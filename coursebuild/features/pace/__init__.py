@@ -13,6 +13,7 @@ from msgspec import Struct
 
 from coursebuild.core import model
 from coursebuild.core.features import Feature
+from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 
@@ -52,7 +53,8 @@ def count_efforts(document: model.Document) -> Efforts:
 
 def _count_effort(blocks: list[model.Block]) -> Effort:
     words = sum(len(model.plain_text(model.block_inlines(block)).split()) for block in blocks)
-    tasks = sum(block.tasks() for block in blocks if isinstance(block, model.FeatureBlock))
+    feature_blocks = [block for block in blocks if isinstance(block, model.FeatureBlock)]
+    tasks = sum(kind_of_block(block).tasks(block) for block in feature_blocks)
     return Effort(_round_to(words, 50), _round_to(sum(map(_count_lines, blocks)), 5), tasks)
 
 

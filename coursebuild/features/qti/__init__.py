@@ -9,7 +9,7 @@ from coursebuild.core.features import Exporter, Feature
 
 if TYPE_CHECKING:
     from coursebuild.core.model.results import SiteFile
-    from coursebuild.core.pages.added_files import ExportContext
+    from coursebuild.core.pages.context import ExportContext
     from coursebuild.core.text.diagnostics import Diagnostic
 
 

@@ -24,8 +24,7 @@ from msgspec import Struct
 from coursebuild.core.model import Block, Course, Inline, find_blocks
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.added_files import ExportContext
-from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.context import ExportContext, PageContext
 from coursebuild.core.pages.xml import element, identifier, markup, render_xml
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.qti.flow import STRIKE_CLASS, Flow

@@ -23,6 +23,8 @@ FEATURE = Feature(
             markdown=quiz_markdown,
             index=index_quiz,
             wide=False,
+            scopes=lambda quiz: tuple(question.span for question in quiz.questions),
+            tasks=lambda quiz: len(quiz.keys),
         ),
     ),
     summary=check_predictions,

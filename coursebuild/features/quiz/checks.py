@@ -11,7 +11,6 @@ from itertools import chain
 
 from msgspec import Struct
 
-from coursebuild.core.features import Mathml
 from coursebuild.core.model import (
     Block,
     CodeBlock,
@@ -22,7 +21,7 @@ from coursebuild.core.model import (
     document_scripts,
     find_blocks,
 )
-from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.model.results import Mathml, Outcome, ScriptRun
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt

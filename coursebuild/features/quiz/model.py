@@ -117,10 +117,6 @@ class Quiz(FeatureBlock, frozen=True):
         """Options, and items to be put in order."""
         return tuple(inline for question in self.questions for inline in _inlines(question))
 
-    def scopes(self) -> tuple[Span, ...]:
-        """The questions."""
-        return tuple(question.span for question in self.questions)
-
     def summary(self) -> Quiz:
         """The quiz with the questions whose answer a script gives, without their texts."""
         bare = (
@@ -134,10 +130,6 @@ class Quiz(FeatureBlock, frozen=True):
         """The anchors of the quiz and of its questions; none where its id cannot be read."""
         return (self.id, *map(self.anchor, self.keys)) if self.id else ()
 
-    def optional_anchors(self) -> tuple[str, ...]:
-        """Its id: a heading that has the same stands for the quiz that it is above."""
-        return (self.id,)
-
     def quoted_lines(self) -> tuple[tuple[str, int], ...]:
         """The lines of output that questions ask for, as (script, line)."""
         return tuple((question.script, question.line) for question in self.output_questions())
@@ -145,10 +137,6 @@ class Quiz(FeatureBlock, frozen=True):
     def progress_keys(self) -> tuple[str, tuple[str, ...]]:
         """The keys under which a reader's answers are kept: of the quiz, and of its questions."""
         return self.id, self.keys
-
-    def tasks(self) -> int:
-        """The number of its questions."""
-        return len(self.keys)
 
     def output_questions(self) -> Iterator[OutputQuestion]:
         """The questions whose answer a script gives."""

@@ -16,8 +16,8 @@ from coursebuild.core.features import Exporter, Feature
 from coursebuild.core.model import Course, Lesson
 from coursebuild.core.model.results import OutputFile, SiteFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.assets import page_script
+from coursebuild.core.pages.context import ExportContext
 from coursebuild.core.pages.frame import policy
 from coursebuild.core.pages.strings import direction
 from coursebuild.core.pages.xml import identifier, render_xml

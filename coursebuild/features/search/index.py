@@ -28,7 +28,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from msgspec import Struct
 
 from coursebuild.core.model.results import CachedFile
-from coursebuild.core.pages.added_files import NotedPage, SiteContext
+from coursebuild.core.pages.context import NotedPage, SiteContext
 from coursebuild.features.search.page import LEAD_ONLY, as_json, script, text_and_terms
 from coursebuild.features.search.words import is_fuzzy, shelf_of
 
@@ -156,7 +156,7 @@ def _sorted_slices(site: SiteContext, plan: IndexPlan, pages: Sequence[NotedPage
     def make() -> bytes:
         return b"\0".join(sort_terms(plan, (text_and_terms(site.note(p.path))[1] for p in pages)))
 
-    return read_slices(plan, site.get_or_create(key, make)) or make().split(b"\0")
+    return read_slices(plan, site.get_or_make(key, make)) or make().split(b"\0")
 
 
 def read_slices(plan: IndexPlan, data: bytes) -> list[bytes] | None:

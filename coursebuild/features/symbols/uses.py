@@ -14,8 +14,8 @@ from markupsafe import Markup
 from msgspec import Struct, field
 
 from coursebuild.core import model
-from coursebuild.core.features import Mathml
 from coursebuild.core.model import Lesson, Owner
+from coursebuild.core.model.results import Mathml
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.document_inputs import (
     OwnerLink,

@@ -26,8 +26,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.pages import urls
-from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Excerpt

@@ -16,8 +16,7 @@ from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownW
 from coursebuild.core.model import FeatureBlock
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.marks import fence as code_block
-from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 

@@ -15,8 +15,7 @@ from msgspec import Struct
 from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter, PagePart
 from coursebuild.core.model import Block, FeatureBlock
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.syntax.fence import Fence
-from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Span

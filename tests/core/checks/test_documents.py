@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coursebuild.core.checks.course import check_course, check_document
+from coursebuild.core.checks.lessons import check_course, check_document
 from coursebuild.core.checks.links import link_targets
 from support.made_courses import make_course, rules_and_texts
 

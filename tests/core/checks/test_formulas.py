@@ -1,15 +1,15 @@
-"""Formulas: which a course has, and where those that do not parse stand."""
+"""Formulas: which a document has, and where those that do not parse stand."""
 
 from __future__ import annotations
 
-from coursebuild.core.checks.formulas import check_formulas, course_formulas
+from coursebuild.core.checks.lessons import check_formulas, document_formulas
 from coursebuild.core.model.results import Formula, MathError
 from support.made_courses import make_course, messages, rules_and_texts
 
 
 def test_each_formula_is_listed_once_in_order_of_first_use() -> None:
-    course = make_course("A $b$ and $$a$$ and $b$.\n", "$$\nb\n$$\n\n- $a$ and $$a$$\n", "$c$\n")
-    assert course_formulas(course) == (
+    course = make_course("A $b$ and $$a$$ and $b$.\n\n$$\nb\n$$\n\n- $a$ and $$a$$\n\n$c$\n")
+    assert document_formulas(course.documents[0]) == (
         Formula("b", False),
         Formula("a", True),
         Formula("b", True),

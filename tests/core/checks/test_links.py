@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.core.checks.course import check_course
+from coursebuild.core.checks.lessons import check_course
 from coursebuild.core.checks.links import anchors
 from support.made_courses import BOX, document, make_course, messages, rules_and_texts
 

@@ -20,7 +20,7 @@ from coursebuild.core.engine.digests import (
     folder_state,
     modules_in,
 )
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 
 
 def sha(data: bytes) -> str:
@@ -93,7 +93,7 @@ def test_an_edit_of_the_same_size_and_time(
 
 def test_where_the_clock_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / ".coursebuild").write_text("in the way")
-    clock = Clock(Memo(tmp_path))
+    clock = Clock(Store(tmp_path))
     before = time.time_ns()
     clock.tick()
     assert before - 1_000_000_000 <= clock.now() <= time.time_ns()

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files import trust
 from coursebuild.pipeline.options import open_store
 from support.workflows import git
@@ -35,7 +35,7 @@ def root(tmp_path: Path, state: Path) -> Path:
 
 def fill(root: Path) -> Path:
     """Keep a result; returns the file in which it lies."""
-    Memo(root).put("kind", KEY, b"kept")
+    Store(root).put("kind", KEY, b"kept")
     return Path(trust.find_store(str(root))[0], "kind", KEY)
 
 
@@ -101,7 +101,7 @@ def test_damaged_key_is_replaced_or_done_without(root: Path, state: Path, damage
         case _:
             (state / "key").mkdir()
     assert look_up(root)[0] is None
-    assert Memo(root).get_or_create("kind", KEY, lambda: b"made") == b"made"
+    assert Store(root).get_or_make("kind", KEY, lambda: b"made") == b"made"
     assert trust.store_key(str(root)) != b"x" * 32
 
 
@@ -135,7 +135,7 @@ def test_without_a_place_of_ones_own_outside_of_the_course_nothing_is_kept(
         user = os.geteuid() + 1
         monkeypatch.setattr(os, "geteuid", lambda: user)
     monkeypatch.setenv("XDG_STATE_HOME", str(root.parent / place))
-    Memo(root).put("kind", KEY, b"kept")
+    Store(root).put("kind", KEY, b"kept")
     assert look_up(root) == (
         None,
         [

@@ -7,7 +7,7 @@ import gzip
 import brotli
 
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages.added_files import compressed_files
+from coursebuild.core.pages.assets import compressed_files
 
 TEXT = b"function f(x) { return x * x + 1 }\n" * 300
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages.links import check_links
+from coursebuild.core.pages.references import check_links
 
 
 def site(page: str, path: str = "lessons/a.html") -> tuple[OutputFile, ...]:

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model import line_anchor, linked_lines, listing_anchor, output_anchor
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages.links import check_links, has_anchor, merge_line_ids
-from coursebuild.core.pages.qr import qr_svg
+from coursebuild.core.pages.references import check_links, has_anchor, merge_line_ids
+from coursebuild.features.lab.page import qr_svg
 from support.rendered_course import Make
 
 

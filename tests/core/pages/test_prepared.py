@@ -14,8 +14,7 @@ import pytest
 
 from coursebuild.core.files.resources import PREPARED, assets_dir, prepared_file, template_texts
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages.added_files import compressed_files
-from coursebuild.core.pages.assets import SCRIPTS, Assets, page_script
+from coursebuild.core.pages.assets import SCRIPTS, Assets, compressed_files, page_script
 from coursebuild.core.pages.fonts import GREEK, font_jobs, read_faces, subset_font
 from coursebuild.core.pages.renderer import compile_templates, compiled_name
 

@@ -13,8 +13,7 @@ from coursebuild.core.files.resources import template_texts
 from coursebuild.core.pages.fonts import BASE
 from coursebuild.core.pages.frame import FRAME_IDS
 from coursebuild.core.pages.page_inputs import PageHead
-from coursebuild.core.pages.record import PageRecord, record
-from coursebuild.core.pages.styles import class_name
+from coursebuild.core.pages.record import PageRecord, class_name, record
 
 PIECES = [
     *("<math><mi>x</mi><mo>&lt;</mo></math>", '<math display="block"><mi>α</mi></math>', "<math>"),

@@ -14,7 +14,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages.links import check_links
+from coursebuild.core.pages.references import check_links
 from support.rendered_course import MAP, Make
 
 LESSON = """## First part

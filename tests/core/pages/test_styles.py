@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.pages.styles import class_name, hoist_styles
+from coursebuild.core.pages.record import class_name, hoist_styles
 
 PAD = class_name("padding: 0")
 

@@ -15,7 +15,6 @@ from msgspec.structs import replace
 from coursebuild.core.model import MjcfModel
 from coursebuild.core.model.results import CompileResult, ModelFacts, OutputFile
 from coursebuild.core.pages.folding import find_imports
-from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.zips import Package, Surroundings, make_archives
 from coursebuild.core.text.source import Source
 from support.rendered_course import Make
@@ -68,7 +67,7 @@ def rendered(make: Make) -> Any:
 
 
 def packed_archives(rendered: Any) -> dict[str, bytes]:
-    library = Library(rendered.course, rendered.results, rendered.assets)
+    library = rendered.library()
     return {archive.path: archive.pack() for archive in make_archives(library, SURROUNDINGS)}
 
 

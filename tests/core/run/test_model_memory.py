@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.model.results import CompileResult
 from coursebuild.core.run import mjcf
 from support.model_files import TETRAHEDRON
@@ -36,7 +36,7 @@ class Course:
         models = {path.stem: path.read_text() for path in sorted(self.root.glob("models/*.xml"))}
         texts = [(f"models/{name}.xml", text) for name, text in models.items()]
         texts += [(mjcf.TEXT_PATH, text) for text in extra_texts]
-        results = mjcf.compile_or_recall(self.root, Memo(self.root, fresh=fresh), texts)
+        results = mjcf.compile_or_recall(self.root, Store(self.root, fresh=fresh), texts)
         return dict(zip([*models, *extra_texts], results, strict=True))
 
     def take_compiled(self) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.run.packages import ABSENT, InstalledPackages
 
 
@@ -35,7 +35,7 @@ def install(folder: Path, name: str, version: str, files: list[str]) -> None:
 
 
 def ask(tmp_path: Path, site: Path) -> InstalledPackages:
-    return InstalledPackages(Memo(tmp_path), [str(site)])
+    return InstalledPackages(Store(tmp_path), [str(site)])
 
 
 def test_versions(tmp_path: Path, site: Path) -> None:
@@ -94,5 +94,5 @@ def test_the_first_on_the_path_counts(tmp_path: Path, site: Path) -> None:
     user = tmp_path / "user/site-packages"
     user.mkdir(parents=True)
     install(user, "Some-Tool", "9", ["tool/__init__.py"])
-    packages = InstalledPackages(Memo(tmp_path), [str(user), str(site), str(tmp_path / "none")])
+    packages = InstalledPackages(Store(tmp_path), [str(user), str(site), str(tmp_path / "none")])
     assert packages.version("tool") == "Some-Tool 9"

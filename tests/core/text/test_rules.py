@@ -22,9 +22,9 @@ from coursebuild.core.registry import installed_features
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.rules import RULES
 from coursebuild.features.lab.engines.browser import LabEngine
-from coursebuild.pipeline.build import build, export
 from coursebuild.pipeline.check import check
-from coursebuild.pipeline.update import update
+from coursebuild.pipeline.outputs import update
+from coursebuild.pipeline.publication import build, export
 from coursebuild.report import Style, diagnostic_text
 from support.fixture_cases import Case, read_cases, rewrite
 from support.rule_cases import Layout, Workshop, parts

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.run.v8 import Isolate
 from coursebuild.features.lab.engines.native import NativeEngine
 from coursebuild.features.lab.export.script import (
@@ -141,7 +141,7 @@ def test_script_is_offered_where_it_does_what_the_lab_does_and_a_reason_where_no
     usual = {"xml": PENDULUM, "verify": {"seconds": 1}}
     labs = [{**usual, **lab} for lab in (*EXPORTED_LABS, *(lab for lab, _ in REFUSED_LABS))]
     fences = (f"```lab\n{json.dumps(lab, ensure_ascii=False)}\n```\n\n" for lab in labs)
-    options = Options(tmp_path, 1, Memo(tmp_path))
+    options = Options(tmp_path, 1, Store(tmp_path))
     engines = Engines(tmp_path)
     engines.native = NativeEngine(tmp_path, seconds=2.0)
     results, diagnostics = try_labs(make_course("".join(fences)), options, engines)

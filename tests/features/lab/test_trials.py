@@ -17,12 +17,12 @@ from typing import Any
 
 import pytest
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.features import TrialContext
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.trust import seal, store_key, unseal
-from coursebuild.core.run.memory import Memory
 from coursebuild.core.run.mjcf import compile_all
+from coursebuild.core.run.run_store import RunStore
 from coursebuild.features.lab.compile import LabCode
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
@@ -124,10 +124,10 @@ def test_poisoned_trials_are_one_that_can_be_shown_or_told(
     for data in (reply, *bombs, *texts):
         entry.write_bytes(seal(name, data, key))
         shutil.rmtree(tried_course.root / ".coursebuild/pictures", ignore_errors=True)
-        memory = Memory(tried_course.root, Memo(tried_course.root))
+        run_store = RunStore(tried_course.root, Store(tried_course.root))
         messages.clear()
-        memory.store.listen(messages.append)
-        context = TrialContext(tried_course.root, course, models, memory, static=True)
+        run_store.store.listen(messages.append)
+        context = TrialContext(tried_course.root, course, models, run_store, static=True)
         try:
             ((result,), diagnostics) = LabTrials(context, engines).run(lab_trials(course))
         except MissedError:
@@ -149,7 +149,7 @@ def test_failure_of_a_lab_is_kept_and_one_that_took_too_long_is_not(tmp_path: Pa
     fences = fence(lab.format(0.1, "null.x")) + fence(lab.format(500, ""))
     course = make_course(fences, models={"ball": BALL})
     models = {"ball": compile_all(tmp_path, [("models/ball.xml", BALL)])[0]}
-    options = Options(tmp_path, 1, Memo(tmp_path))
+    options = Options(tmp_path, 1, Store(tmp_path))
     outcomes = []
     with closing(OpenEngines(tmp_path)) as engines:
         for seconds in (0.2, 60.0):

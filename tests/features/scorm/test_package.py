@@ -11,7 +11,7 @@ import pytest
 from lxml import etree
 
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages.links import check_links
+from coursebuild.core.pages.references import check_links
 from support.archives import Package, entries, mistakes, referenced_files, scorm_schema
 from support.question_zoo import ANY, quiz
 from support.scratch_course import Folder, Make

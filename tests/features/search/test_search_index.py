@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model.results import CachedFile
-from coursebuild.core.pages.added_files import NotedPage, SiteContext
+from coursebuild.core.pages.context import NotedPage, SiteContext
 from coursebuild.core.pages.library import Library
 from coursebuild.features.search import index
 from coursebuild.features.search.index import IndexPlan, search_files
@@ -23,13 +23,13 @@ from support.search_shards import read_shard
 @pytest.fixture(scope="module")
 def library(make: Make) -> Library:
     rendered_course = make("Text.")
-    return Library(rendered_course.course, rendered_course.results, rendered_course.assets)
+    return rendered_course.library()
 
 
 class Cache(dict[str, bytes]):
     """A cache in memory."""
 
-    def get_or_create(self, key: str, make: Callable[[], bytes]) -> bytes:
+    def get_or_make(self, key: str, make: Callable[[], bytes]) -> bytes:
         if key not in self:
             self[key] = make()
         return self[key]
@@ -60,7 +60,7 @@ def search_site(
         for path, note in notes.items()
     )
     cache = Cache() if cache is None else cache
-    keep = cache.get_or_create
+    keep = cache.get_or_make
     site = SiteContext(library, None, None, pages, notes.__getitem__, keep, {}, None)  # type: ignore[arg-type]
     return {file.path: file for file in search_files(site)}
 

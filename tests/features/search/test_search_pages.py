@@ -55,7 +55,7 @@ import mujoco
 
 def sections_of(make: Make, text: str) -> tuple[Section, ...]:
     rendered_course = make(text)
-    library = Library(rendered_course.course, rendered_course.results, rendered_course.assets)
+    library = rendered_course.library()
     document = library.lessons["0.1"].document
     return page_sections(inputs_of(library, "lesson", "0.1"), document, "")
 
@@ -112,7 +112,7 @@ def test_a_quiz_gives_no_answer_away(make: Make) -> None:
 
 def test_pages_that_are_searched_and_that_are_not(make: Make) -> None:
     rendered_course = make("Text.")
-    library = Library(rendered_course.course, rendered_course.results, rendered_course.assets)
+    library = rendered_course.library()
     for kind in ("home", "notfound", "search", "offline", "progress"):
         assert note_page(inputs_of(library, kind), None, "<p>Text</p>") == b"", kind
     planned = inputs_of(library, "lesson", "1.2")
@@ -149,7 +149,7 @@ def test_terms_have_weights_by_place_and_frequency(make: Make) -> None:
 
 def test_the_text_of_a_page_is_in_plain_values(make: Make) -> None:
     rendered_course = make('## `<img src=x onerror="alert(1)">`\n\n`</script>` & \u2028 `\x07`.\n')
-    library = Library(rendered_course.course, rendered_course.results, rendered_course.assets)
+    library = rendered_course.library()
     note = note_page(inputs_of(library, "lesson", "0.1"), rendered_course.page(), "")
     text = text_and_terms(note)[0].decode()
     sections = json.loads(text)

@@ -18,7 +18,7 @@ from msgspec import Struct
 
 from coursebuild.cli.arguments import style_of
 from coursebuild.cli.output import CLEAN, FAILURE, write
-from coursebuild.core.engine.memo import SIZE
+from coursebuild.core.engine.store import SIZE
 from coursebuild.core.files.course_root import find_course_root
 from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import try_lock

@@ -16,7 +16,7 @@ from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.format import format_document
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import select
-from coursebuild.pipeline.update import changed_text
+from coursebuild.pipeline.outputs import changed_text
 from coursebuild.report.text import location
 
 EXAMPLES = """\

@@ -22,7 +22,7 @@ from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.course_map import next_id, with_feature, with_lesson
 from coursebuild.pipeline.load import load_course
-from coursebuild.pipeline.theme import template_copies
+from coursebuild.pipeline.theme_files import template_copies
 
 EXAMPLES = """\
 examples:

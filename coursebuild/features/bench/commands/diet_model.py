@@ -25,7 +25,7 @@ from typing import Any
 import mujoco
 from msgspec.structs import replace
 
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.files.read import CourseFiles, read_bytes
@@ -137,7 +137,7 @@ class Reruns:
             course = load(root).value
             if course is None:
                 return "the course"
-            options = replace(self.options, root=root, store=Memo(root))
+            options = replace(self.options, root=root, store=Store(root))
             outputs = self._run(course, options, self._documents)
         changes = (name for name in original_outputs if outputs.get(name) != original_outputs[name])
         return next(changes, "")

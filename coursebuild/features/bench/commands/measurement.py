@@ -27,7 +27,7 @@ from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.files.write import resolve_inside, write_atomic
-from coursebuild.core.pages.assets import strings_for
+from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.core.values import fingerprint

@@ -68,7 +68,7 @@ def export_lab(
     readouts = [picture["readouts"] for picture in main["pictures"]]
     code = lab_digest(".", "export/script.jinja")
     key = fingerprint((code, lab.config, metadata, main.get("recorded"), readouts))
-    store = context.memory.store
+    store = context.run_store.store
     export = store.get_value("exports", key, LabExport)
     if export is not None:
         return export

@@ -21,8 +21,8 @@ from msgspec import Struct
 from coursebuild.core import model
 from coursebuild.core.checks.links import anchors
 from coursebuild.core.model import Owner
-from coursebuild.core.model.equations import display_formulas
 from coursebuild.core.model.results import Formula, ModelFacts
+from coursebuild.core.model.walk import display_formulas
 from coursebuild.core.pages.library import Library, models_named
 from coursebuild.core.pages.marks import code_span, escape_text, fence
 from coursebuild.core.scripts.bindings import PrintedOutputs

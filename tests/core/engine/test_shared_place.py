@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.engine.memo import Memo
-from coursebuild.core.engine.shared_cache import FolderPlace, SharedCache, shared_cache
+from coursebuild.core.engine.shared_place import FolderFiles, SharedPlace, shared_place
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError
 from support.waiting import wait_until
 
@@ -21,15 +21,17 @@ GROUP = hashlib.sha256(b"a group").hexdigest()
 UPPER = "coursebuild-1"
 
 
-def machine(tmp_path: Path, name: str, shared: SharedCache) -> tuple[Memo, list[str]]:
+def machine(
+    tmp_path: Path, name: str, shared: SharedPlace, timeout: float = 15.0
+) -> tuple[Store, list[str]]:
     (tmp_path / name).mkdir(exist_ok=True)
-    store = Memo(tmp_path / name, shared=shared)
+    store = Store(tmp_path / name, shared=shared, timeout=timeout)
     lines: list[str] = []
     store.listen(lines.append)
     return store, lines
 
 
-def get_or_create(store: Memo, key: str, make: Callable[[], bytes]) -> bytes:
+def get_or_make(store: Store, key: str, make: Callable[[], bytes]) -> bytes:
     """A result of a kind that is shared."""
     data = store.get("labs", key, bytes, shared=True)
     if data is None:
@@ -53,19 +55,19 @@ def address(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 
 def test_what_one_machine_makes_another_has(tmp_path: Path, address: str) -> None:
-    first, first_messages = machine(tmp_path, "one", shared_cache(address))
-    assert get_or_create(first, KEY, lambda: b"\0made\xff") == b"\0made\xff"
+    first, first_messages = machine(tmp_path, "one", shared_place(address))
+    assert get_or_make(first, KEY, lambda: b"\0made\xff") == b"\0made\xff"
     first.put("scripts", f"{GROUP}/{KEY}", b"a result", shared=True)
     first.put("digests", KEY, b"of this machine")
     first.close()
-    second, second_messages = machine(tmp_path, "two", shared_cache(address))
+    second, second_messages = machine(tmp_path, "two", shared_place(address))
     assert second.get("labs", KEY, bytes) is None  # of others is only what is asked for so
-    assert get_or_create(second, KEY, never) == b"\0made\xff"
+    assert get_or_make(second, KEY, never) == b"\0made\xff"
     assert second.shared_group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
     assert second.get("scripts", f"{GROUP}/{KEY}", bytes, shared=True) == b"a result"
     assert second.get("digests", KEY, bytes, shared=True) is None
     assert second.shared_group("scripts", KEY) == []
-    alone = Memo(tmp_path / "two")  # what was fetched is kept here too
+    alone = Store(tmp_path / "two")  # what was fetched is kept here too
     assert alone.get("labs", KEY, bytes, shared=True) == b"\0made\xff"
     assert alone.group("scripts", GROUP) == [f"{GROUP}/{KEY}"]
     assert first_messages == second_messages == []
@@ -73,22 +75,22 @@ def test_what_one_machine_makes_another_has(tmp_path: Path, address: str) -> Non
 
 def test_a_damaged_shared_entry_is_not_served_and_made_good(tmp_path: Path) -> None:
     place = tmp_path / "shared"
-    first, _ = machine(tmp_path, "one", shared_cache(str(place)))
+    first, _ = machine(tmp_path, "one", shared_place(str(place)))
     first.put("labs", KEY, b"made", shared=True)
     first.close()
     path = place / UPPER / "labs" / KEY
     whole = path.read_bytes()
     for position in range(len(whole)):
         path.write_bytes(whole[:position] + bytes([whole[position] ^ 1]) + whole[position + 1 :])
-        second, messages = machine(tmp_path, f"two{position}", shared_cache(str(place)))
-        assert get_or_create(second, KEY, lambda: b"made") == b"made"
+        second, messages = machine(tmp_path, f"two{position}", shared_place(str(place)))
+        assert get_or_make(second, KEY, lambda: b"made") == b"made"
         second.close()
         message = f"the entry labs/{KEY[:12]}… in the shared cache is damaged: it is made again"
         assert messages == [message]
         assert path.read_bytes() == whole
 
 
-class Broken(FolderPlace):
+class Broken(FolderFiles):
     """A place where every call runs into trouble."""
 
     def __init__(self, trouble: Callable[[], object]) -> None:
@@ -123,19 +125,19 @@ def failing(error: Exception) -> Callable[[], object]:
 def test_signed_entries_are_believed_by_those_who_have_the_key(tmp_path: Path) -> None:
     place = tmp_path / "shared"
     for name, key, result in (("one", b"secret", b"ours"), ("other", b"", b"theirs")):
-        store, _ = machine(tmp_path, name, shared_cache(str(place), key))
+        store, _ = machine(tmp_path, name, shared_place(str(place), key))
         store.put("labs", KEY, result, shared=True)
         store.close()
     signed, plain = (place / f"{UPPER}{end}/labs" / KEY for end in ("-signed", ""))
     damage = [f"the entry labs/{KEY[:12]}… in the shared cache is damaged: it is made again"]
     readers = {b"secret": (b"ours", []), b"": (b"theirs", []), b"guess": (None, damage)}
     for key, (expected, messages) in readers.items():
-        store, lines = machine(tmp_path, f"reader {key!r}", shared_cache(str(place), key))
+        store, lines = machine(tmp_path, f"reader {key!r}", shared_place(str(place), key))
         assert (store.get("labs", KEY, bytes, shared=True), lines) == (expected, messages)
     signed.write_bytes(plain.read_bytes())
-    store, lines = machine(tmp_path, "victim", shared_cache(str(place), b"secret"))
+    store, lines = machine(tmp_path, "victim", shared_place(str(place), b"secret"))
     assert (store.get("labs", KEY, bytes, shared=True), lines) == (None, damage)
-    assert Memo(tmp_path / "victim").get("labs", KEY, bytes) is None
+    assert Store(tmp_path / "victim").get("labs", KEY, bytes) is None
 
 
 def test_a_place_that_fails_or_hangs_is_reported_once_and_left_alone(tmp_path: Path) -> None:
@@ -149,9 +151,9 @@ def test_a_place_that_fails_or_hangs_is_reported_once_and_left_alone(tmp_path: P
     }
     for words, trouble in troubles.items():
         place = Broken(trouble)
-        store, messages = machine(tmp_path, words, SharedCache("s3://there", place, timeout=0.2))
+        store, messages = machine(tmp_path, words, SharedPlace("s3://there", place), 0.2)
         for number in range(20):
-            assert get_or_create(store, f"{number:064x}", lambda: b"made") == b"made"
+            assert get_or_make(store, f"{number:064x}", lambda: b"made") == b"made"
         assert store.shared_group("scripts", GROUP) == []
         store.close()
         assert messages == [f"the shared cache s3://there cannot be used: {words}"]
@@ -161,10 +163,10 @@ def test_a_place_that_fails_or_hangs_is_reported_once_and_left_alone(tmp_path: P
 
 def test_sending_ends_when_it_takes_too_long(tmp_path: Path) -> None:
     stop = threading.Event()
-    shared = SharedCache("s3://there", Broken(lambda: stop.wait(600)))
+    shared = SharedPlace("s3://there", Broken(lambda: stop.wait(600)))
     store, messages = machine(tmp_path, "one", shared)
     store.put("labs", KEY, b"made", shared=True)
-    shared.flush(0.2)
+    store.flush(0.2)
     stop.set()
     trouble = "results could not be sent in 0.2 s"
     assert messages == [f"the shared cache s3://there cannot be used: {trouble}"]
@@ -173,7 +175,7 @@ def test_sending_ends_when_it_takes_too_long(tmp_path: Path) -> None:
 def test_all_that_is_written_arrives_and_no_thread_stays(tmp_path: Path) -> None:
     before = threading.active_count()
     place = tmp_path / "shared"
-    store, messages = machine(tmp_path, "one", shared_cache(str(place)))
+    store, messages = machine(tmp_path, "one", shared_place(str(place)))
     for number in range(300):
         store.put("labs", f"{number:064x}", b"x", shared=True)
     store.close()
@@ -185,15 +187,15 @@ def test_all_that_is_written_arrives_and_no_thread_stays(tmp_path: Path) -> None
 def test_a_folder_whose_parent_is_not_there_is_not_made(tmp_path: Path) -> None:
     """If a network folder is not mounted, nothing is written to its mount point."""
     place = tmp_path / "not mounted" / "cache"
-    store, messages = machine(tmp_path, "one", shared_cache(str(place)))
-    assert get_or_create(store, KEY, lambda: b"made") == b"made"
+    store, messages = machine(tmp_path, "one", shared_place(str(place)))
+    assert get_or_make(store, KEY, lambda: b"made") == b"made"
     store.close()
     assert messages == [f"the shared cache {place} cannot be used: no such file or directory"]
     assert not place.parent.exists()
 
 
 def test_other_users_can_read_what_is_shared(tmp_path: Path) -> None:
-    FolderPlace(tmp_path / "shared").write("kind/key", b"x")
+    FolderFiles(tmp_path / "shared").write("kind/key", b"x")
     assert (tmp_path / "shared/kind/key").stat().st_mode & 0o044 == 0o044
 
 
@@ -201,11 +203,11 @@ def test_no_such_kind_of_place_and_no_fsspec(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     with pytest.raises(EffectError) as caught:
-        shared_cache("nowhere://there")
+        shared_place("nowhere://there")
     assert caught.value.message.startswith("there is no place like nowhere://there: protocol not")
     monkeypatch.setitem(sys.modules, "fsspec.core", None)
     with pytest.raises(EffectError) as caught:
-        shared_cache("s3://bucket/cache")
+        shared_place("s3://bucket/cache")
     assert caught.value.message == "the cache s3://bucket/cache needs the package fsspec"
     assert caught.value.help == "run `pip install 'coursebuild[cache]'`"
-    shared_cache(str(tmp_path))
+    shared_place(str(tmp_path))

@@ -147,8 +147,8 @@ class _Updater:
                 for extraction, (first, _) in zip(self.scripts, runs, strict=True)
                 if (not first.cached or first.path in outdated) and not extraction.script.once
             ]
-            memory = options.memory(fresh=True)
-            second_runs = run(scripts_to_run, options, "running scripts again", memory)
+            run_store = options.run_store(fresh=True)
+            second_runs = run(scripts_to_run, options, "running scripts again", run_store)
         by_path = {second.path: second for second in second_runs}
         return [(first, by_path.get(first.path, first)) for first, _ in runs]
 

@@ -1,33 +1,40 @@
 """`coursebuild build` and `export`: verify the course, and write its site or a file of it.
 
 Entry points: `build(options, out)`; `export(options, name, out)`, where features have the
-exporters; `make_files`, what they share. Nothing is written where something is wrong.
+exporters. Nothing is written where something is wrong.
+
+An export is a file or an archive, written in one step, without holding the archive in memory. The
+same files give the same bytes: entries are sorted by path and have the same date. Files that are
+compressed already are stored.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
-from collections.abc import Callable, Mapping
+import os
+import zipfile
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import BinaryIO, TypeVar
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.engine.archives import check_target, write_export
+from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import check_output_folder, publish
 from coursebuild.core.features import Exporter
 from coursebuild.core.files.course_features import load_course_features
-from coursebuild.core.files.errors import EffectError, UsageError
+from coursebuild.core.files.errors import EffectError, PublishRefusedError, UsageError, reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Document
 from coursebuild.core.model.results import SiteFile
-from coursebuild.core.pages.added_files import ExportContext
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.context import ExportContext, PageContext
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.renderer import TemplateFailure
 from coursebuild.core.registry import find_exporter
@@ -104,14 +111,14 @@ def make_files(
     course, results = checked_course.course, checked_course.verification.results
     assets = Assets(template_texts(), Bundle(), prepared_folder())
     try:
-        outputs = make(Library(course, results, assets, checked_course.reports))
+        outputs = make(make_library(course, results, assets, checked_course.reports))
         if course.theme.templates:  # these may fail on any page
             for file in outputs.files:
                 if file.path.endswith(".html"):
                     file.make()
         report = checked_course.report(outputs.diagnostics)
     except TemplateFailure as failure:
-        from coursebuild.pipeline.theme import template_diagnostic
+        from coursebuild.pipeline.theme_files import template_diagnostic
 
         return checked_course.report((template_diagnostic(course, failure),)), None
     return report, outputs if report.ok else None
@@ -162,3 +169,92 @@ def _make_export(exporter: Exporter, reader: Reader, options: Options, library: 
         else:
             files.append(file)
     return _Export(tuple(files), tuple(diagnostics))
+
+
+_DATE = (1980, 1, 1, 0, 0, 0)
+_LEVEL = 6
+_MIMETYPE = "mimetype"
+"""The file that an e-book must begin with, uncompressed."""
+_UNCOMPRESSED_SUFFIXES = (".gz", ".jpeg", ".jpg", ".png", ".webp", ".woff2", ".zip", _MIMETYPE)
+_AUTHOR_FOLDERS = ("features", "models", "examples", ".coursebuild", ".git")
+
+
+def check_target(root: Path, out: Path, mark: str, *, archive: bool) -> None:
+    """Check that an export may be written to `out`: nothing is there, or only an earlier export.
+
+    An earlier archive holds a file called `mark`; any other export has `mark` near its beginning.
+
+    Raises:
+        PublishRefusedError: the file must not go there.
+    """
+    place = Path(os.path.realpath(out))
+    for name in _AUTHOR_FOLDERS:
+        if place.is_relative_to(os.path.realpath(root / name)):
+            raise PublishRefusedError(f"{out} lies in {name}/ of the project, where no export goes")
+    if any((folder / MARKER).is_file() for folder in place.parents):
+        raise PublishRefusedError(
+            f"{out} lies in a published site, which the next build replaces",
+            help="write the file beside it",
+        )
+    if place.is_dir():
+        raise PublishRefusedError(f"{out} is a folder", help="name a file, such as `course.zip`")
+    is_export = _holds_file if archive else _begins_with
+    if os.path.lexists(place) and not is_export(place, mark):
+        raise PublishRefusedError(
+            f"{out} exists and is not such an export", help="move it away, or name another file"
+        )
+
+
+def _holds_file(place: Path, name: str) -> bool:
+    try:
+        with zipfile.ZipFile(place) as archive:
+            return name in archive.namelist()
+    except (OSError, zipfile.BadZipFile, ValueError):
+        return False
+
+
+def _begins_with(place: Path, mark: str) -> bool:
+    try:
+        with place.open("rb") as file:
+            return mark.encode() in file.read(1000)
+    except OSError:
+        return False
+
+
+def write_export(out: Path, files: Iterable[SiteFile], *, archive: bool) -> int:
+    """Write files into an archive, or a single file as it is; return the size in bytes.
+
+    Raises:
+        EffectError: it cannot be written; what was there stays.
+    """
+    place = Path(os.path.realpath(out))
+    # Always the same name, so that the next command overwrites what a killed one left.
+    temporary = place.with_name(f".{place.name}.part")
+    try:
+        try:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            with temporary.open("wb") as target:
+                if archive:
+                    _pack(target, files)
+                else:
+                    (file,) = files
+                    target.write(file.make())
+            size = temporary.stat().st_size
+            temporary.replace(place)
+        finally:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+    except OSError as error:
+        raise EffectError(f"{out} cannot be written: {reason(error)}") from None
+    return size
+
+
+def _pack(target: BinaryIO, files: Iterable[SiteFile]) -> None:
+    with zipfile.ZipFile(target, "w") as archive:
+        for file in sorted(files, key=lambda file: (file.path != _MIMETYPE, file.path)):
+            entry = zipfile.ZipInfo(file.path, _DATE)
+            is_stored = file.path.lower().endswith(_UNCOMPRESSED_SUFFIXES)
+            entry.compress_type = zipfile.ZIP_STORED if is_stored else zipfile.ZIP_DEFLATED
+            entry.create_system = 3
+            entry.external_attr = 0o100644 << 16
+            archive.writestr(entry, file.make(), compresslevel=_LEVEL)

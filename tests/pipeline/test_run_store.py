@@ -1,4 +1,4 @@
-"""The memory of scripts' results; runs are invented here, the files that they read are real."""
+"""The store of scripts' results; runs are invented here, the files that they read are real."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from coursebuild.cli.explain import Explanation, RunExplanation, explanation_text
 from coursebuild.core.files.trust import seal, unseal
 from coursebuild.core.model.results import Divergence, Outcome, Sign, Trace
 from coursebuild.core.run.dependencies import describe
-from coursebuild.core.run.memory import longest_first
+from coursebuild.core.run.run_store import longest_first
 from coursebuild.core.scripts.sensitivity import amplification
-from coursebuild.report.explained import Explanation, RunExplanation, explanation_text
 from coursebuild.report.text import Style
 from support.fake_runs import EMPTY_TRACE, JOB, MODEL_TRACE, PATH, SCRIPT, Desk
 from support.poisoned_values import mutations
@@ -45,8 +45,8 @@ def entries(desk: Desk) -> list[Path]:
 
 
 def test_results_and_failures_are_remembered_whole(desk: Desk) -> None:
-    assert desk.recall() is None
-    assert desk.memory().last_record(PATH) is None
+    assert desk.find_run() is None
+    assert desk.run_store().last_record(PATH) is None
     stderr = f'File "{desk.root}/examples/a.py", line 1\nValueError: no\n'
     for outcome, status in (
         (Outcome.OK, 0),
@@ -56,7 +56,7 @@ def test_results_and_failures_are_remembered_whole(desk: Desk) -> None:
     ):
         shutil.rmtree(desk.root / ".coursebuild", ignore_errors=True)
         desk.run(outcome=outcome, status=status, stderr=stderr, seconds=2.5)
-        run, last = desk.recall(), desk.memory().last_record(PATH)
+        run, last = desk.find_run(), desk.run_store().last_record(PATH)
         assert run is not None and last is not None
         fields = run.outcome, run.status, run.stdout, run.stderr, run.seconds
         assert fields == (outcome, status, "hello\n", stderr, 2.5)
@@ -85,8 +85,8 @@ def test_runs_that_another_may_not_repeat_are_not_remembered(desk: Desk) -> None
     for outcome, fields, reason in UNSTORED_OUTCOMES:
         shutil.rmtree(desk.root / ".coursebuild", ignore_errors=True)
         desk.run(outcome=outcome, **fields)
-        assert (desk.recall(), desk.rerun_reason()) == (None, reason)
-        last = desk.memory().last_record(PATH)
+        assert (desk.find_run(), desk.rerun_reason()) == (None, reason)
+        last = desk.run_store().last_record(PATH)
         assert last is not None and last.stored_run.outcome is outcome
 
 
@@ -96,14 +96,14 @@ def test_another_text_option_or_environment_is_another_result(
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     desk.run()
     for fields in ({"args": ("-v",)}, {"timeout": 20.0}, {"requires": ("numpy",)}):
-        assert desk.recall(replace(JOB, **fields)) is None, fields
-    assert desk.recall(text=SCRIPT + b"#\n") is None
+        assert desk.find_run(replace(JOB, **fields)) is None, fields
+    assert desk.find_run(text=SCRIPT + b"#\n") is None
     monkeypatch.setenv("MUJOCO_GL", "egl")
-    assert desk.recall() is None
+    assert desk.find_run() is None
     monkeypatch.delenv("MUJOCO_GL")
     for name in ("PATH", "HOME", "UNRELATED"):  # no input of a script
         monkeypatch.setenv(name, "/nowhere")
-    assert desk.recall() is not None
+    assert desk.find_run() is not None
 
 
 def test_a_few_results_are_kept_for_a_script(desk: Desk) -> None:
@@ -111,7 +111,7 @@ def test_a_few_results_are_kept_for_a_script(desk: Desk) -> None:
         desk.write("models/a.xml", str(number).encode())
         desk.settle()
         desk.run(MODEL_TRACE, stdout=f"{number}\n")
-    run = desk.recall()
+    run = desk.find_run()
     assert run is not None and run.stdout == "11\n"
     assert len(entries(desk)) <= 8
 
@@ -137,10 +137,10 @@ def test_poisoned_results_of_a_shared_cache_are_one_or_told(tmp_path: Path) -> N
         shutil.rmtree(victim.root / ".coursebuild/scripts", ignore_errors=True)
         entry.write_bytes(seal(name, data, UNSIGNED))
         victim.messages.clear()
-        run = victim.recall()
-        memory = victim.memory()
-        reasons = memory.reasons(memory.inputs(JOB, SCRIPT))
-        last = memory.last_record(PATH)
+        run = victim.find_run()
+        run_store = victim.run_store()
+        reasons = run_store.reasons(run_store.inputs(JOB, SCRIPT))
+        last = run_store.last_record(PATH)
         explanation = RunExplanation("script", PATH, "1.1", "remembered", tuple(reasons))
         if last is not None:
             depends = tuple(map(describe, last.dependencies))
@@ -255,10 +255,10 @@ def test_result_holds_until_something_that_was_looked_at_changes(tmp_path: Path)
             act(desk)
         desk.settle()
         desk.run(trace)
-        assert desk.recall() is not None, name
+        assert desk.find_run() is not None, name
         for number, (act, holds) in enumerate(steps, 1):
             act(desk)
-            assert (desk.recall() is not None) is holds, (name, number)
+            assert (desk.find_run() is not None) is holds, (name, number)
 
 
 def test_a_file_outside_of_the_course_counts(desk: Desk, tmp_path: Path) -> None:
@@ -266,9 +266,9 @@ def test_a_file_outside_of_the_course_counts(desk: Desk, tmp_path: Path) -> None
     outside.write_text("1")
     desk.settle()
     desk.run(Trace((), (), (str(outside),), (), ""))
-    assert desk.recall() is not None
+    assert desk.find_run() is not None
     outside.write_text("2")
-    assert desk.recall() is None
+    assert desk.find_run() is None
 
 
 def test_a_course_that_is_moved_runs_only_what_printed_its_place(
@@ -278,14 +278,14 @@ def test_a_course_that_is_moved_runs_only_what_printed_its_place(
     desk.run(MODEL_TRACE, outcome=Outcome.FAILED, status=1, stderr=stderr)
     desk.root.rename(tmp_path / "moved")
     desk.root = tmp_path / "moved"
-    run = desk.recall()
+    run = desk.find_run()
     assert run is not None and run.stderr == f'File "{desk.root}/examples/a.py"\n'
     printing = replace(JOB, args=("--verbose",))
     desk.run(job=printing, stdout=f"reading {desk.root}/models/a.xml\n")
-    assert desk.recall(printing) is not None
+    assert desk.find_run(printing) is not None
     desk.root.rename(tmp_path / "again")
     desk.root = tmp_path / "again"
-    assert desk.recall(printing) is None
+    assert desk.find_run(printing) is None
 
 
 def test_a_module_that_changed_or_is_there_now(
@@ -297,12 +297,12 @@ def test_a_module_that_changed_or_is_there_now(
     (packages / "wobble.py").write_text("SIZE = 1\n")
     needing = replace(JOB, requires=("nowhere_at_all",))
     desk.run(Trace((), (), (), ("wobble",), ""), needing)
-    assert desk.recall(needing) is not None
+    assert desk.find_run(needing) is not None
     (packages / "wobble.py").write_text("SIZE = 200\n")
-    assert desk.recall(needing) is None
+    assert desk.find_run(needing) is None
     desk.run(Trace((), (), (), ("wobble",), ""), needing)
     (packages / "nowhere_at_all.py").write_text("")
-    assert desk.recall(needing) is None
+    assert desk.find_run(needing) is None
 
 
 def blink(desk: Desk) -> None:
@@ -324,14 +324,14 @@ def test_result_is_not_kept_where_something_was_saved_while_the_script_ran(tmp_p
         desk = Desk(tmp_path / str(number))
         desk.run(trace, during=lambda act=act, desk=desk: act(desk))
         assert desk.rerun_reason() == reason
-        assert (desk.recall() is not None) is (reason == ""), number
+        assert (desk.find_run() is not None) is (reason == ""), number
 
 
 def test_a_module_that_appeared_while_the_script_ran_was_not_seen_by_it(desk: Desk) -> None:
     desk.run(SOUGHT_MODULE, during=lambda: desk.write("examples/json.py", b""))
-    assert desk.recall() is None
+    assert desk.find_run() is None
     (desk.root / "examples/json.py").unlink()
-    assert desk.recall() is not None
+    assert desk.find_run() is not None
 
 
 EDITED_PATHS = ("models/a.xml", "models/b.xml", "data.txt")
@@ -345,7 +345,7 @@ def test_script_runs_again_if_and_only_if_a_file_it_read_changed(
     changes: list[tuple[str, bytes | None]],
     looked: set[str],
 ) -> None:
-    """A result is recalled exactly if the files that were read have been in this state before."""
+    """A result is found exactly if the files that were read have been in this state before."""
     desk = Desk(tmp_path_factory.mktemp("course"))
     states: set[tuple[bytes | None, ...]] = set()
 
@@ -359,7 +359,7 @@ def test_script_runs_again_if_and_only_if_a_file_it_read_changed(
         else:
             desk.write(path, data)
         now = state()
-        run = desk.recall()
+        run = desk.find_run()
         assert (run is not None) == (now in states)
         if run is None:
             desk.settle()
@@ -375,7 +375,7 @@ def test_script_runs_again_if_and_only_if_a_file_it_read_changed(
 def test_a_fresh_run_says_what_differs(desk: Desk) -> None:
     desk.run(MODEL_TRACE, stdout="one\n")
     desk.fresh = True
-    assert desk.recall() is None
+    assert desk.find_run() is None
     ((before, now),) = desk.run(MODEL_TRACE, stdout="two\n").differing_runs
     assert (before.stdout, now.stdout) == ("one\n", "two\n")
     assert desk.run(MODEL_TRACE, stdout="two\n").differing_runs == []
@@ -383,7 +383,7 @@ def test_a_fresh_run_says_what_differs(desk: Desk) -> None:
     desk.settle()
     assert desk.run(MODEL_TRACE, stdout="three\n").differing_runs == []
     desk.fresh = False
-    run = desk.recall()
+    run = desk.find_run()
     assert run is not None and run.stdout == "three\n", "the new result is the one that is kept"
 
 
@@ -393,16 +393,16 @@ def test_another_machine_has_the_result(desk: Desk, tmp_path: Path) -> None:
         MODEL_TRACE, outcome=Outcome.FAILED, status=1, stderr=f'File "{desk.root}/examples/a.py"\n'
     )
     second_desk = Desk(tmp_path / "other", shared=desk.shared)
-    run = second_desk.recall()
+    run = second_desk.find_run()
     assert run is not None
     assert run.stderr == f'File "{second_desk.root}/examples/a.py"\n'
     second_desk.shared = None
-    assert second_desk.recall() is not None, "it is kept there too"
+    assert second_desk.find_run() is not None, "it is kept there too"
     third = Desk(tmp_path / "third", shared=desk.shared)
     third.write("models/a.xml", b"other")
-    assert third.recall() is None
+    assert third.find_run() is None
     (path,) = (p for p in (tmp_path / "shared").rglob("*") if p.is_file())
     name = path.relative_to(tmp_path / "shared" / "coursebuild-1").as_posix()
     for number, data in enumerate((b"", b"{}", b"[1]", b"\x80\x04N.")):
         path.write_bytes(seal(name, data, UNSIGNED))  # an intact entry that is no record
-        assert Desk(tmp_path / f"new {number}", shared=desk.shared).recall() is None
+        assert Desk(tmp_path / f"new {number}", shared=desk.shared).find_run() is None

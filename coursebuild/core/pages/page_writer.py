@@ -10,7 +10,7 @@ import re
 import shlex
 from collections.abc import Iterable
 from decimal import Decimal
-from typing import TYPE_CHECKING, assert_never
+from typing import assert_never
 
 from markupsafe import Markup, escape
 from msgspec import Struct
@@ -18,6 +18,7 @@ from msgspec import Struct
 from coursebuild.core.model import (
     Callout,
     Comparison,
+    FeatureBlock,
     Image,
     Mjcf,
     Mode,
@@ -35,14 +36,14 @@ from coursebuild.core.model import (
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.folding import Part, fold
 from coursebuild.core.pages.highlight import highlight_lines
+from coursebuild.core.pages.markup import SpecialBlock
 from coursebuild.core.pages.page_inputs import ShownRun
 from coursebuild.core.pages.strings import Strings
+from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.characters import visible
-
-if TYPE_CHECKING:
-    from coursebuild.core.pages.context import PageContext
 
 
 class CodePart(Struct, frozen=True):
@@ -66,10 +67,21 @@ class Receipt(Struct, frozen=True):
 
 def script(page: PageContext, block: Script, recordings: tuple[Recording, ...]) -> Markup:
     """A script and the outputs that belong to it, as one object."""
+    text = block.code.text.rstrip("\n")
+    lines = highlight_lines("python", text)
+    parts = (Part(1, len(lines), folded=True),) if block.figures else fold(text)
     return page.template(
         "blocks/script.html",
         script=block,
-        parts=_parts(page, block),
+        parts=tuple(
+            CodePart(
+                numbered_lines(lines[part.first - 1 : part.last], block.path, part.first),
+                part.first,
+                part.folded,
+                _fold_label(page.words, part),
+            )
+            for part in parts
+        ),
         anchor=listing_anchor(block.path),
         href=page.place.href(block.path),
         command=shlex.join(("python", block.path, *block.args)),
@@ -133,7 +145,7 @@ def mjcf(page: PageContext, block: Mjcf) -> Markup:
     )
 
 
-def binding(page: PageContext, node: NumberBinding) -> Markup:
+def number(page: PageContext, node: NumberBinding) -> Markup:
     """A number that a script printed, marked with the script's name."""
     text = re.sub(r"(?<!\w)-(?=\d)", "\u2212", node.text)
     runs = page.inputs.runs
@@ -206,7 +218,13 @@ def _describe_comparison(words: Strings, comparison: Comparison) -> str:
         case Mode.DIGITS:
             text = words("receipt.digits")
         case Mode.TOLERANCE:
-            text = _tolerance(words, comparison.rtol, comparison.atol)
+            rtol, atol = short(comparison.rtol), short(comparison.atol)
+            if comparison.rtol and comparison.atol:
+                text = words("receipt.rtol_atol", rtol=rtol, atol=atol)
+            elif comparison.rtol:
+                text = words("receipt.rtol", rtol=rtol)
+            else:
+                text = words("receipt.atol", atol=atol)
         case _:
             assert_never(comparison.mode)
     if comparison.ellipsis:
@@ -214,13 +232,6 @@ def _describe_comparison(words: Strings, comparison: Comparison) -> str:
     if comparison.volatile:
         text += f"; {words('receipt.varies', pattern=comparison.volatile)}"
     return text
-
-
-def _tolerance(words: Strings, rtol: Decimal, atol: Decimal) -> str:
-    relative, absolute = short(rtol), short(atol)
-    if rtol and atol:
-        return words("receipt.rtol_atol", rtol=relative, atol=absolute)
-    return words("receipt.rtol", rtol=relative) if rtol else words("receipt.atol", atol=absolute)
 
 
 def short(value: Decimal) -> str:
@@ -252,22 +263,6 @@ def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
 # --- code
 
 
-def _parts(page: PageContext, block: Script) -> tuple[CodePart, ...]:
-    """The parts of a script; one that draws is folded whole, since its figure says enough."""
-    text = block.code.text.rstrip("\n")
-    lines = highlight_lines("python", text)
-    parts = (Part(1, len(lines), folded=True),) if block.figures else fold(text)
-    return tuple(
-        CodePart(
-            numbered_lines(lines[part.first - 1 : part.last], block.path, part.first),
-            part.first,
-            part.folded,
-            _fold_label(page.words, part),
-        )
-        for part in parts
-    )
-
-
 def numbered_lines(lines: Iterable[Markup], path: str, first: int = 1) -> Markup:
     """Number lines of a file, from its line `first` on, so that each can be linked to.
 
@@ -287,3 +282,39 @@ def _fold_label(words: Strings, part: Part) -> str:
     holds += [words("code.imports")] if part.imports else []
     holds += part.names
     return f"{lines}: {', '.join(holds)}" if holds else lines
+
+
+class PageWriter(PageContext, frozen=True):
+    """A page that can be written whole: its special blocks are drawn here, or by their feature."""
+
+    def figure(self, image: Image, caption: Markup) -> Markup:
+        """An image with its caption, its script and its data."""
+        return figure(self, image, caption) + Markup("\n")
+
+    def code(self, language: str, text: str) -> Markup:
+        """A code block that is only shown, not run."""
+        return code(self, language, text.rstrip("\n")) + Markup("\n")
+
+    def binding(self, binding: NumberBinding) -> Markup:
+        """A number that was compared with the output of a script."""
+        return number(self, binding)
+
+    def block(self, block: SpecialBlock) -> Markup:
+        """A special block, with its line end."""
+        match block:
+            case Callout():
+                html = callout(self, block)
+            case Script():
+                html = script(self, block, self.script_outputs.get(block.span.start, ()))
+            case Recording():
+                follows_script = any(block in group for group in self.script_outputs.values())
+                html = Markup() if follows_script else recording(self, block)
+            case Mjcf():
+                html = mjcf(self, block)
+            case PlainCode():
+                html = plain_code(self, block)
+            case FeatureBlock():
+                html = kind_of_block(block).draw(self, block)
+            case _:
+                assert_never(block)
+        return html + Markup("\n") if html else html

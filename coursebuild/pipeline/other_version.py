@@ -170,10 +170,10 @@ class _Comparison(Struct):
         from coursebuild.core.run.script_server import ScriptServer
 
         options_there = replace(self.options, interpreter=interpreter)
-        memory = options_there.memory(fresh=fresh)
+        run_store = options_there.run_store(fresh=fresh)
         with ScriptServer() as server:
             server_options = replace(options_there, run_all=server.run)
-            runs = run(scripts, server_options, stage, memory)
+            runs = run(scripts, server_options, stage, run_store)
         return run_standings(self.course, self.runs_here, runs)
 
     def _compare_models(self, interpreter: Interpreter) -> tuple[ModelLine, ...]:

@@ -12,7 +12,7 @@ Entry points: `check_links(files, base_url)`, which returns broken links sorted 
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import TypeAlias
 from urllib.parse import unquote, urljoin, urlsplit
 
@@ -102,9 +102,10 @@ def ids_and_addresses(html: str) -> tuple[frozenset[str], frozenset[str], frozen
                 (repeated_ids if value in ids else ids).add(value or "")
             elif name == "name" and tag == "a":
                 names.add(value or "")
+            elif name == "srcset" and name in _ADDRESSES.get(tag, ()):
+                addresses.update(p.split()[0] for p in (value or "").split(",") if p.strip())
             elif name in _ADDRESSES.get(tag, ()):
-                is_list = name == "srcset"
-                addresses.update(_srcset(value or "") if is_list else (value or "",))
+                addresses.add(value or "")
     return frozenset(ids | names), frozenset(addresses), frozenset(repeated_ids)
 
 
@@ -189,7 +190,3 @@ def _find_problem(
     if anchor in ("", "top") or target not in ids or has_anchor(ids[target], anchor):
         return None
     return broken(f"`{target}` has no anchor `#{anchor}`", nearest(anchor, ids[target]))
-
-
-def _srcset(value: str) -> Iterator[str]:
-    return (part.split()[0] for part in value.split(",") if part.strip())

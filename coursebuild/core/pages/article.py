@@ -5,8 +5,6 @@ Entry points: `draw(inputs, document, renderer)`; `article`, the text of a docum
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
@@ -27,7 +25,6 @@ from coursebuild.core.model import (
     without_links,
 )
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.blocks import numbered_lines
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.graph import drawings
 from coursebuild.core.pages.highlight import highlight_lines
@@ -38,6 +35,7 @@ from coursebuild.core.pages.page_inputs import (
     PageHead,
     PageInputs,
 )
+from coursebuild.core.pages.page_writer import PageWriter, numbered_lines
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.registry import kind_of_block, model_parts, page_kind
 
@@ -59,21 +57,21 @@ def article(page: PageContext, document: Document) -> Markup:
     parts: list[Markup] = []
     for further, blocks in main_and_further(document.blocks):
         heading = page.blocks(blocks[:1]) if further else None
-        text = Markup("\n").join(_text(page, blocks[1:] if further else blocks))
+        texts: list[Markup] = []
+        for group in _groups(blocks[1:] if further else blocks):
+            if group.docked is None:
+                texts.append(page.blocks(group.before))
+            else:
+                before, after = page.blocks(group.before), page.blocks(group.after)
+                docked = page.block(group.docked)
+                texts.append(
+                    page.template("partials/dock.html", before=before, docked=docked, after=after)
+                )
+        text = Markup("\n").join(texts)
         parts.append(
             page.template("partials/further.html", heading=heading, text=text) if further else text
         )
     return Markup("\n").join((*parts, page.footnotes()))
-
-
-def _text(page: PageContext, blocks: tuple[Block, ...]) -> Iterator[Markup]:
-    for group in _groups(blocks):
-        if group.docked is None:
-            yield page.blocks(group.before)
-        else:
-            before, after = page.blocks(group.before), page.blocks(group.after)
-            docked = page.block(group.docked)
-            yield page.template("partials/dock.html", before=before, docked=docked, after=after)
 
 
 class _Group(Struct, frozen=True):
@@ -95,7 +93,7 @@ def _is_wide(block: Block) -> bool:
 
 
 def _docked(block: Block) -> FeatureBlock | None:
-    return block if isinstance(block, FeatureBlock) and block.is_docked() else None
+    return block if isinstance(block, FeatureBlock) and kind_of_block(block).docked(block) else None
 
 
 def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
@@ -147,7 +145,7 @@ def draw(
     values = {name: _draw_value(value, renderer) for name, value in inputs.values.items()}
     head = inputs.head
     if document is not None and inputs.document_inputs is not None:
-        page = PageContext(renderer, inputs.document_inputs, urls.Place(head.path), document)
+        page = PageWriter(renderer, inputs.document_inputs, urls.Place(head.path), document)
         values["contents"] = contents(page, document)
         values["article"] = article(page, document)
         values["title_anchor"] = document.title_anchor

@@ -32,15 +32,15 @@ from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import (
     Fence,
     FenceKeys,
+    TextParser,
     Word,
-    check_kind,
     find_likely_end,
     find_likely_start,
     split_words,
 )
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
-from coursebuild.core.syntax.texts import TextParser
+from coursebuild.core.syntax.unread_markup import check_kind
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 

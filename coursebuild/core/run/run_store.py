@@ -1,12 +1,12 @@
-"""Memory of scripts' results: a script runs again only if something that it depends on changed.
+"""The results of scripts: one runs again only if something that it depends on has changed.
 
-Entry point: `Memory`.
+Entry point: `RunStore`.
 
-1. `recall`: what is known before a script runs determines a group of results; the one whose
+1. `get_runs`: what is known before a script runs determines a group of results; the one whose
    dependencies are all unchanged is its result. Groups that this machine lacks are looked for in
    the shared cache.
-2. `keep`: after a run, the state of everything in its trace is read and stored with the result. If
-   something changed while it ran, the script may have seen another state: then nothing is stored.
+2. `put_run`: after a run, the state of everything in its trace is read and stored with the result.
+   If something changed while it ran, the script may have seen another state, and nothing is stored.
 3. How a script's last run ended is noted under its path, whether it is remembered or not: for
    `explain`, and for the order in which scripts run.
 """
@@ -30,7 +30,7 @@ from coursebuild.core.engine.digests import (
     folder_state,
     modules_in,
 )
-from coursebuild.core.engine.memo import Memo
+from coursebuild.core.engine.store import Store
 from coursebuild.core.files.trust import FOLDER
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run.dependencies import (
@@ -69,7 +69,7 @@ _REASON = "{} changed while it ran"
 class States:
     """The present states of needs, each read once, when it is first asked for."""
 
-    def __init__(self, root: Path, store: Memo, interpreter: Interpreter | None = None) -> None:
+    def __init__(self, root: Path, store: Store, interpreter: Interpreter | None = None) -> None:
         self.root = root
         self._inside = f"{str(root).rstrip('/')}/"
         self.places = places(root, os.environ, interpreter)
@@ -105,12 +105,12 @@ class States:
                 assert_never(need.kind)
 
 
-class Memory:
-    """What is remembered of the scripts of a course.
+class RunStore:
+    """The results of the scripts of a course in its store.
 
     Args:
         root: the course folder.
-        store: where it is kept.
+        store: where they are kept.
         fresh: whether all is to be run again.
         interpreter: another one that runs them. Last runs are noted only for the course's own.
     """
@@ -118,7 +118,7 @@ class Memory:
     def __init__(
         self,
         root: Path,
-        store: Memo,
+        store: Store,
         *,
         fresh: bool = False,
         interpreter: Interpreter | None = None,
@@ -137,14 +137,14 @@ class Memory:
         """The inputs of a script, which are known before it runs."""
         return inputs_of(job, text, self.states.conditions)
 
-    def recall(self, all_inputs: Sequence[Inputs]) -> dict[str, ScriptRun]:
+    def get_runs(self, all_inputs: Sequence[Inputs]) -> dict[str, ScriptRun]:
         """The results that hold, by path; none where everything is to run."""
         if self.fresh:
             return {}
         runs: dict[str, ScriptRun] = {}
         missing: list[Inputs] = []
         for inputs in all_inputs:
-            record = self.find_record(inputs)
+            record = self.get_record(inputs)
             if record is None:
                 missing.append(inputs)
             else:
@@ -153,15 +153,15 @@ class Memory:
             runs[record.inputs.path] = record.restore(self.states.places)
         return runs
 
-    def find_record(self, inputs: Inputs) -> RunRecord | None:
+    def get_record(self, inputs: Inputs) -> RunRecord | None:
         """The result kept on this machine that holds now."""
-        records = (record for record in self.results(inputs) if self._holds(record))
+        records = (record for record in self.records(inputs) if self._holds(record))
         record = next(records, None)
         if record is not None:
             self._note(record)
         return record
 
-    def results(self, inputs: Inputs) -> Iterator[RunRecord]:
+    def records(self, inputs: Inputs) -> Iterator[RunRecord]:
         """All results kept on this machine for these inputs, newest first."""
         for key in self.store.group(_RESULTS, group_key(inputs)):
             record = self.store.peek(_RESULTS, key, from_bytes)
@@ -220,7 +220,7 @@ class Memory:
         """Mark the moment before scripts run: any file written until now is older than they."""
         self._clock.tick()
 
-    def keep(self, inputs: Inputs, run: ScriptRun) -> None:
+    def put_run(self, inputs: Inputs, run: ScriptRun) -> None:
         """Remember the result of a run, or why it is not remembered."""
         states = self.states
         dependencies = dependencies_of(run, inputs.requires, states.places, states.now)
@@ -229,7 +229,7 @@ class Memory:
         if not reason:
             assert run.outcome in STORABLE_OUTCOMES
             if self.fresh:
-                for before in self.results(inputs):
+                for before in self.records(inputs):
                     if before.dependencies == dependencies:
                         old = before.restore(states.places)
                         is_same = old.outcome == run.outcome and old.status == run.status

@@ -63,7 +63,7 @@ class Files:
     def show(self, library: Library) -> None:
         """Draw pages of this course from now on."""
         self._library = library
-        self._trial_files = {file.path: file for file in library.trials.files}
+        self._trial_files = {file.path: file for file in library.trial_files}
         self._entries = {entry.path: entry for entry in page_list(library)}
         self._last_good = {p: key for p, key in self._last_good.items() if p in self._entries}
         if self._sites:
@@ -134,7 +134,11 @@ class Files:
             # Browsers may ask for shared files of an older page.
             newest = site is self._sites[-1][0]
             if path in files and (newest or path.startswith("assets/")):
-                return _data(files[path])
+                file = files[path]
+                try:
+                    return file.data if isinstance(file, OutputFile) else file.make()
+                except EffectError:
+                    return None  # gone since the course was read
         return None
 
     def _find_page(self, path: str) -> bytes | None:
@@ -161,10 +165,3 @@ class Files:
 
 def _with_files(site: Site) -> tuple[Site, Mapping[str, SiteFile]]:
     return site, {file.path: file for file in site.files}
-
-
-def _data(file: SiteFile) -> bytes | None:
-    try:
-        return file.data if isinstance(file, OutputFile) else file.make()
-    except EffectError:
-        return None  # gone since the course was read

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.engine.memo import Memo, prune
+from coursebuild.core.engine.store import Store, prune
 
 ROOT = Path(__file__).parents[3]
 KEY = hashlib.sha256(b"a key").hexdigest()
@@ -28,7 +28,7 @@ def entry(root: Path, name: str = NAME) -> Path:
     return root / ".coursebuild" / name
 
 
-def messages_of(store: Memo) -> list[str]:
+def messages_of(store: Store) -> list[str]:
     lines: list[str] = []
     store.listen(lines.append)
     return lines
@@ -39,25 +39,25 @@ def messages_of(store: Memo) -> list[str]:
 
 def test_every_position_of_an_entry_on_the_disk(tmp_path: Path) -> None:
     """Nothing is found, nothing is said, and the next result takes its place."""
-    store = Memo(tmp_path)
+    store = Store(tmp_path)
     store.put("kind", KEY, b"the result")
     whole = entry(tmp_path).read_bytes()
     for position in range(len(whole)):
         entry(tmp_path).write_bytes(
             whole[:position] + bytes([whole[position] ^ 0x10]) + whole[position + 1 :]
         )
-        fresh = Memo(tmp_path)
+        fresh = Store(tmp_path)
         assert fresh.get("kind", KEY, bytes) is None
         assert messages_of(fresh) == []
-        assert fresh.get_or_create("kind", KEY, lambda: b"made again") == b"made again"
-        assert Memo(tmp_path).get("kind", KEY, bytes) == b"made again"
+        assert fresh.get_or_make("kind", KEY, lambda: b"made again") == b"made again"
+        assert Store(tmp_path).get("kind", KEY, bytes) == b"made again"
 
 
 # --- several processes
 
 
 def write_many(root: str, seed: int) -> None:
-    store = Memo(Path(root))
+    store = Store(Path(root))
     for number in range(40):
         data = f"{number % 5}".encode() * 20_000
         store.put("kind", key(number % 5), data)
@@ -86,11 +86,11 @@ def test_several_processes_write_read_and_prune_at_once(tmp_path: Path) -> None:
 KILLED_SCRIPT = """
 import os, sys
 from pathlib import Path
-from coursebuild.core.engine import memo
+from coursebuild.core.engine.store import Store
 def stop(source, target):
     print("writing", flush=True)
     sys.stdin.read()
-store = memo.Memo(Path(sys.argv[1]))
+store = Store(Path(sys.argv[1]))
 store.put("other", sys.argv[2], b"")
 os.replace = stop
 store.put("kind", sys.argv[2], b"x" * 100_000)
@@ -111,7 +111,7 @@ def test_a_writer_that_was_killed_leaves_nothing_that_is_served_or_stays(tmp_pat
         assert [path.name[:5] for path in folder.iterdir()] == [".new-"]
         process.kill()
         process.wait()
-    assert Memo(tmp_path).get("kind", KEY, bytes) is None
+    assert Store(tmp_path).get("kind", KEY, bytes) is None
     [left] = folder.iterdir()
     prune(tmp_path / ".coursebuild", 1 << 30)
     assert left.exists(), "its writer may live"
@@ -130,11 +130,11 @@ def test_a_disk_that_takes_nothing_costs_time_and_is_reported_once(
     def refuse(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    store = Memo(tmp_path)
+    store = Store(tmp_path)
     monkeypatch.setattr(os, call, refuse)
     lines = messages_of(store)
-    assert store.get_or_create("kind", KEY, lambda: b"a") == b"a"
-    assert store.get_or_create("kind", key(2), lambda: b"b") == b"b"
+    assert store.get_or_make("kind", KEY, lambda: b"a") == b"a"
+    assert store.get_or_make("kind", key(2), lambda: b"b") == b"b"
     assert lines == ["results cannot be kept in .coursebuild: no space left on device"]
     assert [path for path in tmp_path.rglob("*") if path.name.startswith(".new-")] == []
 
@@ -146,7 +146,7 @@ def test_a_place_that_cannot_be_written(held_back: Path) -> None:
     held_back.chmod(0o500)
     for root in (in_the_way, held_back):
         for text in (b"made", b"made again"):
-            assert Memo(root).get_or_create("kind", KEY, lambda text=text: text) == text
+            assert Store(root).get_or_make("kind", KEY, lambda text=text: text) == text
     assert list(held_back.iterdir()) == [in_the_way]
     held_back.chmod(0o700)
 
@@ -155,11 +155,11 @@ def test_what_fails_is_not_kept_and_nothing_is_a_result(tmp_path: Path) -> None:
     def fail() -> bytes:
         raise RuntimeError("no")
 
-    store = Memo(tmp_path)
+    store = Store(tmp_path)
     with pytest.raises(RuntimeError):
-        store.get_or_create("kind", KEY, fail)
-    assert store.get_or_create("kind", KEY, lambda: b"") == b""
-    assert store.get_or_create("kind", KEY, fail) == b""
+        store.get_or_make("kind", KEY, fail)
+    assert store.get_or_make("kind", KEY, lambda: b"") == b""
+    assert store.get_or_make("kind", KEY, fail) == b""
     assert (tmp_path / ".coursebuild/.gitignore").read_text() == "*\n"
 
 
@@ -167,15 +167,15 @@ def test_what_fails_is_not_kept_and_nothing_is_a_result(tmp_path: Path) -> None:
 
 
 def test_a_fresh_store_makes_everything_again_and_says_what_differs(tmp_path: Path) -> None:
-    Memo(tmp_path).put("kind", KEY, b"old")
-    fresh = Memo(tmp_path, fresh=True)
+    Store(tmp_path).put("kind", KEY, b"old")
+    fresh = Store(tmp_path, fresh=True)
     lines = messages_of(fresh)
     assert fresh.get("kind", KEY, bytes) is None
-    assert fresh.get_or_create("kind", KEY, lambda: b"new") == b"new"
+    assert fresh.get_or_make("kind", KEY, lambda: b"new") == b"new"
     assert lines == [f"the entry kind/{KEY[:12]}… was made again and is not what was kept"]
-    assert Memo(tmp_path).get("kind", KEY, bytes) == b"new"
+    assert Store(tmp_path).get("kind", KEY, bytes) == b"new"
     lines.clear()
-    fresh.get_or_create("kind", KEY, lambda: b"new")
+    fresh.get_or_make("kind", KEY, lambda: b"new")
     assert lines == []
 
 
@@ -183,7 +183,7 @@ def test_a_fresh_store_makes_everything_again_and_says_what_differs(tmp_path: Pa
 
 
 def test_a_group_lists_its_newest_and_drops_the_rest(tmp_path: Path) -> None:
-    store = Memo(tmp_path)
+    store = Store(tmp_path)
     group = key(0)
     for number in range(12):
         store.put("kind", f"{group}/{key(number)}", b"x")
@@ -217,7 +217,7 @@ def test_entries_are_cut_to_the_limit_the_oldest_first(tmp_path: Path) -> None:
 
 
 def test_what_is_used_stays(tmp_path: Path) -> None:
-    store = Memo(tmp_path, size=1)
+    store = Store(tmp_path, size=1)
     for number in range(3):
         store.put("kind", key(number), b"x" * 1000)
         os.utime(entry(tmp_path, f"kind/{key(number)}"), (1000 + number, 1000 + number))
@@ -231,7 +231,7 @@ def test_pruning_is_now_and_then(tmp_path: Path) -> None:
 
     def prunes(size: int) -> bool:
         """Whether a command that wrote so many bytes prunes as it ends."""
-        store = Memo(tmp_path, size=100_000)
+        store = Store(tmp_path, size=100_000)
         store.put("kind", key(size), b"x" * size)
         (folder / "kind" / key(0)).write_bytes(b"x" * 200_000)
         store.close()

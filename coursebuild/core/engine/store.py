@@ -1,16 +1,19 @@
 """Results that are expensive to make and depend on nothing but their key, kept in `.coursebuild/`.
 
-Entry point: `Memo`, with `get` and `put`, or both in one, `get_or_create`; `get_value` and
-`put_value` for JSON.
+Entry point: `Store`, with `get` and `put`, or both in one, `get_or_make`; `get_value` and
+`put_value` for JSON. The words are those of `core.engine`.
 
 1. An entry lies at `.coursebuild/KIND/KEY`, or `KIND/GROUP/KEY` where several results belong
    together. It is sealed under its name with the user's key (see `core.files.trust`), and the
    reader says which type the data must have. What somebody else wrote, or damaged, is not there.
 2. It is written under a temporary name and then renamed, so that other processes see whole entries
    only.
-3. Results of scripts and trials can be shared: they are also looked for in the shared cache, if
+3. Results of scripts and trials can be shared: they are also looked for in the shared place, if
    there is one, and sent there. Everything else is made on this machine.
-4. Now and then, as a command ends, the entries used longest ago are removed until the rest is
+4. Reading waits for the shared place; up to four threads write while the work goes on. If it cannot
+   be reached or takes too long, that is reported once, and it is left alone for a while: it costs
+   time, but is never an error.
+5. Now and then, as a command ends, the entries used longest ago are removed until the rest is
    within the limit.
 
 Nothing is lost when the folder is deleted.
@@ -26,10 +29,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import msgspec
 
+from coursebuild.core.engine.shared_place import SharedPlace, in_words
 from coursebuild.core.files.errors import reason
 from coursebuild.core.files.trust import (
     FOLDER,
@@ -43,10 +47,8 @@ from coursebuild.core.files.trust import (
 )
 from coursebuild.core.values import DAMAGE
 
-if TYPE_CHECKING:
-    from coursebuild.core.engine.shared_cache import SharedCache
-
 Value = TypeVar("Value")
+T = TypeVar("T")
 
 SIZE = 1 << 30
 """Bytes that all entries may take together."""
@@ -62,10 +64,17 @@ _GROUP_SIZE = 8
 """Entries that a group keeps, the newest."""
 _PRUNED_SHARE = 0.9
 """Part of the limit that pruning leaves in use, so that not every command has to prune."""
+_TIMEOUT = 15.0
+"""Seconds that a request to the shared place may take."""
+_FLUSH_TIMEOUT = 60.0
+"""Seconds that a command waits at its end for entries still to be sent."""
+_PAUSE = 120.0
+"""Seconds for which a shared place that failed is left alone."""
+_WRITERS = 4
 
 
-class Memo:
-    """The results kept for a course, here and perhaps in a shared cache.
+class Store:
+    """The results kept for a course, here and perhaps in a shared place.
 
     Safe to use from several threads, and from several processes on the same folder.
     """
@@ -74,9 +83,10 @@ class Memo:
         self,
         root: Path,
         *,
-        shared: SharedCache | None = None,
+        shared: SharedPlace | None = None,
         size: int = SIZE,
         fresh: bool = False,
+        timeout: float = _TIMEOUT,
     ) -> None:
         folder, self.set_aside = find_store(str(root))
         """Why the folder `.coursebuild` of the course is not used; mostly empty."""
@@ -92,8 +102,10 @@ class Memo:
         self._pending: list[str] = []
         self._tell: Callable[[str], None] = self._pending.append
         self._bytes_written = 0
-        if shared is not None:
-            shared.tell = self._say
+        self._timeout = timeout
+        self._shared_failed = False
+        self._down_until = -1.0
+        self._writers = threading.Semaphore(_WRITERS)
 
     def listen(self, tell: Callable[[str], None]) -> None:
         """Send messages about the store to `tell`, a line each, earlier ones included."""
@@ -103,7 +115,7 @@ class Memo:
         for line in pending:
             tell(line)
 
-    def get_or_create(self, kind: str, key: str, make: Callable[[], bytes]) -> bytes:
+    def get_or_make(self, kind: str, key: str, make: Callable[[], bytes]) -> bytes:
         """The result of this kind and key: the one kept, or one made and kept now."""
         data = self.get(kind, key, bytes)
         if data is not None:
@@ -122,7 +134,7 @@ class Memo:
         """The result of this kind and key, if an undamaged one is kept.
 
         `read` makes the result from its bytes; if it raises one of `DAMAGE` or returns `None`, the
-        entry is damaged. A `shared` result is looked for in the shared cache too.
+        entry is damaged. A `shared` result is looked for in the shared place too.
         """
         if self.fresh:
             return None
@@ -148,11 +160,17 @@ class Memo:
         return value
 
     def put(self, kind: str, key: str, data: bytes, *, shared: bool = False) -> None:
-        """Keep a result, if `shared` also in the shared cache; failing to only costs time."""
+        """Keep a result, if `shared` also in the shared place; failing to only costs time."""
         name = f"{kind}/{key}"
         self._write(name, data)
-        if self.shared is not None and shared:
-            self.shared.write(name, seal(name, data, self.shared.key))
+        if self.shared is None or not shared or self._is_down():
+            return
+        if self._writers.acquire(timeout=self._timeout):
+            # A thread each, since an idle one would keep this process from forking.
+            work = (self.shared, name, seal(name, data, self.shared.seal_key))
+            threading.Thread(target=self._send, args=work, name="shared", daemon=True).start()
+        else:
+            self._fail(self.shared, f"no answer within {self._timeout:g} s")
 
     def get_value(self, kind: str, key: str, type: type[Value]) -> Value | None:
         """A result that was kept as JSON, if it is of this type."""
@@ -174,16 +192,30 @@ class Memo:
         return [f"{key}/{name}" for _, name in entries[:_GROUP_SIZE]]
 
     def shared_group(self, kind: str, key: str) -> list[str]:
-        """The keys of a group that the shared cache has."""
-        if self.shared is None or self.fresh:
+        """The keys of a group that the shared place has."""
+        shared = self.shared
+        if shared is None or self.fresh:
             return []
-        names = sorted(self.shared.names(f"{kind}/{key}"))
-        return [f"{key}/{name}" for name in names if HASH.fullmatch(name)]
+        names = self._ask(shared, lambda: shared.files.names(shared.path(f"{kind}/{key}"))) or []
+        return [f"{key}/{name}" for name in sorted(names) if HASH.fullmatch(name)]
+
+    def flush(self, seconds: float = _FLUSH_TIMEOUT) -> None:
+        """Wait until everything is sent to the shared place, but not for ever."""
+        if self.shared is None:
+            return
+        until = time.monotonic() + seconds
+        with contextlib.ExitStack() as idle:
+            for _ in range(_WRITERS):
+                if self._is_down():
+                    return
+                if not self._writers.acquire(timeout=max(until - time.monotonic(), 0.0)):
+                    self._fail(self.shared, f"results could not be sent in {seconds:g} s")
+                    return
+                idle.callback(self._writers.release)
 
     def close(self) -> None:
-        """Wait until the shared cache has all new results, and keep this one within its limit."""
-        if self.shared is not None:
-            self.shared.flush()
+        """Wait until the shared place has all new results, and keep the store within its limit."""
+        self.flush()
         if self._bytes_written:
             with contextlib.suppress(OSError):
                 self._prune_if_due()
@@ -209,12 +241,12 @@ class Memo:
         tell(line)
 
     def _fetch(
-        self, shared: SharedCache, name: str, read: Callable[[bytes], Value | None]
+        self, shared: SharedPlace, name: str, read: Callable[[bytes], Value | None]
     ) -> Value | None:
-        entry = shared.read(name)
+        entry = self._ask(shared, lambda: shared.files.read(shared.path(name)))
         if entry is None:
             return None
-        data = unseal(name, entry, shared.key)
+        data = unseal(name, entry, shared.seal_key)
         value = _value(data, read)
         if data is None or value is None:
             self._say(f"{_short(name)} in the shared cache is damaged: it is made again")
@@ -237,6 +269,49 @@ class Memo:
             return
         with self._lock:
             self._bytes_written += len(entry)
+
+    # --- the shared place
+
+    def _send(self, shared: SharedPlace, name: str, entry: bytes) -> None:
+        try:
+            if not self._is_down():
+                shared.files.write(shared.path(name), entry)
+        except Exception as error:  # libraries of clouds raise what they like
+            self._fail(shared, in_words(error))
+        finally:
+            self._writers.release()
+
+    def _ask(self, shared: SharedPlace, function: Callable[[], T]) -> T | None:
+        """The function's result if it comes in time; a call that hangs is abandoned."""
+        if self._is_down():
+            return None
+        results: list[T] = []
+        errors: list[Exception] = []
+
+        def work() -> None:
+            try:
+                results.append(function())
+            except Exception as error:
+                errors.append(error)
+
+        thread = threading.Thread(target=work, name="shared", daemon=True)
+        thread.start()
+        thread.join(self._timeout)
+        if results:
+            return results[0]
+        cause = in_words(errors[0]) if errors else f"no answer within {self._timeout:g} s"
+        self._fail(shared, cause)
+        return None
+
+    def _is_down(self) -> bool:
+        return time.monotonic() < self._down_until
+
+    def _fail(self, shared: SharedPlace, cause: str) -> None:
+        with self._lock:
+            self._down_until = time.monotonic() + _PAUSE
+            failed_before, self._shared_failed = self._shared_failed, True
+        if not failed_before:
+            self._say(f"the shared cache {shared.address} cannot be used: {cause}")
 
 
 def _value(data: bytes | None, read: Callable[[bytes], Value | None]) -> Value | None:

@@ -1,0 +1,215 @@
+"""Check a whole course: lessons, links, mentions, terms, formulas and the rules of features.
+
+Entry points: `check_course`; `check_document`, the same for one document; `document_formulas`, and
+`check_formulas`, which reports those that do not parse or look mistyped.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+
+from coursebuild.core.checks.links import LinkTargets, check_links, link_targets
+from coursebuild.core.model import (
+    Course,
+    Document,
+    Term,
+    document_blocks,
+    document_scripts,
+    find_formulas,
+    find_inlines,
+    is_blank,
+)
+from coursebuild.core.model.blocks import title_line
+from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.registry import features
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean
+from coursebuild.core.text.source import Excerpt, Span
+
+
+def check_course(course: Course) -> tuple[Diagnostic, ...]:
+    """Check lessons, links, mentions and terms against each other, and the rules of features."""
+    targets, documents = link_targets(course), course.documents
+    diagnostics = [
+        diagnostic
+        for document in documents
+        for diagnostic in _check_core_rules(course, document, targets)
+    ]
+    return (*diagnostics, *_check_unproven(course), *_check_features(course, documents))
+
+
+def check_document(
+    course: Course, document: Document, targets: LinkTargets
+) -> tuple[Diagnostic, ...]:
+    """What `check_course` finds in one document, given what the rest of the course offers."""
+    diagnostics = _check_core_rules(course, document, targets)
+    return (*diagnostics, *_check_features(course, (document,)))
+
+
+def _check_core_rules(
+    course: Course, document: Document, targets: LinkTargets
+) -> Iterator[Diagnostic]:
+    source = document.source
+    for lesson in course.lessons:
+        if lesson.document is not document or not is_blank(document_blocks(document)):
+            continue
+        help = 'say `status = "planned"` in the map and remove the file'
+        if lesson.status == "complete":
+            message = f"lesson {lesson.id} is complete, but there is nothing to read in it"
+            help = f'write it, say `status = "draft"` in the map, or {help}'
+            yield diagnose("lesson-empty", source.span(0, 0), message, help=help)
+        elif not document.blocks:
+            message = f"lesson {lesson.id} is a draft, and its file is empty"
+            yield diagnose("draft-empty", source.span(0, 0), message, help=f"begin it, or {help}")
+    span = title_line(document.source)
+    for page in course.pages:
+        if page.document is document and span is not None and span.text != page.title:
+            message = f"the course map calls this page `{page.title}`"
+            yield diagnose("heading-top", span, message, help="give it one title in both")
+    yield from check_links(course, document, targets)
+    for term in find_inlines(document, Term):
+        first = targets.terms.get(term.id)
+        if first is None or (first.path, first.start) == (term.span.path, term.span.start):
+            continue
+        message = f"the term `{term.id}` is defined twice"
+        help = "leave one definition, and link to it from here: "
+        help += f'`[…](term:{term.id})`; or name this one by `{{term="…"}}`'
+        notes = [Note("the first one is here", first)]
+        yield diagnose("term-repeated", term.span, message, help=help, notes=notes)
+
+
+def _check_features(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:
+    """Yield what features find wrong in some documents of a course."""
+    for feature in features():
+        if feature.check is not None:
+            try:
+                yield from feature.check(course, documents)
+            except Exception as error:
+                path = _find_failing(functools.partial(feature.check, course), documents)
+                error.add_note(f"it fails for {path}" if path else "it fails for no text alone")
+                raise
+
+
+def _find_failing(
+    check: Callable[[Collection[Document]], Iterable[Diagnostic]], documents: Iterable[Document]
+) -> str:
+    """The path of the first document whose check raises an exception; empty if none does."""
+    for document in documents:
+        try:
+            tuple(check((document,)))
+        except Exception:
+            return document.source.path
+    return ""
+
+
+def _check_unproven(course: Course) -> Iterator[Diagnostic]:
+    """Report scripts that the map lets pass unproven and that are not there, or always run."""
+    scripts = {s.path: s for document in course.documents for s in document_scripts(document)}
+    first: dict[str, Span] = {}
+    for entry in course.unproven:
+        script = scripts.get(entry.path)
+        if first.setdefault(entry.path, entry.span) is not entry.span:
+            message = f"the script `{entry.path}` is named twice"
+            notes = [Note("the first one is here", first[entry.path])]
+            help = "remove it here"
+            yield diagnose("unproven-name", entry.span, message, help=help, notes=notes)
+        elif script is None:
+            message = f"no lesson or page has a script `{entry.path}`"
+            help = did_you_mean(entry.path, scripts) or "remove it"
+            yield diagnose("unproven-name", entry.span, message, help=help)
+        elif not (script.norun or script.requires):
+            message = f"`{entry.path}` always runs: it says neither `norun` nor `requires`"
+            yield diagnose("unproven-name", entry.span, message, help="remove it")
+
+
+_WORDS = re.compile(
+    r"\\(?:text\w*|math(?:rm|sf|tt|it|bf|cal|bb|frak|scr)|operatorname\*?|begin|end|tag|label|ref"
+    r"|href|color|boldsymbol|mbox|hbox|bm)\s*\{[^{}]*\}|[_^]\s*\{[A-Za-z0-9 ,]*\}"
+)
+"""What stands in letters of its own, and indices that are words."""
+_COMMANDS = frozenset(
+    """
+    alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta iota kappa lambda sigma tau
+    upsilon phi varphi chi psi omega rho pi Gamma Delta Theta Lambda Sigma Upsilon Phi Psi Omega
+    frac tfrac dfrac sqrt cdot cdots ldots dots times approx leq geq neq equiv infty partial nabla
+    dot ddot hat vec tilde overline mathrm mathbf mathcal boldsymbol sin cos tan cot arcsin arccos
+    arctan sinh cosh tanh exp log lim prod quad qquad langle rangle lVert rVert
+    """.split()
+)
+"""Commands that no product of letters spells."""
+_SHORT_COMMANDS = frozenset("mu nu xi ln le ge ne in to int sum det bar sgn".split())
+"""Those that one may; they are taken for commands where the text uses them as such."""
+_LETTERS = re.compile(r"\\[A-Za-z]+|\\.|[A-Za-z]+", re.DOTALL)
+_BRACKETS = re.compile(r"\\[{}]|\\[^{}]|[()\[\]]", re.DOTALL)
+_INTERVAL = re.compile(r"[()\[\]][^()\[\]]*[,;][^()\[\]]*[()\[\]]|\\(?:left|right)\s*\.|\\begin")
+
+
+def _formula_uses(document: Document) -> Iterator[tuple[Formula, Excerpt]]:
+    """Every formula with its TeX in the text; empty ones were reported by the parser."""
+    for _, formula in find_formulas(document):
+        if formula.tex.text.strip():
+            yield Formula(formula.tex.text, formula.display), formula.tex
+
+
+def document_formulas(document: Document) -> tuple[Formula, ...]:
+    """Each different formula of one document, in order of first use."""
+    return tuple(dict.fromkeys(formula for formula, _ in _formula_uses(document)))
+
+
+def check_formulas(
+    document: Document, typeset: Mapping[Formula, str | MathError]
+) -> tuple[Diagnostic, ...]:
+    """One diagnostic for each place where a formula that does not parse stands."""
+    diagnostics: list[Diagnostic] = []
+    uses = [*_formula_uses(document)]
+    used_commands = {
+        command[1:] for _, tex in uses for command in re.findall(r"\\[A-Za-z]+", tex.text)
+    }
+    commands = _COMMANDS | (_SHORT_COMMANDS & used_commands)
+    for formula, tex in uses:
+        result = typeset[formula]
+        if not isinstance(result, MathError):
+            diagnostics += _check_letters(tex, commands)
+            continue
+        span = tex.span()
+        if result.position is not None:
+            at = min(result.position, len(tex.text) - 1)
+            span = tex.span(at, at + 1)
+        diagnostics.append(
+            diagnose("math-syntax", span, f"the formula does not parse: {result.message}")
+        )
+    return tuple(diagnostics)
+
+
+def _check_letters(tex: Excerpt, commands: frozenset[str]) -> Iterator[Diagnostic]:
+    """Report commands without their backslash, and brackets without the other one."""
+    text = _WORDS.sub(lambda match: " " * len(match[0]), tex.text)
+    for letters in _LETTERS.finditer(text):
+        if letters[0] in commands:
+            message = f"`{letters[0]}` would be shown as a product of letters"
+            help = f"write `\\{letters[0]}`, or `\\mathrm{{{letters[0]}}}` for a name"
+            yield diagnose("math-command", tex.span(*letters.span()), message, help=help)
+    if (prime := re.search(r"(?:^|[(\[=+,;&-])\s*(')", text)) is not None:
+        message, help = "this prime follows nothing", "write the letter before it"
+        yield diagnose("math-syntax", tex.span(*prime.span(1)), message, help=help)
+    if (at := text.find("`")) >= 0:
+        message, help = "a backtick would be shown in this formula", "delete it"
+        yield diagnose("math-syntax", tex.span(at, at + 1), message, help=help)
+    if _INTERVAL.search(text):
+        return
+    unmatched: list[int] = []
+    for bracket in _BRACKETS.finditer(text):
+        if bracket[0] in ("(", "[", "\\{"):
+            unmatched.append(bracket.start())
+        elif bracket[0] in (")", "]", "\\}"):
+            if not unmatched:
+                unmatched = [bracket.start()]
+                break
+            unmatched.pop()
+    if unmatched:
+        at = unmatched[-1]
+        end = at + (2 if text[at] == "\\" else 1)
+        help = "write the other one, or `\\lbrack`, `\\rbrack` where one stands alone"
+        message = f"`{text[at:end]}` has no bracket that belongs to it"
+        yield diagnose("math-brackets", tex.span(at, end), message, help=help)

@@ -1,0 +1,90 @@
+"""What the pages of a course are drawn with, made of what the tool and its features bring.
+
+Entry points: `make_library`, a course with its results, words and templates; `renderer_for`,
+`strings_for` and `words_for`, for a language alone.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from unicodedata import normalize
+
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import Formula, MathError, PublishedTrials, Reports, Results
+from coursebuild.core.model.vocabulary import ENGLISH, Words
+from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.renderer import Renderer, Texts, templates_of
+from coursebuild.core.pages.strings import DEFAULT_LANGUAGE, Strings, parse_strings
+from coursebuild.core.registry import feature_trials, features, publish_trials
+
+
+def make_library(
+    course: Course,
+    results: Results,
+    assets: Assets,
+    reports: Reports,
+    trials: PublishedTrials | None = None,
+) -> Library:
+    """The library of a course; `trials` are what is published of trials, if it is known already."""
+    renderer = renderer_for(
+        assets, course.language, course.theme.template_texts, dict(results.formulas)
+    )
+    trials = trials or publish_trials(results, assets)
+    blocks = {name: trial.block for name, (_, trial) in feature_trials(course).items()}
+    values = {
+        (blocks[name].span.path, blocks[name].span.start): value
+        for name, value in trials.values.items()
+        if name in blocks
+    }
+    return Library(course, results, assets, renderer, reports, values, trials.files)
+
+
+def renderer_for(
+    assets: Assets,
+    language: str,
+    course_templates: Texts = (),
+    formulas: Mapping[Formula, str | MathError] = {},
+) -> Renderer:
+    """The renderer of pages in a language, with the templates of a course and of the tool."""
+    templates = templates_of(assets.templates, assets.compiled_templates, course_templates)
+    return Renderer(strings_for(assets.templates, language), templates, formulas)
+
+
+def strings_for(templates: tuple[tuple[str, str], ...], language: str) -> Strings:
+    """The interface texts of a language: for `pt-BR` its own, then those of `pt`, then English."""
+    feature_texts = (feature.texts.items() for feature in features())
+    return _strings_for(
+        templates, tuple(text for texts in feature_texts for text in texts), language
+    )
+
+
+def words_for(templates: tuple[tuple[str, str], ...], language: str) -> Words:
+    """The words by which texts of a language are read: its own, and the English ones.
+
+    Letters with marks may be typed as one character or as two.
+    """
+    strings, words = strings_for(templates, language), {}
+    for field in Words.__struct_fields__:
+        names = strings(f"words.{field}").split("|")
+        forms = (normalize(form, name) for name in names for form in ("NFC", "NFD"))
+        words[field] = tuple(dict.fromkeys((*forms, *getattr(ENGLISH, field))))
+    return Words(**words)
+
+
+@functools.lru_cache(maxsize=8)
+def _strings_for(
+    templates: tuple[tuple[str, str], ...],
+    feature_texts: tuple[tuple[str, str], ...],
+    language: str,
+) -> Strings:
+    files = [(path, text) for path, text in templates if path.startswith("strings/")]
+    texts = [(path[len("strings/") :].removesuffix(".toml"), text) for path, text in files]
+    strings = Strings({}, language)
+    for name in dict.fromkeys((DEFAULT_LANGUAGE, language.split("-")[0].lower(), language)):
+        for text in (
+            text for file_language, text in (*texts, *feature_texts) if file_language == name
+        ):
+            strings = parse_strings(text, strings, language)
+    return strings
