@@ -120,16 +120,20 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
     text = visible(code)
     # Lexers drop a byte order mark at the start.
     mark = "\ufeff" if text.startswith("\ufeff") else ""
-    runs = _merge(chain([("", mark)], _runs_of(language.lower(), text.removeprefix(mark))))
-    html = "".join(_element(css, escape(run, quote=False)) for css, run in runs)
-    return tuple(map(Markup, html.split("\n")))
-
-
-def _runs_of(language: str, code: str) -> Iterable[Run]:
-    if language in _PYTHON and len(code) <= _MAX_FOR_TREE_SITTER:
-        return python_runs(code)
-    lexer = _lexer(_ALIASES.get(language, language))
-    return [("", code)] if lexer is None else _lex(lexer, code)
+    text, language = text.removeprefix(mark), language.lower()
+    runs: Iterable[Run] = [("", text)]
+    if language in _PYTHON and len(text) <= _MAX_FOR_TREE_SITTER:
+        runs = python_runs(text)
+    elif (lexer := _lexer(_ALIASES.get(language, language))) is not None:
+        runs = _lex(lexer, text)
+    parts: list[str] = []
+    for css, run in _merge(chain([("", mark)], runs)):
+        html = escape(run, quote=False)
+        if css:  # an element for each line, without the white space around it
+            element = f'<span class="{css}">'
+            html = _WITHOUT_OUTER_SPACE.sub(rf"{element}\g<0></span>", html)
+        parts.append(html)
+    return tuple(map(Markup, "".join(parts).split("\n")))
 
 
 @functools.cache
@@ -171,10 +175,3 @@ def _merge(runs: Iterator[Run]) -> Iterator[Run]:
             yield css, run
             css, run = kind, text
     yield css, run
-
-
-def _element(css: str, html: str) -> str:
-    """Put each line into an element, without the white space around it."""
-    if not css:
-        return html
-    return _WITHOUT_OUTER_SPACE.sub(lambda line: f'<span class="{css}">{line[0]}</span>', html)
