@@ -29,10 +29,10 @@ from coursebuild.core.files.resources import Bundle, prepared_folder, template_t
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Formula, MathError, Reports, Results
 from coursebuild.core.model.walk import without_prose
-from coursebuild.core.pages import folding
+from coursebuild.core.pages import listings
 from coursebuild.core.pages.article import draw
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.folding import find_imports
+from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_list
@@ -194,11 +194,11 @@ def measure_lessons(course: Course, results: Results, repeat: int) -> None:
     renderer = library.renderer
 
     def draws() -> list[tuple[PageHead, Markup]]:
-        folding._analyse.cache_clear()
+        listings._analyse.cache_clear()
         return [draw(inputs, document, renderer)[:2] for inputs, document in pages]
 
     def modules() -> list[frozenset[str]]:
-        folding._analyse.cache_clear()
+        listings._analyse.cache_clear()
         return [find_imports(script) for script in scripts]
 
     def parses() -> list[object]:

@@ -21,8 +21,8 @@ from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls, zips
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.theme import dark_colours, dark_drawing
 from coursebuild.core.run.packages import distributions, module_files
 from coursebuild.core.run.script_environment import course_environment

@@ -39,7 +39,7 @@ from coursebuild.core.model.course import TEMPLATES, Theme
 from coursebuild.core.model.vocabulary import CALLOUTS, ENGLISH, Words
 from coursebuild.core.pages.materials import words_for
 from coursebuild.core.registry import read_references
-from coursebuild.core.run.script_environment import Interpreter, course_environment, engine_version
+from coursebuild.core.run.script_environment import course_environment, engine_version
 from coursebuild.core.scripts.edit import check_source_parts, shown_files
 from coursebuild.core.text.conflicts import find_conflict
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
@@ -162,7 +162,14 @@ class _Loader:
         self.diagnostics += self._check(course)
         self.diagnostics += environment.diagnostics
         if course.python is None or environment.value is not None:
-            self.diagnostics += _check_engine(course, environment.value)
+            interpreter = environment.value
+            installed = engine_version() if interpreter is None else interpreter.engine
+            if course.engine not in (None, installed):
+                message = f"the course is written for MuJoCo {course.engine}, and {installed} is "
+                message += "installed" + (f" for `{course.python.path}`" if course.python else "")
+                help = "install that version, or bring the outputs up to date and change `engine`"
+                diagnostic = diagnose("engine-version", course.engine_span, message, help=help)
+                self.diagnostics.append(diagnostic)
         self.diagnostics += check_source_parts(course, self._read_text)
         self.diagnostics += _check_unlisted_files(course)
         for package in course.packages:
@@ -406,14 +413,3 @@ def _check_unlisted_files(course: Course) -> Iterator[Diagnostic]:
             message = f"the course map does not name {path}, and nothing links to it"
             help = f"add a [[page]] to {MAP}, or move the file out of content/"
             yield diagnose("file-unlisted", Source(path, "").span(0, 0), message, help=help)
-
-
-def _check_engine(course: Course, interpreter: Interpreter | None) -> list[Diagnostic]:
-    installed = engine_version() if interpreter is None else interpreter.engine
-    if course.engine in (None, installed):
-        return []
-    purpose = "" if course.python is None else f" for `{course.python.path}`"
-    message = f"the course is written for MuJoCo {course.engine}, and {installed} is installed"
-    message += purpose
-    help = "install that version, or bring the outputs up to date and change `engine`"
-    return [diagnose("engine-version", course.engine_span, message, help=help)]

@@ -37,8 +37,8 @@ from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.formulas import equations_of
+from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.materials import renderer_for
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.renderer import Renderer, Texts, known_mathml
@@ -399,7 +399,7 @@ _UNPACKABLE = (pickle.PicklingError, AttributeError, TypeError, ValueError, Recu
 _HEAVY = (
     "coursebuild.core.run.v8",
     "coursebuild.core.pages.article",
-    "coursebuild.core.pages.highlight",
+    "coursebuild.core.pages.listings",
     "coursebuild.core.pages.document_inputs",
     "coursebuild.core.pages.page_list",
     "coursebuild.core.syntax.document",
@@ -410,7 +410,7 @@ def _prepare_to_read(sample: SourceText) -> None:
     """Import and make what reading and drawing need, so that worker processes share it."""
     for name in _HEAVY:
         importlib.import_module(name)
-    from coursebuild.core.pages.highlight import highlight_lines
+    from coursebuild.core.pages.listings import highlight_lines
 
     # Several modules prepare things at their first use.
     document = sample.parse().value

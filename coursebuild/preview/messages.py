@@ -187,18 +187,14 @@ def _outputs(session: Session, library: Library, document: Document) -> Iterator
         elif verdict is not None:
             output["state"] = verdict.status
             if verdict.status == "drift":
-                output |= _describe_drift(session, library, verdict)
+                run = library.runs[verdict.recording.script or ""]
+                edit = new_output(session, library, verdict)
+                output |= {
+                    "rows": diff_rows(verdict, run.stdout),
+                    "offer": Offer.of(edit) if isinstance(edit, Edit) else None,
+                    "refused": edit.message if isinstance(edit, Diagnostic) else "",
+                }
         yield output
-
-
-def _describe_drift(session: Session, library: Library, verdict: Verdict) -> dict[str, Any]:
-    run = library.runs[verdict.recording.script or ""]
-    edit = new_output(session, library, verdict)
-    return {
-        "rows": diff_rows(verdict, run.stdout),
-        "offer": Offer.of(edit) if isinstance(edit, Edit) else None,
-        "refused": edit.message if isinstance(edit, Diagnostic) else "",
-    }
 
 
 def new_output(session: Session, library: Library, verdict: Verdict) -> Edit | Diagnostic | None:

@@ -27,7 +27,7 @@ from coursebuild.core.model import (
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.graph import drawings
-from coursebuild.core.pages.highlight import highlight_lines
+from coursebuild.core.pages.listings import highlight_lines
 from coursebuild.core.pages.page_inputs import (
     AddedParts,
     HighlightedFile,

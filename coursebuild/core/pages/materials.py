@@ -32,7 +32,8 @@ def make_library(
         assets, course.language, course.theme.template_texts, dict(results.formulas)
     )
     trials = trials or publish_trials(results, assets)
-    blocks = {name: trial.block for name, (_, trial) in feature_trials(course).items()}
+    course_trials = feature_trials(course) if trials.values else {}
+    blocks = {name: trial.block for name, (_, trial) in course_trials.items()}
     values = {
         (blocks[name].span.path, blocks[name].span.start): value
         for name, value in trials.values.items()

@@ -37,8 +37,7 @@ from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.folding import Part, fold
-from coursebuild.core.pages.highlight import highlight_lines
+from coursebuild.core.pages.listings import Part, fold, highlight_lines
 from coursebuild.core.pages.markup import SpecialBlock
 from coursebuild.core.pages.page_inputs import ShownRun
 from coursebuild.core.pages.strings import Strings

@@ -154,7 +154,7 @@ class Renderer(Struct, frozen=True):
     def highlight(self, language: str, code: str) -> Markup:
         """Code with its syntax highlighted."""
         # The package is built, its templates compiled, where no highlighter is installed.
-        from coursebuild.core.pages.highlight import highlight_lines
+        from coursebuild.core.pages.listings import highlight_lines
 
         return Markup("\n".join(highlight_lines(language, code)))
 

@@ -89,7 +89,15 @@ def theme_style(theme: Theme) -> str:
     css = "".join(f"{file.text.rstrip()}\n" for file in theme.css)
     light, dark = accents(theme)
     accent = f"@media screen{{:root{{--accent:light-dark({light},{dark})}}}}\n"
-    return ("" if (light, dark) == _ACCENT else accent) + _synthesis(theme) + css
+    # The browser synthesizes bold or italics if a font lacks them.
+    synthesis = "body{font-synthesis:weight style}math{font-synthesis:none}\n"
+    families = [theme_faces(Theme(fonts=(family,))) for family in theme.fonts]
+    is_whole = all(
+        any(face.weight[1] >= _BOLD for face, _ in faces)
+        and any(face.style == "italic" for face, _ in faces)
+        for faces in families
+    )
+    return ("" if (light, dark) == _ACCENT else accent) + ("" if is_whole else synthesis) + css
 
 
 def accents(theme: Theme) -> tuple[str, str]:
@@ -98,17 +106,6 @@ def accents(theme: Theme) -> tuple[str, str]:
         return _ACCENT
     light = theme.accent or _ACCENT[0]
     return light, theme.accent_dark or legible(light, GROUNDS_DARK, RECOMMENDED_CONTRAST)
-
-
-def _synthesis(theme: Theme) -> str:
-    """Let the browser synthesize bold or italics if a font lacks them."""
-    for family in theme.fonts:
-        faces = [face for face, _ in theme_faces(Theme(fonts=(family,)))]
-        if not any(face.weight[1] >= _BOLD for face in faces) or not any(
-            face.style == "italic" for face in faces
-        ):
-            return "body{font-synthesis:weight style}math{font-synthesis:none}\n"
-    return ""
 
 
 def picture_size(file: ThemeFile) -> tuple[float, float] | None:

@@ -22,8 +22,8 @@ from msgspec import Struct
 from coursebuild.core.model import Script, document_scripts
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.folding import find_imports
 from coursebuild.core.pages.library import Library, models_named
+from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.text.source import Excerpt
 
 _NEVER_REQUIRED = sys.stdlib_module_names | {"mjcourse"}

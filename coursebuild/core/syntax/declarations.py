@@ -14,7 +14,7 @@ Entry point: `parse_declarations(source)`.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from msgspec import Struct
 from msgspec.structs import asdict
@@ -147,7 +147,11 @@ def _check_scenarios(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
         yield from _check_times(node, table)
         spans = [item.mark for item in node.items("timesteps")]
         pairs = list(zip(table.timesteps, spans, strict=True))
-        for (length, name), (step, span) in itertools.product(_checked_lengths(table), pairs):
+        times = [(table.hold, "hold"), (table.duration, "duration")]
+        if table.sample is not None:  # it divides the others
+            times = [(table.sample, "sample")]
+        lengths = [(length, name) for length, name in times if length is not None]
+        for (length, name), (step, span) in itertools.product(lengths, pairs):
             if not is_multiple(length, step):
                 message = f"the timestep {step:g} s does not divide `{name}` ({length:g} s)"
                 help = "every timestep must end at the same times, or errors cannot be compared"
@@ -193,11 +197,3 @@ def _check_times(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]
         message = f"`sample` makes {duration / sample:.3g} looks at the state"
         help = f"{MOST_SAMPLES} are the most: look less often"
         yield diagnose("field-value", node.place("sample"), message, help=help)
-
-
-def _checked_lengths(table: ScenarioTable) -> Sequence[tuple[float, str]]:
-    """The times that a timestep must divide, with their names; the sample divides the others."""
-    if table.sample is not None:
-        return ((table.sample, "sample"),)
-    lengths = ((table.hold, "hold"), (table.duration, "duration"))
-    return [(length, name) for length, name in lengths if length is not None]

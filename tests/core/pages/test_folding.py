@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.pages.folding import HEAD, LONG, Part, find_imports, fold
+from coursebuild.core.pages.listings import HEAD, LONG, Part, find_imports, fold
 
 
 def function(name: str, lines: int) -> str:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coursebuild.core.pages.highlight import highlight_lines
+from coursebuild.core.pages.listings import highlight_lines
 from coursebuild.core.text.characters import visible
 
 

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import MjcfModel
 from coursebuild.core.model.results import CompileResult, ModelFacts, OutputFile
-from coursebuild.core.pages.folding import find_imports
+from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.zips import Package, Surroundings, make_archives
 from coursebuild.core.text.source import Source
 from support.rendered_course import Make

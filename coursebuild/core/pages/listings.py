@@ -1,0 +1,339 @@
+"""Code as pages show it: as HTML, and which parts of it a reader sees at first.
+
+Entry points: `highlight_lines(language, code)`; `fold(code)`; `find_imports(code)`, the modules
+that it imports.
+
+1. tree-sitter reads Python, the language of most code, eight times as fast as Pygments, which reads
+   the other languages. It also reads code that does not parse, such as a fragment or a mistake that
+   a lesson makes on purpose. Pygments distinguishes more kinds of tokens than a page should show;
+   they are mapped to few classes, and a token of none gets no element.
+2. Characters that HTML forbids (control characters, non-characters) are replaced by symbols.
+3. A fold begins and ends between top-level statements. The head (docstring, imports, constants) is
+   folded if it is long: the page around the script has said what it is for. The rest is shown up to
+   `SHOWN_LINES` lines and then folded, except for the `__main__` guard at the end, which says what
+   the script does.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import re
+import warnings
+from collections.abc import Iterable, Iterator
+from html import escape
+from itertools import chain, pairwise
+from typing import TypeAlias
+
+import tree_sitter_python
+from markupsafe import Markup
+from msgspec import Struct
+from pygments.lexer import Lexer
+from pygments.lexers import find_lexer_class_by_name
+from pygments.token import Comment, Keyword, Literal, Name, Operator, String, Token, _TokenType
+from pygments.util import ClassNotFound
+from tree_sitter import Language, Parser, Query, QueryCursor
+
+from coursebuild.core.text.characters import visible
+
+_KEYWORDS = """
+    and as assert async await break case class continue def del elif else except finally for from
+    global if import in is lambda match nonlocal not or pass raise return try type while with yield
+"""
+_QUERY = """
+    [(string_start) (string_content) (string_end) (format_specifier)] @s
+    (expression_statement . (string [(string_start) (string_content) (string_end)] @d) .)
+    (interpolation ["{" "}" (type_conversion)] @i)
+    (format_specifier ":" @i)
+    (format_expression ["{" "}"] @i) @_
+    (comment) @c
+    [(integer) (float)] @n
+    [(true) (false) (none) KEYWORDS] @k
+    (function_definition name: (identifier) @f)
+    (class_definition name: (identifier) @f)
+    (decorator ["@" (identifier) (attribute)] @a)
+    (decorator (call function: (_) @a))
+"""
+"""The nodes of each class of `highlight.py`, and (`_`) those of none. A string that is a statement
+of its own is a docstring."""
+_ORDER = "sd_icnkfa"
+"""The classes from the outside in: where two overlap, the later one wins."""
+
+
+def python_runs(code: str) -> Iterator[tuple[str, str]]:
+    """The code in runs, each with its class, perhaps an empty one."""
+    data = code.encode()
+    nodes_by_class = QueryCursor(_query()).captures(_parser().parse(data).root_node)
+    classes = bytearray(b"_") * len(data)
+    edges = {0, len(data)}
+    for css in _ORDER:
+        for node in nodes_by_class.get(css, ()):
+            start, end = node.byte_range
+            classes[start:end] = css.encode() * (end - start)
+            edges.update((start, end))
+    for start, end in pairwise(sorted(edges)):
+        yield chr(classes[start]).strip("_"), data[start:end].decode()
+
+
+@functools.cache
+def _language() -> Language:
+    return Language(tree_sitter_python.language())
+
+
+@functools.cache
+def _parser() -> Parser:
+    return Parser(_language())
+
+
+@functools.cache
+def _query() -> Query:
+    keywords = " ".join(f'"{word}"' for word in _KEYWORDS.split())
+    return Query(_language(), _QUERY.replace("KEYWORDS", keywords))
+
+
+Run: TypeAlias = tuple[str, str]
+"""A class, perhaps empty, and the text that has it."""
+
+_CLASSES: tuple[tuple[_TokenType, str], ...] = (
+    (Comment, "c"),
+    (String.Doc, "d"),
+    (String.Interpol, "i"),
+    (String, "s"),
+    (Literal.Number, "n"),
+    (Keyword, "k"),
+    (Operator.Word, "k"),
+    (Name.Function, "f"),
+    (Name.Class, "f"),
+    (Name.Decorator, "a"),
+    (Name.Attribute, "a"),
+    (Name.Tag, "t"),
+    (Token.Generic.Prompt, "p"),
+    (Token.Generic.Deleted, "x"),
+    (Token.Generic.Inserted, "y"),
+)
+"""Kinds of tokens and their classes, the special before the general."""
+_PYTHON = ("python", "py", "python3", "py3")
+_MAX_FOR_TREE_SITTER = 20_000
+"""The most characters of Python that tree-sitter reads. For absurd texts, such as backslashes only,
+its time grows with the square of the length, unlike that of Pygments: a second at this length."""
+_ALIASES = {"mjcf": "xml", "urdf": "xml"}
+_WITHOUT_OUTER_SPACE = re.compile(r"\S(?:.*\S)?")
+
+
+def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
+    """The lines of code as HTML; no element crosses the end of a line.
+
+    If no lexer knows the language, they are escaped text.
+    """
+    text = visible(code)
+    # Lexers drop a byte order mark at the start.
+    mark = "\ufeff" if text.startswith("\ufeff") else ""
+    text, language = text.removeprefix(mark), language.lower()
+    runs: Iterable[Run] = [("", text)]
+    if language in _PYTHON and len(text) <= _MAX_FOR_TREE_SITTER:
+        runs = python_runs(text)
+    elif (lexer := _lexer(_ALIASES.get(language, language))) is not None:
+        runs = _lex(lexer, text)
+    parts: list[str] = []
+    for css, run in _merge(chain([("", mark)], runs)):
+        html = escape(run, quote=False)
+        if css:  # an element for each line, without the white space around it
+            element = f'<span class="{css}">'
+            html = _WITHOUT_OUTER_SPACE.sub(rf"{element}\g<0></span>", html)
+        parts.append(html)
+    return tuple(map(Markup, "".join(parts).split("\n")))
+
+
+@functools.cache
+def _lexer(language: str) -> Lexer | None:
+    try:
+        return find_lexer_class_by_name(language)(stripnl=False, ensurenl=False)
+    except ClassNotFound:
+        return None
+
+
+def _lex(lexer: Lexer, code: str) -> list[Run]:
+    """The runs of a text. If the lexer leaves anything out, nothing is marked."""
+    # Lexers of sessions need a line end.
+    for end in ("", "\n"):
+        runs = [(_class_of(token), text) for token, text in lexer.get_tokens(code + end)]
+        if "".join(text for _, text in runs) == code + end:
+            break
+    else:
+        return [("", code)]
+    if end:
+        css, text = runs.pop()
+        runs.append((css, text.removesuffix(end)))
+    return runs
+
+
+@functools.cache
+def _class_of(token: _TokenType) -> str:
+    """The class of a kind of token; empty if it has none."""
+    return next((css for kind, css in _CLASSES if token in kind), "")
+
+
+def _merge(runs: Iterator[Run]) -> Iterator[Run]:
+    """Merge neighbours of the same class, with the space between them on a line."""
+    css, run = "", ""
+    for kind, text in runs:
+        if kind == css or not text or (text.isspace() and "\n" not in text):
+            run += text
+        else:
+            yield css, run
+            css, run = kind, text
+    yield css, run
+
+
+LONG = 48
+"""Lines; a script up to this length is not folded."""
+HEAD = 8
+"""Lines; a head shorter than this is not worth folding."""
+SHOWN_LINES = 44
+"""About how many lines of the rest are shown."""
+TAIL = 12
+"""Lines; a `__main__` guard up to this length is not folded, and no fold is shorter than this."""
+
+_DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+
+
+class Part(Struct, frozen=True):
+    """Whole lines of a script, from `first` to `last` (from 1, both included)."""
+
+    first: int
+    last: int
+    folded: bool
+    docstring: bool = False
+    """Whether it holds the script's docstring."""
+    imports: bool = False
+    """Whether it holds imports."""
+    names: tuple[str, ...] = ()
+    """Names that it defines."""
+
+
+def fold(code: str) -> tuple[Part, ...]:
+    """The parts of a script; a short one, or one that does not parse, is a single part."""
+    return _analyse(code)[0]
+
+
+def find_imports(code: str) -> frozenset[str]:
+    """The top-level modules that a Python text imports; none if it does not parse."""
+    return _analyse(code.rstrip("\n"))[1]  # so that drawing it finds it in the cache
+
+
+@functools.lru_cache(maxsize=1024)
+def _analyse(code: str) -> tuple[tuple[Part, ...], frozenset[str]]:
+    """The parts and the modules; both are needed, as a lesson is read and as it is drawn."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            body = ast.parse(code).body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        body = []
+    lines = code.removesuffix("\n").split("\n")
+    parts = _fold_long(body, lines) if len(lines) > LONG else (Part(1, len(lines), folded=False),)
+    modules: set[str] = set()
+    stack: list[ast.AST] = [*body]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, ast.Import):
+            modules.update(alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            if node.module and not node.level:
+                modules.add(node.module.partition(".")[0])
+        else:
+            for name in ("body", "orelse", "finalbody", "handlers", "cases"):
+                stack += getattr(node, name, None) or ()
+    return parts, frozenset(modules)
+
+
+def _fold_long(body: list[ast.stmt], lines: list[str]) -> tuple[Part, ...]:
+    """The parts of a long script."""
+    unfolded = (Part(1, len(lines), folded=False),)
+    starts = [_start(statement) for statement in body]
+    if not body or len(set(starts)) != len(starts):
+        return unfolded
+    cuts = [*(_with_comments(lines, start) for start in starts), len(lines) + 1]
+    head = _head_length(body)
+    if head == len(body) or cuts[head] - 1 < HEAD:
+        return _fold_rest(body, [1, *cuts[1:]], lines)
+    return (
+        _folded_part(1, cuts[head] - 1, body[:head]),
+        *_fold_rest(body[head:], cuts[head:], lines),
+    )
+
+
+def _fold_rest(body: list[ast.stmt], cuts: list[int], lines: list[str]) -> tuple[Part, ...]:
+    """The parts after the head: a visible one, perhaps a folded one, perhaps the guard.
+
+    Statement `i` has the lines from `cuts[i]` to before `cuts[i + 1]`. Blank lines at the border of
+    a fold belong to the fold.
+    """
+    first, total = cuts[0], len(lines)
+    shown_count = 1
+    while shown_count < len(body) and cuts[shown_count + 1] - first <= SHOWN_LINES:
+        shown_count += 1
+    last = body[-1]
+    is_guard = isinstance(last, ast.If) and "__name__" in ast.dump(last.test)
+    has_guard = shown_count < len(body) and is_guard and total - cuts[-2] < TAIL
+    stop = len(body) - 1 if has_guard else len(body)
+    end = cuts[shown_count] - 1
+    while end > first and not lines[end - 1].strip():
+        end -= 1
+    if cuts[stop] - 1 - end < TAIL:
+        return (Part(first, total, folded=False),)
+    guard = (Part(cuts[stop], total, folded=False),) if has_guard else ()
+    return (
+        Part(first, end, folded=False),
+        _folded_part(end + 1, cuts[stop] - 1, body[shown_count:stop]),
+        *guard,
+    )
+
+
+def _folded_part(first: int, last: int, body: list[ast.stmt]) -> Part:
+    docstring = _is_docstring(body[0]) if first == 1 else False
+    imports = any(isinstance(statement, ast.Import | ast.ImportFrom) for statement in body)
+    names: list[str] = []
+    for statement in body:
+        if isinstance(statement, _DEFINITIONS):
+            names.append(statement.name)
+        elif isinstance(statement, ast.Assign):
+            names += [target.id for target in statement.targets if isinstance(target, ast.Name)]
+        elif isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+            names.append(statement.target.id)
+    return Part(first, last, True, docstring, imports, tuple(names))
+
+
+def _start(statement: ast.stmt) -> int:
+    """The first line of a statement, its decorators included."""
+    if isinstance(statement, _DEFINITIONS):
+        return min([statement.lineno, *(d.lineno for d in statement.decorator_list)])
+    return statement.lineno
+
+
+def _with_comments(lines: list[str], start: int) -> int:
+    """The line where the comments above a statement begin."""
+    while start > 1 and lines[start - 2].startswith("#"):
+        start -= 1
+    return start
+
+
+def _head_length(body: list[ast.stmt]) -> int:
+    """How many statements the head has: docstring, imports, constants.
+
+    Assignments are constants if only assignments come before the first definition.
+    """
+    count = int(_is_docstring(body[0]))
+    while count < len(body) and isinstance(body[count], ast.Import | ast.ImportFrom):
+        count += 1
+    first = count
+    while first < len(body) and isinstance(body[first], ast.Assign | ast.AnnAssign):
+        first += 1
+    defines = first < len(body) and isinstance(body[first], _DEFINITIONS)
+    return first if defines else count
+
+
+def _is_docstring(statement: ast.stmt) -> bool:
+    if not isinstance(statement, ast.Expr) or not isinstance(statement.value, ast.Constant):
+        return False
+    return isinstance(statement.value.value, str)
