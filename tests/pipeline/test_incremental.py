@@ -129,11 +129,7 @@ def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
             assert b"Renamed" in page and b"Tested" not in page
 
 
-JUNK = (
-    b"null",
-    msgspec.msgpack.encode((["os:system"], [16, "exit 70"])),
-    pickle.dumps(Trap()),
-)
+JUNK = (b"null", msgspec.msgpack.encode((["os:system"], [16, "exit 70"])), pickle.dumps(Trap()))
 
 
 @pytest.mark.site

@@ -91,8 +91,7 @@ def test_a_script_gets_the_memory_that_the_course_allows(make: Make) -> None:
 
 
 @pytest.mark.parametrize(
-    "piece",
-    ["<b>", "</b>", "<b></i>", "<a href=x", "- <p>\n", "[x](y) `", "<script>\n", "<title>"],
+    "piece", ["<b>", "</b>", "<b></i>", "<a href=x", "- <p>\n", "[x](y) `", "<script>\n", "<title>"]
 )
 def test_reading_takes_as_long_as_the_text_whatever_is_broken_in_it(piece: str) -> None:
     def read(count: int) -> None:

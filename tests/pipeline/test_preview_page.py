@@ -2,22 +2,67 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.lab_page import wait_for_condition
-from support.preview_page import LESSON, PreviewPage, lesson_page, see, texts
-from support.preview_process import serve_preview
-from support.scratch_course import GOOD, ROOT, WAIT_FOR_GO, Make, block
+from support.preview_process import Preview, serve_preview
+from support.scratch_course import GOOD, ROOT, WAIT_FOR_GO, Folder, Make, block
 from support.static_host import Host
 from support.waiting import wait_for_file
 
-pytestmark = pytest.mark.browser
+
+class PreviewPage:
+    """A page of a preview, and what its console said."""
+
+    def __init__(self, browser: Browser, preview: Preview, path: str, **options: object) -> None:
+        self.context = browser.new_context(**options)
+        self.page = self.context.new_page()
+        self.console: list[str] = []
+        self.page.on("console", lambda message: self.console.append(message.text))
+        self.page.on("pageerror", lambda error: self.console.append(str(error)))
+        self.page.goto(f"http://127.0.0.1:{preview.port}/{path}")
+        # A page that is loaded again loses this.
+        self.page.evaluate("window.same = true")
+
+    def __enter__(self) -> PreviewPage:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.context.close()
+
+    def check_unbroken(self) -> None:
+        """It is still the same document, and nothing went wrong in it."""
+        assert self.page.evaluate("window.same")
+        assert self.console == []
+
+
+def see(locator: Locator) -> None:
+    expect(locator).to_be_visible()
+
+
+def texts(page: Page, text: str) -> None:
+    expect(page.locator(".prose")).to_contain_text(text)
+
+
+LESSON = "lessons/1.1-one.html"
+
+
+@contextlib.contextmanager
+def lesson_page(folder: Folder, browser: Browser) -> Iterator[Page]:
+    """The page of a lesson, which stays the same document, with nothing that goes wrong in it."""
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("checked: ")
+        with PreviewPage(browser, preview, LESSON) as preview_page:
+            yield preview_page.page
+            preview_page.check_unbroken()
+
 
 FILLER = "".join(f"Paragraph {n}.\n\n" for n in range(80))
 QUIZ = {
@@ -38,6 +83,7 @@ def browser(browsers: Mapping[str, Browser]) -> Browser:
     return browsers["plain"]
 
 
+@pytest.mark.browser
 def test_what_was_not_touched_stays_as_and_where_it_is(make: Make, browser: Browser) -> None:
     folder = make(RICH)
     with lesson_page(folder, browser) as page:
@@ -72,6 +118,7 @@ def test_what_was_not_touched_stays_as_and_where_it_is(make: Make, browser: Brow
         wait_for_condition(page, lambda: abs(place.evaluate(top) - before) < 1)
 
 
+@pytest.mark.browser
 def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
     folder = make(RICH)
     with serve_preview(folder) as preview:
@@ -117,6 +164,7 @@ def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
             wait_for_condition(page, lambda: page.evaluate(structure) == living)
 
 
+@pytest.mark.browser
 def test_lab_that_was_not_touched_goes_on(make: Make, browser: Browser) -> None:
     lab = {"title": "A lab", "model": "ball", "readouts": [{"label": "t", "expr": "data.time"}]}
     folder = make(GOOD + f"```lab\n{json.dumps(lab)}\n```\n\nAfter it.\n")
@@ -138,6 +186,7 @@ def test_lab_that_was_not_touched_goes_on(make: Make, browser: Browser) -> None:
         expect(live).to_have_count(1)
 
 
+@pytest.mark.browser
 def test_page_that_goes_and_one_that_comes(make: Make, browser: Browser) -> None:
     folder = make(GOOD, "## Two\n\nText.\n")
     map_ = folder.text("content/course.toml")
@@ -159,6 +208,7 @@ def test_page_that_goes_and_one_that_comes(make: Make, browser: Browser) -> None
             expect(page.locator(".preview-button")).to_be_hidden()
 
 
+@pytest.mark.browser
 def test_preview_that_stops_and_starts_again(make: Make, browser: Browser) -> None:
     folder = make(GOOD)
     with serve_preview(folder) as preview:
@@ -207,6 +257,7 @@ STEAL = """async (address) => {
 }"""
 
 
+@pytest.mark.browser
 def test_page_of_another_origin_can_only_link_to_the_preview(
     make: Make, browser: Browser, tmp_path: Path
 ) -> None:
@@ -233,6 +284,7 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
                 expect(page.locator("h1").first).to_have_text("Scratch")
 
 
+@pytest.mark.browser
 def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> None:
     """With everything that it can show at once, light and dark."""
     axe = (ROOT / "site/node_modules/axe-core/axe.min.js").read_text("utf-8")
@@ -251,6 +303,7 @@ def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> Non
                 assert [(v["id"], v["nodes"][0]["html"]) for v in audit["violations"]] == []
 
 
+@pytest.mark.browser
 def test_mistakes_are_shown_and_clear_by_themselves(
     make: Make, browser: Browser, tmp_path: Path
 ) -> None:
@@ -308,6 +361,7 @@ def test_mistakes_are_shown_and_clear_by_themselves(
             page_open.check_unbroken()
 
 
+@pytest.mark.browser
 def test_drift_is_shown_in_its_place_and_accepted(make: Make, browser: Browser) -> None:
     folder = make(GOOD + "About `3.14`{out}.\n")
     with lesson_page(folder, browser) as page:
@@ -338,6 +392,7 @@ def test_drift_is_shown_in_its_place_and_accepted(make: Make, browser: Browser) 
         assert folder.text(folder.lesson()) == text
 
 
+@pytest.mark.browser
 def test_figures_are_shown_side_by_side_and_accepted(make: Make, browser: Browser) -> None:
     """An SVG with its data, and a PNG."""
     code = """from PIL import Image
@@ -377,6 +432,7 @@ with open("b.png", "wb") as file:
         assert folder.text("content/lessons/a.csv") == "end\n40\n"
 
 
+@pytest.mark.browser
 def test_script_that_runs_and_fails_is_marked(make: Make, browser: Browser) -> None:
     folder = make(GOOD)
     with lesson_page(folder, browser) as page:

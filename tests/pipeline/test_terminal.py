@@ -392,10 +392,7 @@ def test_shells_take_what_is_printed(course: Folder, tmp_path: Path) -> None:
 
 
 def test_place_opens_in_each_kind_of_editor(
-    make: Make,
-    live: Callable[[Folder], Live],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    make: Make, live: Callable[[Folder], Live], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = make("## One\n\nSee [x](lesson:9.9).\n")
     session = live(folder).session

@@ -5,14 +5,7 @@ from __future__ import annotations
 from coursebuild.core.model.results import TrialLine
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.report import (
-    Report,
-    ScriptLine,
-    Style,
-    Summary,
-    diagnostic_text,
-    render_report,
-)
+from coursebuild.report import Report, ScriptLine, Style, Summary, diagnostic_text, render_report
 from coursebuild.report.text import clip, visible
 
 

@@ -8,20 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.core.model import (
-    Document,
-    Script,
-    document_blocks,
-)
+from coursebuild.core.model import Document, Script, document_blocks
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.scripts.bindings import PrintedOutputs, check_bindings, dependent_bindings
 from coursebuild.core.scripts.compare import verify
-from coursebuild.core.scripts.numbers import (
-    Number,
-    round_like,
-    scan,
-    scan_prose,
-)
+from coursebuild.core.scripts.numbers import Number, round_like, scan, scan_prose
 from coursebuild.core.text.diagnostics import Diagnostic
 from support.growth import processor_time_growth
 from support.sample_lessons import course, describe, document, make_run
@@ -184,10 +175,7 @@ LESSON = script() + output()
 
 
 def check(
-    text: str,
-    *runs: ScriptRun,
-    documents: tuple[Document, ...] = (),
-    scripts: tuple[str, ...] = (),
+    text: str, *runs: ScriptRun, documents: tuple[Document, ...] = (), scripts: tuple[str, ...] = ()
 ) -> tuple[Diagnostic, ...]:
     lesson = document(text)
     paths = [

@@ -243,8 +243,7 @@ WORDS = st.sampled_from(
 )
 OUTPUTS = st.lists(st.lists(WORDS, max_size=4).map(" ".join), max_size=6).map("\n".join)
 FILTERS = st.lists(
-    st.sampled_from([Filter(r"\d", r"<\g<0>>"), Filter(r"^a.*\n", ""), Filter("x", "")]),
-    max_size=2,
+    st.sampled_from([Filter(r"\d", r"<\g<0>>"), Filter(r"^a.*\n", ""), Filter("x", "")]), max_size=2
 ).map(tuple)
 MODES = st.sampled_from([EXACT, DIGITS, tolerance("0.1", "0.1"), ELLIPSIS, DIGITS_ELLIPSIS])
 

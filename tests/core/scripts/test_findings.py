@@ -58,10 +58,7 @@ def test_paths_that_clash() -> None:
         extraction = extract(course_of(block(first) + block(second)))
         assert [e.path for e in extraction.value] == [first]
         (clash,) = extraction.diagnostics
-        assert (clash.message, clash.span.text) == (
-            message.format(one=first, two=second),
-            second,
-        )
+        assert (clash.message, clash.span.text) == (message.format(one=first, two=second), second)
         notes = [(n.message, n.span and n.span.text) for n in clash.notes]
         assert notes == [(f"`{first}` is written here", first)]
     neighbours = ["examples/a.py", "examples/a_py/b.py", "examples/b/a.py", "examples/b.py"]
@@ -151,11 +148,7 @@ Output:
     lessons = course(document(text))
     runs = (make_run("one\n"), make_run("1.52\n", path="examples/b.py"))
     assert [v.status for v in verify(lessons, runs)] == ["verified", "volatile", "verified"]
-    assert [v.status for v in verify(lessons, runs[:1])] == [
-        "verified",
-        "volatile",
-        "unchecked",
-    ]
+    assert [v.status for v in verify(lessons, runs[:1])] == ["verified", "volatile", "unchecked"]
     failed_runs = (
         make_run("one\n", outcome=Outcome.FAILED, status=1),
         make_run("", path="examples/b.py"),

@@ -121,9 +121,7 @@ def test_item_of_a_choice_holds_all_that_its_question_says(
 
 
 @pytest.mark.site
-def test_item_of_a_number_has_its_tolerance_and_unit(
-    zoo_items: dict[str, etree._Element],
-) -> None:
+def test_item_of_a_number_has_its_tolerance_and_unit(zoo_items: dict[str, etree._Element]) -> None:
     for name, value, margin in (
         ("numeric", 0.08, 1e-4), ("zero", 0.0, 0.5), ("large", 6.02e23, 0.02 * 6.02e23)
     ):  # fmt: skip
