@@ -171,8 +171,8 @@ def waits_for_presence(calls: list[ast.Call]) -> bool:
     """Whether a statement waits for something, and not only until it is gone."""
     awaited = [c for c in calls if called_name(c).startswith(("to_", "wait_for", "reach"))]
     awaited += [c for c in calls if called_name(c) in ("until", "becomes", "shows")]
-    gone = ("to_be_hidden()", "to_have_count(0)", "state='hidden')", "state='detached')")
-    return any(not ast.unparse(call).endswith(gone) for call in awaited)
+    absent = ("to_be_hidden()", "to_have_count(0)", "state='hidden')", "state='detached')")
+    return any(not ast.unparse(call).endswith(absent) for call in awaited)
 
 
 def is_passing(text: object) -> bool:
