@@ -29,11 +29,13 @@ signal.signal(signal.SIGQUIT, signal.SIG_DFL)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # The key of a session's stores, which no test may find in the home of who runs it. Worker processes
-# have it from the first one.
+# have it from the first one. Whoever runs it builds this repository's own course (`built_sites`).
 if "PYTEST_XDIST_WORKER" not in os.environ:
+    for _name in ("XDG_STATE_HOME", "COURSEBUILD_STORE_KEY"):
+        if _name in os.environ:
+            os.environ[f"OUTER_{_name}"] = os.environ.pop(_name)
     _state = tempfile.TemporaryDirectory(prefix="coursebuild-tests-")
     os.environ["XDG_STATE_HOME"] = _state.name
-    os.environ.pop("COURSEBUILD_STORE_KEY", None)
 
 # Checkers in Java run for seconds only, in which compiling more costs more than it saves.
 os.environ["JDK_JAVA_OPTIONS"] = "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC -Xss4m"
