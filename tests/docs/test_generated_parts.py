@@ -40,7 +40,6 @@ def regenerate(text: str) -> str:
 
 
 def headings(text: str, level: int) -> list[str]:
-    """The texts of a page's headings."""
     return re.findall(rf"^#{{{level}}} (.+)$", _FENCE.sub("", text), re.MULTILINE)
 
 

@@ -62,7 +62,6 @@ MAP = "content/course.toml"
 
 @pytest.fixture
 def course(tmp_path: Path, stores: Path) -> Folder:
-    """A course that uses a feature of its own."""
     folder = Folder(tmp_path / "a course")
     folder.fill([LESSON], stores)
     folder.write("features/shout.py", SHOUT)
@@ -189,7 +188,6 @@ def defined_name(node: ast.stmt) -> str:
 
 @pytest.fixture
 def inventory(course: Folder) -> Folder:
-    """A course with the page of the docs."""
     course.write("features/inventory.py", EXAMPLES[1])
     course.replace(MAP, '"features/shout.py"', '"features/shout.py", "features/inventory.py"')
     course.write("models/box.xml", "<mujoco><worldbody/></mujoco>\n")

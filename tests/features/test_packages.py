@@ -62,7 +62,6 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def course(tmp_path_factory: pytest.TempPathFactory, stores: Path, packages: Path) -> Folder:
-    """A course that uses them, built."""
     folder = Folder(tmp_path_factory.mktemp("course") / "a course")
     folder.fill([LESSON], stores)
     result = run(folder, packages, "build")

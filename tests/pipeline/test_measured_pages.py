@@ -65,7 +65,6 @@ class Course:
         return replace(box(), **{"model": name, "digest": digest, "machine": machine, **fields})
 
     def record(self) -> None:
-        """Put reports into the course."""
         self.write_bench(self.bench())
         self.write_diet("nobody reads it")
         self.write_cases("it swings")
@@ -86,7 +85,6 @@ class Course:
         self.folder.write(STABILITY.path(), STABILITY.encode(cases))
 
     def build(self) -> str:
-        """Build the site, which must succeed; return its warnings."""
         result = self.folder.main("build", "-q")
         assert result.status == 0, result.out
         return result.out

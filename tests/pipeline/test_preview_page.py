@@ -19,8 +19,6 @@ from support.waiting import wait_for_file
 
 
 class PreviewPage:
-    """A page of a preview, and what its console said."""
-
     def __init__(self, browser: Browser, preview: Preview, path: str, **options: object) -> None:
         self.context = browser.new_context(**options)
         self.page = self.context.new_page()

@@ -164,8 +164,6 @@ def make(hint: Any) -> Any:
 
 
 class Sample(Struct, frozen=True):
-    """Any struct."""
-
     text: str
 
 

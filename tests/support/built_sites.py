@@ -38,7 +38,6 @@ class Site:
         return self.root / "public"
 
     def pages(self) -> list[str]:
-        """Return the site paths of all pages."""
         paths = self.public.rglob("*.html")
         return sorted(path.relative_to(self.public).as_posix() for path in paths)
 

@@ -164,7 +164,6 @@ NAME = "coursebuild.tmp.abcdefgh"
 
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
-    """The folder for temporary files."""
     place = tmp_path / "tmp"
     place.mkdir()
     return place

@@ -33,7 +33,6 @@ from coursebuild.core.files.write import (
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A file of an author."""
     path = tmp_path / "a.md"
     path.write_bytes(b"old")
     return path

@@ -145,7 +145,6 @@ class ChangedEngine:
 
 
 def command_of(case: Case) -> str:
-    """The command that a case is for."""
     match = re.search(r"\[((?:check|update|build|export)[\w -]*)\]", case.title)
     return match[1] if match else "check"
 

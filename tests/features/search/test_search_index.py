@@ -34,8 +34,6 @@ def library(make: Make) -> Library:
 
 
 class Cache(dict[str, bytes]):
-    """A cache in memory."""
-
     def get_or_create(self, key: str, make: Callable[[], bytes]) -> bytes:
         if key not in self:
             self[key] = make()
