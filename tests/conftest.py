@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
     from support.built_sites import BuiltCourses
+    from support.scratch_course import Folder, Make
 
 # No deadlines: a slow machine is no mistake. A change is judged by the same examples each time;
 # `make test-slow` tries new ones.
@@ -29,11 +30,13 @@ signal.signal(signal.SIGQUIT, signal.SIG_DFL)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # The key of a session's stores, which no test may find in the home of who runs it. Worker processes
-# have it from the first one.
+# have it from the first one. Whoever runs it builds this repository's own course (`built_sites`).
 if "PYTEST_XDIST_WORKER" not in os.environ:
+    for _name in ("XDG_STATE_HOME", "COURSEBUILD_STORE_KEY"):
+        if _name in os.environ:
+            os.environ[f"OUTER_{_name}"] = os.environ.pop(_name)
     _state = tempfile.TemporaryDirectory(prefix="coursebuild-tests-")
     os.environ["XDG_STATE_HOME"] = _state.name
-    os.environ.pop("COURSEBUILD_STORE_KEY", None)
 
 # Checkers in Java run for seconds only, in which compiling more costs more than it saves.
 os.environ["JDK_JAVA_OPTIONS"] = "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC -Xss4m"
@@ -82,6 +85,19 @@ def built_courses(shared: Path, stores: Path) -> BuiltCourses:
     from support.built_sites import BuiltCourses
 
     return BuiltCourses(shared / "built", stores)
+
+
+@pytest.fixture
+def make(tmp_path: Path, stores: Path) -> Make:
+    """Makes a course of these lessons, in a folder whose name has unusual characters."""
+    from support.scratch_course import Folder
+
+    def make(*lessons: str | bytes, name: str = "a cöurse") -> Folder:
+        folder = Folder(tmp_path / name)
+        folder.fill(lessons, stores)
+        return folder
+
+    return make
 
 
 @pytest.fixture(scope="session")

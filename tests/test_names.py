@@ -32,8 +32,9 @@ RIDDLES = frozenset(f"{PARTICIPLES} {FUNCTION_WORDS}".split())
 
 def bound_names(tree: ast.AST) -> Iterator[tuple[str, int]]:
     """The names that a module gives to functions, parameters and variables, with their lines."""
-    fields = [s for node in ast.walk(tree) if isinstance(node, ast.ClassDef) for s in node.body]
-    for node in ast.walk(tree):
+    nodes = list(ast.walk(tree))
+    fields = {s for node in nodes if isinstance(node, ast.ClassDef) for s in node.body}
+    for node in nodes:
         match node:
             case ast.AnnAssign(target=ast.Name(id=name)) if node not in fields:
                 yield name, node.lineno

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import ast
 import re
+import tomllib
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
+from textwrap import indent
 
 import pytest
 
@@ -30,8 +32,23 @@ WAITS = frozenset(
     "becomes expect until wait_for wait_for_condition wait_for_event wait_for_load_state "
     "wait_for_url".split()
 )
-PASSING = frozenset({"loading", "Copied", "The link is copied."})
+WORDS = tomllib.loads((HERE.parent / "templates/strings/en.toml").read_text(encoding="utf-8"))
+PASSING = frozenset(
+    {
+        *("loading", WORDS["search"]["failed"]),
+        *(WORDS["search"]["live"][key] for key in ("loading", "command_copied")),
+        *(WORDS["code"][key] for key in ("copied", "failed")),
+        *(WORDS["lab"]["live"][key] for key in ("log_copied", "link_copied", "link_shown")),
+    }
+)
 """States and texts that a page leaves by itself."""
+SIGHT = re.compile(r"data-state|dataset\.state|textContent|innerText|text=|:text|has-text")
+"""Marks of a script or a selector that looks at a state or a text."""
+EXACT = frozenset(
+    "to_have_accessible_name to_have_class to_have_count to_have_text to_have_title to_have_url "
+    "to_have_value".split()
+)
+"""Expectations of which only one can hold at a time."""
 Rule = Callable[[], Iterator[tuple[str, int]]]
 
 
@@ -134,32 +151,48 @@ def passes_unseen(function: ast.FunctionDef, acts: frozenset[str]) -> Iterator[i
     That is what `PASSING` names, and a state after which another one of the same element is waited
     for with nothing done in between.
     """
-    lines: dict[str, int] = {}
+    states: dict[str, tuple[int, str]] = {}
     for node in statements(function.body):
         inner = [call for call in ast.walk(node) if isinstance(call, ast.Call)]
         names = {called_name(call) for call in inner}
-        if any(name.startswith(("to_", "wait_for", "reach")) for name in names):
-            texts = {part.value for part in ast.walk(node) if isinstance(part, ast.Constant)}
-            if texts & PASSING:
-                yield node.lineno
-        for call in inner:
-            subject = awaited_state(call)
-            if subject in lines:
-                yield lines[subject]
-            if subject:
-                lines[subject] = node.lineno
-        if names & acts:
-            lines.clear()
+        texts = [part.value for part in ast.walk(node) if isinstance(part, ast.Constant)]
+        if waits_for_presence(inner) and any(map(is_passing, texts)):
+            yield node.lineno
+        for subject, state in filter(None, map(awaited_state, inner)):
+            line, before = states.get(subject, (0, state))
+            if before != state:
+                yield line
+            states[subject] = node.lineno, state
+        if names & acts or "write" in names:  # of a file, by the author
+            states.clear()
 
 
-def awaited_state(call: ast.Call) -> str:
-    """The element whose state is waited for, as it is written; empty for another call."""
+def waits_for_presence(calls: list[ast.Call]) -> bool:
+    """Whether a statement waits for something, and not only until it is gone."""
+    awaited = [c for c in calls if called_name(c).startswith(("to_", "wait_for", "reach"))]
+    awaited += [c for c in calls if called_name(c) in ("until", "becomes", "shows")]
+    absent = ("to_be_hidden()", "to_have_count(0)", "state='hidden')", "state='detached')")
+    return any(not ast.unparse(call).endswith(absent) for call in awaited)
+
+
+def is_passing(text: object) -> bool:
+    """Whether a text, a script, a selector or a pattern names what a page leaves by itself."""
+    if not isinstance(text, str):
+        return False
+    is_named = any(re.search(rf"(?<!\w){re.escape(name)}(?!\w)", text) for name in PASSING)
+    return text.strip("^$") in PASSING or (is_named and SIGHT.search(text) is not None)
+
+
+def awaited_state(call: ast.Call) -> tuple[str, str] | None:
+    """The element whose state is waited for, as it is written, and the state."""
     match call:
-        case ast.Call(ast.Name("reach"), [*subject, _]):
-            return ", ".join(map(ast.unparse, subject))
-        case ast.Call(ast.Attribute(subject, "to_have_attribute"), [ast.Constant("data-state"), _]):
-            return ast.unparse(subject)
-    return ""
+        case ast.Call(ast.Name("reach" | "shows" | "becomes"), [*subject, ast.Constant() as state]):
+            return ", ".join(map(ast.unparse, subject)), ast.unparse(state)
+        case ast.Call(ast.Attribute(subject, "to_have_attribute"), [name, ast.Constant() as state]):
+            return f"{ast.unparse(subject)}, {ast.unparse(name)}", ast.unparse(state)
+        case ast.Call(ast.Attribute(subject, name), [ast.Constant() as state]) if name in EXACT:
+            return f"{ast.unparse(subject)}, {name}", ast.unparse(state)
+    return None
 
 
 def statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
@@ -239,20 +272,29 @@ def test_assertion_that_looks_at_page_once_is_found() -> None:
     assert list(looks_once(function, WAITS, ACTIONS)) == [6]
 
 
-def test_wait_for_a_state_that_may_pass_unseen_is_found() -> None:
-    (function,) = functions(
-        ast.parse(
-            "def test(page, lab):\n"
-            "    expect(lab).to_have_attribute('data-state', 'loading')\n"
-            "    lab.get_by_role('button', name='Copied').wait_for()\n"
-            "    expect(lab.locator('.copy')).not_to_have_text('Copied')\n"
-            "    has_been(lab, 'Copied')\n"
-            "    page.click('a')\n"
-            "    reach(page, 1, 'playing')\n"
-            "    reach(page, 2, 'playing')\n"
-            "    reach(page, 1, 'paused')\n"
-            "    page.click('a')\n"
-            "    reach(page, 1, 'ended')\n"
-        )
-    )
-    assert list(passes_unseen(function, ACTIONS)) == [2, 3, 7]
+@pytest.mark.parametrize(
+    ("lines", "passing"),
+    [
+        ("expect(lab).to_have_attribute('data-state', 'loading')", [1]),
+        ("lab.get_by_role('button', name='Copied').wait_for()", [1]),
+        ("expect(button).to_have_text(re.compile('^Copied$'))", [1]),
+        ("page.wait_for_selector('.lab[data-state=loading]')", [1]),
+        ("until(page, \"document.querySelector('.lab').dataset.state === 'loading'\")", [1]),
+        ("becomes(page, lambda: button.inner_text(), 'Copied')", [1]),
+        ("wait_for_condition(page, lambda: button.inner_text() == 'Copied')", [1]),
+        ("expect(lab.locator('.copy')).not_to_have_text('Copied')", []),
+        ("expect(lab.locator('[data-state=loading]')).to_have_count(0)", []),
+        ("has_been(lab, 'Copied')", []),
+        ("reach(page, 1, 'playing')\nreach(page, 2, 'playing')\nreach(page, 1, 'paused')", [1]),
+        (
+            "expect(a).to_have_text('1')\nexpect(b).to_be_visible()\nexpect(a).to_have_text('2')",
+            [1],
+        ),
+        ("becomes(page, lambda: a.count(), 1)\nbecomes(page, lambda: a.count(), 2)", [1]),
+        ("expect(a).to_have_text('1')\npage.click('b')\nexpect(a).to_have_text('2')", []),
+        ("expect(a).to_contain_text('1')\nexpect(a).to_contain_text('2')", []),
+    ],
+)
+def test_wait_for_a_state_that_may_pass_unseen_is_found(lines: str, passing: list[int]) -> None:
+    (function,) = functions(ast.parse("def test(page, lab):\n" + indent(lines, "    ")))
+    assert [line - 1 for line in passes_unseen(function, ACTIONS)] == passing

@@ -1,4 +1,4 @@
-"""The generator of courses for benchmarks: what it writes is whole, true and always the same."""
+"""Courses that are generated for benchmarks, and the mistakes that benchmarks make in them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.courses import FLAVORS, names_of, write_course
+from benchmarks.measure.building import make_site, remove
+from benchmarks.measure.tools import Places, all_tools
+from benchmarks.mistakes import describe, run, table
+from benchmarks.slips.changes import KINDS
+from support.scratch_course import Folder
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
-
-from benchmarks.courses import FLAVORS, names_of, write_course  # noqa: E402
-from benchmarks.measure.building import make_site, remove  # noqa: E402
-from benchmarks.measure.tools import Places, all_tools  # noqa: E402
-from support.scratch_course import Folder  # noqa: E402
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -114,3 +116,23 @@ def test_a_cold_build_finds_nothing_but_the_results_of_scripts(tmp_path: Path) -
     assert len(files(site.earlier)) == 4
     remove(site.earlier)
     assert not site.earlier.exists()
+
+
+sys.path.insert(0, str(ROOT))
+
+COURSE = ROOT / "tests/courses/full/course"
+EXPECTED = Path(__file__).parent / "mistakes.md"
+
+
+@pytest.mark.site
+def test_mistakes_of_each_kind_end_as_they_did(rewriting: bool) -> None:
+    outcomes = list(run(COURSE, [37], 2 * len(KINDS), KINDS, 1))
+    lines = table(outcomes)
+    for outcome in outcomes:
+        if outcome.end in ("silent", "elsewhere", "reason"):
+            lines += ["", *describe(outcome, (COURSE / outcome.change.path).read_text("utf-8"))]
+    text = "\n".join(["# How a sample of mistakes ends", "", *lines, ""])
+    if rewriting:
+        EXPECTED.write_text(text, encoding="utf-8")
+    assert text == EXPECTED.read_text(encoding="utf-8")
+    assert {outcome.change.kind for outcome in outcomes} >= {*KINDS} - {"declarations of models"}

@@ -30,7 +30,6 @@ def course(sites: Sites) -> Site:
 
 @pytest.fixture(scope="session")
 def base(course: Site) -> str:
-    """The address of its site."""
     return course.url()
 
 

@@ -24,7 +24,6 @@ def base(sites: Mapping[str, Site]) -> str:
 
 @pytest.fixture
 def page(browsers: Mapping[str, Browser]) -> Iterator[Page]:
-    """A wide window."""
     size = {"width": 1300, "height": 700}
     with browsers["plain"].new_context(viewport=size, service_workers="block") as context:
         yield context.new_page()

@@ -335,8 +335,6 @@ def test_lab_that_was_used_runs_without_a_network(
 
 
 class FolderSession(Session):
-    """Serves the files of a folder."""
-
     def find(self, path: str) -> bytes | None:
         file = self.root / path
         return file.read_bytes() if file.is_file() else None

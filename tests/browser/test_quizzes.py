@@ -173,10 +173,7 @@ def test_open_question_is_compared_and_marked_by_the_learner(lesson: Page) -> No
 
 def test_line_that_is_printed(lesson: Page) -> None:
     field = answer_field(lesson, OUTPUT)
-    for entered, message in (
-        ("t = 2.0061 s", "Only capitals"),
-        ("T  =  2.00610 s ", "Right."),
-    ):
+    for entered, message in (("t = 2.0061 s", "Only capitals"), ("T  =  2.00610 s ", "Right.")):
         field.fill(entered)
         press(lesson, OUTPUT)
         expect(verdict(lesson, OUTPUT)).to_contain_text(message)

@@ -259,7 +259,7 @@ def test_an_index_that_does_not_come_is_told(calm: BrowserContext, site: str) ->
     page.goto(site + FIRST_LESSON)
     open_by_key(page)
     page.locator("#_search-field").fill("inertia")
-    expect(status(page)).to_have_text(re.compile("^The search cannot be loaded."))
+    expect(status(page)).to_have_text(re.compile("^The search cannot be loaded. Load"))
 
 
 def test_a_list_of_pages_from_before_is_loaded_anew(

@@ -1,4 +1,4 @@
-"""Pages against the standards: HTML, accessibility, narrow windows, no request to anyone else."""
+"""Pages against the standards: HTML, accessibility, no request to anyone else, safe drawings."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 from support import quiz_page
 from support.axe import violations
 from support.built_sites import Site
+from support.hostile_svg import HARMLESS, HOSTILE, mutants
 from support.lab_page import until, wait_until_settled, watch_page
+from support.opened_drawings import Drawings, published_files
 from support.scratch_course import ROOT
 from support.static_host import Host
-
-pytestmark = pytest.mark.browser
 
 VNU = ROOT / "site" / "node_modules" / "vnu-jar" / "build" / "dist" / "vnu.jar"
 NAMES = ("real", "full")
@@ -31,6 +31,7 @@ WINDOW: Any = {"width": 1440, "height": 900}
 NARROW = (320, 360)
 
 
+@pytest.mark.browser
 def test_every_kind_of_page_is_found(sites: Mapping[str, Site]) -> None:
     for site in (sites[name] for name in NAMES):
         assert site.kinds().keys() >= COMMON_KINDS
@@ -59,6 +60,7 @@ def launch_page(scorm: Path) -> Iterator[str]:
         yield f"{host.url}sco/1.1-one.html"
 
 
+@pytest.mark.browser
 def test_nu_checker_finds_nothing(
     sites: Mapping[str, Site], live_quizzes: str, launch_page: str
 ) -> None:
@@ -101,6 +103,7 @@ class FetchedAddresses(HTMLParser):
             self.found.append(values.get("data", ""))
 
 
+@pytest.mark.browser
 @pytest.mark.parametrize("name", NAMES)
 def test_no_page_names_anything_to_fetch_elsewhere(sites: Mapping[str, Site], name: str) -> None:
     site = sites[name]
@@ -139,6 +142,7 @@ def run_labs(page: Page) -> None:
             until(page, LAB_HAS_STARTED, number)
 
 
+@pytest.mark.browser
 @pytest.mark.parametrize("name", NAMES)
 def test_every_kind_of_page_keeps_the_standards(
     browsers: Mapping[str, Browser], sites: Mapping[str, Site], name: str
@@ -149,6 +153,7 @@ def test_every_kind_of_page_keeps_the_standards(
     keeps_the_standards(browsers["webgl"], sites[name], paths, closely=name == "full")
 
 
+@pytest.mark.browser
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_every_page_keeps_the_standards(
@@ -184,6 +189,7 @@ def keeps_the_standards(browser: Browser, site: Site, paths: list[str], closely:
         assert len(requests) > 3 * len(paths)
 
 
+@pytest.mark.browser
 def test_every_kind_of_page_opens_from_disk(
     browsers: Mapping[str, Browser], sites: Mapping[str, Site]
 ) -> None:
@@ -202,3 +208,33 @@ def test_every_kind_of_page_opens_from_disk(
                 expect(lab).to_contain_text("when the page comes from a web server")
         assert console == []
         assert all(url.startswith(("file:", "blob:", "data:")) for url in requests)
+
+
+ACTIVE = (
+    *("script", "XHTML script", "XHTML frame", "XHTML picture", "onclick", "set of a link"),
+    *("animate of a picture", "a link elsewhere", "image from afar", "stylesheet from afar"),
+    *("style: fill:u\\72l(FAR/x.svg#x)", "style: background-image:image-set('FAR/i.png' 1x)"),
+)
+"""Some that act where nobody judges them, so that it is known what the probe sees."""
+
+
+@pytest.fixture(scope="module")
+def drawings(
+    browsers: Mapping[str, Browser], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Drawings]:
+    with Drawings(browsers["plain"], tmp_path_factory.mktemp("drawings")) as drawings:
+        yield drawings
+
+
+def test_hostile_drawings_act_where_nobody_judges_them(drawings: Drawings) -> None:
+    files = dict(HOSTILE)
+    assert [name for name in ACTIVE if not drawings.open(files[name])] == []
+
+
+def test_a_published_drawing_runs_nothing_and_asks_nobody(drawings: Drawings) -> None:
+    files = {name: published_files(data) for name, data in (*HOSTILE, *mutants(1_000, seed=36))}
+    assert sum(not files[name] for name, _ in HOSTILE) > 250, "these are refused"
+    files |= {name: published_files(data)[:1] for name, data in HARMLESS}
+    traces = {name: [drawings.open(data) for data in versions] for name, versions in files.items()}
+    assert sum(map(len, traces.values())) > 40, "these are opened"
+    assert {name: traces[name] for name in files if any(traces[name])} == {}

@@ -40,7 +40,6 @@ def course(tmp_path: Path, stores: Path) -> Folder:
 
 
 def run(course: Folder, *arguments: str) -> tuple[int, str]:
-    """Run pytest; return its exit status and what it prints."""
     plugins = ("-p", NAME, "-p", "no:cacheprovider")
     result = subprocess.run(
         [sys.executable, "-m", "pytest", *plugins, *arguments],

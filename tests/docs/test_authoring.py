@@ -69,12 +69,10 @@ def checked_course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Pa
 
 @pytest.fixture
 def course(checked_course: Path, tmp_path: Path) -> Path:
-    """A copy of that course."""
     return Path(shutil.copytree(checked_course, tmp_path / "course", symlinks=True))
 
 
 def with_second_lesson(course: Path, text: str) -> None:
-    """Write a lesson in the place of the planned one."""
     map_file = course / "content/course.toml"
     planned, complete = 'status = "planned"', 'status = "complete"'
     assert map_file.read_text().count(planned) == 1
@@ -83,7 +81,6 @@ def with_second_lesson(course: Path, text: str) -> None:
 
 
 def check(course: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
-    """The JSON report of `coursebuild check`."""
     capsys.readouterr()
     status = main(["-C", str(course), "check", "--quiet", "--format", "json"])
     report: dict[str, Any] = json.loads(capsys.readouterr().out)

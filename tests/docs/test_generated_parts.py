@@ -1,19 +1,199 @@
-"""Parts of the pages in docs/ that are generated from the code are up to date and complete.
+"""Parts of the pages in docs/ that are made from the code are up to date and complete.
 
-`pytest tests/docs/test_generated_parts.py --rewrite-fixtures` updates them.
+`pytest tests/docs/test_generated_parts.py --rewrite-fixtures` updates them. Such a part stands
+between `<!-- generated: WORDS -->` and `<!-- end -->`. The words are those of `_MAKERS`:
+
+- `contents`: links to the page's sections;
+- `fields lab SimLab`: the fields of a structure in the schema `lab`; `beyond` or `within` and the
+  name of another one leave out those that it has, or has not;
+- `commands`, and `command check`: all of them, and what one takes; `options`: those of several.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import re
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
+from typing import Any
 
 import pytest
 
-from coursebuild.cli.commands import known_commands
+from coursebuild.cli.commands import known_commands, parser_of
+from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.syntax.schemas import json_schema
-from support.generated_parts import headings, regenerate
 from support.markdown_files import PAGES
+
+_PART = re.compile(r"(<!-- generated: ([^>\n]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+_FENCE = re.compile(r"^(`{3,})[^`\n]*\n.*?^\1`*$", re.MULTILINE | re.DOTALL)
+
+
+def regenerate(text: str) -> str:
+    """Return a page with its generated parts made anew."""
+
+    def part(match: re.Match[str]) -> str:
+        name, *words = match[2].split()
+        return f"{match[1]}\n{_MAKERS[name](text, *words)}\n\n{match[3]}"
+
+    return _PART.sub(part, text)
+
+
+def headings(text: str, level: int) -> list[str]:
+    return re.findall(rf"^#{{{level}}} (.+)$", _FENCE.sub("", text), re.MULTILINE)
+
+
+def _contents(text: str) -> str:
+    """Shown on code hosts, which drop `hidden`: on the site, contents stand beside the text."""
+    links = "\n".join(f"- [{title}](#{slug(title)})" for title in headings(text, 2))
+    return f"<div hidden>\n\n{links}\n\n</div>"
+
+
+def _table(head: str, rows: Iterable[tuple[str, ...]]) -> str:
+    cells = ([cell.replace("|", r"\|") for cell in row] for row in rows)
+    lines = (f"| {' | '.join(row)} |" for row in cells)
+    rule = "|" + " --- |" * (head.count("|") + 1)
+    return "\n".join((f"| {head} |", rule, *lines))
+
+
+# --------------------------------------------------------------------------------------- fields
+
+
+def _fields(
+    text: str, schema: str, name: str, relation: str = "beyond", other_name: str = ""
+) -> str:
+    definitions = json.loads(json_schema(schema))["$defs"]
+    structure = definitions[name]
+    other_fields = definitions[other_name]["properties"] if other_name else {}
+    rows = []
+    for field, field_schema in structure["properties"].items():
+        if (field in other_fields) != (relation == "within") or (other_fields and field == "kind"):
+            continue
+        meaning = field_schema.get("description") or _describe(field_schema, definitions)
+        required = ", required" * (field in structure.get("required", ()))
+        rows.append((f"`{field}`{required}", _value(field_schema), meaning))
+    return _table("field | value | meaning", rows)
+
+
+def _describe(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
+    """Return the description of the structure that a field holds."""
+    match = re.search(r'"\$ref": "#/\$defs/(\w+)"', json.dumps(schema))
+    meaning = definitions[match[1]]["description"].partition("\n")[0] if match else ""
+    return meaning[:1].lower() + meaning[1:].rstrip(".")
+
+
+def _value(schema: dict[str, Any]) -> str:
+    value = _kind(schema)
+    default = schema.get("default")
+    if default not in (None, "", [], {}, False):
+        value += f"; `{json.dumps(default)}` without it"
+    return value
+
+
+def _kind(schema: dict[str, Any]) -> str:
+    if "anyOf" in schema:
+        kinds = [_kind(choice) for choice in schema["anyOf"] if choice.get("type") != "null"]
+        return " or ".join(dict.fromkeys(kinds))
+    if "enum" in schema:
+        return ", ".join(f"`{json.dumps(choice)}`" for choice in schema["enum"])
+    match schema.get("type"):
+        case "array":
+            inner = schema.get("items", {})
+            return f"list of {_kind(inner)}" if inner else "list"
+        case "string":
+            return "Markdown" if "contentMediaType" in schema else "text"
+        case "boolean":
+            return "`true` or `false`"
+        case "integer" | "number" as kind:
+            return ("whole " * (kind == "integer")) + "number" + _bounds(schema)
+    return "table"
+
+
+def _bounds(schema: dict[str, Any]) -> str:
+    low, high = schema.get("minimum"), schema.get("maximum")
+    if "exclusiveMinimum" in schema:
+        return f" above {schema['exclusiveMinimum']:g}"
+    if low is not None and high is not None:
+        return f", {low} to {high}"
+    return f" from {low}" if low is not None else ""
+
+
+# ------------------------------------------------------------------------------------- commands
+
+
+def _commands(text: str) -> str:
+    rows = (
+        (f"[`{command.name}`](#{command.name})", command.summary)
+        for command in known_commands().values()
+    )
+    return _table("command | what it does", rows)
+
+
+def _actions(name: str) -> Iterator[argparse.Action]:
+    parser = parser_of(known_commands()[name])
+    return (action for action in parser._actions if action.dest not in ("help", "root"))
+
+
+def _shared() -> dict[tuple[str, str], list[str]]:
+    """Options that at least three commands take, with the commands."""
+    commands_by_row: dict[tuple[str, str], list[str]] = {}
+    for name in known_commands():
+        for action in _actions(name):
+            if action.option_strings:
+                commands_by_row.setdefault(_row(action), []).append(name)
+    return {row: names for row, names in commands_by_row.items() if len(names) > 2}
+
+
+def _row(action: argparse.Action) -> tuple[str, str]:
+    value = action.metavar or "|".join(map(str, action.choices or ()))
+    if not action.option_strings:
+        names = [f"`{action.metavar or action.dest}`"]
+    else:
+        names = [f"`{name}{' ' * bool(value)}{value}`" for name in action.option_strings]
+    return ", ".join(names), (action.help or "") % {"default": action.default}
+
+
+def _options(text: str) -> str:
+    rows = (
+        (name, ", ".join(f"`{command}`" for command in commands), meaning)
+        for (name, meaning), commands in _shared().items()
+    )
+    return _table("option | of | meaning", rows)
+
+
+def _command(text: str, name: str) -> str:
+    command = known_commands()[name]
+    parser = parser_of(command)
+    rows = [row for action in _actions(name) if (row := _row(action)) not in _shared()]
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            rows = [*chain.from_iterable(_kinds(action))]
+    parts = [f"{command.summary[:1].upper()}{command.summary[1:]}."]
+    if rows:
+        parts.append(_table("argument | meaning", rows))
+    if parser.epilog:
+        examples = parser.epilog.partition("\n")[2].rstrip("\n")
+        lines = "\n".join(line[2:] for line in examples.splitlines())
+        parts.append(f"```console\n{lines}\n```")
+    return "\n\n".join(parts)
+
+
+def _kinds(action: Any) -> Iterator[list[tuple[str, str]]]:
+    helps = {choice.dest: choice.help for choice in action._choices_actions}
+    for name, parser in action.choices.items():
+        yield [(f"`{name}`", helps[name])]
+        rows = [_row(option) for option in parser._actions if option.dest not in ("help", "root")]
+        yield [(f"`{name}` {argument}", meaning) for argument, meaning in rows]
+
+
+_MAKERS: dict[str, Callable[..., str]] = {
+    "contents": _contents,
+    "fields": _fields,
+    "commands": _commands,
+    "command": _command,
+    "options": _options,
+}
+
 
 LONG = 6
 """With so many sections or more, a page begins with its contents."""

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import ast
+import pydoc
 import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from coursebuild.core import features
 from support.live_course import Live
 from support.live_course import live as live
 from support.markdown_files import DOCS, fences
+from support.rendered_course import Make
 from support.scratch_course import Folder
-
-pytestmark = pytest.mark.site
 
 CODE = [fence for fence in fences(DOCS / "how-to/features.md") if fence.kind == "python"]
 EXAMPLES = [fence.text for fence in CODE if not fence.words]
@@ -61,7 +62,6 @@ MAP = "content/course.toml"
 
 @pytest.fixture
 def course(tmp_path: Path, stores: Path) -> Folder:
-    """A course that uses a feature of its own."""
     folder = Folder(tmp_path / "a course")
     folder.fill([LESSON], stores)
     folder.write("features/shout.py", SHOUT)
@@ -69,6 +69,7 @@ def course(tmp_path: Path, stores: Path) -> Folder:
     return folder
 
 
+@pytest.mark.site
 def test_a_fence_of_a_feature_follows_its_code_and_the_map(course: Folder) -> None:
     result = course.main("build")
     assert result.status == 0, result.out
@@ -84,6 +85,7 @@ def test_a_fence_of_a_feature_follows_its_code_and_the_map(course: Folder) -> No
     assert "LISTEN" not in course.text(PAGE), "a file that the map does not name is no feature"
 
 
+@pytest.mark.site
 def test_blocks_of_a_feature_go_from_process_to_process(tmp_path: Path, stores: Path) -> None:
     course = Folder(tmp_path)
     course.fill([LESSON.replace("now", str(number)) for number in range(9)], stores)
@@ -113,6 +115,7 @@ BROKEN = {
 }
 
 
+@pytest.mark.site
 def test_broken_feature_is_reported_at_its_place_in_the_map(course: Folder) -> None:
     def check() -> str:
         result = course.main("check")
@@ -134,6 +137,7 @@ def test_broken_feature_is_reported_at_its_place_in_the_map(course: Folder) -> N
         assert "a Python file in `features/`, as in `features/tabs.py`" in out
 
 
+@pytest.mark.site
 def test_the_example_of_the_docs_works(course: Folder) -> None:
     course.write("features/shout.py", EXAMPLES[0])
     task = '\n```task name="A & B"\nDo **this**.\n```\n'
@@ -152,6 +156,7 @@ def test_the_example_of_the_docs_works(course: Folder) -> None:
     assert course.main("check").out.startswith(expected)
 
 
+@pytest.mark.site
 def test_the_walk_of_the_docs_ends_with_diagrams(course: Folder) -> None:
     """Each step replaces the definitions of the same names in the generated feature."""
     assert course.main("new", "feature", "mermaid").status == 0
@@ -183,13 +188,13 @@ def defined_name(node: ast.stmt) -> str:
 
 @pytest.fixture
 def inventory(course: Folder) -> Folder:
-    """A course with the page of the docs."""
     course.write("features/inventory.py", EXAMPLES[1])
     course.replace(MAP, '"features/shout.py"', '"features/shout.py", "features/inventory.py"')
     course.write("models/box.xml", "<mujoco><worldbody/></mujoco>\n")
     return course
 
 
+@pytest.mark.site
 def test_the_page_of_the_docs_is_a_page_of_the_site(inventory: Folder) -> None:
     result = inventory.main("build")
     assert result.status == 0, result.out
@@ -201,6 +206,7 @@ def test_the_page_of_the_docs_is_a_page_of_the_site(inventory: Folder) -> None:
     assert "[box](../models/box.md)" in inventory.text("public/inventory/index.md")
 
 
+@pytest.mark.site
 def test_a_page_of_a_feature_follows_the_course(
     inventory: Folder, live: Callable[[Folder], Live]
 ) -> None:
@@ -220,6 +226,7 @@ def test_a_page_of_a_feature_follows_the_course(
     assert not [path for path in inventory.tree("public") if "inventory" in path]
 
 
+@pytest.mark.site
 def test_broken_link_of_a_feature_page_is_reported(inventory: Folder) -> None:
     inventory.replace("features/inventory.py", 'href="{}"', 'href="{}l"')
     result = inventory.main("build")
@@ -227,6 +234,7 @@ def test_broken_link_of_a_feature_page_is_reported(inventory: Folder) -> None:
     assert "error[link-broken]: `../models/box.htmll` leads nowhere" in result.out
 
 
+@pytest.mark.site
 def test_page_that_cannot_be_added_is_reported(inventory: Folder) -> None:
     code = inventory.text("features/inventory.py")
     for name, message in (
@@ -248,6 +256,7 @@ TIMELINE = SHOUT.replace(
 DRAWN = 'lambda page, block: Markup(f"<p id=year-{block.text}>{block.text}</p>")'
 
 
+@pytest.mark.site
 def test_equal_ids_of_blocks_of_a_feature_are_reported(course: Folder) -> None:
     """Those that a block declares by `check`; all others, by `build`, on the finished page."""
     draw = 'lambda page, block: Markup(f"<p>{escape(block.text.upper())}</p>")'
@@ -285,6 +294,7 @@ FAILURES = {
 }
 
 
+@pytest.mark.site
 def test_a_feature_that_fails_is_named_with_the_lesson(course: Folder) -> None:
     summary = "    text: str\n\n    def summary(self):\n        return self\n"
     code = SHOUT.replace("    text: str\n", summary)
@@ -297,3 +307,20 @@ def test_a_feature_that_fails_is_named_with_the_lesson(course: Folder) -> None:
         assert f"for {course.lesson()}{line}\n" in last_lines, error
         if "Shout(fence" in new:
             assert "TypeError: `parse` returned a value of the type Shout; return `Parsed(" in error
+
+
+def test_table_links_to_the_lessons(make: Make) -> None:
+    text = "It weighs 1.5 kg.\n\n```truth\n```\n"
+    site = make(text, **{"1.1": "Nothing."}).site()
+    page = site["lessons/0.1-falling.html"].decode()
+    assert '<a href="0.1-falling.html">0.1 Falling</a></td>' in page
+    assert '<a href="1.1-spinning.html">1.1 Spinning &lt;fast&gt;</a>' in page
+    copy = site["lessons/0.1-falling.md"].decode()
+    assert '| <a href="0.1-falling.html">0.1 Falling</a> | 0.0 % | 1 |' in copy
+
+
+def test_help_shows_each_part_of_the_interface() -> None:
+    for name, part in vars(features).items():
+        if isinstance(part, type) and part.__module__ == features.__name__:
+            assert name in pydoc.render_doc(part)
+    assert "core.pages.context.PageContext" in pydoc.plain(pydoc.render_doc(features.FenceKind))

@@ -69,7 +69,6 @@ class Attempts:
             self.repeat(data)
 
     def seconds(self, data: bytes) -> float:
-        """The processor time that an input takes."""
         before, peak = resident(), peak_memory()
         signal.setitimer(signal.ITIMER_PROF, MOST_SECONDS)
         start = time.process_time()
@@ -90,7 +89,6 @@ class Attempts:
         return seconds
 
     def stop(self, *_: object) -> None:
-        """Break the attempt off."""
         raise SlownessError(f"an input takes more than {MOST_SECONDS} s")
 
     def repeat(self, data: bytes) -> None:

@@ -130,7 +130,6 @@ def journal(data: bytes) -> None:
 
 
 def _packed(form: bytes, payload: bytes) -> bytes:
-    """The bytes behind the seal."""
     if form != AS_JSON:
         return payload
     try:

@@ -22,7 +22,6 @@ def write(path: Path, text: str = "") -> Path:
 
 @pytest.fixture
 def course(tmp_path: Path) -> Path:
-    """A course as an author has it."""
     root = tmp_path / "course"
     write(root / "content" / "course.toml")
     for name in ("box", "tumbling_box", "pendulum", "arms/ur5", "arms/panda", "v1.2"):

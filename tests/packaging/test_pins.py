@@ -15,7 +15,6 @@ LOCKS = ("requirements.txt", "requirements-build.txt", "requirements-dev.txt")
 
 
 def read_lock(root: Path, name: str) -> Iterator[Requirement]:
-    """The packages of a lock that are installed on this machine."""
     text = (root / name).read_text(encoding="utf-8")
     for line in LOCKED.findall(text):
         requirement = Requirement(line)

@@ -57,12 +57,7 @@ def wheels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         code += (
             "def mju_isBad(x):\n    return 1\n" if version == VERSION else "import mujoco_core\n"
         )
-        wheel(
-            folder,
-            version,
-            code,
-            part="" if version == VERSION else f"mujoco-core=={version}",
-        )
+        wheel(folder, version, code, part="" if version == VERSION else f"mujoco-core=={version}")
     wheel(folder, NEW_VERSION, "", name="mujoco_core")
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.setenv("PIP_FIND_LINKS", str(folder))
@@ -149,11 +144,7 @@ def test_changed_outputs_are_told_number_by_number(
     assert course.main("check", "-q").out == ""
     report = json.loads(check_against(course, "1.2", "--format", "json", "-q").out)
     assert [(s["path"], s["status"]) for s in report["scripts"]] == [("examples/plain.py", "same")]
-    assert (report["engine"], report["against"], report["models"]) == (
-        VERSION,
-        NEW_VERSION,
-        [],
-    )
+    assert (report["engine"], report["against"], report["models"]) == (VERSION, NEW_VERSION, [])
     assert environments(course) == [NEW_VERSION], "no control was needed"
     quiet, result = check_against(course, "-q"), check_against(course)
     error = abs(9_001_000 - REAL_NUMBER) / REAL_NUMBER

@@ -81,9 +81,7 @@ def test_an_edit_runs_again_what_depends_on_it(course: Folder) -> None:
     assert run_paths(course) == []
 
 
-def test_damaged_entry_and_unreachable_cache_are_no_mistake(
-    course: Folder,
-) -> None:
+def test_damaged_entry_and_unreachable_cache_are_no_mistake(course: Folder) -> None:
     result = course.main("check", "--cache", "/not/mounted/cache")
     assert result.status == 0
     warnings = [line for line in result.err.splitlines() if "shared cache" in line]

@@ -1,11 +1,14 @@
-"""An incremental build draws what has changed and no more, and gives what a clean one gives."""
+"""The same bytes wherever a course is built, and whether a build is incremental or clean."""
 
 from __future__ import annotations
 
+import io
 import os
 import pickle
 import shutil
+import sys
 import tempfile
+import zipfile
 from pathlib import Path
 
 import msgspec
@@ -14,11 +17,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.files.trust import seal, store_key, unseal
+from support.built_sites import BuiltCourses, course_copy
 from support.edited_course import EDITS, LESSON, NORUN, QUIZ, WORDS, Course, Edit, drawn_pages
-from support.live_course import differences
-from support.scratch_course import Folder
-
-pytestmark = pytest.mark.site
+from support.live_course import TRIALS, differences
+from support.scratch_course import ROOT, Folder
 
 UNSHARED_KINDS = ("compressed", "fonts", "mjb", "parts", "pictures", "published", "unchanged")
 """Kinds of entries that hold bytes of the site, or that are not shared."""
@@ -58,6 +60,7 @@ def build(course: Course) -> dict[str, bytes]:
     return course.folder.tree("public")
 
 
+@pytest.mark.site
 def test_an_edit_draws_the_pages_that_show_it(course: Course) -> None:
     assert drawn_pages(course.folder) == set()
     for path in (course.folder.root / "content").rglob("*"):
@@ -101,6 +104,7 @@ def test_an_edit_draws_the_pages_that_show_it(course: Course) -> None:
     assert drawn_pages(course.folder) == {"models/box.html"}
 
 
+@pytest.mark.site
 def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
     course.titles["1.2"] = "New title"
     course.save()
@@ -125,13 +129,10 @@ def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
             assert b"Renamed" in page and b"Tested" not in page
 
 
-JUNK = (
-    b"null",
-    msgspec.msgpack.encode((["os:system"], [16, "exit 70"])),
-    pickle.dumps(Trap()),
-)
+JUNK = (b"null", msgspec.msgpack.encode((["os:system"], [16, "exit 70"])), pickle.dumps(Trap()))
 
 
+@pytest.mark.site
 def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Course) -> None:
     before = build(course)
     assert course.folder.spoil() > 30
@@ -157,6 +158,7 @@ def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Cou
     assert build(course) == before, "a field of another type"
 
 
+@pytest.mark.site
 def test_a_mistake_that_an_edit_makes_elsewhere_is_found(course: Course) -> None:
     course.edit("1.1", "Prose", '<a href="1.2-l12.html#first">x</a>')
     course.edit("1.3", "Prose", "[there](lesson:1.2#first)")
@@ -178,6 +180,7 @@ def test_a_mistake_that_an_edit_makes_elsewhere_is_found(course: Course) -> None
 # --- any edits
 
 
+@pytest.mark.site
 @given(
     st.lists(
         st.tuples(
@@ -210,6 +213,7 @@ def test_after_any_edits_the_site_is_that_of_a_clean_checkout(
             assert differences(folder.tree("public"), clean.tree("public")) == []
 
 
+@pytest.mark.site
 def test_copies_of_the_process_give_what_one_gives(tmp_path: Path, stores: Path) -> None:
     sites = []
     for jobs in ("1", "3"):
@@ -225,3 +229,68 @@ def test_copies_of_the_process_give_what_one_gives(tmp_path: Path, stores: Path)
         assert (result.status, result.out, result.err) == (0, "", "")
         sites.append(course.folder.tree("public"))
     assert differences(*sites) == []
+
+
+FULL = ROOT / "tests/courses/full/course"
+
+
+@pytest.fixture(scope="module")
+def original(built_courses: BuiltCourses) -> Folder:
+    """The course that uses everything, built in a process of the tests."""
+    return built_courses["full"]
+
+
+@pytest.mark.engine
+def test_build_elsewhere_in_another_environment_gives_the_same_bytes(
+    original: Folder, tmp_path: Path, stores: Path
+) -> None:
+    """With the stored results of labs; the next test runs labs again."""
+    folder = course_copy("full", tmp_path / "anderswo ünd 別" / "a course", stores)
+    for name in TRIALS:
+        (folder.root / ".coursebuild" / name).symlink_to(original.root / ".coursebuild" / name)
+    environment = {
+        "TZ": "Pacific/Kiritimati",
+        "LANG": "tr_TR.UTF-8",
+        "LC_ALL": "C",
+        "PYTHONHASHSEED": "4242",
+        "PYTHONOPTIMIZE": "2",
+        "SOURCE_DATE_EPOCH": "1",
+        "USER": "somebody",
+    }
+    root = str(folder.root)
+    result = folder.run(
+        "-C", root, "build", "--jobs", "3", "--quiet", cwd=tmp_path, env=environment
+    )
+    assert result.status == 0, result.out
+    assert differences(original.tree(), folder.tree()) == []
+
+
+@pytest.mark.engine
+@pytest.mark.slow
+def test_build_without_caches_and_with_files_in_another_order_gives_the_same_bytes(
+    original: Folder, tmp_path: Path
+) -> None:
+    """Fonts are cut again, and the files of folders are created in reverse order."""
+    root = tmp_path / "reverse"
+    for path in sorted(FULL.rglob("*"), reverse=True):
+        if path.is_file():
+            target = root / path.relative_to(FULL)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(path.read_bytes())
+            target.chmod(0o600)
+    folder = Folder(root)
+    folder.tmp.mkdir()
+    result = folder.run("build", env={"PYTHONHASHSEED": "1"})
+    assert result.status == 0, result.out
+    assert differences(original.tree(), folder.tree()) == []
+
+
+@pytest.mark.engine
+def test_nothing_in_a_site_says_where_it_was_built(original: Folder) -> None:
+    places = [str(place).encode() for place in (original.root.parent, ROOT, sys.prefix)]
+    for name, data in original.tree("public").items():
+        texts = [data]
+        if name.endswith(".zip"):
+            with zipfile.ZipFile(io.BytesIO(data)) as archive:
+                texts += [archive.read(member) for member in archive.namelist()]
+        assert not [place for place in places if any(place in text for text in texts)], name

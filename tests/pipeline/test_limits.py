@@ -1,13 +1,31 @@
-"""Limits of hostile texts."""
+"""Limits of hostile texts, of small machines, and of courses with many lessons."""
 
 from __future__ import annotations
 
+import gc
+import subprocess
+import tracemalloc
+from pathlib import Path
+
 import pytest
 
+from coursebuild.core.model.results import CachedFile
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
+from coursebuild.pipeline.publication import build, make_files
+from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.site import Site
 from support.growth import processor_time_growth
-from support.scratch_course import GOOD, Make, block, kill_at_end, processes, wait_until_alone
+from support.scratch_course import (
+    GOOD,
+    Folder,
+    Make,
+    block,
+    command,
+    kill_at_end,
+    processes,
+    wait_until_alone,
+)
 from support.waiting import wait_until
 
 MAP = "content/course.toml"
@@ -73,8 +91,7 @@ def test_a_script_gets_the_memory_that_the_course_allows(make: Make) -> None:
 
 
 @pytest.mark.parametrize(
-    "piece",
-    ["<b>", "</b>", "<b></i>", "<a href=x", "- <p>\n", "[x](y) `", "<script>\n", "<title>"],
+    "piece", ["<b>", "</b>", "<b></i>", "<a href=x", "- <p>\n", "[x](y) `", "<script>\n", "<title>"]
 )
 def test_reading_takes_as_long_as_the_text_whatever_is_broken_in_it(piece: str) -> None:
     def read(count: int) -> None:
@@ -102,3 +119,104 @@ def test_containers_that_hold_too_many_lines_together_are_told_and_read_no_furth
 def test_a_long_list_is_not_taken_for_a_deep_one(item: str) -> None:
     document = parse_document(Source("x.md", item * 1_000), frozenset(), lesson=False)
     assert document.diagnostics == ()
+
+
+def run_limited(folder: Folder, limit: str, *arguments: str) -> tuple[int, str]:
+    """The status of a command under a limit, and what it says on standard error."""
+    result = subprocess.run(
+        ["bash", "-c", f'ulimit {limit} && exec "$@"', "bash", *command(*arguments)],
+        cwd=folder.root,
+        env=folder.environment(),
+        capture_output=True,
+        text=True,
+    )
+    return result.returncode, result.stderr
+
+
+@pytest.mark.site
+def test_too_few_files_are_told_and_as_many_as_said_are_enough(make: Make) -> None:
+    folder = make(GOOD + "$a_{17}$\n\n" + block("two.py", "print(2)", "2"))
+    assert run_limited(folder, "-n 12", "check") == (
+        1,
+        "coursebuild: only 12 files may be open at a time, and 64 are needed\n"
+        "  help: `ulimit -n 256` raises the limit\n",
+    )
+    status, output = run_limited(folder, "-n 64", "build", "--jobs", "2")
+    assert status == 0, output
+
+
+@pytest.mark.site
+def test_too_few_addresses_for_v8_are_told(make: Make) -> None:
+    folder = make(GOOD + "$a_{18}$\n")
+    status, output = run_limited(folder, "-v 8388608", "check")
+    assert status == 1
+    assert "coursebuild: V8 needs more than the 8 GiB of addresses" in output
+    assert "`ulimit -v unlimited`" in output
+    assert "Traceback" not in output
+
+
+FEW_LESSONS, MANY_LESSONS = 20, 50
+TEXT = 20_000
+"""Bytes of prose in a lesson."""
+SLOPE = 60_000
+"""Bytes that a further lesson may take: its text, its summary, names and keys of its files, and its
+packed tree."""
+
+
+def write_course(folder: Folder, count: int, size: int = TEXT) -> None:
+    """Write a course of some lessons, each with as much prose.
+
+    A level has ten lessons, since each of its pages lists them all.
+    """
+    ids = [f"{1 + n // 10}.{1 + n % 10}" for n in range(count)]
+    entries = ['[course]\ntitle = "Long"\n']
+    for n, (id_, following) in enumerate(zip(ids, ids[1:] + ids[:1], strict=True)):
+        prose = "What is said of *this* thing is said of `that` one. " * 6 + "\n\n"
+        code = "\n".join(f"print({i})" for i in range(120))
+        text = block(f"s{n}.py", code, info="norun") + prose * (size // len(prose))
+        links = f"See [there](#part), and [the next](lesson:{following}).\n"
+        folder.write(f"content/lessons/{id_}-l.md", f"## Part {{#part}}\n\n{text}{links}")
+        if n % 10 == 0:
+            level = id_.split(".")[0]
+            entries.append(f'[[level]]\nid = "{level}"\ntitle = "Level {level}"\n')
+        entries.append(
+            f'[[level.lesson]]\nid = "{id_}"\nslug = "l"\ntitle = "L {n}"\nstatus = "complete"\n'
+        )
+    folder.write("content/course.toml", "\n".join(entries))
+
+
+def peak(folder: Folder) -> int:
+    """The peak of Python's memory during a build, with the files that it makes, in bytes."""
+    gc.collect()
+    gc.freeze()  # else the garbage of other tests decides when the collector runs
+    tracemalloc.start()
+    try:
+        options = folder.options()
+        with Reader(options) as reader:
+            report, site = make_files(options, reader, lambda lib: Site(lib, reader, options))
+            assert site is not None, report.diagnostics
+            for file in site.files:
+                if file.path.endswith((".html", ".md", ".ipynb", ".epub")):
+                    assert isinstance(file, CachedFile)
+                    file.make()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+        gc.unfreeze()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("again", [False, True], ids=["cold", "one edit"])
+def test_memory_does_not_grow_with_the_lessons(tmp_path: Path, stores: Path, again: bool) -> None:
+    peaks: dict[int, list[int]] = {FEW_LESSONS: [], MANY_LESSONS: []}
+    # Several times: whatever else the process does can only add to it.
+    for number, count in enumerate((FEW_LESSONS, FEW_LESSONS, MANY_LESSONS, MANY_LESSONS)):
+        folder = Folder(tmp_path / str(number))
+        write_course(folder, count)
+        folder.borrow(stores)
+        if again:
+            build(folder.options(), Path("public"))
+            folder.replace("content/lessons/1.2-l.md", "See [there]", "See again [there]")
+        peaks[count].append(peak(folder))
+    slope = (min(peaks[MANY_LESSONS]) - min(peaks[FEW_LESSONS])) / (MANY_LESSONS - FEW_LESSONS)
+    assert slope < SLOPE, f"{slope:.0f} bytes a lesson: {peaks}"

@@ -58,7 +58,6 @@ See [one](lesson:1.1).
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> dict[str, str]:
-    """The pages of a course with all of these."""
     folder = Folder(tmp_path_factory.mktemp("lookup") / "course")
     folder.fill([FIRST, SECOND, THIRD], stores)
     result = folder.main("build")

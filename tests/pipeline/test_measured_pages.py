@@ -1,4 +1,4 @@
-"""Recorded reports on pages and in lessons: those that fit are shown, others lead to a warning."""
+"""Recorded reports on pages and in lessons, and MuJoCo's warnings while a model is measured."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from coursebuild.cli import main
 from coursebuild.core.model import Declarations
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.numerics.reports.records import BENCH, DIET, STABILITY
@@ -18,12 +19,14 @@ from coursebuild.numerics.reports.scene_report import SceneReport
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.scenes import scene_digest
 from support.edited_course import drawn_pages
+from support.measured_course import TOML, write
 from support.model_reports import box, case, diet, finding
 from support.preview_process import serve_preview
 from support.scratch_course import GOOD, Folder
 from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
+
 
 BOX = '<mujoco><include file="arm/part.xml"/></mujoco>\n'
 PART = '<mujoco><worldbody><geom name="g" size="1"/></worldbody></mujoco>\n'
@@ -62,7 +65,6 @@ class Course:
         return replace(box(), **{"model": name, "digest": digest, "machine": machine, **fields})
 
     def record(self) -> None:
-        """Put reports into the course."""
         self.write_bench(self.bench())
         self.write_diet("nobody reads it")
         self.write_cases("it swings")
@@ -83,7 +85,6 @@ class Course:
         self.folder.write(STABILITY.path(), STABILITY.encode(cases))
 
     def build(self) -> str:
-        """Build the site, which must succeed; return its warnings."""
         result = self.folder.main("build", "-q")
         assert result.status == 0, result.out
         return result.out
@@ -250,3 +251,71 @@ def test_a_model_with_an_unusual_name(course: Course) -> None:
     assert "reports/odd%20&amp;%20old/" in page or "reports/odd%20%26%20old/" in page
     course.folder.write(f"models/{name}.xml", "<mujoco></mujoco>\n")
     assert f"`{name}`, its files or its scenarios have changed since" in course.build()
+
+
+SINGULAR = """\
+<mujoco>
+  <worldbody>
+    <body>
+      <joint axis="0 0 1"/>
+      <joint axis="0 0 1"/>
+      <geom size="0.1" pos="0.3 0 0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+"""A model of whose inertia MuJoCo warns at compilation and in each `mj_forward`."""
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("bench", "--quick"),
+        pytest.param(("bench", "--record"), marks=pytest.mark.slow),
+        ("diet", "--quick", "--fix"),
+    ],
+    ids=" ".join,
+)
+def test_measuring_leaves_no_log_of_mujoco(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    command: tuple[str, ...],
+) -> None:
+    write(tmp_path / "content" / "course.toml", "")
+    write(tmp_path / "models" / "box.xml", SINGULAR)
+    declarations = TOML.replace("qvel = [1.0]", "qvel = [1.0, 0.0]")
+    write(tmp_path / "models" / "box.toml", declarations)
+    monkeypatch.chdir(tmp_path)
+    assert main(command) == 0
+    out, err = capfd.readouterr()
+    assert "box" in out
+    assert "WARNING" not in out + err
+    assert not list(tmp_path.rglob("MUJOCO_LOG*"))
+
+
+CROWDED_MODEL = f"""\
+<mujoco>
+  <size memory="10K"/>
+  <worldbody>
+    <geom type="plane" size="2 2 1"/>
+    {'<body pos="0 0 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>' * 9}
+  </worldbody>
+</mujoco>
+"""
+"""A model whose contacts need more memory than it sets."""
+
+
+def test_bench_tells_a_model_that_mujoco_gives_up(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path / "content" / "course.toml", "")
+    write(tmp_path / "models" / "box.xml", CROWDED_MODEL)
+    write(tmp_path / "models" / "box.toml", TOML.replace("qvel = [1.0]\n", ""))
+    assert main(["-C", str(tmp_path), "bench", "--quick"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith(
+        "error[model-error]: the model `box` cannot be measured: mj_stackAlloc: out of memory"
+    )
+    assert lines[1] == "  --> models/box.xml:1:1"
+    assert not list(tmp_path.rglob("MUJOCO_LOG*"))

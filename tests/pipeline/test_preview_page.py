@@ -1,22 +1,67 @@
-"""The preview in a real browser: only what differs is replaced, and nothing else moves."""
+"""The preview in a real browser: only what differs is replaced; mistakes, drift, acceptance."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.lab_page import wait_for_condition
-from support.preview_page import LESSON, PreviewPage, lesson_page, see, texts
-from support.preview_process import serve_preview
-from support.scratch_course import GOOD, ROOT, Make
+from support.preview_process import Preview, serve_preview
+from support.scratch_course import GOOD, ROOT, WAIT_FOR_GO, Folder, Make, block
 from support.static_host import Host
+from support.waiting import wait_for_file
 
-pytestmark = pytest.mark.browser
+
+class PreviewPage:
+    def __init__(self, browser: Browser, preview: Preview, path: str, **options: object) -> None:
+        self.context = browser.new_context(**options)
+        self.page = self.context.new_page()
+        self.console: list[str] = []
+        self.page.on("console", lambda message: self.console.append(message.text))
+        self.page.on("pageerror", lambda error: self.console.append(str(error)))
+        self.page.goto(f"http://127.0.0.1:{preview.port}/{path}")
+        # A page that is loaded again loses this.
+        self.page.evaluate("window.same = true")
+
+    def __enter__(self) -> PreviewPage:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.context.close()
+
+    def check_unbroken(self) -> None:
+        """It is still the same document, and nothing went wrong in it."""
+        assert self.page.evaluate("window.same")
+        assert self.console == []
+
+
+def see(locator: Locator) -> None:
+    expect(locator).to_be_visible()
+
+
+def texts(page: Page, text: str) -> None:
+    expect(page.locator(".prose")).to_contain_text(text)
+
+
+LESSON = "lessons/1.1-one.html"
+
+
+@contextlib.contextmanager
+def lesson_page(folder: Folder, browser: Browser) -> Iterator[Page]:
+    """The page of a lesson, which stays the same document, with nothing that goes wrong in it."""
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("checked: ")
+        with PreviewPage(browser, preview, LESSON) as preview_page:
+            yield preview_page.page
+            preview_page.check_unbroken()
+
+
 FILLER = "".join(f"Paragraph {n}.\n\n" for n in range(80))
 QUIZ = {
     "id": "q",
@@ -36,6 +81,7 @@ def browser(browsers: Mapping[str, Browser]) -> Browser:
     return browsers["plain"]
 
 
+@pytest.mark.browser
 def test_what_was_not_touched_stays_as_and_where_it_is(make: Make, browser: Browser) -> None:
     folder = make(RICH)
     with lesson_page(folder, browser) as page:
@@ -70,6 +116,7 @@ def test_what_was_not_touched_stays_as_and_where_it_is(make: Make, browser: Brow
         wait_for_condition(page, lambda: abs(place.evaluate(top) - before) < 1)
 
 
+@pytest.mark.browser
 def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
     folder = make(RICH)
     with serve_preview(folder) as preview:
@@ -115,6 +162,7 @@ def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
             wait_for_condition(page, lambda: page.evaluate(structure) == living)
 
 
+@pytest.mark.browser
 def test_lab_that_was_not_touched_goes_on(make: Make, browser: Browser) -> None:
     lab = {"title": "A lab", "model": "ball", "readouts": [{"label": "t", "expr": "data.time"}]}
     folder = make(GOOD + f"```lab\n{json.dumps(lab)}\n```\n\nAfter it.\n")
@@ -136,6 +184,7 @@ def test_lab_that_was_not_touched_goes_on(make: Make, browser: Browser) -> None:
         expect(live).to_have_count(1)
 
 
+@pytest.mark.browser
 def test_page_that_goes_and_one_that_comes(make: Make, browser: Browser) -> None:
     folder = make(GOOD, "## Two\n\nText.\n")
     map_ = folder.text("content/course.toml")
@@ -157,6 +206,7 @@ def test_page_that_goes_and_one_that_comes(make: Make, browser: Browser) -> None
             expect(page.locator(".preview-button")).to_be_hidden()
 
 
+@pytest.mark.browser
 def test_preview_that_stops_and_starts_again(make: Make, browser: Browser) -> None:
     folder = make(GOOD)
     with serve_preview(folder) as preview:
@@ -205,6 +255,7 @@ STEAL = """async (address) => {
 }"""
 
 
+@pytest.mark.browser
 def test_page_of_another_origin_can_only_link_to_the_preview(
     make: Make, browser: Browser, tmp_path: Path
 ) -> None:
@@ -231,6 +282,7 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
                 expect(page.locator("h1").first).to_have_text("Scratch")
 
 
+@pytest.mark.browser
 def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> None:
     """With everything that it can show at once, light and dark."""
     axe = (ROOT / "site/node_modules/axe-core/axe.min.js").read_text("utf-8")
@@ -247,3 +299,147 @@ def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> Non
                 page.emulate_media(color_scheme=scheme)
                 audit = page.evaluate("rules => axe.run({ runOnly: rules })", rules)
                 assert [(v["id"], v["nodes"][0]["html"]) for v in audit["violations"]] == []
+
+
+@pytest.mark.browser
+def test_mistakes_are_shown_and_clear_by_themselves(
+    make: Make, browser: Browser, tmp_path: Path
+) -> None:
+    folder = make(GOOD, "## Two\n\nText.\n")
+    editor, calls = tmp_path / "code", tmp_path / "told"
+    editor.write_text(f'#!/bin/sh\necho "$@" > "{calls}"\n')
+    editor.chmod(0o755)
+    with serve_preview(folder, env={"VISUAL": str(editor)}) as preview:
+        preview.wait_for_line("checked: ")
+        second_page = PreviewPage(browser, preview, "lessons/1.2-two.html")
+        with second_page, PreviewPage(browser, preview, LESSON) as page_open:
+            page = page_open.page
+            panel = page.get_by_role("region", name="Problems")
+            expect(panel).to_have_count(0)
+            folder.replace(folder.lesson(), "## Hello\n", "## Never\n\n[x](lesson:9.9)\n")
+            see(panel)
+            expect(panel).to_contain_text("The last good page is shown")
+            panel.get_by_role("button", name="content/lessons/1.1-one.md:3:5").click()
+            wait_for_file(calls, 1)
+            assert calls.read_text() == f"--goto {folder.root / folder.lesson()}:3:5\n"
+            expect(panel).to_contain_text("lesson 9.9 is not in the course map")
+            expect(panel.locator(".preview-source mark")).to_have_text("lesson:9.9")
+            expect(page.locator(".prose h2").first).to_contain_text("Hello")
+            see(second_page.page.get_by_role("region", name="Problems"))
+            expect(second_page.page.get_by_role("region", name="Problems")).to_contain_text(
+                "What is wrong with the course"
+            )
+            # The list can be closed, by keyboard too, and opens again for another mistake.
+            panel.get_by_role("button", name="Close").click()
+            expect(panel).to_have_count(0)
+            button = page.get_by_role("button", name="1 mistake")
+            expect(button).to_be_focused()
+            expect(button).to_have_attribute("aria-expanded", "false")
+            page.keyboard.press("Enter")
+            see(panel)
+            page.keyboard.press("Escape")
+            expect(panel).to_have_count(0)
+            folder.replace(folder.lesson(2), "## Two\n", "[x](lesson:9.9)\n")
+            expect(page.get_by_role("button", name="2 mistakes")).to_be_visible()
+            folder.replace(folder.lesson(), "[x](lesson:9.9)", "[x](lesson:9.9) $\\frac{1$")
+            see(panel)
+            # On each page, the mistakes that keep it from being drawn come first.
+            kinds = ["Blocks this page", "Blocks this page", "Mistake"]
+            expect(panel.locator("strong")).to_have_text(kinds)
+            kinds = ["Blocks this page", "Mistake", "Mistake"]
+            elsewhere = second_page.page.get_by_role("region", name="Problems")
+            expect(elsewhere.locator("strong")).to_have_text(kinds)
+            expect(elsewhere.get_by_role("listitem").first).to_contain_text("1.2-two.md:1:5")
+            folder.write(folder.lesson(2), "## Two\n\nText.\n")
+            expect(panel).to_contain_text("the formula does not parse")
+            folder.write(folder.lesson(), GOOD.replace("## Hello", "## Mended"))
+            expect(panel).to_have_count(0)
+            expect(page.locator(".prose h2").first).to_contain_text("Mended")
+            expect(second_page.page.get_by_role("region", name="Problems")).to_have_count(0)
+            page_open.check_unbroken()
+
+
+@pytest.mark.browser
+def test_drift_is_shown_in_its_place_and_accepted(make: Make, browser: Browser) -> None:
+    folder = make(GOOD + "About `3.14`{out}.\n")
+    with lesson_page(folder, browser) as page:
+        output = page.locator(".output")
+        expect(output.locator(".receipt")).to_have_class("receipt verified")
+        folder.replace(folder.lesson(), 'print("hello", 3.14159)', 'print("hello", 2.71828)')
+        box = output.get_by_role("group", name="Recorded output, and this run")
+        see(box)
+        expect(box.locator("del")).to_have_text("hello 3.14159")
+        expect(box.locator("ins")).to_have_text("hello 2.71828")
+        expect(box.locator("del mark")).to_have_text("3.14159")
+        expect(box.locator(".preview-row .preview-sign")).to_have_text(["−", "+"])
+        expect(output.locator("> pre")).to_be_hidden()
+        expect(page.get_by_role("region", name="Problems")).to_have_count(0)
+        page.get_by_role("button", name="Accept this output").click()
+        # Now the number in the prose is the one that does not hold.
+        number = page.get_by_role("group", name="A bound number that does not hold")
+        see(number)
+        expect(number.locator("ins")).to_have_text("2.72")
+        expect(box).to_have_count(0)
+        expect(output.locator(".receipt")).to_have_class("receipt verified")
+        expect(output.locator("samp")).to_contain_text("hello 2.71828")
+        number.get_by_role("button", name="Accept").click()
+        expect(number).to_have_count(0)
+        expect(page.locator(".bound")).to_have_text("2.72")
+        expect(page.locator(".preview-button")).to_be_hidden()
+        text = GOOD.replace("3.14159", "2.71828") + "About `2.72`{out}.\n"
+        assert folder.text(folder.lesson()) == text
+
+
+@pytest.mark.browser
+def test_figures_are_shown_side_by_side_and_accepted(make: Make, browser: Browser) -> None:
+    """An SVG with its data, and a PNG."""
+    code = """from PIL import Image
+
+with open("a.svg", "w") as file:
+    file.write('<svg xmlns="http://www.w3.org/2000/svg" width="90" height="90">')
+    file.write('<path d="M0 0H50"/></svg>')
+with open("a.csv", "w") as file:
+    file.write("end\\n50\\n")
+with open("b.png", "wb") as file:
+    Image.new("L", (50, 20), 50).save(file, "PNG")
+"""
+    lesson = block("a.py", code, info="figure=a.svg,a.csv,b.png")
+    folder = make(f"## A\n\n{lesson}Figure: ![A line](a.svg)\n\nFigure: ![A box](b.png)\n")
+    assert folder.run("update").status == 0
+    with lesson_page(folder, browser) as page:
+        folder.write(folder.lesson(), folder.text(folder.lesson()).replace("50", "40"))
+        for name in ("A line", "A box"):
+            figures = page.locator("figure.figure", has=page.get_by_alt_text(name, exact=True))
+            box = figures.get_by_role("group", name="Recorded figure, and this run").first
+            see(box)
+            see(box.get_by_alt_text(f"{name} (recorded)"))
+            see(box.get_by_alt_text(f"{name} (this run)"))
+            expect(figures.locator("> img").first).to_be_hidden()
+        expect(page.get_by_role("region", name="Problems")).to_have_count(0)
+        sizes = "images => images.map((one) => one.naturalWidth)"
+        assert box.locator("img").evaluate_all(sizes) == [50, 40]
+        for count in (2, 1, 0):
+            accept = page.get_by_role("button", name=re.compile("^Accept th"))
+            expect(accept).to_have_count(count + 1)
+            accept.first.click()
+        expect(page.locator(".preview-drift")).to_have_count(0)
+        see(page.get_by_alt_text("A box", exact=True))
+        assert page.get_by_alt_text("A box", exact=True).evaluate_all(sizes) == [40]
+        expect(page.locator(".preview-button")).to_be_hidden()
+        assert "H40" in folder.text("content/lessons/a.svg")
+        assert folder.text("content/lessons/a.csv") == "end\n40\n"
+
+
+@pytest.mark.browser
+def test_script_that_runs_and_fails_is_marked(make: Make, browser: Browser) -> None:
+    folder = make(GOOD)
+    with lesson_page(folder, browser) as page:
+        folder.replace(folder.lesson(), 'print("hello"', f'{WAIT_FOR_GO}print("hello"')
+        mark = page.locator(".output").get_by_role("status")
+        expect(mark).to_have_text("The script is running.")
+        folder.write("go", "")
+        expect(mark).to_have_count(0)
+        folder.replace(folder.lesson(), "print(", "raise ValueError('no')\nprint(")
+        expect(mark).to_have_text("The script failed.")
+        panel = page.get_by_role("region", name="Problems")
+        expect(panel).to_contain_text("ValueError: no")

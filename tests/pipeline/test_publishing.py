@@ -1,14 +1,16 @@
-"""Nothing broken is published, and the old site stays."""
+"""Nothing broken is published, and the old site stays: strict checks, links, empty lessons."""
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from support.scratch_course import GOOD, Make, block, without_locks
+from support.scratch_course import FIRST, GOOD, Folder, Make, block, without_locks
 
 pytestmark = pytest.mark.site
 
@@ -114,3 +116,205 @@ def test_builds_at_once_wait_for_each_other_without_locks(make: Make) -> None:
     assert folder.main("build").status == 0
     assert folder.tree("public") == site
     assert ".coursebuild-lock" not in folder.entries()
+
+
+QUIZ = """```quiz
+{"id": "q", "questions": [{"kind": "mcq", "id": "a", "q": "See <a href=\\"gone.html\\">it</a>?",
+ "options": ["yes", "no"], "answer": 0, "explain": "So."}]}
+```
+"""
+LINKS = {
+    '<a href="gone.html">it</a>': "1:10",
+    '<a title="<b>it</b>" href="gone.html">it</a>': "1:28",
+    "<a title='gone.html' href='gone.html?<b>&amp;c=\"d\"'>it</a>": "1:28",
+    "<a href=gone.html#&lt;b&gt;>it</a>": "1:9",
+    '<p>\n<b title="a>b">c</b>\n<a\nhref="gone.html">it</a></p>': "4:7",
+    '> quoted\n> <a\n> href="gone.html">it</a>': "3:9",
+    '- A [rotor]{term} is <a href="gone.html">it</a>.': "1:31",
+    "`gone.html` and <!-- <a href='gone.html'> --> <a href='gone.html'>it</a>": "1:56",
+    QUIZ: "2:74",
+}
+
+
+def test_broken_link_in_raw_html_is_reported_at_its_place(make: Make) -> None:
+    """A title of the map that looks like such a link is text, and no link of the page."""
+    folder = make("Text\n")
+    title = "title = '<a href=\"gone.html\">'"
+    folder.replace("content/course.toml", 'title = "Lesson one"', title)
+    places = {}
+    for text in LINKS:
+        folder.write(folder.lesson(), f"{text}\n")
+        result = folder.main("build")
+        assert result.status == 1, text
+        places[text] = re.findall(r"(?:error|warning)\[.*\n *--> (.*)", result.out)
+    assert places == {text: [f"{folder.lesson()}:{place}"] for text, place in LINKS.items()}
+
+
+def test_what_counts_as_something_to_read(make: Make) -> None:
+    little = ["Prose.\n", "<!-- x -->\n\nProse.\n", "---\n", "$$x$$\n", "    code\n", "<hr>\n", "x"]
+    folder = make(GOOD, *little)
+    result = folder.main("check")
+    assert result.status == 0, result.out
+    # No other check looks at prose; the second check takes its diagnostics from the store.
+    for text, status in (
+        ("", 1),
+        ("Other prose.\n", 0),
+        ("<!-- x -->\n\n<!-- y\n\nz -->\n", 1),
+        ("\u00a0\n\u2003", 1),
+        ("[there]: https://example.org\n", 1),
+    ):
+        folder.write(folder.lesson(2), text)
+        result = folder.main("check")
+        assert (result.status, "error[lesson-empty]" in result.out) == (status, status == 1)
+    head, second = folder.text("content/course.toml").split('"1.2"')  # a draft may be empty
+    folder.write("content/course.toml", f'{head}"1.2"{second.replace("complete", "draft", 1)}')
+    assert folder.main("build").status == 0
+    folder.write(folder.lesson(3), "```quiz\n{\n```\n")
+    result = folder.main("check")
+    assert ("error[json-syntax]" in result.out, "lesson-empty" in result.out) == (True, False)
+
+
+SKIP = "\n#### Deep\n"
+"""A heading that gets a warning."""
+TORCH = (
+    "## Two\n\n"
+    + block("two.py", "import no_torch", "2.99", info="requires=no_torch")
+    + "It is `2.99`{out}, or `3.0`{out=examples/two.py}, of 17.5.\n"
+)
+NORUN = "## Three\n\n" + block("three.py", "print(3)", "7.77", info="norun")
+
+
+def verify(folder: Folder, text: str) -> None:
+    """Write the table `[verify]` of the map, or another one at its end."""
+    name = "content/course.toml"
+    map = folder.text(name).partition("\n[verify]")[0]
+    folder.write(name, f"{map}\n[verify]\n{text}")
+
+
+def last_line(text: str) -> str:
+    return text.splitlines()[-1]
+
+
+def test_strict_shows_a_warning_as_an_error_in_every_format(make: Make) -> None:
+    folder = make(FIRST + SKIP)
+    plain = folder.main("check")
+    strict = folder.main("check", "--strict")
+    assert (plain.status, strict.status) == (0, 1)
+    assert plain.out.startswith("warning[heading-skip]: ")
+    assert strict.out.partition("\n\n")[0] == plain.out.partition("\n\n")[0].replace(
+        "warning[", "error["
+    )
+    assert last_line(strict.out) == "1 lesson, 0 scripts run, 1 cached: 1 error"
+    parts = {
+        "json": '"severity": "error"',
+        "junit": '<failure type="heading-skip"',
+        "sarif": '"level": "error"',
+        "github": "::error file=content/lessons/1.1-one.md,line=14,",
+    }
+    for form, part in parts.items():
+        result = folder.main("check", "--strict", "--format", form)
+        assert (result.status, part in result.out) == (1, True), form
+        assert part not in folder.main("check", "--format", form).out, form
+
+
+@pytest.mark.parametrize("is_option", (True, False))
+def test_strict_build_publishes_nothing_while_there_is_a_warning(
+    make: Make, is_option: bool
+) -> None:
+    folder = make(FIRST + SKIP)
+    option = ("--strict",) if is_option else ()
+    verify(folder, "" if is_option else "strict = true\n")
+    result = folder.main("build", *option)
+    assert (result.status, (folder.root / "public").exists()) == (1, False)
+    assert "nothing was published" in result.out
+    folder.write(folder.lesson(), FIRST)
+    assert folder.main("build", *option).status == 0
+    assert (folder.root / "public/index.html").exists()
+
+
+def test_a_run_with_nothing_to_do_keeps_the_verdict_of_strict_apart(make: Make) -> None:
+    folder = make(FIRST + SKIP)
+    expected = {(): 0, ("--strict",): 1}
+    for _ in range(2):
+        for option, status in expected.items():
+            assert folder.main("check", *option).status == status
+    verify(folder, "strict = true\n")
+    assert folder.main("check").status == 1
+    verify(folder, "strict = false\n")
+    assert folder.main("check").status == 0
+
+
+def test_strict_leaves_what_is_silenced_or_only_listed(make: Make) -> None:
+    folder = make(FIRST + SKIP + "\nIt weighs 17.5 kg.\n")
+    silence = '[[silence]]\nrule = "heading-skip"\nreason = "a list of tasks"\n'
+    verify(folder, f"strict = true\n\n{silence}")
+    result = folder.main("check", "--truth")
+    assert result.status == 0
+    assert result.out.startswith("warning[number-unproven]: nothing proves `17.5`")
+    assert last_line(result.out) == "1 lesson, 1 script run: 1 warning (1 silenced)"
+
+
+def test_a_script_that_lacks_a_package_proves_nothing(make: Make) -> None:
+    folder = make(FIRST, TORCH)
+    result = folder.main("check")
+    assert result.status == 0
+    assert last_line(result.out) == (
+        "2 lessons, 1 script run: holds, but for 1 script that was not run (no_torch)"
+    )
+    report = json.loads(folder.main("check", "--format", "json").out)
+    summary, script = report["summary"], report["scripts"][1]
+    assert (summary["unproven"], summary["reasons"]) == (1, ["no_torch"])
+    assert (script["unproven_outputs"], script["unproven_numbers"]) == (1, 2)
+    strict = folder.main("check", "--strict", "--format", "github")
+    assert strict.status == 1
+    assert strict.out.startswith("::error file=content/lessons/1.2-two.md,line=3,col=1,")
+    truth = folder.main("check", "--truth").out
+    assert "1.2: 0.0 % of 3 numbers proven: 0 bound, 0 computed, 0 given with a source;" in truth
+    verify(folder, "truth = 0.5\n")
+    assert "error[truth-share]: 0.0 % of the numbers are proven" in folder.main("check").out
+    verify(folder, "")
+    assert folder.main("build").status == 0
+    page = folder.text("public/lessons/1.2-two.html")
+    doubt = "Not verified: no_torch was not installed when the site was built."
+    for number in ("2.99", "3.0"):
+        assert f'<span class="bound unverified" title="{doubt}">{number}</span>' in page
+
+
+def test_several_scripts_that_were_not_run_are_counted_with_their_reasons(make: Make) -> None:
+    again = TORCH.replace("two.py", "again.py")
+    folder = make(FIRST, TORCH, again)
+    result = folder.main("check")
+    assert last_line(result.out).endswith(": holds, but for 2 scripts that were not run (no_torch)")
+    folder.write(folder.lesson(3), NORUN + SKIP)
+    result = folder.main("check")
+    assert last_line(result.out).endswith(
+        ": 1 warning, and 2 scripts that were not run (no_torch, norun)"
+    )
+
+
+def test_the_map_lets_scripts_pass_by_name(make: Make) -> None:
+    folder = make(FIRST, TORCH, NORUN)
+    verify(folder, 'strict = true\nunproven = ["examples/three.py"]\n')
+    result = folder.main("check")
+    assert result.status == 1
+    assert "examples/three.py` was not run" not in result.out
+    assert last_line(result.out).endswith(
+        ": 1 error, and 2 scripts that were not run (no_torch, norun)"
+    )
+    verify(folder, 'strict = true\nunproven = ["examples/three.py", "examples/two.py"]\n')
+    for command in ("check", "build"):
+        result = folder.main(command)
+        assert result.status == 0
+        assert last_line(result.out).endswith(
+            ": holds, but for 2 scripts that were not run (no_torch, norun)"
+        )
+
+
+def test_a_course_whose_only_scripts_are_let_pass_is_clean(make: Make) -> None:
+    folder = make(TORCH)
+    verify(folder, 'strict = true\nunproven = ["examples/two.py"]\n')
+    assert folder.main("check").status == 0
+    verify(folder, "strict = true\n")
+    result = folder.main("check")
+    assert result.status == 1
+    assert "error[no-scripts]" in result.out

@@ -1,4 +1,4 @@
-"""Terminals, pipes and signals: the real command in a process of its own."""
+"""Terminals, pipes, signals, completion and editors: the real command in a process of its own."""
 
 from __future__ import annotations
 
@@ -10,18 +10,25 @@ import os
 import pty
 import re
 import select
+import shutil
 import signal
 import struct
 import subprocess
+import sys
 import termios
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from coursebuild.preview.server import open_in_editor
+from support.live_course import Live
+from support.live_course import live as live
 from support.scratch_course import (
+    FIRST,
     GOOD,
+    SECOND,
     SILENT,
     WAIT_FOR_GO,
     Folder,
@@ -36,6 +43,7 @@ from support.scratch_course import (
 from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.site
+
 ERASE = "\r\x1b[K"
 SLOW = """
 import subprocess, sys, time
@@ -322,3 +330,104 @@ def test_the_folder_of_a_course_may_vanish(make: Make, tmp_path: Path) -> None:
     result = folder.run("-C", str(folder.root), "check", cwd=tmp_path)
     assert "Traceback" not in result.err
     assert result.status in (0, 1)
+
+
+@pytest.fixture
+def course(make: Make) -> Folder:
+    folder = make(FIRST, SECOND)
+    folder.write("models/pendulum.xml", "<mujoco/>\n")
+    return folder
+
+
+def complete(folder: Folder, *line: str, cwd: Path | None = None) -> list[str]:
+    result = folder.main("completion", "bash", "--", *line, cwd=cwd)
+    assert (result.status, result.err) == (0, "")
+    return result.out.split("\n")[:-1]
+
+
+def test_words_are_completed_by_where_they_stand(course: Folder, tmp_path: Path) -> None:
+    assert complete(course, "c") == ["check", "completion"]
+    assert {"help", "check", "bench", "-C"} < {*complete(course, "")}
+    assert complete(course, "help", "sta") == ["stability"]
+    assert complete(course, "check", "--fo") == ["--format"]
+    assert complete(course, "check", "--format", "j") == ["json", "junit"]
+    assert complete(course, "check", "--out-of", "") == ["1.1", "1.2"]
+    assert complete(course, "check", "--timings", "") == [], "the shell completes a file"
+    assert complete(course, "update", "1.1", "1") == ["1.1", "1.2"]
+    assert complete(course, "bench", "--quick", "") == ["pendulum"]
+    assert complete(course, "explain", "output-d") == ["output-drift"]
+    assert complete(course, "schema", "") == ["course", "lab", "model", "quiz"]
+    assert "epub" in complete(course, "export", "")
+    assert complete(course, "nosuch", "") == []
+    elsewhere = ("-C", str(course.root), "check", "1")
+    assert complete(course, *elsewhere, cwd=tmp_path) == ["1.1", "1.2"]
+    for text in ("", "[", "level = 3", "[[level]]\nlesson = 2", "\x00"):
+        course.write("content/course.toml", text)
+        assert complete(course, "check", "") == [], text
+
+
+def test_shells_take_what_is_printed(course: Folder, tmp_path: Path) -> None:
+    bin = tmp_path / "bin"
+    bin.mkdir()
+    (bin / "coursebuild").write_text(f'#!/bin/sh\nexec {sys.executable} -m coursebuild "$@"\n')
+    (bin / "coursebuild").chmod(0o755)
+    bash = shutil.which("bash")
+    assert bash is not None
+    code = (
+        f'PATH="{bin}:$PATH"; eval "$(coursebuild completion bash)"; complete -p coursebuild\n'
+        'COMP_WORDS=(coursebuild check 1.2); COMP_CWORD=2; _coursebuild; echo "${COMPREPLY[@]}"\n'
+        'COMP_WORDS=(coursebuild check --tru 1.2); _coursebuild; echo "${COMPREPLY[@]}"\n'
+    )
+    result = subprocess.run(
+        [bash, "-c", code],
+        cwd=course.root,
+        env=course.environment(),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert result.stdout == "complete -o default -F _coursebuild coursebuild\n1.2\n--truth\n"
+    for shell, line in (("zsh", "compdef _coursebuild coursebuild"), ("fish", "complete -c ")):
+        assert line in course.main("completion", shell).out
+
+
+def test_place_opens_in_each_kind_of_editor(
+    make: Make, live: Callable[[Folder], Live], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = make("## One\n\nSee [x](lesson:9.9).\n")
+    session = live(folder).session
+    place = f"{folder.lesson()}:3:9"
+    file = folder.root.resolve() / folder.lesson()
+    bin, calls = tmp_path / "bin", tmp_path / "told"
+    bin.mkdir()
+    monkeypatch.setenv("PATH", str(bin))
+
+    def arguments_of_editor(visual: str, editor: str = "") -> list[str]:
+        monkeypatch.setenv("VISUAL", visual)
+        monkeypatch.setenv("EDITOR", editor)
+        calls.unlink(missing_ok=True)
+        assert open_in_editor(session, place) == ""
+        return calls.read_text().splitlines()
+
+    def install(name: str, ends: int = 0) -> None:
+        (bin / name).write_text(f'#!/bin/sh\nprintf "%s\\n" {name} "$@" > "{calls}"\nexit {ends}\n')
+        (bin / name).chmod(0o755)
+
+    assert open_in_editor(session, place) == (
+        "no editor that opens a window was found: set VISUAL to one, such as `code`"
+    )
+    for name in ("code", "subl", "pycharm", "emacsclient", "gvim", "vim"):
+        install(name)
+    assert arguments_of_editor("code --wait") == ["code", "--wait", "--goto", f"{file}:3:9"]
+    assert arguments_of_editor("", str(bin / "subl")) == ["subl", f"{file}:3:9"]
+    assert arguments_of_editor("pycharm") == ["pycharm", "--line", "3", "--column", "9", str(file)]
+    assert arguments_of_editor("emacsclient -n") == ["emacsclient", "-n", "+3:9", str(file)]
+    assert arguments_of_editor("vim", "gvim") == ["gvim", "+3", str(file)]
+    assert arguments_of_editor("vim", "not-there") == ["code", "--goto", f"{file}:3:9"]
+    calls.unlink()
+    for other_place in (f"{folder.lesson()}:3:8", "content/course.toml:1:1", "/etc/passwd:1:1", ""):
+        assert open_in_editor(session, other_place) == "nothing is wrong there any more"
+    assert not calls.exists()
+    install("gvim", ends=3)
+    monkeypatch.setenv("VISUAL", "gvim")
+    assert open_in_editor(session, place) == "gvim ended with status 3"

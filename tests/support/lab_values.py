@@ -89,5 +89,4 @@ class OpenEngines(Engines):
         """Keep the engines open."""
 
     def close(self) -> None:
-        """Stop the engines."""
         super().__exit__()

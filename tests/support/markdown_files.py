@@ -25,8 +25,6 @@ PAGES = sorted(path for path in DOCS.rglob("*.md") if path.name != "rules.md")
 
 @dataclass(frozen=True, slots=True)
 class Fence:
-    """A code fence."""
-
     page: str
     """The name of the document's file, without its suffix."""
     line: int
@@ -55,7 +53,6 @@ def _tokens(path: Path) -> list[Token]:
 
 
 def fences(path: Path) -> list[Fence]:
-    """The fences of a document, in order."""
     matches = []
     for token in _tokens(path):
         if token.type == "fence" and token.map is not None:

@@ -30,8 +30,6 @@ The usual waits suit a program that saves within a few milliseconds on an idle m
 
 
 class Preview:
-    """A running `coursebuild serve`."""
-
     def __init__(self, folder: Folder, process: subprocess.Popen[bytes]) -> None:
         self.folder = folder
         self.process = process
@@ -143,7 +141,6 @@ class Events:
         return self
 
     def wait_for_change(self) -> Events:
-        """Wait until the page has changed."""
         before = self.state
         return self.until(lambda events: events.state != before)
 

@@ -86,8 +86,6 @@ _ESCAPE = re.compile(rb"\\(?:x([0-9a-f]{2})|(.))")
 
 @dataclass(slots=True)
 class Layout:
-    """The files of a scratch course."""
-
     files: dict[str, bytes] = field(default_factory=dict)
     later: dict[str, bytes] = field(default_factory=dict)
     links: dict[str, str] = field(default_factory=dict)
@@ -135,13 +133,11 @@ class Layout:
             (root / path).symlink_to(target)
 
     def write_later(self, root: Path) -> None:
-        """Put the later files there."""
         for path, data in self.later.items():
             write_file(root / path, data)
 
 
 def write_file(path: Path, data: bytes) -> None:
-    """Write a file, its folder as well."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(data)
 

@@ -107,7 +107,6 @@ class Folder:
         return self.read(path).decode()
 
     def replace(self, path: str, old: str, new: str) -> None:
-        """An author's edit."""
         text = self.text(path)
         assert text.count(old) == 1, f"{old!r} occurs {text.count(old)} times in {path}"
         self.write(path, text.replace(old, new))
@@ -149,7 +148,6 @@ class Folder:
         return Options(root, jobs, Store(root))
 
     def main(self, *arguments: str, cwd: Path | None = None) -> CommandResult:
-        """Run a command in this process."""
         out, err = io.StringIO(), io.StringIO()
         with (
             contextlib.chdir(cwd or self.root),
@@ -170,7 +168,6 @@ class Folder:
         env: Mapping[str, str] | None = None,
         seconds: float = 600.0,
     ) -> CommandResult:
-        """Run a command in a process of its own."""
         process = subprocess.run(
             command(*arguments),
             cwd=cwd or self.root,

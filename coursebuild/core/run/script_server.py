@@ -281,7 +281,8 @@ class _Work:
                 if worker.is_reused:  # it may have been dying before it was given the job
                     self.pending.insert(0, index)
                     return False
-                if self.interpreter is not None and worker.status() > 0:
+                is_ended = worker.excess is not None  # by us, whatever the sandbox makes of it
+                if self.interpreter is not None and not is_ended and worker.status() > 0:
                     raise EffectError(f"{self.interpreter.python} cannot run scripts")
                 status = worker.status() if self.sandbox is None else -signal.SIGKILL
                 self._finish(index, _lost_run(self.jobs[index].path, status, worker.excess))

@@ -1,8 +1,10 @@
-"""Anchors of lines and outputs, and how they are checked."""
+"""Listings: highlighted lines, their anchors and how those are checked, what is folded."""
 
 from __future__ import annotations
 
+import itertools
 import re
+from html import unescape
 
 import pytest
 from hypothesis import given
@@ -10,7 +12,9 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model import line_anchor, linked_lines, listing_anchor, output_anchor
 from coursebuild.core.model.results import OutputFile
+from coursebuild.core.pages.listings import HEAD, LONG, Part, find_imports, fold, highlight_lines
 from coursebuild.core.pages.references import check_links, has_anchor, merge_line_ids
+from coursebuild.core.text.characters import visible
 from coursebuild.features.lab.page import qr_svg
 from support.rendered_course import Make
 
@@ -101,3 +105,177 @@ def test_of_the_lines_of_a_listing_the_last_is_kept(ids: list[str]) -> None:
     short = merge_line_ids(ids)
     assert short == other_ids | {f"{stem}.L{line}" for stem, line in last.items()}
     assert all(has_anchor(short, name) for name in ids)
+
+
+def function(name: str, lines: int) -> str:
+    return f"def {name}():\n" + "    x = 1\n" * (lines - 1)
+
+
+HEADER = '"""Title.\n\nText\n"""\n\nimport math\nfrom a import b\n\n'
+GUARD = 'if __name__ == "__main__":\n    one()\n'
+
+
+def test_head_and_rest_are_folded_and_the_guard_stays() -> None:
+    code = HEADER + "G: float = 9.81\n\n" + function("one", 40) + "\n\n" + function("two", 20)
+    code += "Z = 3\n\n\n" + GUARD
+    assert fold(code) == (
+        Part(1, 10, True, docstring=True, imports=True, names=("G",)),
+        Part(11, 50, False),
+        Part(51, 75, True, names=("two", "Z")),
+        Part(76, 77, False),
+    )
+
+
+def test_modules_that_a_script_imports() -> None:
+    code = (
+        "import a.b as c, d\nfrom e.f import g\nfrom . import h\nfrom .i import j\n"
+        "try:\n    import k\nexcept ImportError:\n    import l\nelse:\n    import m\n"
+        "finally:\n    import n\ndef go():\n    if True:\n        from o import *\n"
+        "match 1:\n    case 1:\n        import p\n"
+    )
+    assert find_imports(code) == frozenset("adeklmnop")
+    assert find_imports(f"{code}(") == frozenset()
+
+
+def test_assignments_are_no_constants_where_something_is_done_at_once() -> None:
+    code = HEADER + "a = 1\nprint(a)\n" * 30
+    assert fold(code)[0] == Part(1, 8, True, docstring=True, imports=True)
+
+
+def test_decorators_and_comments_stay_with_what_they_belong_to() -> None:
+    code = function("one", 44) + "\n# About two.\n# More.\n@cache\n" + function("two", 20)
+    parts = fold(code)
+    assert parts == (Part(1, 44, False), Part(45, 68, True, names=("two",)))
+    assert code.split("\n")[parts[1].first] == "# About two."
+
+
+def test_44_lines_of_the_rest_are_shown_and_no_more() -> None:
+    rest = function("three", 20)
+    fits = function("one", 20) + function("two", 24)
+    assert fold(fits + rest) == (Part(1, 44, False), Part(45, 64, True, names=("three",)))
+    longer = function("one", 20) + function("two", 25)
+    assert fold(longer + rest) == (Part(1, 20, False), Part(21, 65, True, names=("two", "three")))
+
+
+def test_a_remainder_is_folded_from_12_lines_on() -> None:
+    assert fold(function("one", 44) + function("two", 11)) == (Part(1, 55, False),)
+    parts = (Part(1, 44, False), Part(45, 56, True, names=("two",)))
+    assert fold(function("one", 44) + function("two", 12)) == parts
+
+
+def test_a_guard_of_up_to_12_lines_stays() -> None:
+    code = function("one", 44) + function("two", 20) + 'if __name__ == "__main__":\n'
+    parts = (Part(1, 44, False), Part(45, 64, True, names=("two",)), Part(65, 76, False))
+    assert fold(code + "    one()\n" * 11) == parts
+    assert fold(code + "    one()\n" * 12)[1:] == (Part(45, 77, True, names=("two",)),)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        HEADER + function("one", LONG - 8),
+        function("one", 44) + function("two", 6),
+        function("one", 300),
+        "(\n" * 50,  # which does not parse
+        "\n",
+        "a = 1; b = 2\n" * 60,
+    ],
+)
+def test_what_has_no_part_to_fold_is_shown_whole(code: str) -> None:
+    assert fold(code) == (Part(1, code.count("\n"), False),)
+
+
+STATEMENTS = st.sampled_from(
+    [
+        "import a\n",
+        "x = 1\n",
+        "\n",
+        "# note\n",
+        function("f", 9),
+        function("g", 30),
+        GUARD,
+        '"""d"""\n',
+    ]
+)
+
+
+@given(st.lists(STATEMENTS, max_size=30))
+def test_parts_follow_each_other_and_cover_the_script(pieces: list[str]) -> None:
+    code = "".join(pieces)
+    parts = fold(code)
+    assert parts[0].first == 1
+    assert parts[-1].last == max(code.count("\n"), 1)
+    for previous, next_part in itertools.pairwise(parts):
+        assert next_part.first == previous.last + 1
+        assert previous.folded or next_part.folded
+    assert any(not part.folded for part in parts)
+    assert all(part.last - part.first + 1 >= HEAD for part in parts if part.folded)
+
+
+def highlight(language: str, code: str) -> str:
+    return "\n".join(highlight_lines(language, code))
+
+
+def test_python_gets_classes_for_what_a_reader_looks_for() -> None:
+    code = 'def spin(rate: float) -> str:\n    return f"{rate:.3f} rad/s"  # <slow>\n'
+    assert highlight("python", code) == (
+        '<span class="k">def</span> <span class="f">spin</span>(rate: float) -&gt; str:\n'
+        '    <span class="k">return</span> <span class="s">f"</span><span class="i">{</span>rate'
+        '<span class="i">:</span><span class="s">.3f</span><span class="i">}</span>'
+        ' <span class="s">rad/s"</span>  <span class="c"># &lt;slow&gt;</span>\n'
+    )
+
+
+def test_a_docstring_a_decorator_and_nested_fields_have_their_classes() -> None:
+    code = '"""Doc."""\n@cache\ndef f():\n    return f"{x!r:>{w}}"\n'
+    assert highlight("python", code) == (
+        '<span class="d">"""Doc."""</span>\n<span class="a">@cache</span>\n'
+        '<span class="k">def</span> <span class="f">f</span>():\n'
+        '    <span class="k">return</span> <span class="s">f"</span><span class="i">{</span>x'
+        '<span class="i">!r:</span><span class="s">&gt;</span><span class="i">{</span>w'
+        '<span class="i">}}</span><span class="s">"</span>\n'
+    )
+
+
+def test_python_that_does_not_parse_is_marked_as_far_as_it_can_be_read() -> None:
+    assert highlight("python", "def (:\n    x = 1  # ν\n") == (
+        '<span class="k">def</span> (:\n    x = <span class="n">1</span>'
+        '  <span class="c"># ν</span>\n'
+    )
+
+
+def test_a_very_long_script_is_marked_too() -> None:
+    for lines in (highlight_lines("python", "x = 1\n" * n) for n in (3000, 4000)):
+        assert {*lines[:-1]} == {'x = <span class="n">1</span>'}
+
+
+@pytest.mark.parametrize("language", ["", "no such language", "text", "jsön", "../x", "<b>"])
+def test_unknown_languages_are_plain_escaped_text(language: str) -> None:
+    assert highlight(language, "a < b & c\n") == "a &lt; b &amp; c\n"
+
+
+def test_forbidden_characters_are_shown_as_symbols() -> None:
+    expected = "\u241b[31mred\u241b[0m\u2400\u240d\u2421\ufffd\ufffd\ufffd\t\n"
+    assert visible("\x1b[31mred\x1b[0m\0\r\x7f\x85\ufffe\U0010ffff\t\n") == expected
+
+
+@given(st.text())
+def test_visible_text_has_nothing_that_html_forbids(text: str) -> None:
+    for character in visible(text):
+        code = ord(character)
+        assert code in (9, 10) or code >= 0x20
+        assert not 0x7F <= code < 0xA0
+        assert code & 0xFFFE != 0xFFFE
+        assert not 0xFDD0 <= code <= 0xFDEF
+
+
+LANGUAGES = "python xml json bash sh text c++ diff console pycon pytb doscon ps1con irc".split()
+UNENDED_LINE = "$ run it\nerror: x\n    = help: `y` <z>"
+"""Some lexers see lines that end only, which the last line of a block does not."""
+
+
+@given(st.sampled_from(LANGUAGES), st.text() | st.sampled_from([UNENDED_LINE, ">>> 1\n1", " x "]))
+def test_highlighting_keeps_every_character(language: str, text: str) -> None:
+    lines = [re.sub(r"</?span[^>]*>", "", line) for line in highlight_lines(language, text)]
+    assert unescape("\n".join(lines)) == visible(text)
+    assert all(line.count("<span") == line.count("</span>") for line in lines)

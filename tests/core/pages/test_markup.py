@@ -1,7 +1,10 @@
-"""Blocks and inlines into HTML: what CommonMark's own examples do not show."""
+"""Blocks, inlines and formulas into HTML: what CommonMark's own examples do not show."""
 
 from __future__ import annotations
 
+import re
+from html import unescape
+from re import findall, sub
 from typing import Literal
 
 import pytest
@@ -10,12 +13,20 @@ from hypothesis import strategies as st
 from markupsafe import Markup
 
 from coursebuild.core.model import Document, NumberBinding, Target, Text
+from coursebuild.core.pages.formulas import glue_formulas, split_formula
 from coursebuild.core.pages.markup import SpecialBlock
-from coursebuild.core.pages.quantities import isolate_ltr, join_units, split_quantities
-from coursebuild.core.pages.strings import Strings, parse_strings
+from coursebuild.core.pages.quantities import (
+    isolate_ltr,
+    join_units,
+    split_quantities,
+    text_html,
+    unit_length,
+)
+from coursebuild.core.pages.strings import Strings, direction, parse_strings
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source, Span
 from support.plain_html import WORDS, PlainWriter
+from support.rendered_course import MAP, Make
 
 KINDS = frozenset({"note"})
 
@@ -173,3 +184,227 @@ def test_text_has_its_quantities_kept_and_is_escaped(text: str) -> None:
     expected = "".join(isolate_ltr(html) if is_quantity else html for html, is_quantity in pieces)
     assert Writer(direction="rtl").inlines(inlines) == expected
     assert Writer().inlines(inlines) == text.translate(_ESCAPES)
+
+
+SCRIPT = """```python file=examples/a.py
+print("<one>")
+```
+"""
+OUTPUT = """
+Output, in order:
+
+```text
+one  <1>
+two
+```
+"""
+
+
+def receipt(html: str) -> str:
+    return html.split('<p class="receipt ')[1].split("</p>")[0].replace('">', ": ")
+
+
+def test_a_script_and_its_output_are_one_object_in_callouts_and_lists_too(make: Make) -> None:
+    lines = (SCRIPT + OUTPUT).strip().split("\n")
+    for first, indent in (("> ", "> "), ("- ", "  ")):
+        html = make(first + f"\n{indent}".join(lines)).html()
+        assert html.count("<figure") == 1
+        assert html.count("<samp>") == 1
+
+
+def test_an_output_in_the_next_list_item_stays_apart_from_the_script(make: Make) -> None:
+    text = "- x\n\n" + "\n".join(f"  {line}" for line in SCRIPT.split("\n"))
+    text += "\n- " + "\n  ".join(OUTPUT.strip().split("\n"))
+    assert make(text).html().count("<figure") == 2
+
+
+@pytest.mark.parametrize(
+    ("keys", "status", "expected"),
+    [
+        (" atol=1e-12", "verified", "verified: Verified with MuJoCo 3.14.0, Python 3.11.7: "
+         "every number to within 1e-12."),
+        (' volatile="[0-9.]+ s"', "verified",
+         "verified: Verified with MuJoCo 3.14.0, Python 3.11.7: the same text, character by "
+         "character; what matches [0-9.]+ s varies from run to run and is not compared."),
+        ("", "unchecked", "unverified: Not verified: the script was not run to its end."),
+        ("", "drift", "unverified: Not verified: with MuJoCo 3.14.0, Python 3.11.7 the script "
+         "prints something else."),
+    ],
+)  # fmt: skip
+def test_the_receipt_of_an_output_says_how_it_was_compared(
+    make: Make, keys: str, status: str, expected: str
+) -> None:
+    """`tests/courses/full` has the other comparisons."""
+    course = make(SCRIPT + OUTPUT.replace("text", f"text{keys}"), status=status)
+    assert receipt(course.html()) == expected
+
+
+def test_a_keyframe_without_a_name_is_numbered(make: Make) -> None:
+    assert "keyframe <code>1</code>" in make('```lab\n{"model": "box", "key": 1}\n```\n').html()
+
+
+def test_a_long_script_is_folded_and_loses_no_line(make: Make) -> None:
+    body = '"""Doc."""\n\nimport math\nimport sys\n\nA = 1\nB = 2\nC = 3\n\n'
+    body += "".join(f"def f{i}():\n" + "    return 1\n" * 12 + "\n\n" for i in range(8))
+    html = make(f"```python file=examples/a.py\n{body}```\n").html()
+    assert "<summary>lines 1–9: docstring, imports, A, B, C</summary>" in html
+    assert "<summary>lines 38–127: f2, f3, f4, f5, f6, f7</summary>" in html
+    code = "".join(findall(r"<code class=\"language-python\">(.*?)</code></pre>", html, flags=16))
+    assert unescape(sub(r"</?span[^>]*>", "", code)) == body.rstrip("\n") + "\n"
+
+
+def test_control_characters_of_an_output_are_shown(make: Make) -> None:
+    html = make(SCRIPT + OUTPUT.replace("two", "\x1b[31mtwo\x07")).html()
+    assert "␛[31mtwo␇" in html
+
+
+def test_code_without_a_file_is_shown_with_its_language_escaped(make: Make) -> None:
+    assert make("```sh\nls *.py\n```\n").html() == (
+        '<div class="code" data-copy>\n<pre tabindex="0" role="group" aria-label="Code">'
+        '<code class="language-sh">ls *.py\n</code></pre>\n</div>\n'
+    )
+    assert 'class="language-python"' in make("```python fragment\nx = (\n```\n").html()
+    hostile = make('```"><script>alert(1)</script>\nx\n```\n').html()
+    assert "<script" not in hostile
+
+
+ROW = "<mrow><mi>alpha</mi><mrow><mi>beta</mi></mrow><mo>=</mo></mrow>"
+END = "<mrow><mi>gamma</mi><mo>+</mo><mn>123456</mn></mrow>"
+
+
+@pytest.mark.parametrize("space", ["", "<mspace/>"])
+def test_a_long_formula_is_cut_between_its_outermost_rows(space: str) -> None:
+    expected = f"<math>{ROW}</math><math>{space}{END}</math>"
+    assert split_formula(f"<math>{ROW}{space}{END}</math>") == expected
+
+
+@pytest.mark.parametrize(
+    "mathml",
+    [
+        f"<math>{ROW}</math>",
+        "<math><mrow><mi>a</mi><mo>=</mo></mrow><mrow><mi>b</mi></mrow></math>",
+        f'<math display="block">{ROW}{END}</math>',
+        f"<math>{ROW}{END}<mo>+</mo></math>",
+    ],
+)
+def test_short_displayed_and_open_formulas_stay_whole(mathml: str) -> None:
+    assert split_formula(mathml) == mathml
+
+
+X = "<math><mi>x</mi></math>"
+Y = "<math><mi>y</mi></math>"
+
+
+@pytest.mark.parametrize(
+    ("html", "expected"),
+    [
+        (f"axis {X}, {Y}.", f'axis <span class="held">{X},</span> <span class="held">{Y}.</span>'),
+        (f"({X})", f'<span class="held">({X})</span>'),
+        (f"{X}\u00a0m, to", f'<span class="held">{X}\u00a0m,</span> to'),
+        (f"{Y}\u00a0kg<sup>2</sup>", f'<span class="held">{Y}\u00a0kg</span><sup>2</sup>'),
+        (f"{X} m, {Y}\u00a0", f"{X} m, {Y}\u00a0"),
+        (f"“{X}”, so", f'<span class="held">“{X}”,</span> so'),
+        (f"{X} and {X}", f"{X} and {X}"),
+        (f"({X}{Y}{X})!", f'<span class="held">({X}</span>{Y}<span class="held">{X})!</span>'),
+        (f"{X}{Y},", f'{X}<span class="held">{Y},</span>'),
+        (f"<p>{X}</p>", f"<p>{X}</p>"),
+        (f'<math display="block">{X}</math>', f'<math display="block">{X}</math>'),
+        ("no formula, here", "no formula, here"),
+    ],
+)  # fmt: skip
+def test_punctuation_stays_on_the_line_of_its_formula(html: str, expected: str) -> None:
+    assert glue_formulas(html) == expected
+
+
+START, TWO = "of <math><mrow>", "<mn>2</mn>"
+NOTE = '<annotation encoding="application/x-tex">=2</annotation></semantics></math>'
+
+
+@pytest.mark.parametrize(
+    ("html", "expected"),
+    [
+        (f"{START}<mo>=</mo>{TWO}</mrow>", f'{START}<mo lspace="0em">=</mo>{TWO}</mrow>'),
+        (f"\n<math><semantics><mo>≈</mo>{TWO}", f'\n<math><semantics><mo lspace="0em">≈</mo>{TWO}'),
+        (f"{TWO}<mo>&lt;</mo></mrow>{NOTE} 3", f'{TWO}<mo rspace="0em">&lt;</mo></mrow>{NOTE} 3'),
+        ("a <math><mo>=</mo></math> b", 'a <math><mo lspace="0em" rspace="0em">=</mo></math> b'),
+        *((unchanged, unchanged) for unchanged in (
+            f"of {X}<math><mo>=</mo>{TWO}</math> m",
+            f"of <math>{TWO}<mo>=</mo></math><math>{TWO}</math> m",
+            f"of <math><mo>sin</mo>{TWO}</math> m",
+            f'of <math><mo lspace="0em">−</mo>{TWO}</math> m',
+        )),
+    ],
+)  # fmt: skip
+def test_an_operator_beside_a_space_of_the_text_has_none(html: str, expected: str) -> None:
+    assert glue_formulas(html) == expected
+
+
+LANGUAGES = {
+    "rtl": "ar ar-EG AR he iw fa fa-IR ur yi ps sd ug dv ckb ks az-Arab uz-Arab-AF en-Hebr pa-PK"
+    " nqo syr ku-IQ",
+    "ltr": "en de pt-BR zh-Hant az pa ku uz ur-Latn ar-Latn ks-Deva sr-Cyrl xx en-x-arab"
+    " de-u-nu-arab tr mt so",
+}
+
+
+@pytest.mark.parametrize("side", LANGUAGES)
+def test_the_direction_of_a_language_is_that_of_its_script(side: str) -> None:
+    assert [code for code in LANGUAGES[side].split() if direction(code) != side] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a mass of 5 kg falls", "a mass of 5\u00a0kg falls"),
+        ("9.81 m/s² and 3 N·m", "9.81\u00a0m/s² and 3\u00a0N·m"),
+        ("20 % of 3 ms", "20\u00a0% of 3\u00a0ms"),
+        ("3 minutes, 5 metres, 2 of them", "3 minutes, 5 metres, 2 of them"),
+        ("see 4.2 and 4.3", "see 4.2 and 4.3"),
+        ("30 °C, 2 kΩ, 4 µm, 4 μm", "30\u00a0°C, 2\u00a0kΩ, 4\u00a0µm, 4\u00a0μm"),
+        ("in 2 steps a 5 kg\nbox", "in 2 steps a 5\u00a0kg\nbox"),
+        ("3 kg m² of 4 N m s/rad", "3\u00a0kg\u00a0m² of 4\u00a0N\u00a0m\u00a0s/rad"),
+        ("5 kg mass, 2 m in 3 s more", "5\u00a0kg mass, 2\u00a0m in 3\u00a0s more"),
+    ],
+)
+def test_numbers_keep_their_units(text: str, expected: str) -> None:
+    assert join_units(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("التسارع -9.81 m/s² هنا", ["-9.81 m/s²"]),
+        ("من −3 إلى +4.5", ["−3", "+4.5"]),
+        ("القيمة +3.2×10^-4 فقط", ["+3.2×10^-4"]),
+        ("الكتلة 2 kg، ثم 3", ["2 kg"]),
+        ("MuJoCo 3.14 و MuJoCo 3 kg", []),
+        ("2024-11-20", []),
+    ],
+)
+def test_quantities_in_text_from_the_right(text: str, expected: list[str]) -> None:
+    pieces = list(split_quantities(text))
+    assert [piece for piece, is_quantity in pieces if is_quantity] == expected
+    assert "".join(piece for piece, _ in pieces) == text
+
+
+@given(st.text(alphabet="0123456789.,-+−×^ kgms²/°%بة\u00a0<&"))
+def test_finding_quantities_loses_no_character(text: str) -> None:
+    assert "".join(piece for piece, _ in split_quantities(text)) == text
+    assert join_units(text).replace("\u00a0", " ") == text.replace("\u00a0", " ")
+    assert 0 <= unit_length(text) <= len(text)
+
+    for side in ("ltr", "rtl"):
+        html = str(text_html(text, side))
+        assert unescape(re.sub("</?bdi[^>]*>", "", html)) == join_units(text)
+
+
+def test_pages_say_their_direction_and_hold_numbers_and_units_together(make: Make) -> None:
+    hebrew = MAP.replace('"en"', '"he"').replace("A body falls.", "-3 m")
+    course = make("It is $x$ kg and $y$ kilos.", course=hebrew)
+    page = course.site()["lessons/0.1-falling.html"].decode()
+    assert '<html lang="he" dir="rtl" ' in page
+    assert '<p class="lead"><bdi dir="ltr">-3\u00a0m</bdi></p>' in page
+    math = '<math class="inline"><mi>x</mi></math>'
+    assert f'<bdi dir="ltr">{math}\u00a0kg</bdi> and ' in course.html()
+    assert course.html().count("<bdi") == 1
+    assert f"{math}\u00a0kg and " in make("It is $x$ kg and $y$ kilos.").html()

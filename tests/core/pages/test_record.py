@@ -1,10 +1,12 @@
-"""What is changed in a page that was just drawn, and what is noted of it."""
+"""HTML as browsers read it: what is changed in a page that was just drawn, and noted of it."""
 
 from __future__ import annotations
 
 import re
-from html import unescape
+from html import escape, unescape
+from xml.etree import ElementTree
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from markupsafe import Markup
@@ -12,8 +14,103 @@ from markupsafe import Markup
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.pages.fonts import BASE
 from coursebuild.core.pages.frame import FRAME_IDS
+from coursebuild.core.pages.html_tree import HtmlElement, parse_html, to_html, to_xml
 from coursebuild.core.pages.page_inputs import PageHead
-from coursebuild.core.pages.record import PageRecord, class_name, record
+from coursebuild.core.pages.record import PageRecord, class_name, hoist_styles, record
+from coursebuild.core.pages.theme import dark_colours, dark_drawing
+from support.hostile_html import PAGES
+
+
+@pytest.mark.parametrize(
+    ("html", "expected"),
+    [
+        ("<p>a<p>b", "<p>a</p><p>b</p>"),
+        ("<table><tr><td>1<td>2", "<table><tbody><tr><td>1</td><td>2</td></tr></tbody></table>"),
+        ("<b>a<i>b</b>c</i>", "<b>a<i>b</i></b><i>c</i>"),
+        ("<table>out<tr><td>in", "out<table><tbody><tr><td>in</td></tr></tbody></table>"),
+        ("&lt;&amp;&nbsp;<!-- c -->", "&lt;&amp;\xa0"),
+        ("</body></html>a<body onload=x><title>b", "a<title>b</title>"),
+        ('<svg viewBox="0" xlink:href="#"><path/></svg>',
+         '<svg viewBox="0" xlink:href="#"><path></path></svg>'),
+        ("<script>a<b</script>", "<script>a<b</script>"),
+        ("<pre>\n\na</pre>", "<pre>\n\na</pre>"),
+        ("\x00\ud800<p title='\"&'>", "?<p title=\"&quot;&amp;\"></p>"),
+    ],
+)  # fmt: skip
+def test_html_is_read_as_by_a_browser(html: str, expected: str) -> None:
+    assert to_html(parse_html(html)) == expected
+
+
+@given(PAGES | st.text())
+def test_whatever_is_read_is_written_as_xml(html: str) -> None:
+    ElementTree.fromstring(f"<body>{to_xml(parse_html(html))}</body>")
+
+
+def test_deep_html_is_brought_up_and_loses_no_text() -> None:
+    tree = parse_html("<div>" * 5000 + "deep" + "</div>" * 5000 + "end")
+    assert "".join(c if isinstance(c, str) else c.text for c in tree) == "deepend"
+
+
+def test_elements_are_found() -> None:
+    (root,) = parse_html('<div class="a b"><p><b>1</b></p><b>2<b>3</b></b></div>')
+    assert isinstance(root, HtmlElement)
+    assert root.classes == {"a", "b"} and root.text == "123"
+    assert [element.text for element in root.nearest("b")] == ["1", "23"]
+
+
+PAD = class_name("padding: 0")
+
+
+@pytest.mark.parametrize(
+    ("html", "expected"),
+    [
+        ('<mtd style="padding: 0;">', f'<mtd class="{PAD}">'),
+        ('<mtd class="tml-left" style="padding: 0;"/>', f'<mtd class="tml-left {PAD}"/>'),
+        ("<b style='padding:\n 0' title='a > b'>", f"<b class=\"{PAD}\" title='a > b'>"),
+        ('<b STYLE="padding: 0" class=x id=y>', f'<b class="x {PAD}" id=y>'),
+        ('<b style="">', "<b>"),
+        ("<b style>", "<b>"),
+        ('<b class="x" style=";">', '<b class="x">'),
+        ('<b style="background: url(&quot;a&quot;)">', None),
+    ],
+)
+def test_a_style_becomes_a_class(html: str, expected: str | None) -> None:
+    page, declarations = hoist_styles(html)
+    assert page == (
+        expected or f'<b class="{class_name("background: url(" + chr(34) + "a" + chr(34) + ")")}">'
+    )
+    assert "style" not in page.lower().replace(PAD, "")
+    assert len(declarations) == ("padding" in html or "background" in html)
+
+
+@pytest.mark.parametrize(
+    "html",
+    [
+        '<!-- <b style="padding: 0"> -->',
+        "<script>\"<b style='padding: 0'>\"</script>",
+        "<p>style=\"padding: 0\" &lt;b style='x'></p>",
+        '<b title="style=x" data-style="y">',
+        '<textarea><b style="padding: 0"></textarea>',
+        "<b title='<i style=\"padding: 0\">'>",
+    ],
+)
+def test_what_only_looks_like_a_style_stays(html: str) -> None:
+    assert hoist_styles(html) == (html, frozenset())
+
+
+@pytest.mark.parametrize(
+    "declaration",
+    ["} body { display: none", "color: red /* ", 'content: "', "a: </style>", "a: \\7d"],
+)
+def test_a_declaration_cannot_reach_out_of_its_rule(declaration: str) -> None:
+    assert hoist_styles(f'<b style="{escape(declaration)}">') == ("<b>", frozenset())
+
+
+@given(st.text(alphabet="<>/=\"' abcstyle-!\n"))
+def test_any_text_is_taken_and_the_result_has_nothing_more_to_take(html: str) -> None:
+    page, _ = hoist_styles(html)
+    assert hoist_styles(page)[0] == page
+
 
 PIECES = [
     *("<math><mi>x</mi><mo>&lt;</mo></math>", '<math display="block"><mi>α</mi></math>', "<math>"),
@@ -75,3 +172,19 @@ def test_an_id_that_the_page_or_its_frame_has_already_is_noted() -> None:
     assert frozenset(re.findall(r'\bid="([^"]*)"', base)) == FRAME_IDS
     for name in FRAME_IDS:
         assert record_of(f'<p id="{name}">')[0].repeated_ids == ((name, 0, 0),)
+
+
+DRAWING = """<svg viewBox="0 0 9 9"><style>.a{fill:#0072B2}</style>
+<defs><g id="x1"/></defs>
+<path class="a" style="stroke: #1e1e1c; fill-opacity: 1" fill="none"/>
+<path stroke="blue" fill="url(#x1)"/><use href="#x1" color="#fff"/></svg>"""
+DARK = """<svg fill="#ffffff" viewBox="0 0 9 9"><style>.a{fill:#56b4e9}</style>
+<defs><g id="x1"/></defs>
+<path class="a" style="stroke: #e6e3dc; fill-opacity: 1" fill="none"/>
+<path stroke="#dadaff" fill="url(#x1)"/><use href="#x1" color="#000000"/></svg>"""
+CSS = """--a: light-dark(#0072b2, #56b4e9); --b: light-dark(#1e1e1c,#e6e3dc);
+--c: light-dark(#0072b2, #000000); --d: light-dark(rgb(1 2 3 / 5%), #111111)"""
+
+
+def test_colours_of_pages_are_known_and_others_turned_round() -> None:
+    assert dark_drawing(DRAWING, dark_colours(CSS)) == DARK

@@ -1,4 +1,4 @@
-"""The whole site: its files, the same bytes each time, no broken link, nothing hostile in it."""
+"""The whole site: its files, the same bytes each time, its addresses, nothing hostile in it."""
 
 from __future__ import annotations
 
@@ -8,13 +8,19 @@ import json
 import re
 from html import unescape
 from html.parser import HTMLParser
+from itertools import product
+from urllib.parse import unquote, urljoin, urlsplit
 from xml.etree import ElementTree
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from coursebuild.core.model import local_file
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.references import check_links
+from coursebuild.core.pages.urls import Place, dark_path, file_path
 from support.rendered_course import MAP, Make
 
 LESSON = """## First part
@@ -238,3 +244,127 @@ def test_styles_in_elements_become_classes_of_the_sheet(make: Make) -> None:
     (name,) = re.findall(r'<p class="(s[0-9a-f]{7})">x</p>', page)
     (sheet,) = (data.decode() for path, data in site.items() if path.endswith(".css"))
     assert sheet.endswith(f".{name}{{color: red}}\n")
+
+
+def linked_site(page: str, path: str = "lessons/a.html") -> tuple[OutputFile, ...]:
+    return (
+        OutputFile(path, page.encode()),
+        OutputFile("index.html", b'<h1 id="top-level">x</h1><a name="old"></a>'),
+        OutputFile("levels/1 x.html", b'<p id="\xc3\xbcber">x</p>'),
+        OutputFile("assets/site.css", b""),
+        OutputFile("deep/index.html", b"<p id=x>"),
+    )
+
+
+def test_links_that_lead_somewhere_are_not_told() -> None:
+    page = """<p id=here>
+    <a href="#here">1</a> <a href="../index.html#top-level">2</a> <a href="../#old">3</a>
+    <a href="../levels/1%20x.html#%C3%BCber">4</a> <a href="">5</a> <a href="#top">6</a>
+    <a href="https://elsewhere.org/nothing">7</a> <a href="mailto:a@b.c">8</a> <a href="tel:1">9</a>
+    <a href="data:text/plain,x">10</a> <link rel=stylesheet href="../assets/site.css?v=1">
+    <a href="../deep/#x">11</a>
+    <img src=" ../assets/site.css " srcset="../assets/site.css 2x, a.html">
+    <a href="//elsewhere.org/x">12</a> <a>13</a> <!-- <a href="gone.html"> -->
+    """
+    assert check_links(linked_site(page)) == ()
+
+
+def test_broken_links_are_reported_with_the_nearest_target() -> None:
+    page = (
+        '<p id="conservation">\n<a href="#conservatoin">1</a>\n'
+        '<img src="../assets/sites.css" srcset="x.png 2x">\n<a href="../../up.html">2</a>'
+        '<a href="b.html#x">3</a><script src=gone.js></script><a href="http://[">4</a>'
+    )
+    broken_links = [
+        (broken.url, broken.reason, broken.suggestion) for broken in check_links(linked_site(page))
+    ]
+    assert broken_links == [
+        ("#conservatoin", "`lessons/a.html` has no anchor `#conservatoin`", "conservation"),
+        ("../../up.html", "no file `up.html` in the site", None),
+        ("../assets/sites.css", "no file `assets/sites.css` in the site", "assets/site.css"),
+        ("b.html#x", "no file `lessons/b.html` in the site", "lessons/a.html"),
+        ("gone.js", "no file `lessons/gone.js` in the site", None),
+        ("http://[", "the address cannot be read", None),
+        ("x.png", "no file `lessons/x.png` in the site", None),
+    ]
+
+
+def test_links_of_a_site_below_a_path_stay_below_it() -> None:
+    page = (
+        '<a href="/course/index.html">1</a><a href="/index.html">2</a>'
+        '<a href="https://h.org/course/levels/">3</a><a href="https://h.org/other/">4</a>'
+        '<a href="../../index.html">5</a>'
+    )
+    broken = check_links(linked_site(page), "https://h.org/course/")
+    assert [(b.url, b.reason) for b in broken] == [
+        ("../../index.html", "the address leads out of the site"),
+        ("/index.html", "the address leads out of the site"),
+        ("https://h.org/course/levels/", "no file `levels/index.html` in the site"),
+    ]
+
+
+PATHS = [
+    "index.html",
+    "about.html",
+    "404.html",
+    "lessons/4.2-mass-and-inertia.html",
+    "models/arms/left hand.xml",
+    "examples/l4_2.py",
+    "a:b.html",
+    "levels/ü%23.html",
+]
+
+
+BASES = ("https://h/", "https://h/deep/er/", "file:///home/u/site/")
+
+
+def test_files_of_a_course_lie_apart_but_for_those_that_a_model_includes() -> None:
+    assert file_path("content/lessons/sketch.svg") == "files/lessons/sketch.svg"
+    assert dark_path("content/lessons/sketch.svg") == "files/lessons/sketch.dark.svg"
+    assert file_path("models/meshes/hand.obj") == "models/meshes/hand.obj"
+
+
+def test_a_browser_resolves_an_address_to_its_path() -> None:
+    for start, end in product(PATHS, PATHS):
+        href = Place(start).href(end, "x y")
+        assert not href.startswith("/") and "//" not in href, (start, end)
+        for base in BASES:
+            page = base + (start if start == "index.html" else Place("index.html").href(start))
+            address = urlsplit(urljoin(page, href))
+            expected = (urlsplit(base).path + end, "x%20y")
+            assert (unquote(address.path), address.fragment) == expected, (base, start, end)
+
+
+def test_addresses_are_as_short_as_they_can_be() -> None:
+    place = Place("lessons/1-a.html")
+    assert place.href("lessons/1-a.html", "b") == "#b"
+    assert place.href("lessons/1-a.html") == "1-a.html"
+    assert place.href("lessons/2-b.html") == "2-b.html"
+    assert place.href("index.html") == "../index.html"
+
+
+def test_the_page_for_missing_addresses_starts_at_the_root() -> None:
+    place = Place("404.html", "/course/")
+    assert place.href("index.html") == "/course/"
+    assert place.href("assets/site.css") == "/course/assets/site.css"
+
+
+@pytest.mark.parametrize(
+    ("url", "path"),
+    [
+        ("sketch.svg", "content/lessons/sketch.svg"),
+        ("./a%20b.png", "content/lessons/a b.png"),
+        ("../pages/x.csv?raw#L3", "content/pages/x.csv"),
+        ("/content/x.png", "content/x.png"),
+    ],
+)
+def test_files_are_named_from_the_document(url: str, path: str) -> None:
+    assert local_file(url, "content/lessons/4.2-x.md") == path
+
+
+@given(st.text(st.characters(exclude_categories=["Cs"], exclude_characters="/"), min_size=1))
+def test_the_address_of_any_file_name_leads_to_it(name: str) -> None:
+    path = f"files/{name}"
+    href = Place("lessons/1-a.html").href(path)
+    if name not in (".", ".."):
+        assert unquote(urlsplit(urljoin("https://h/lessons/1-a.html", href)).path) == f"/{path}"

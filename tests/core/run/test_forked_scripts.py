@@ -1,4 +1,8 @@
-"""A script in a forked process does what it does when Python runs it alone."""
+"""A script in a forked process does what it does when Python runs it alone.
+
+`tests/fixtures/probe_scripts.toml` has scripts that look at all that a process is started with, and
+scripts that fail in every way.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ import re
 import subprocess
 import sys
 import tempfile
-import textwrap
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -22,12 +26,15 @@ from coursebuild.core.run.script_environment import (
     python_version,
 )
 from coursebuild.core.run.script_server import ScriptServer
-from support.probe_scripts import FAILURES, PROBES
 from support.runners import job
+from support.scratch_course import ROOT
 
 pytestmark = pytest.mark.site
 
 ARGUMENTS = ("a b", "", "*", "é", "--flag=1", "\udc80")
+SCRIPTS = tomllib.loads((ROOT / "tests/fixtures/probe_scripts.toml").read_text(encoding="utf-8"))
+PROBES: dict[str, str] = SCRIPTS["probes"]
+FAILURES: dict[str, list[str]] = SCRIPTS["failures"]
 VisibleResult = tuple[str, str, int]
 
 
@@ -86,12 +93,8 @@ def differences(server: ScriptServer, root: Path, scripts: Mapping[str, str]) ->
     return lines
 
 
-def dedent_probes(names: list[str]) -> dict[str, str]:
-    return {name: textwrap.dedent(PROBES[name]) for name in names}
-
-
 def test_forked_script_finds_what_python_gives_it(forking: ScriptServer, root: Path) -> None:
-    assert differences(forking, root.resolve(), dedent_probes([*PROBES])) == []
+    assert differences(forking, root.resolve(), PROBES) == []
 
 
 def test_forked_script_fails_as_it_does_alone(forking: ScriptServer, root: Path) -> None:
@@ -100,7 +103,7 @@ def test_forked_script_fails_as_it_does_alone(forking: ScriptServer, root: Path)
 
 
 def test_spawned_script_does_what_it_does_alone(spawning: ScriptServer, root: Path) -> None:
-    scripts = dedent_probes(["main", "numbers"]) | {"fails": FAILURES["errors"][0]}
+    scripts = {"main": PROBES["main"], "numbers": PROBES["numbers"], "fails": FAILURES["errors"][0]}
     assert differences(spawning, root.resolve(), scripts) == []
 
 

@@ -1,13 +1,25 @@
-"""The place, the class and the text of each change."""
+"""The place, the class and the text of each change, in a report and on a page."""
 
 from __future__ import annotations
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from coursebuild.core.model import Comparison
 from coursebuild.core.model.results import DriftKind
+from coursebuild.core.scripts.compare import compare
+from coursebuild.core.scripts.diff import diff_rows
+from coursebuild.core.scripts.findings import drift_diagnostic
+from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.report.text import Style, diagnostic_text
 from support.sample_lessons import (
+    DIGITS_ELLIPSIS,
     ELLIPSIS,
+    EXACT,
     change_values,
+    recording,
+    table,
     verdict,
 )
 
@@ -97,3 +109,109 @@ def test_changes_beside_an_ellipsis() -> None:
     assert [change_values(c) for c in result.changes] == [("numeric", "1.5", "2.5")]
     result = verdict("t=... s, E", "u=0.1 s, F", ELLIPSIS)
     assert [change_values(c) for c in result.changes] == [("text", "t=... s, E", "u=0.1 s, F")]
+
+
+def drift(recorded: str, printed: str, comparison: Comparison = EXACT) -> Diagnostic:
+    return drift_diagnostic(compare(recording(recorded), comparison, printed), "4.2")
+
+
+@pytest.mark.parametrize(
+    ("recorded", "printed", "label"),
+    [
+        ("E 6.641", "E 6.702", "this run printed 6.702 (relative error 9.2e-03, 2 digits agree)"),
+        ("E 1.0", "E 1.5", "this run printed 1.5 (relative error 5.0e-01, no digit agrees)"),
+        ("E 1.00", "E 1.05", "this run printed 1.05 (relative error 5.0e-02, 1 digit agrees)"),
+        ("E 1.00", "E 1.01", "this run printed 1.01 (relative error 1.0e-02, 2 digits agree)"),
+        ("E 0.0", "E 1.5", "this run printed 1.5"),
+        ("E 1.0", "E nan", "this run printed nan"),
+        ("E 1e-9", "E 1e500", "this run printed 1e500"),
+        ("E 1.0", "E 1.00", "this run printed 1.00 (the same value, written in another way)"),
+        ("a red b", "a blue b", "this run printed `blue`"),
+        ("a red b", "a b", "this run printed nothing here"),
+        ("a b", "a red b", "this run printed `red`"),
+        ("a   b", "a b", "this run printed white space of another width here"),
+        ("a\nb c d", "a", "this run did not print this line"),
+        ("a\nb\nc", "a", "this run did not print these 2 lines"),
+        ("a", "a\nb", "this run printed `b` here"),
+        ("a", "a\nb\nc", "this run printed `b` and 1 more line here"),
+        ("a", "a\nb\nc\nd", "this run printed `b` and 2 more lines here"),
+        ("a", "b" * 99, f"this run printed `{'b' * 59}…`"),
+    ],
+)
+def test_labels(recorded: str, printed: str, label: str) -> None:
+    assert drift(recorded, printed).label == label
+
+
+def test_a_drift_is_reported_in_ten_lines() -> None:
+    lines = "\n".join(f"row {i} = {i}.5" for i in range(40))
+    diagnostic = drift(lines, lines.replace(".5", ".7"))
+    assert diagnostic.message == "recorded output differs from this run (numeric: 40)"
+    assert [note.message for note in diagnostic.notes] == [
+        "recorded 1.5; this run printed 1.7 (relative error 1.3e-01, no digit agrees)",
+        "recorded 2.5; this run printed 2.7 (relative error 8.0e-02, 1 digit agrees)",
+        "recorded 3.5; this run printed 3.7 (relative error 5.7e-02, 1 digit agrees)",
+        "and 36 more differences",
+    ]
+    assert len(diagnostic_text(diagnostic, Style()).split("\n")) == 10
+
+
+def rows(recorded: str, printed: str) -> list[str]:
+    """Each row as text; what changed is in brackets."""
+    block = recording(recorded)
+    verdict = compare(block, DIGITS_ELLIPSIS, printed)
+    return [
+        mark + "".join(f"[{text}]" if is_changed else text for text, is_changed in parts)
+        for mark, parts in diff_rows(verdict, printed)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("recorded", "printed", "expected"),
+    [
+        ("pi 3.14\nn 2", "pi 3.14159\nn 3", [" pi 3.14", "-n [2]", "+n [3]"]),
+        ("a\n...\nz 1", "a\nb\nc\nz 2", [" a", " ...", "-z [1]", "+z [2]"]),
+        ("a 1\nb 2\nc 3", "a 1\nb 4\nc 3", [" a 1", "-b [2]", "+b [4]", " c 3"]),
+        ("a 1\nb 2", "a 3\nb 4", ["-a [1]", "-b [2]", "+a [3]", "+b [4]"]),
+        ("one\ntwo", "one", [" one", "-[two]"]),
+        ("one", "one\ntwo", [" one", "+[two]"]),
+        # half of their words make two lines one; what is between such is one after the other
+        (
+            "first\nmass one",
+            "mass two\nlast",
+            ["-[first]", "-mass [one]", "+mass [two]", "+[last]"],
+        ),
+        ("the mass is 3", "the mass was 3", ["-the mass [is] 3", "+the mass [was] 3"]),
+        ("a\n\nb 1", "a\n\nb 2", [" a", " ", "-b [1]", "+b [2]"]),
+    ],
+)
+def test_rows(recorded: str, printed: str, expected: list[str]) -> None:
+    assert rows(recorded, printed) == expected
+
+
+def test_rows_of_a_table_are_the_cells_that_changed() -> None:
+    block = table("| n | x |\n| --- | --- |\n| 1 | 2.5 |")
+    verdict = compare(block, EXACT, "1 3.5\n")
+    cell_rows = [(mark, parts[0][0]) for mark, parts in diff_rows(verdict, "1 3.5\n")]
+    assert cell_rows == [("-", "2.5"), ("+", "3.5")]
+
+
+# No digits beside spaces: `1` and ` 1` are the same number, shown as it was recorded.
+LINE = st.text("ab1", max_size=6) | st.text("ab ", max_size=6).map(str.rstrip)
+LINES = st.lists(LINE, min_size=1, max_size=6)
+
+
+@settings(max_examples=50)
+@given(LINES, LINES)
+def test_the_rows_are_both_texts(recorded: list[str], printed: list[str]) -> None:
+    """Without added rows they are the recorded text; without removed rows, the printed one."""
+    recorded_text, printed_text = "\n".join(recorded).rstrip("\n"), "\n".join(printed).rstrip("\n")
+    if (
+        not recorded_text
+        or compare(recording(recorded_text), DIGITS_ELLIPSIS, printed_text).status != "drift"
+    ):
+        return
+    lines = [row.replace("[", "").replace("]", "") for row in rows(recorded_text, printed_text)]
+    assert [row[1:] for row in lines if row[0] != "+"] == recorded_text.split("\n")
+    assert [row[1:] for row in lines if row[0] != "-"] == (
+        printed_text.split("\n") if printed_text else []
+    )

@@ -12,15 +12,7 @@ from coursebuild.core.model import Comparison, Filter, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Trace
 from coursebuild.core.model.sensitivity import Sensitivity, Standing
 from coursebuild.core.scripts.sensitivity import is_worth_moving, noise_warnings, sensitivity
-from support.sample_lessons import (
-    DIGITS,
-    EXACT,
-    course,
-    describe,
-    document,
-    recording,
-    tolerance,
-)
+from support.sample_lessons import DIGITS, EXACT, course, describe, document, recording, tolerance
 
 TRACE = Trace((), (), (), ("mujoco",), "")
 

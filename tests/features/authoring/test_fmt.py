@@ -120,9 +120,7 @@ def test_lines_of_the_course_stay() -> None:
         assert all(line.lstrip("> ").startswith("|") for line in new_lines), path
 
 
-def test_command_formats_the_course_by_the_width_of_its_map(
-    make: Make,
-) -> None:
+def test_command_formats_the_course_by_the_width_of_its_map(make: Make) -> None:
     course = make("## A\none two three four\n", "## B\n\ntext\n")
     course.write(MAP, course.text(MAP) + "\n[format]\nwidth = 10\n")
     path, before = course.lesson(1), course.tree()

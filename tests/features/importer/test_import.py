@@ -24,7 +24,6 @@ GENERATED = ("public", "examples", ".coursebuild")
 
 
 def texts(folder: Path) -> dict[str, bytes]:
-    """Return all files of a folder except generated ones."""
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))

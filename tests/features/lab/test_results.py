@@ -1,17 +1,27 @@
-"""Labs through the commands: what a report says of them, and what a site shows."""
+"""Results of labs: the verdict on a trial, what is kept of it, and how it is shown."""
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
 
+from coursebuild.core.run.script_environment import engine_version
+from coursebuild.features.lab.reply import (
+    Attempt,
+    Parity,
+    TrialFailure,
+    TrialReply,
+    read_reply,
+    reply_bytes,
+)
+from coursebuild.features.lab.verdict import failure_diagnostics
 from support.lab_lessons import RIGHT, course, fence, run_check
+from support.lab_values import BALL, lab_of, make_lab
 from support.scratch_course import Folder
-
-pytestmark = pytest.mark.engine
 
 RESETS = '{"model": "ball",\n"setup": "ctx.n = (ctx.n ?? 0) + 1; data.qvel[1] = ctx.n"}'
 
@@ -51,6 +61,7 @@ def site(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> BuiltSite:
     return BuiltSite(folder, report)
 
 
+@pytest.mark.engine
 def test_a_lab_in_which_everything_holds(site: BuiltSite) -> None:
     lab, _ = site.report["labs"]
     assert {k: lab[k] for k in ("name", "title", "lesson", "status", "tried", "cached")} == {
@@ -70,6 +81,7 @@ def test_a_lab_in_which_everything_holds(site: BuiltSite) -> None:
     assert "1 lab tried" in text
 
 
+@pytest.mark.engine
 def test_a_lab_whose_reset_leads_elsewhere_is_warned_of_and_published(site: BuiltSite) -> None:
     second_report = run_check(site.folder, status=0)
     for report, is_cached in ((site.report, False), (second_report, True)):
@@ -82,6 +94,7 @@ def test_a_lab_whose_reset_leads_elsewhere_is_warned_of_and_published(site: Buil
     assert [lab["name"] for lab in only["labs"]] == ["1.3-lab-1"]
 
 
+@pytest.mark.engine
 def test_a_page_shows_what_the_trial_recorded(site: BuiltSite) -> None:
     text = site.page("1.2")
     assert text.count('<svg class="lab-plot"') == 1
@@ -90,6 +103,7 @@ def test_a_page_shows_what_the_trial_recorded(site: BuiltSite) -> None:
     assert len(list(site.public.glob("assets/labs/1.2-lab-1.*.png"))) == 1
 
 
+@pytest.mark.engine
 def test_models_are_live_on_their_pages_and_seen_in_the_gallery(site: BuiltSite) -> None:
     models = site.public / "models"
     for name, lab in (("ball", "1.2-lab-1"), ("a/still", "model-a-still"), ("lost", "model-lost")):
@@ -99,3 +113,141 @@ def test_models_are_live_on_their_pages_and_seen_in_the_gallery(site: BuiltSite)
     gallery = (models / "index.html").read_text("utf-8")
     assert gallery.count('<img src="../assets/labs/') == 3
     assert "<p>A box that nothing moves.</p>" in gallery
+
+
+LINES = """{
+  "xml": "BALL",
+  "stopAt": 2,
+  "setup": "ctx.a = 1",
+  "controller":
+    "ctx.b = 1",
+  "controls": [
+    {"label": "mass", "min": 0, "max": 1, "value": 0,
+     "set": "model.body_mass[1]"},
+    {
+      "label": "size",
+      "min": 0, "max": 1, "value": 0,
+      "apply": "ctx.size = value"
+    },
+    {"type": "button",
+     "label": "Kick", "run":
+       "data.qvel[0] = 1"},
+    {"min": 0, "max": 1, "value": 0, "label": "gain",
+     "param": "gain"}
+  ],
+  "readouts": [
+    {"label": "x",
+     "expr": "data.qpos[0]"}, {"label": "y", "expr": "data.qpos[1]"}
+  ],
+  "plots": [
+    {"ylabel": "z", "traces": [{"label": "one", "expr": "1"},
+      {"label": "two",
+       "expr": "2"}]}
+  ],
+  "expect": [
+    {"t": 1,
+     "expr": "data.time", "min": 1}
+  ],
+  "verify": {"seconds": 1,
+    "rtol": 1e-6}
+}""".replace("BALL", BALL)
+
+PLACES = [
+    ((), "```lab simlab"),
+    (("stopAt",), "2"),
+    (("controller",), '"ctx.b = 1"'),
+    (("controls", 0), '"model.body_mass[1]"'),
+    (("controls", 1), '"ctx.size = value"'),
+    (("controls", 2), '"data.qvel[0] = 1"'),
+    (("controls", 3), '"gain"'),
+    (("readouts", 0, "expr"), '"data.qpos[0]"'),
+    (("readouts", 1, "expr"), '"data.qpos[1]"'),
+    (("plots", 0, "traces", 1, "expr"), '"2"'),
+    (("plots", 0, "traces", 1), "{"),
+    (("expect", 0), '"data.time"'),
+    (("verify", "rtol"), "1e-6"),
+    (("no", "such", 7), "```lab simlab"),
+    (("controls", 99, "run"), "["),
+]
+
+
+def test_every_entry_has_its_place() -> None:
+    lab = make_lab(LINES)
+    assert {entry: lab.place(entry).text for entry, _ in PLACES} == dict(PLACES)
+    lines = {(): 3, ("controller",): 9, ("controls", 2, "run"): 20}
+    lines["plots", 0, "traces", 1, "expr"] = 31
+    assert {entry: lab.place(entry).line for entry in lines} == lines
+
+
+def test_lab_inside_a_quiz_has_places_too() -> None:
+    sim = {"xml": BALL, "readouts": [{"label": "x", "expr": "nope"}]}
+    question = {"kind": "predict", "q": "Which?", "options": ["a", "b"], "answer": 0, "sim": sim}
+    quiz = json.dumps({"id": "q", "questions": [question]}, indent=1)
+    text = f"```quiz\n{quiz}\n```\n"
+    lab = lab_of(text)
+    span = lab.place(("readouts", 0, "expr"))
+    assert (span.text, span.line) == ('"nope"', text[: text.index('"nope"')].count("\n") + 1)
+    assert lab.place(()).text == "{"
+
+
+def test_what_is_so_from_the_start_is_told_once() -> None:
+    failures = (
+        TrialFailure((), "diverged", "qpos[0] is NaN", 1.0, Attempt("start")),
+        TrialFailure(("controls", 0), "diverged", "qpos[0] is NaN", 1.5, Attempt("a")),
+        TrialFailure(("controls", 1), "warning", "badctrl", 1.5, Attempt("b")),
+        TrialFailure(("controls", 2, "run"), "throws", "x", 1.5, Attempt("c")),
+    )
+    reply = TrialReply(engine_version(), (), failures, None)
+    diagnostics = failure_diagnostics(make_lab(LINES), reply)
+    assert [d.rule for d in diagnostics] == ["lab-diverged", "lab-warning", "lab-throws"]
+
+
+def test_parity_in_words() -> None:
+    whole = "bit-identical to native MuJoCo"
+    for first, relative, text in (
+        (None, 0.0, f"{whole} over 100 steps"),
+        (31, 0.0, f"{whole} for 30 of 100 steps"),
+        (31, 2.2e-12, f"{whole} for 30 of 100 steps, then within 2e-12"),
+    ):
+        assert Parity(steps=100, first=first, relative=relative).describe() == text
+
+
+def test_difference_from_native_mujoco_is_allowed_as_the_lab_or_its_model_says() -> None:
+    for relative, rtol, exact, expected in (
+        (1e-10, None, False, True),
+        (1e-8, None, False, False),
+        (1e-8, 1e-7, False, True),
+        (1e-8, 1e-8, False, True),
+        (1e-16, 0.0, False, False),
+        (0.0, 0.0, False, False),
+        (0.0, None, False, True),
+        (1e-16, None, True, False),
+        (1e-16, 1e-12, True, True),
+    ):
+        parity = Parity(first=3, relative=relative, exact=exact)
+        assert parity.is_within_tolerance(rtol) is expected, (relative, rtol, exact)
+        assert Parity(exact=exact).is_within_tolerance(rtol)
+
+
+def test_failure_without_a_message_is_told() -> None:
+    reply = {
+        "version": engine_version(),
+        "tried": [{"entry": [], "what": "start"}],
+        "failures": [{"entry": [], "kind": "throws", "at": None}],
+        "main": None,
+    }
+    trial = read_reply(reply_bytes(reply))
+    assert (trial.attempts, trial.steps_per_second) == ((Attempt("start"),), None)
+    (diagnostic,) = failure_diagnostics(make_lab(LINES), trial)
+    assert diagnostic.message == "the lab throws: something that has no text"
+
+
+def test_what_only_the_browsers_engine_says_of_an_edited_model_is_told_at_its_line() -> None:
+    lab = lab_of('```lab mjcf\n<mujoco>\n  <include file="part.xml"/>\n</mujoco>\n```\n')
+    message = "XML Error: Error opening file 'part.xml'\nElement 'include', line 2\n\n"
+    failure = TrialFailure((), "engine", message, None, Attempt("start"))
+    (diagnostic,) = failure_diagnostics(lab, TrialReply(engine_version(), (), (failure,), None))
+    assert (diagnostic.rule, diagnostic.span.text) == ("lab-engine", '<include file="part.xml"/>')
+    wording = "the browser's engine says: error opening file 'part.xml' in <include>"
+    assert diagnostic.message == wording
+    assert "beside which there are no files" in diagnostic.help

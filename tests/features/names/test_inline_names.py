@@ -105,6 +105,7 @@ def test_variables_of_a_script_are_what_it_makes_them(make_course: MakeCourse) -
     assert named_mistakes(course) == ["nqq"]
 
 
+@pytest.mark.site
 def test_pages_link_names_to_what_explains_them(make_course: MakeCourse) -> None:
     text = """## Of `mj_step`
 

@@ -1,4 +1,4 @@
-"""Quizzes as a package of IMS QTI 2.1: every kind of question, whatever stands in it."""
+"""Quizzes as a package of IMS QTI 2.1, and the rules that its items are held to."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ from support.qti_rules import MATHML, QTI
 from support.qti_rules import mistakes as item_mistakes
 from support.question_zoo import ANY, SCRIPT, SVG, quiz
 from support.scratch_course import GOOD, CommandResult, Folder, Make
-
-pytestmark = pytest.mark.site
 
 ZIP = "quizzes-qti.zip"
 SPACES = {"q": QTI, "m": MATHML}
@@ -82,6 +80,7 @@ def right(item: etree._Element) -> list[str]:
     return shape(item, "//q:correctResponse/q:value")
 
 
+@pytest.mark.site
 def test_package_of_every_kind_of_question_is_whole(
     qti: Package, zoo_items: dict[str, etree._Element]
 ) -> None:
@@ -100,6 +99,7 @@ def test_package_of_every_kind_of_question_is_whole(
     assert titles == [f"Check: Question {n}" for n in range(1, 11)]
 
 
+@pytest.mark.site
 def test_item_of_a_choice_holds_all_that_its_question_says(
     zoo_items: dict[str, etree._Element],
 ) -> None:
@@ -120,9 +120,8 @@ def test_item_of_a_choice_holds_all_that_its_question_says(
     assert "Choose all that are right." in shape(several, "//q:itemBody/q:p")
 
 
-def test_item_of_a_number_has_its_tolerance_and_unit(
-    zoo_items: dict[str, etree._Element],
-) -> None:
+@pytest.mark.site
+def test_item_of_a_number_has_its_tolerance_and_unit(zoo_items: dict[str, etree._Element]) -> None:
     for name, value, margin in (
         ("numeric", 0.08, 1e-4), ("zero", 0.0, 0.5), ("large", 6.02e23, 0.02 * 6.02e23)
     ):  # fmt: skip
@@ -133,6 +132,7 @@ def test_item_of_a_number_has_its_tolerance_and_unit(
     assert shape(zoo_items["numeric"], "//q:sup") == ["2"]
 
 
+@pytest.mark.site
 def test_items_of_outputs_texts_and_orders(zoo_items: dict[str, etree._Element]) -> None:
     item = zoo_items["output"]
     assert (right(item), right(zoo_items["marks"])) == (["drift  +6.6 %"], ["<b>&amp;"])
@@ -170,6 +170,7 @@ FORMULAS = (
 )
 
 
+@pytest.mark.site
 def test_package_of_hard_cases_is_whole_and_its_losses_are_reported(make_course: Make) -> None:
     """Text that a page cannot hold either is a mistake of the author's, and not tried here."""
     hostile = [
@@ -234,6 +235,7 @@ def test_package_of_hard_cases_is_whole_and_its_losses_are_reported(make_course:
 # --- edits
 
 
+@pytest.mark.site
 def test_package_follows_edits_and_names_of_other_items_stay(make_course: Make) -> None:
     folder = make_course("## One\n\n" + quiz("a", ANY["zero"], ANY["several"]))
     before = set(package(folder))
@@ -261,3 +263,47 @@ def test_package_follows_edits_and_names_of_other_items_stay(make_course: Make) 
     assert files["files/lessons/sketch.svg"] == SVG.replace("4", "5").encode()
     [address] = shape(items(files)[-1], "//q:modalFeedback//q:a/@href")
     assert re.fullmatch(r"https://example\.org/c/lessons/1\.1-one\.html#a\.[0-9a-f]{8}", address)
+
+
+GOOD_ITEM = f"""\
+<assessmentItem xmlns="{QTI}" xmlns:m="http://www.w3.org/1998/Math/MathML" identifier="q" title="t"
+ adaptive="false" timeDependent="false">
+<responseDeclaration identifier="RESPONSE" cardinality="single" baseType="identifier">
+<correctResponse><value>A</value></correctResponse></responseDeclaration>
+<outcomeDeclaration identifier="SCORE" cardinality="single" baseType="float"/>
+<itemBody><p>Which <b>one</b>?</p>
+<choiceInteraction responseIdentifier="RESPONSE" shuffle="false" maxChoices="1">
+<simpleChoice identifier="A">a</simpleChoice><simpleChoice identifier="B">b</simpleChoice>
+</choiceInteraction></itemBody>
+<responseProcessing><responseCondition><responseIf>
+<match><variable identifier="RESPONSE"/><correct identifier="RESPONSE"/></match>
+<setOutcomeValue identifier="SCORE"><baseValue baseType="float">1</baseValue></setOutcomeValue>
+</responseIf></responseCondition></responseProcessing>
+</assessmentItem>"""
+BAD = (
+    ('adaptive="false"', ""),
+    ('identifier="q"', 'identifier="4q"'),
+    ('cardinality="single" baseType="i', 'cardinality="one" baseType="i'),
+    ('shuffle="false"', ""),
+    ('identifier="B">', 'identifier="A">'),
+    ("<value>A</value>", "<value>C</value>"),
+    ("<value>A</value>", "<value>A</value><value>B</value>"),
+    ("<itemBody>", "<itemBody>text"),
+    ("<itemBody>", "<itemBody><b>inline</b>"),
+    ("<itemBody>", "<itemBody><video/>"),
+    ("<itemBody>", "<itemBody><table><tr><td>no body</td></tr></table>"),
+    ("<itemBody>", '<itemBody><p onclick="x()">p</p>'),
+    ("<p>Which", "<p><p>in</p>Which"),
+    ('<variable identifier="RESPONSE"/>', ""),
+    ('<variable identifier="RESPONSE"/>', '<variable identifier="OTHER"/>'),
+    ('setOutcomeValue identifier="SCORE"', 'setOutcomeValue identifier="POINTS"'),
+    ("</itemBody>", "</itemBody><outcomeDeclaration/>"),
+    ("<p>Which", '<p><textEntryInteraction responseIdentifier="RESPONSE"/>Which'),
+    ("<p>Which", '<p><img src="a.png"/>Which'),
+)
+
+
+def test_rules_find_every_mistake_in_an_item() -> None:
+    assert item_mistakes(GOOD_ITEM.encode()) == []
+    missed = [new for old, new in BAD if not item_mistakes(GOOD_ITEM.replace(old, new).encode())]
+    assert missed == []

@@ -52,7 +52,6 @@ def check(files: dict[str, bytes]) -> None:
 
 
 def items(files: dict[str, bytes]) -> list[tuple[int, str]]:
-    """Titles of the organisation, by depth."""
     root = etree.fromstring(files["imsmanifest.xml"])
     return [
         (len(list(node.iterancestors(f"{CP}item"))), node.findtext(f"{CP}title"))

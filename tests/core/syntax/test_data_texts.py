@@ -1,0 +1,390 @@
+"""JSON and TOML with places: the values are those of the standard library.
+
+The diagnostics of wrong texts are `tests/fixtures/texts/`; `pytest tests/core/syntax
+--rewrite-fixtures` writes their expected parts anew.
+"""
+
+from __future__ import annotations
+
+import datetime
+import json
+import tomllib
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.syntax.declarations import parse_declarations
+from coursebuild.core.syntax.json_text import parse_json
+from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
+from coursebuild.core.syntax.toml_text import parse_toml
+from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.source import Excerpt, Source
+from support.json_fences import parse_lab, parse_quiz
+from support.json_fences import parse_text as parse
+from support.positioned_nodes import plain
+from support.text_cases import FOLDER, Reader, check_texts
+
+
+def walk(node: Node) -> list[Node]:
+    if isinstance(node, ObjectNode):
+        inner = [n for member in node.members.values() for n in (member.key, member.value)]
+        return [node, *(m for n in inner for m in walk(n))]
+    if isinstance(node, ArrayNode):
+        return [node, *(n for item in node.items for n in walk(item))]
+    return [node]
+
+
+def test_each_character_of_json_knows_its_place() -> None:
+    text = '> ["a\\n\\u00e9\\ud83d\\ude00\\\\x",\n>  "plain", ""]'
+    source = Source("lesson.md", text)
+    body = Excerpt.join([line.slice(2) for line in source.excerpt().lines()], "\n")
+    node = parse_json(body, source.span(0, 0)).value
+    assert isinstance(node, ArrayNode)
+    with_escapes, simple, empty = node.items
+    assert isinstance(with_escapes, StringNode) and isinstance(simple, StringNode)
+    assert isinstance(empty, StringNode)
+    excerpt = with_escapes.excerpt
+    assert excerpt.text == "a\n\u00e9\U0001f600\\x"
+    places = [excerpt.offset(i) for i in range(len(excerpt.text))]
+    assert [text[p : p + 2] for p in places] == ["a\\", "\\n", "\\u", "\\u", "\\\\", 'x"']
+    assert simple.excerpt.span().text == "plain"
+    assert simple.excerpt.span(2, 4).text == "ai"
+    assert (simple.span.line, simple.span.column) == (2, 4)
+    assert empty.excerpt.text == "" and text[empty.excerpt.span().start] == '"'
+
+
+# ------------------------------------------------------------------------------------- properties
+
+VALUES = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(exclude_categories=["Cs"]), max_size=8),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(
+            st.text(st.characters(exclude_categories=["Cs"]), max_size=4), inner, max_size=4
+        )
+    ),
+    max_leaves=12,
+)
+JSON_PIECES = st.sampled_from(
+    [
+        *"{}[],:\" \n\t\r0123456789-+.eE/*#\\='",
+        *('"a"', '"b":', "true", "false", "null", "NaN", "True", "//", "/*", "*/", '"$\\tau$"'),
+        *("\\u00e9", "\\ud83d\\ude00", "“", "\u00a0", "\x0c"),
+    ]
+)
+
+
+@given(VALUES, st.sampled_from([None, 0, 2]), st.booleans())
+@example([float("inf"), 10**30, "\x00\U0001f600/"], None, True)
+def test_valid_json_is_read_as_the_standard_library_reads_it_and_knows_its_places(
+    value: object, indent: int | None, ascii_only: bool
+) -> None:
+    text = json.dumps(value, indent=indent, ensure_ascii=ascii_only).replace("Infinity", "1e999")
+    parsed_json = parse(text)
+    assert [d for d in parsed_json.diagnostics if d.rule != "field-value"] == []
+    root = parsed_json.value
+    assert root is not None
+    assert repr(plain(root)) == repr(json.loads(text))
+    for node in walk(root):
+        assert json.loads(node.span.text) == plain(node)
+        assert root.span.contains(node.span)
+        assert node.span.contains(node.mark)
+        if isinstance(node, StringNode):
+            excerpt = node.excerpt
+            assert excerpt.text == node.value
+            for i, char in enumerate(excerpt.text):
+                source_char = text[excerpt.offset(i)]
+                assert source_char in (char, "\\")
+                assert node.span.start < excerpt.offset(i) < node.span.end - 1
+
+
+def is_json(text: str) -> bool:
+    def refuse(name: str) -> None:
+        raise ValueError(name)
+
+    try:
+        value = json.loads(text, parse_constant=refuse)
+        json.dumps(value, ensure_ascii=False).encode()
+    except (ValueError, UnicodeEncodeError):
+        return False
+    return True
+
+
+@st.composite
+def edited_json(draw: st.DrawFn) -> str:
+    """JSON with a piece in the place of some characters."""
+    text = json.dumps(draw(VALUES), indent=1)
+    at = draw(st.integers(0, len(text)))
+    return text[:at] + draw(JSON_PIECES) + text[at + draw(st.integers(0, 3)) :]
+
+
+@settings(max_examples=200)
+@given(st.lists(JSON_PIECES, max_size=16).map("".join) | st.text(max_size=20) | edited_json())
+@example('{"a":1}{')
+@example("[1]]")
+@example('["\\u')
+def test_invalid_json_is_always_reported(text: str) -> None:
+    parsed_json = parse(text)
+    syntax = [d for d in parsed_json.diagnostics if d.rule == "json-syntax"]
+    assert is_json(text) == (not syntax)
+    for diagnostic in parsed_json.diagnostics:
+        assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
+    assert syntax or parsed_json.value is not None
+
+
+DATES = (datetime.date, datetime.time)
+
+
+def root_of(text: str) -> ObjectNode:
+    parsed_toml = parse_toml(Source("content/course.toml", text))
+    assert parsed_toml.diagnostics == ()
+    assert parsed_toml.value is not None
+    return parsed_toml.value
+
+
+def replace_dates(value: object) -> object:
+    """A value of tomllib with dates as `plain` gives them."""
+    if isinstance(value, dict):
+        return {key: replace_dates(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [replace_dates(inner) for inner in value]
+    return "a date" if isinstance(value, DATES) else value
+
+
+ALL = r'''# a comment
+top = 1
+a.b."c d".'e' = 0x1F   # dotted
+
+[course]
+title = "Mass and \"inertia\""
+path = 'C:\temp'
+long = """
+first \
+   joined
+ second""""
+raw = """""\u00e9"""
+literal = LLL'quoted'LLL
+when = 1979-05-27 07:32:00Z
+day = 1979-05-27
+hour = 07:32:00.999
+numbers = [ 1, 2.5e3, +inf, -nan, 1_000, # comment ] here
+  0o17, 0b1,
+]
+inline = { x = 1, y.z = [ "a", { b = true } ], "q" = 'r' }
+
+[[level]]
+id = 0
+[[level.lesson]]
+id = "0.1"
+[level.lesson.more]
+k = []
+[[level.lesson]]
+id = "0.2"
+[[level]]
+id = 1
+[other.deep]
+[other]
+x = false
+'''.replace("LLL", "'''")
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_every_kind_of_statement_and_its_place(newline: str) -> None:
+    text = ALL.replace("\n", newline)
+    root = root_of(text)
+    assert repr(plain(root)) == repr(replace_dates(tomllib.loads(text)))
+
+    def at(*path: str | int) -> str:
+        node: Node | None = root
+        for part in path:
+            if isinstance(part, int):
+                assert isinstance(node, ArrayNode)
+                node = node.items[part]
+            else:
+                assert isinstance(node, ObjectNode)
+                node = node.get(part)
+        assert node is not None
+        return f"{node.span.line}:{node.span.column} {node.mark.text}"
+
+    assert at("top") == "2:7 1"
+    assert at("a") == "3:1 a"
+    assert at("a", "b", "c d", "e") == "3:17 0x1F"
+    assert at("course") == "5:1 [course]"
+    assert at("course", "title") == r'6:9 "Mass and \"inertia\""'
+    assert at("course", "when") == "14:8 1979-05-27 07:32:00Z"
+    assert at("course", "numbers") == "17:11 ["
+    assert at("course", "numbers", 4) == "17:35 1_000"
+    assert at("course", "numbers", 6) == "18:9 0b1"
+    assert at("course", "inline") == "20:10 {"
+    assert at("course", "inline", "y", "z", 1, "b") == "20:38 true"
+    assert at("level") == "22:1 [[level]]"
+    assert at("level", 0, "lesson") == "24:1 [[level.lesson]]"
+    assert at("level", 0, "lesson", 0, "more", "k") == "27:5 ["
+    assert at("level", 0, "lesson", 1, "id") == '29:6 "0.2"'
+    assert at("level", 1) == "30:1 [[level]]"
+    assert at("other") == "32:2 [other]"  # its first part stands above its header
+    assert at("other", "x") == "34:5 false"
+
+
+def test_each_character_of_toml_knows_its_place() -> None:
+    text = "a = \"\"\"\r\nx\\ty\\\r\n   \\u00e9z\r\n\"\"\"\r\nb = '''\r\np\r\nq'''\r\n"
+    root = root_of(text)
+    a, b = root.get("a"), root.get("b")
+    assert isinstance(a, StringNode) and isinstance(b, StringNode)
+    assert a.value == "x\ty\u00e9z\n"
+    assert "".join(text[a.excerpt.offset(i)] for i in range(len(a.value))) == "x\\y\\z\r"
+    assert b.value == "p\nq"
+    assert [b.excerpt.span(i, i + 1).line for i in range(3)] == [6, 6, 7]
+
+
+# ------------------------------------------------------------------------------------- properties
+
+TOML_PIECES = st.sampled_from(
+    [
+        *"[]{}.=,\n\"'#\\ abc1",
+        *("[[", "]]", " = ", "4.2", '"x"', "'y'", '"""', "'''", "\r\n", "\r", "#c", "true", "inf"),
+        *("1979-05-27", "07:32:00", '"$\\tau$"', "\\\n", "\\u00e9", "“x”", "\u00a0"),
+        *("[a]\n", "[[a]]\n", "[a.b]\n", "[[a.b]]\n", "a.b=1\n", "a={}\n", "b=[1,2]\n"),
+        *("a.b.c=1\n", "c={a.b=1,c=[]}\n", 'd="""\nx\\\n y"""\n', "e='''x'''\n", "a=[]\n"),
+    ]
+)
+
+
+@st.composite
+def edited_toml(draw: st.DrawFn, text: str) -> str:
+    """A text with a piece in the place of some characters."""
+    at = draw(st.integers(0, len(text)))
+    return text[:at] + draw(TOML_PIECES) + text[at + draw(st.integers(0, 3)) :]
+
+
+@settings(max_examples=200)
+@given(st.lists(TOML_PIECES, max_size=14).map("".join) | st.text(max_size=20) | edited_toml(ALL))
+@example("a=[]\na.b=1\n")
+@example("[a.b.c]\n[a]\nb.x=1\n")
+@example("[x]\na.b=1\n[x.a.c]\n")
+@example('a="""""" \n')
+@example("\r\r\n")
+def test_values_and_validity_are_those_of_tomllib(text: str) -> None:
+    parsed_toml = parse_toml(Source("x.toml", text))
+    try:
+        expected = replace_dates(tomllib.loads(text))
+    except ValueError:
+        assert parsed_toml.value is None
+        assert len(parsed_toml.diagnostics) == 1
+    else:
+        assert parsed_toml.value is not None
+        assert repr(plain(parsed_toml.value)) == repr(expected)
+        check_places(parsed_toml.value, text)
+    for diagnostic in parsed_toml.diagnostics:
+        assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
+
+
+def check_places(node: Node, text: str) -> None:
+    """Check that a node contains its mark and, if the text has no headers, its child nodes."""
+    inner: list[Node] = []
+    if isinstance(node, ObjectNode):
+        inner = [n for member in node.members.values() for n in (member.key, member.value)]
+    elif isinstance(node, ArrayNode):
+        inner = list(node.items)
+    assert node.span.contains(node.mark)
+    for child in inner:
+        assert 0 <= child.span.start <= child.span.end <= len(text)
+        assert node.span.contains(child.span) or "[" in text or node.span.start == 0
+        check_places(child, text)
+
+
+def test_toml_of_a_fence_has_its_places_in_the_lesson() -> None:
+    lesson = Source("lesson.md", "> ```toml\n> a = 1\n> b = 'x'\n> ```\n")
+    lines = (Excerpt.of_span(lesson.span(start, end)) for start, end in ((12, 17), (20, 27)))
+    body = Excerpt.join([*lines], "\n")
+    root = parse_toml(body).value
+    assert root is not None
+    assert [member.value.span.text for member in root.members.values()] == ["1", "'x'"]
+    (diagnostic,) = parse_toml(body.slice(0, 3), rule="toml-syntax").diagnostics
+    assert (diagnostic.rule, diagnostic.span.source) == ("toml-syntax", lesson)
+    assert (diagnostic.span.line, diagnostic.span.column) == (2, 6)
+
+
+DEEP = "objects and arrays nest more than 64 deep"
+
+
+def read_toml(text: str) -> tuple[object, tuple[Diagnostic, ...]]:
+    return None, parse_toml(Source("course.toml", text)).diagnostics
+
+
+def read_map(text: str) -> tuple[object, tuple[Diagnostic, ...]]:
+    parsed_map = parse_course_map(Source("content/course.toml", text))
+    return parsed_map.value, parsed_map.diagnostics
+
+
+def read_model(text: str) -> tuple[object, tuple[Diagnostic, ...]]:
+    parsed_file = parse_declarations(Source("models/arms/arm.toml", text))
+    return parsed_file.value, parsed_file.diagnostics
+
+
+def read_lab(text: str) -> tuple[object, tuple[Diagnostic, ...]]:
+    parsed_lab = parse_lab(text)
+    return parsed_lab.value, parsed_lab.diagnostics
+
+
+READERS: dict[str, Reader] = {
+    "json": lambda text: (None, parse(text).diagnostics),
+    "toml": read_toml,
+    "map": read_map,
+    "model": read_model,
+    "lab": read_lab,
+    "quiz": lambda text: (None, parse_quiz(text).diagnostics),
+}
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_diagnostics_of_wrong_texts(name: str, rewriting: bool) -> None:
+    check_texts(name, READERS[name], rewriting=rewriting)
+
+
+def test_every_file_of_texts_is_read() -> None:
+    assert {path.stem for path in FOLDER.iterdir()} == {*READERS, "fields"}
+
+
+def test_notes_point_at_the_first_key_and_at_the_bracket() -> None:
+    notes = [
+        (diagnostics[0].message, note.message, note.span and (note.span.line, note.span.column))
+        for diagnostics in (
+            parse('{"a": 1,\n "a": 2}').diagnostics,
+            parse('{"a":\n [1}').diagnostics,
+            read_toml("[a]\nb = 1\nb = 2\n")[1],
+        )
+        for note in diagnostics[0].notes
+    ]
+    assert notes == [
+        ("`a` is given twice", "the first one is here", (1, 2)),
+        ("expected `,` or `]`, found `}`", "`[` is opened here", (2, 2)),
+        ("`b` is given twice", "the first one is here", (2, 1)),
+    ]
+
+
+def test_deep_nesting_and_long_numbers_are_reported() -> None:
+    diagnostics = [
+        *parse("[" * 100_000).diagnostics,
+        *parse('{"a":' * 100_000).diagnostics,
+        *parse("[" + "9" * 5000 + "]").diagnostics,
+        *read_toml("a = " + "[" * 9_999)[1],
+    ]
+    assert [(d.span.start, d.message) for d in diagnostics] == [
+        (64, DEEP),
+        (320, DEEP),
+        (1, "a number of 5000 digits is too long"),
+        (0, "tables, arrays or keys nest too deep"),
+    ]
+
+
+def test_nesting_up_to_the_limit_is_read() -> None:
+    assert parse("[" * 64 + "]" * 64).diagnostics == ()
+    assert read_toml("a = " + "[" * 64 + "]" * 64)[1] == ()
+    assert read_toml(".".join("a" * 64) + " = 1")[1] == ()
