@@ -366,7 +366,8 @@ def require_one_of(
         member for name in names if (member := node.members.get(name)) and has_value(node, name)
     ]
     if not members and not _has_misspelling(node, type, names):
-        choice = ", ".join(f"`{name}`" for name in names[:-1]) + f" or `{names[-1]}`"
+        choice = ", ".join(f"`{name}`" for name in names[:-1])
+        choice = f"{choice} or `{names[-1]}`" if choice else f"`{names[-1]}`"
         yield diagnose("field-missing", node.mark, f"{choice} is missing")
     for second in members[1:] if only else ():
         first, help = members[0].key, "leave one of them out"
