@@ -41,6 +41,7 @@ from coursebuild.features.lab.engines.native import NativeEngine, NativeError, l
 from coursebuild.features.lab.equations.equation_trial import (
     EquationEngine,
     EquationReply,
+    add_points,
     run_trial,
 )
 from coursebuild.features.lab.export.trial import LabExport, export_lab, record_for_export
@@ -140,10 +141,12 @@ class LabTrials:
     def _try_equations(self, trial: Trial, lab: Lab) -> tuple[TrialResult | None, list[Diagnostic]]:
         """Try a lab without an engine, or read what an earlier trial found."""
         inputs, memory, start = equation_inputs(lab, trial.name), self._context.memory, time.time()
-        key = fingerprint((inputs.text, inputs.conditions))
+        config = json.loads(lab.config)
+        missing = tuple(add_points(config, self._context.course))
+        key = fingerprint((inputs.text, inputs.conditions, json.dumps(config["plots"])))
         decode = msgspec.json.Decoder(EquationReply).decode
         kept_reply = memory.store.get("labs", key, decode, shared=True)
-        reply = kept_reply or run_trial(self._engines.equations, lab, self._seconds)
+        reply = kept_reply or run_trial(self._engines.equations, config, self._seconds)
         if kept_reply is None:
             seconds = round(time.time() - start, 4)
             reply = replace(reply, seconds=seconds, timestamp=int(start))
@@ -151,12 +154,13 @@ class LabTrials:
                 memory.store.put("labs", key, msgspec.json.encode(reply), shared=True)
         memory.note_trial(
             inputs,
-            (),
+            (lab.span.path,) if any(plot["points"] for plot in config["plots"]) else (),
             ok=not reply.findings,
             lasting=reply.lasting,
             seconds=reply.seconds,
             timestamp=reply.timestamp,
         )
+        reply = replace(reply, findings=(*missing, *reply.findings))
         line = TrialLine(
             name=trial.name,
             title=lab.fields.title,
@@ -167,7 +171,7 @@ class LabTrials:
             parity=reply.describe(lab.kind),
             cached=kept_reply is not None,
         )
-        output = LabOutput("", {"id": trial.name} | json.loads(lab.config))
+        output = LabOutput("", {"id": trial.name} | config)
         if self._context.static and not reply.findings and reply.start is not None:
             from coursebuild.features.lab.picture.static import equation_record, plots_file
 

@@ -15,6 +15,7 @@ from coursebuild.core.model.fields import Inlines, NotNegative, OptionalBlocks, 
 from coursebuild.features.lab.schema import Control, Height, PlotFields, Readout, Scalar
 
 Formula: TypeAlias = float | Text
+Column: TypeAlias = Annotated[int, Meta(ge=1, le=100)]
 Values: TypeAlias = Annotated[
     dict[str, Scalar], Meta(description="the controls that are set before, by their labels")
 ]
@@ -35,6 +36,18 @@ class Axis(Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
 
 
+class Points(Struct, frozen=True, forbid_unknown_fields=True):
+    """Numbers that a script of the course has printed, on or beside the first trace."""
+
+    script: Annotated[Text, Meta(description="the path of the script, as `examples/fall.py`")]
+    within: Annotated[
+        Positive, Meta(description="how far from the first trace a number may be, in its unit")
+    ]
+    x: Annotated[Column, Meta(description="the column of the axis in its recorded output")] = 1
+    y: Annotated[Column, Meta(description="the column of the trace")] = 2
+    label: Annotated[str, Meta(description="plain text beside the last point")] = ""
+
+
 class EquationPlot(PlotFields, frozen=True, kw_only=True):
     """A plot of a lab without an engine."""
 
@@ -46,6 +59,9 @@ class EquationPlot(PlotFields, frozen=True, kw_only=True):
     field: Annotated[
         bool, Meta(description="arrows show where motion leads; `x` and the trace are states")
     ] = False
+    points: Annotated[
+        Points | None, Meta(description="numbers that a script of the course has printed")
+    ] = None
 
 
 class State(Struct, frozen=True, forbid_unknown_fields=True):

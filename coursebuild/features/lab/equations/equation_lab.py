@@ -32,7 +32,13 @@ from coursebuild.core.syntax.nodes import (
 )
 from coursebuild.core.syntax.texts import Prose, TextParser
 from coursebuild.core.syntax.toml_text import parse_toml
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Parsed,
+    diagnose,
+    did_you_mean,
+    sort_diagnostics,
+)
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import check_unit
 from coursebuild.features.lab.compile import control_data
@@ -70,6 +76,11 @@ from coursebuild.features.lab.schema import (
 )
 
 _MOST_STATES = 20
+_MOST = {
+    "controls": 12, "options": 12, "plots": 6, "traces": 6, "readouts": 20, "events": 20,
+    "expect": 20,
+}  # fmt: skip
+"""How many of each a page can show, and a trial try, without delay."""
 _FOREIGN = ("set", "apply", "init", "reset")
 """Fields of controls that act on a simulation."""
 
@@ -139,6 +150,15 @@ def _check(node: ObjectNode, structs: Mapping[ObjectNode, Struct]) -> Iterator[D
     """Check how fields fit together, of each part whose own fields are right."""
     yield from check_controls(node, structs, ("param",))
     yield from check_axes(node, structs)
+    for owner in (node, *node.objects("controls"), *node.objects("plots")):
+        for name, most in _MOST.items():
+            if (count := len(owner.items(name))) > most:
+                message = f"`{name}` has {count} entries, and may have {most}"
+                yield diagnose("field-value", owner.place(name), message)
+    for plot in node.objects("plots"):
+        if "points" in plot.members and "x" in plot.members:
+            message, help = "points belong to the axis of the lab", "leave `x` out"
+            yield diagnose("field-value", plot.place("points"), message, help=help)
     for control in node.objects("controls"):
         match structs.get(control):
             case Slider() | Select():
@@ -311,12 +331,12 @@ class _Compiler:
         new = []
         for name, member in node.object("set").members.items():
             if name not in states:
-                help = f"states: {', '.join(f'`{state}`' for state in sorted(states))}"
+                help = did_you_mean(name, states)
                 self.report("lab-name", member.key.span, f"there is no state `{name}`", help)
             else:
                 new.append([self.slots[normalise_name(name)], self.formula(member.value)])
         is_end = getattr(stop, "value", False)
-        if not new and not is_end:
+        if not node.object("set").members and not is_end:
             help = "give states new values by `set`, or end the run by `stop`"
             self.report("field-missing", node.mark, "nothing happens at this event", help)
         end: Program | None = self.formula(stop) if isinstance(is_end, str) else None

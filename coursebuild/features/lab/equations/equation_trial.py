@@ -1,6 +1,7 @@
 """Trials of labs without an engine: the page's own code in V8, held against NumPy and SciPy.
 
-Entry points: `EquationEngine`; `run_trial(engine, lab, seconds)` → `EquationReply`.
+Entry points: `EquationEngine`; `run_trial(engine, config, seconds)` → `EquationReply`;
+`add_points`, of recorded outputs.
 
 1. The page's code computes what follows from the controls as they start, from each at its ends, and
    from what claims and the goal set.
@@ -11,15 +12,20 @@ Entry points: `EquationEngine`; `run_trial(engine, lab, seconds)` → `EquationR
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Iterator, Mapping
+import math
+import re
+import time
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import msgspec
 from msgspec import Struct
 
+from coursebuild.core.model import Course, Recording, find_blocks
 from coursebuild.core.run.v8 import Isolate, LimitError, ScriptError, StoppedError
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.features.lab.engines.native import equation_script_path
 from coursebuild.features.lab.equations.reference import (
     Comparison,
@@ -29,6 +35,7 @@ from coursebuild.features.lab.equations.reference import (
 )
 from coursebuild.features.lab.model import PLOT, Entry, Lab
 
+_MOST_POINTS = 500
 _CHAOS = (
     "where small differences grow, say how far SciPy may be off, and up to where: "
     "`verify = {rtol = …, until = …}`"
@@ -168,10 +175,46 @@ def _attempts(config: Mapping[str, Any]) -> list[_Attempt]:
     return list(attempts.values())
 
 
-def run_trial(engine: EquationEngine, lab: Lab, seconds: float) -> EquationReply:
+def add_points(config: dict[str, Any], course: Course) -> Iterator[Finding]:
+    """Put the numbers that scripts have printed into the data of a lab; yield what is missing."""
+    for i, plot in enumerate(config["plots"]):
+        points = plot["points"]
+        if points is None:
+            continue
+        outputs = {
+            recording.script: recording.body_span.text
+            for document in course.documents
+            for recording in find_blocks(document, Recording)
+            if recording.script is not None
+        }
+        points["data"] = []
+        entry: Entry = ("plots", i, "points", "script")
+        if points["script"] not in outputs:
+            message = f"no script `{points['script']}` has a recorded output"
+            help = did_you_mean(points["script"], outputs)
+            yield Finding("lab-name", entry, message, help=help)
+            continue
+        for line in outputs[points["script"]].splitlines():
+            words = re.split(r"[\s|,;]+", line.strip(" |").replace("\u2212", "-"))
+            with contextlib.suppress(ValueError, IndexError):
+                pair = [float(words[points[name] - 1]) for name in ("x", "y")]
+                if config["axis"]["min"] <= pair[0] <= config["axis"]["max"]:
+                    points["data"].append(pair)
+        points["data"] = points["data"][:_MOST_POINTS]
+        if not points["data"]:
+            columns = f"columns {points['x']} and {points['y']}"
+            message = f"the output of `{points['script']}` has no numbers of the axis in {columns}"
+            yield Finding("lab-points", entry, message)
+
+
+def run_trial(engine: EquationEngine, config: dict[str, Any], seconds: float) -> EquationReply:
     """Try a lab, whose result depends on nothing but its data and the tool."""
-    config = json.loads(lab.config)
-    attempts = _attempts(config)
+    attempts, patience = _attempts(config), time.thread_time() + seconds
+    marks = [
+        (i, plot["traces"][0]["value"], *pair)
+        for i, plot in enumerate(config["plots"])
+        for pair in (plot["points"] or {"data": ()})["data"]
+    ]
     request = {
         "config": config,
         "attempts": [
@@ -180,7 +223,8 @@ def run_trial(engine: EquationEngine, lab: Lab, seconds: float) -> EquationReply
                 "claims": [
                     (config["expect"][i]["value"] or [0.0], config["expect"][i]["at"])
                     for i in a.claims
-                ],
+                ]
+                + ([] if a.changed else [(program, x) for _, program, x, _ in marks]),
             }
             for a in attempts
         ],
@@ -200,14 +244,33 @@ def run_trial(engine: EquationEngine, lab: Lab, seconds: float) -> EquationReply
     for attempt, run in zip(attempts, runs, strict=True):
         mistakes = list(_check_run(config, attempt, run))
         if not mistakes:
-            comparison, entry = _compare(config, attempt, run)
-            worst = max(worst, comparison.difference)
+            comparison, entry = _compare(config, attempt, run, patience)
             mistakes = list(_check_comparison(config, comparison, entry))
+            worst = worst if mistakes else max(worst, comparison.difference)
+        if not attempt.changed:
+            values = run.claims[len(attempt.claims) :]
+            mistakes += _check_points(config, zip(marks, values, strict=True))
         for finding in mistakes:
             label = f"while trying: {attempt.description}" if attempt.description else ""
             labelled = msgspec.structs.replace(finding, label=label)
             findings.setdefault((finding.rule, finding.entry), labelled)
     return EquationReply(tuple(findings.values()), len(attempts), worst, runs[0])
+
+
+def _check_points(
+    config: Mapping[str, Any], pairs: Iterable[tuple[tuple[int, Any, float, float], float | None]]
+) -> Iterator[Finding]:
+    """Report the printed number of each plot that is farthest from its curve, if it is too far."""
+    worst: dict[int, tuple[float, str]] = {}
+    for (i, _, x, y), value in pairs:
+        points, at = config["plots"][i]["points"], _place(config, x)
+        distance = math.inf if value is None else abs(value - y)
+        if distance > max(points["within"], worst.get(i, (0.0, ""))[0]):
+            curve = "no value" if value is None else f"{value:.6g}"
+            text = f"`{points['script']}` printed {y:.6g} at {at}, where the curve has {curve}"
+            worst[i] = distance, text
+    for i, (_, message) in worst.items():
+        yield Finding("lab-points", ("plots", i, "points", "within"), message)
 
 
 def _check_run(config: Mapping[str, Any], attempt: _Attempt, run: Run) -> Iterator[Finding]:
@@ -244,7 +307,7 @@ _NAN_HELP = "say where there is no value: `1/x if x != 0 else nan`"
 
 
 def _check_claims(config: Mapping[str, Any], attempt: _Attempt, run: Run) -> Iterator[Finding]:
-    for i, value in zip(attempt.claims, run.claims, strict=True):
+    for i, value in zip(attempt.claims, run.claims, strict=False):
         claim = config["expect"][i]
         at = _place(config, claim["at"])
         entry: Entry = ("expect", i)
@@ -295,14 +358,16 @@ def _failure(config: Mapping[str, Any], run: Run) -> Finding:
     return Finding(rule, entry, message, help=help or _CLAIM_HELP)
 
 
-def _compare(config: dict[str, Any], attempt: _Attempt, run: Run) -> tuple[Comparison, Entry]:
+def _compare(
+    config: dict[str, Any], attempt: _Attempt, run: Run, patience: float
+) -> tuple[Comparison, Entry]:
     """Compare a run with NumPy and SciPy; return the larger difference, and the entry it is at."""
     tolerance = config["verify"]
     comparison = compare_values(config, attempt.values, run)
     if comparison.difference > tolerance["rtol"] or not config["states"] or run.failure is not None:
         return comparison, ("plots",)
     until = config["axis"]["max"] if tolerance["until"] is None else tolerance["until"]
-    states = compare_states(config, attempt.values, run, until)
+    states = compare_states(config, attempt.values, run, until, patience)
     return max(comparison, states, key=lambda c: c.difference), ("states",)
 
 

@@ -7,6 +7,7 @@ the page's own code against them.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
@@ -117,6 +118,7 @@ def compare_values(config: dict[str, Any], values: Sequence[float], run: Run) ->
 
 
 _MOST_EVALUATIONS = 300_000
+"""Of the equations of one run; it takes a few thousand where they are harmless."""
 
 
 class _TooLongError(Exception):
@@ -126,14 +128,15 @@ class _TooLongError(Exception):
 class _Equations:
     """The equations of a lab for SciPy."""
 
-    def __init__(self, config: dict[str, Any], values: Sequence[float]) -> None:
-        self.config, self.values, self.count = config, values, 0
+    def __init__(self, config: dict[str, Any], values: Sequence[float], end: float) -> None:
+        """`end`: the processor time of this thread at which patience ends, s."""
+        self.config, self.values, self.count, self.end = config, values, 0, end
         self.latest = -1
         """The event that has just been."""
 
     def rates(self, t: float, y: Sequence[float]) -> list[float]:
         self.count += 1
-        if self.count > _MOST_EVALUATIONS:
+        if self.count > _MOST_EVALUATIONS or time.thread_time() > self.end:
             raise _TooLongError
         env = environment(self.config, self.values, t, y)
         return [float(evaluate(state["rate"], env)) for state in self.config["states"]]
@@ -182,10 +185,13 @@ class _Equations:
 
 
 def compare_states(
-    config: dict[str, Any], values: Sequence[float], run: Run, until: float
+    config: dict[str, Any], values: Sequence[float], run: Run, until: float, patience: float
 ) -> Comparison:
-    """Compare the states with SciPy's solution, event by event, up to a place on the axis."""
-    equations, times = _Equations(config, values), np.array(run.times)
+    """Compare the states with SciPy's solution, event by event, up to a place on the axis.
+
+    `patience`: the processor time of this thread at which it is given up, s.
+    """
+    equations, times = _Equations(config, values, patience), np.array(run.times)
     columns = np.array([_array(states) for states in run.states])
     sizes = np.abs(columns).max(axis=1) + 1e-300
     t, most = config["axis"]["min"], config["axis"]["max"]

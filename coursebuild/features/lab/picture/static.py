@@ -126,7 +126,9 @@ def equation_record(lab: Lab, config: dict[str, Any], run: Run) -> LabRecord:
             [None if x is None else y for x, y in zip(data["x"], line, strict=True)]
             for line in data["traces"]
         ]
-        plots.append(Markup(plot_svg(plot, horizontal, lines, narrow=lab.fields.dock, ends=ends)))
+        points = (source["points"] or {"data": ()})["data"]
+        svg = plot_svg(plot, horizontal, lines, narrow=lab.fields.dock, ends=ends, marks=points)
+        plots.append(Markup(svg))
     readouts = tuple(
         (readout.label, _format_value(value, readout.digits))
         for readout, value in zip(lab.fields.readouts, run.readouts, strict=True)
@@ -139,7 +141,8 @@ def equation_record(lab: Lab, config: dict[str, Any], run: Run) -> LabRecord:
 
 _FILE_STYLE = (
     "svg{font:11px sans-serif;fill:#555}path{fill:none;stroke:#555}.lab-grid{stroke:#ddd}"
-    ".lab-reference{stroke-dasharray:1 3}.lab-trace{stroke-width:1.6}"
+    ".lab-measured{fill:none;stroke:#555}.lab-reference{stroke-dasharray:1 3}"
+    ".lab-trace{stroke-width:1.6}"
     + "".join(
         f".lab-trace-{i}{{stroke:{colour}}}"
         for i, colour in enumerate(("#0072b2", "#b84f00", "#00785a", "#a3487d", "#8a6000"), 1)
@@ -188,12 +191,13 @@ def plot_svg(
     *,
     narrow: bool = False,
     ends: tuple[float | None, float | None] = (None, None),
+    marks: Sequence[Sequence[float]] = (),
 ) -> str:
     """Draw a plot as an `svg` element; values that are not finite interrupt their line.
 
     A narrow plot is for the margin: its text has the same size there. `ends` are those of the
-    horizontal axis, if they are not where the samples end. The result is empty if nothing was
-    recorded.
+    horizontal axis, if they are not where the samples end; `marks` are points beside the lines. The
+    result is empty if nothing was recorded.
     """
     start = -math.inf if plot.window is None or not times else times[-1] - plot.window * (1 + 1e-9)
     samples = [(t, i) for i, t in enumerate(times) if t >= start]
@@ -203,7 +207,7 @@ def plot_svg(
     high_t = max(t for t, _ in samples) if ends[1] is None else ends[1]
     lines = [[(t, line[i]) for t, i in samples] for line in traces]
     values = [v for points in lines for _, v in points if _is_finite(v)]
-    values += [line.y for line in plot.refLines]
+    values += [line.y for line in plot.refLines] + [y for _, y in marks]
     low, high = _range(values, plot.ymin, plot.ymax)
     labels = [trace.label for trace in plot.traces]
     frame = _frame(low_t, high_t if high_t > low_t else low_t + 1.0, low, high, labels, narrow)
@@ -218,6 +222,10 @@ def plot_svg(
         _reference(frame, line.y, line.label) for line in plot.refLines if low <= line.y <= high
     ]
     parts = [*_axes(frame, plot), *references, *paths, *_labels(frame, names)]
+    parts += [
+        f'<circle class="lab-measured" cx="{frame.x(x):.1f}" cy="{frame.y(y):.1f}" r="3"/>'
+        for x, y in marks
+    ]
     title = f"{plot.ylabel} against {plot.xlabel}" if plot.ylabel else "plot"
     return (
         f'<svg class="lab-plot" viewBox="0 0 {frame.width:g} {_HEIGHT:g}" role="img" '

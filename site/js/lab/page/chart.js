@@ -34,10 +34,11 @@ export class Chart {
     this.lines = plot.traces.map((trace, i) =>
       draw('path', { class: `lab-trace ${colour('lab-trace', i)}`, 'stroke-dasharray': dashOf(trace, i) }),
     )
+    this.marks = draw('g', { class: 'lab-measured' })
     this.cursor = draw('path', { class: 'lab-cursor' })
     this.points = plot.traces.map((_, i) => draw('circle', { class: `lab-point ${colour('lab-trace', i)}`, r: '4.5' }))
     this.names = plot.traces.map(({ label }, i) => write(label, { class: `lab-name ${colour('lab-name', i)}` }))
-    this.svg.append(this.frame, this.field, ...this.ghosts, this.cursor, ...this.lines, ...this.points, ...this.names)
+    this.svg.append(this.frame, this.field, ...this.ghosts, this.cursor, ...this.lines, this.marks, ...this.points, ...this.names)
     this.element = h('figure', { class: 'lab-chart' }, this.svg)
     this.element.style.setProperty('--height', `${plot.height ?? height}px`)
     this.width = this.height = 0
@@ -100,7 +101,7 @@ export class Chart {
     }
     const [low, high] = range(
       plot,
-      all.flatMap(({ traces }) => traces),
+      [...all.flatMap(({ traces }) => traces), (plot.points?.data ?? []).map(([, y]) => y)],
     )
     const across =
       plot.x === null
@@ -138,6 +139,13 @@ export class Chart {
       parts.push(write(label, { x: left + 4, y: y > TOP + 14 ? y - 4 : y + 13 }))
     }
     this.frame.replaceChildren(...parts)
+    const marks = plot.points?.data ?? []
+    this.marks.replaceChildren(...marks.map(([x, y]) => draw('circle', { cx: this.scaleX(x), cy: this.scaleY(clamp(y, this.scaleY)), r: 3 })))
+    const last = marks[marks.length - 1]
+    if (last && plot.points.label) {
+      const place = { x: this.scaleX(last[0]), y: this.scaleY(clamp(last[1], this.scaleY)) - 9, 'text-anchor': 'end' }
+      this.marks.append(write(plot.points.label, place))
+    }
     this.ghosts.forEach((path, i) => path.setAttribute('d', ghost ? this.path(ghost.x, ghost.traces[i], ghost.x.length) : ''))
     this.field.setAttribute('d', plot.field ? this.arrows() : '')
     this.drawLines()
