@@ -39,7 +39,7 @@ class Axis(Struct, frozen=True, forbid_unknown_fields=True):
 class Points(Struct, frozen=True, forbid_unknown_fields=True):
     """Numbers that a script of the course has printed, on or beside the first trace."""
 
-    script: Annotated[Text, Meta(description="the path of the script, as `examples/fall.py`")]
+    script: Annotated[Text, Meta(description="the path of the script, as its fence names it")]
     within: Annotated[
         Positive, Meta(description="how far from the first trace a number may be, in its unit")
     ]

@@ -131,8 +131,8 @@ class _Equations:
     def __init__(self, config: dict[str, Any], values: Sequence[float], end: float) -> None:
         """`end`: the processor time of this thread at which patience ends, s."""
         self.config, self.values, self.count, self.end = config, values, 0, end
-        self.latest = -1
-        """The event that has just been."""
+        self.before: tuple[int, float] | None = None
+        """The event that has just been, and the value of its quantity then."""
 
     def rates(self, t: float, y: Sequence[float]) -> list[float]:
         self.count += 1
@@ -147,8 +147,8 @@ class _Equations:
         """SciPy's solution to an end or an event, expected after `length`; or why there is none."""
         from scipy.integrate import solve_ivp
 
-        events = [self.event(i, t) for i in range(len(self.config["events"]))]
         try:
+            events = [self.event(i, t, y, end - t) for i in range(len(self.config["events"]))]
             with np.errstate(all="ignore"):
                 solution = solve_ivp(
                     self.rates, (t, end), y, method="DOP853", rtol=1e-11, atol=1e-13 * sizes,
@@ -159,16 +159,30 @@ class _Equations:
             return "SciPy needs too many steps"
         return solution if solution.success else f"SciPy says: {solution.message}"
 
-    def event(self, index: int, start: float) -> Any:
-        """The quantity of an event, as SciPy wants it; right after it has happened, it is armed."""
-        event = self.config["events"][index]
-        direction, latest = event["direction"], self.latest
+    def quantity(self, index: int, t: float, y: Sequence[float]) -> float:
+        """The quantity whose zero an event is."""
+        env = environment(self.config, self.values, t, y)
+        return float(evaluate(self.config["events"][index]["when"], env))
+
+    def event(self, index: int, start: float, y: list[float], length: float) -> Any:
+        """The quantity of an event for SciPy, in a solution that begins here.
+
+        Right after the event, and at some starts, it is 0 but for rounding; then it stands where it
+        moves, as in the page.
+        """
+        direction = self.config["events"][index]["direction"]
+        first = self.quantity(index, start, y)
+        is_latest = self.before is not None and self.before[0] == index
+        if is_latest or first == 0:
+            before = self.before[1] if is_latest and self.before is not None else 0.0
+            delta = 1e-7 * length
+            moved = [a + delta * b for a, b in zip(y, self.rates(start, y), strict=True)]
+            change = self.quantity(index, start + delta, moved) - first
+            if abs(first) <= 10 * abs(before) + abs(change):
+                first = float(np.sign(change)) or float(-direction)
 
         def quantity(t: float, y: Sequence[float]) -> float:
-            if index == latest and t <= start:
-                return float(-direction)
-            env = environment(self.config, self.values, t, y)
-            return float(evaluate(event["when"], env))
+            return first if t <= start else self.quantity(index, t, y)
 
         quantity.terminal = True  # type: ignore[attr-defined]
         quantity.direction = direction  # type: ignore[attr-defined]
@@ -176,7 +190,7 @@ class _Equations:
 
     def assign(self, index: int, t: float, y: list[float]) -> list[float]:
         """The states after an event."""
-        self.latest = index
+        self.before = index, self.quantity(index, t, y)
         env = environment(self.config, self.values, t, y)
         after = list(y)
         for slot, program in self.config["events"][index]["set"]:

@@ -14,6 +14,7 @@ const MOST_STEPS = 20_000
 const MOST_EVENTS = 500
 const LOOKS = 12 // places in a step at which events are looked for
 const CLOSER = 40 // halvings, in search of the first flight after an event
+const NEARBY = 1e-7 // of the whole range: where it is seen to which side an event's quantity moves
 const SHORTEST = 1e-14 // of the whole range
 
 const A = [
@@ -109,7 +110,10 @@ export function solve(problem) {
   }
   wrong = restart()
   if (wrong >= 0) return fail('value', t, wrong)
-  watch.restart(t, y, -1)
+  watch.restart(t, y)
+  events.forEach(({ when }, index) => {
+    if (when(t, y) === 0) watch.release(index, { t, y, rate: k[0], before: 0, range: end - start })
+  })
   for (let tries = 0; t < end; tries++) {
     if (tries >= MOST_STEPS) return fail('steps', t)
     const last = t + h >= end - shortest
@@ -156,6 +160,7 @@ export function solve(problem) {
     if (found === null) continue
     if (solution.events.length >= MOST_EVENTS) return fail('events', t, found.index)
     solution.events.push({ t, index: found.index })
+    const before = events[found.index].when(t, y)
     const ends = events[found.index].assign(t, y)
     wrong = firstWrong(y)
     if (wrong >= 0) return fail('value', t, wrong)
@@ -165,7 +170,8 @@ export function solve(problem) {
     }
     wrong = restart()
     if (wrong >= 0) return fail('value', t, wrong)
-    watch.restart(t, y, found.index)
+    watch.restart(t, y)
+    watch.release(found.index, { t, y, rate: k[0], before, range: end - start })
   }
   return solution
 }
@@ -205,13 +211,25 @@ class Watch {
     this.latest = -1 // the event that has just been, until its quantity has left 0
   }
 
-  /** Begin anew after the event `index`, which may come again once its quantity has changed its side. */
-  restart(t, y, index) {
-    this.latest = index
-    this.events.forEach(({ when, direction }, i) => {
-      this.sides[i] = i === index ? -direction : Math.sign(when(t, y))
-    })
+  /** Begin anew. */
+  restart(t, y) {
+    this.latest = -1
+    this.sides = this.events.map(({ when }) => Math.sign(when(t, y)))
     this.states = new Float64Array(y.length)
+  }
+
+  /**
+   * Find the side of an event that has just been. Its quantity is 0 but for rounding, unless the event has changed it; then the side
+   * is the one to which it moves. If it stays 0, as for a ball that is laid on the floor, the event may come again.
+   */
+  release(index, { t, y, rate, before, range }) {
+    const { when, direction } = this.events[index]
+    const delta = NEARBY * range
+    const after = when(t, y)
+    const change = when(t + delta, y.map((value, i) => value + delta * rate[i])) - after
+    if (Math.abs(after) > 10 * Math.abs(before) + Math.abs(change)) return
+    this.latest = index
+    this.sides[index] = Math.sign(change) || -direction
   }
 
   value(i, step, t) {
