@@ -23,7 +23,7 @@ from coursebuild.features.lab.equations.formula import (
     compile_formula,
 )
 from coursebuild.features.lab.equations.reference import (
-    Run,
+    CurveRun,
     compare_states,
     compare_values,
     evaluate,
@@ -50,7 +50,7 @@ def config_of(text: str, kind: str = "ode") -> dict[str, Any]:
     return data
 
 
-def run_of(engine: EquationEngine, config: dict[str, Any], *values: float) -> Run:
+def run_of(engine: EquationEngine, config: dict[str, Any], *values: float) -> CurveRun:
     attempt = {"values": values, "claims": []}
     return engine.run({"config": config, "attempts": [attempt]}, 60)[0]
 
@@ -70,7 +70,7 @@ def excerpt(text: str) -> Excerpt:
     return Source("a.md", text).excerpt()
 
 
-def compiled(text: str) -> Program:
+def program_of(text: str) -> Program:
     compilation = compile_formula(excerpt(text), NAMES)
     assert compilation.value is not None, compilation.diagnostics
     return compilation.value
@@ -100,7 +100,7 @@ def test_expression_has_the_same_value_in_page_and_numpy(
 ) -> None:
     if not math.isfinite(x):
         return
-    program = compiled(text)
+    program = program_of(text)
     expected = float(evaluate(program, [np.float64(x), np.float64(y)]))
     (value,) = page_values(engine, [program], x, y)
     assert value == (expected if math.isfinite(expected) else None)
@@ -109,7 +109,7 @@ def test_expression_has_the_same_value_in_page_and_numpy(
 def test_functions_have_the_same_values_in_page_and_numpy(engine: EquationEngine) -> None:
     calls = [f"{name}({', '.join('xy'[:count])})" for name, count in sorted(ARITIES.items())]
     calls += ["x**y", "x**0.5", "x**-2"]
-    programs = [compiled(call) for call in calls]
+    programs = [program_of(call) for call in calls]
     for x, y in ((0.3, 2.0), (-0.7, 3.0), (1.0, math.inf), (12.5, -0.5), (0.0, 0.0)):
         values = page_values(engine, programs, x, y) if math.isfinite(y) else []
         for call, program, value in zip(calls, programs, values, strict=False):

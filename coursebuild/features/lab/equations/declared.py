@@ -81,7 +81,7 @@ class Event(Struct, frozen=True, forbid_unknown_fields=True):
     ] = False
 
 
-class Claim(Struct, frozen=True, forbid_unknown_fields=True):
+class CurveClaim(Struct, frozen=True, forbid_unknown_fields=True):
     """What the build proves of a place on the axis."""
 
     at: Annotated[float, Meta(description="a value of the axis")]
@@ -126,7 +126,7 @@ class EquationLab(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     ] = {}
     controls: Annotated[tuple[Control, ...], Meta(description="sliders and selects")] = ()
     readouts: Annotated[tuple[Readout, ...], Meta(description="numbers at the point")] = ()
-    expect: Annotated[tuple[Claim, ...], Meta(description="claims that the build proves")] = ()
+    expect: Annotated[tuple[CurveClaim, ...], Meta(description="claims that the build proves")] = ()
     goal: Annotated[Challenge | None, Meta(description="what the reader is asked to reach")] = None
     verify: Annotated[Tolerance | None, Meta(description="how closely SciPy has to agree")] = None
     play: Annotated[

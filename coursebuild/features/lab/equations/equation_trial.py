@@ -28,8 +28,8 @@ from coursebuild.core.run.v8 import Isolate, LimitError, ScriptError, StoppedErr
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.features.lab.engines.native import equation_script_path
 from coursebuild.features.lab.equations.reference import (
-    Comparison,
-    Run,
+    CurveComparison,
+    CurveRun,
     compare_states,
     compare_values,
 )
@@ -59,7 +59,7 @@ _FAILURES = {
 _CLAIM_HELP = "if that is intended, claim so: `expect` with `diverges`"
 
 
-class Finding(Struct, frozen=True):
+class CurveFinding(Struct, frozen=True):
     """What a trial found, at an entry of the lab."""
 
     rule: str
@@ -77,11 +77,11 @@ class Finding(Struct, frozen=True):
 class EquationReply(Struct, frozen=True):
     """The result of a trial."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[CurveFinding, ...]
     tried: int = 0
     difference: float = 0.0
     """The largest, relative, from NumPy and SciPy."""
-    start: Run | None = None
+    start: CurveRun | None = None
     """What follows from the controls as they start."""
     seconds: float = 0.0
     timestamp: int = 0
@@ -114,7 +114,7 @@ class EquationEngine:
         if (isolate := self._isolate) is not None:
             isolate.stop()
 
-    def run(self, request: dict[str, Any], seconds: float) -> list[Run]:
+    def run(self, request: dict[str, Any], seconds: float) -> list[CurveRun]:
         """Run the attempts of a lab.
 
         Raises:
@@ -130,7 +130,7 @@ class EquationEngine:
         except (LimitError, ScriptError):
             self.close()
             raise
-        return msgspec.convert(json.loads(text), list[Run])
+        return msgspec.convert(json.loads(text), list[CurveRun])
 
 
 class _Attempt(Struct, frozen=True):
@@ -175,7 +175,7 @@ def _attempts(config: Mapping[str, Any]) -> list[_Attempt]:
     return list(attempts.values())
 
 
-def add_points(config: dict[str, Any], course: Course) -> Iterator[Finding]:
+def add_points(config: dict[str, Any], course: Course) -> Iterator[CurveFinding]:
     """Put the numbers that scripts have printed into the data of a lab; yield what is missing."""
     for i, plot in enumerate(config["plots"]):
         points = plot["points"]
@@ -192,7 +192,7 @@ def add_points(config: dict[str, Any], course: Course) -> Iterator[Finding]:
         if points["script"] not in outputs:
             message = f"no script `{points['script']}` has a recorded output"
             help = did_you_mean(points["script"], outputs)
-            yield Finding("lab-name", entry, message, help=help)
+            yield CurveFinding("lab-name", entry, message, help=help)
             continue
         for line in outputs[points["script"]].splitlines():
             words = re.split(r"[\s|,;]+", line.strip(" |").replace("\u2212", "-"))
@@ -204,7 +204,7 @@ def add_points(config: dict[str, Any], course: Course) -> Iterator[Finding]:
         if not points["data"]:
             columns = f"columns {points['x']} and {points['y']}"
             message = f"the output of `{points['script']}` has no numbers of the axis in {columns}"
-            yield Finding("lab-points", entry, message)
+            yield CurveFinding("lab-points", entry, message)
 
 
 def run_trial(engine: EquationEngine, config: dict[str, Any], seconds: float) -> EquationReply:
@@ -232,14 +232,14 @@ def run_trial(engine: EquationEngine, config: dict[str, Any], seconds: float) ->
     try:
         runs = engine.run(request, seconds)
     except LimitError as error:
-        finding = Finding("lab-timeout", (), f"trying the lab {error}")
+        finding = CurveFinding("lab-timeout", (), f"trying the lab {error}")
         return EquationReply((finding,), lasting=False)
     except ScriptError as error:
         reason = str(error).splitlines()[0]
         return EquationReply(
-            (Finding("lab-engine", (), f"the trial broke: {reason}"),), lasting=False
+            (CurveFinding("lab-engine", (), f"the trial broke: {reason}"),), lasting=False
         )
-    findings: dict[tuple[str, Entry], Finding] = {}
+    findings: dict[tuple[str, Entry], CurveFinding] = {}
     worst = 0.0
     for attempt, run in zip(attempts, runs, strict=True):
         mistakes = list(_check_run(config, attempt, run))
@@ -259,7 +259,7 @@ def run_trial(engine: EquationEngine, config: dict[str, Any], seconds: float) ->
 
 def _check_points(
     config: Mapping[str, Any], pairs: Iterable[tuple[tuple[int, Any, float, float], float | None]]
-) -> Iterator[Finding]:
+) -> Iterator[CurveFinding]:
     """Report the printed number of each plot that is farthest from its curve, if it is too far."""
     worst: dict[int, tuple[float, str]] = {}
     for (i, _, x, y), value in pairs:
@@ -270,10 +270,12 @@ def _check_points(
             text = f"`{points['script']}` printed {y:.6g} at {at}, where the curve has {curve}"
             worst[i] = distance, text
     for i, (_, message) in worst.items():
-        yield Finding("lab-points", ("plots", i, "points", "within"), message)
+        yield CurveFinding("lab-points", ("plots", i, "points", "within"), message)
 
 
-def _check_run(config: Mapping[str, Any], attempt: _Attempt, run: Run) -> Iterator[Finding]:
+def _check_run(
+    config: Mapping[str, Any], attempt: _Attempt, run: CurveRun
+) -> Iterator[CurveFinding]:
     """Check what a run shows, claims and reaches."""
     if run.failure is not None and not _is_claimed(config, attempt, run):
         yield _failure(config, run)
@@ -284,11 +286,11 @@ def _check_run(config: Mapping[str, Any], attempt: _Attempt, run: Run) -> Iterat
                 at = _place(config, run.times[line.index(None)])
                 message = f"the trace `{trace['label']}` is no finite number at {at}"
                 entry: Entry = ("plots", i, "traces", j, "expr")
-                yield Finding("lab-value", entry, message, help=_NAN_HELP)
+                yield CurveFinding("lab-value", entry, message, help=_NAN_HELP)
     for i, (readout, value) in enumerate(zip(config["readouts"], run.readouts, strict=True)):
         if value is None and "nan" not in readout["value"]:
             message = f"the readout `{readout['label']}` is no finite number"
-            yield Finding("lab-value", ("readouts", i, "expr"), message, help=_NAN_HELP)
+            yield CurveFinding("lab-value", ("readouts", i, "expr"), message, help=_NAN_HELP)
     yield from _check_claims(config, attempt, run)
     goal = config["goal"]
     if goal is None:
@@ -296,35 +298,37 @@ def _check_run(config: Mapping[str, Any], attempt: _Attempt, run: Run) -> Iterat
     if attempt.is_goal and run.reached is None:
         duration = f": it holds for {run.longest:.3g} at the most, not {goal['hold']:g}"
         message = "the goal is not reached by what `after` sets" + (duration if run.longest else "")
-        yield Finding("lab-goal", ("goal", "after"), message)
+        yield CurveFinding("lab-goal", ("goal", "after"), message)
     elif not attempt.changed and run.reached is not None:
         message = f"the goal is reached at {_place(config, run.reached)} with nothing done"
         help = "ask for something that has to be done"
-        yield Finding("lab-goal", ("goal", "expr"), message, help=help)
+        yield CurveFinding("lab-goal", ("goal", "expr"), message, help=help)
 
 
 _NAN_HELP = "say where there is no value: `1/x if x != 0 else nan`"
 
 
-def _check_claims(config: Mapping[str, Any], attempt: _Attempt, run: Run) -> Iterator[Finding]:
+def _check_claims(
+    config: Mapping[str, Any], attempt: _Attempt, run: CurveRun
+) -> Iterator[CurveFinding]:
     for i, value in zip(attempt.claims, run.claims, strict=False):
         claim = config["expect"][i]
         at = _place(config, claim["at"])
         entry: Entry = ("expect", i)
         if claim["value"] is None:
             if run.failure is None or run.end > claim["at"]:
-                yield Finding("lab-expect", entry, f"the solution goes on after {at}")
+                yield CurveFinding("lab-expect", entry, f"the solution goes on after {at}")
         elif value is None:
-            yield Finding("lab-expect", entry, f"the claim has no finite value at {at}")
+            yield CurveFinding("lab-expect", entry, f"the claim has no finite value at {at}")
         elif claim["min"] is not None and value < claim["min"]:
             message = f"the claim does not hold: {value:.6g} at {at}, not at least {claim['min']:g}"
-            yield Finding("lab-expect", entry, message)
+            yield CurveFinding("lab-expect", entry, message)
         elif claim["max"] is not None and value > claim["max"]:
             message = f"the claim does not hold: {value:.6g} at {at}, not at most {claim['max']:g}"
-            yield Finding("lab-expect", entry, message)
+            yield CurveFinding("lab-expect", entry, message)
 
 
-def _is_claimed(config: Mapping[str, Any], attempt: _Attempt, run: Run) -> bool:
+def _is_claimed(config: Mapping[str, Any], attempt: _Attempt, run: CurveRun) -> bool:
     """Whether the solution ends, and the lab claims that it does with one of these controls."""
     claims = [claim for claim in config["expect"] if claim["diverges"]]
     assert run.failure is not None
@@ -342,7 +346,7 @@ def _is_claimed(config: Mapping[str, Any], attempt: _Attempt, run: Run) -> bool:
     )
 
 
-def _failure(config: Mapping[str, Any], run: Run) -> Finding:
+def _failure(config: Mapping[str, Any], run: CurveRun) -> CurveFinding:
     """Report a solution that ends too soon."""
     assert run.failure is not None
     kind, index, t = run.failure["kind"], run.failure["index"], run.failure["t"]
@@ -355,12 +359,12 @@ def _failure(config: Mapping[str, Any], run: Run) -> Finding:
     elif kind == "events":
         entry = ("events", index, "when")
     message = text.format(name=name, t=_place(config, t))
-    return Finding(rule, entry, message, help=help or _CLAIM_HELP)
+    return CurveFinding(rule, entry, message, help=help or _CLAIM_HELP)
 
 
 def _compare(
-    config: dict[str, Any], attempt: _Attempt, run: Run, patience: float
-) -> tuple[Comparison, Entry]:
+    config: dict[str, Any], attempt: _Attempt, run: CurveRun, patience: float
+) -> tuple[CurveComparison, Entry]:
     """Compare a run with NumPy and SciPy; return the larger difference, and the entry it is at."""
     tolerance = config["verify"]
     comparison = compare_values(config, attempt.values, run)
@@ -372,8 +376,8 @@ def _compare(
 
 
 def _check_comparison(
-    config: Mapping[str, Any], comparison: Comparison, entry: Entry
-) -> Iterator[Finding]:
+    config: Mapping[str, Any], comparison: CurveComparison, entry: Entry
+) -> Iterator[CurveFinding]:
     rtol = config["verify"]["rtol"]
     if comparison.difference <= rtol:
         return
@@ -387,7 +391,7 @@ def _check_comparison(
             f"`{comparison.name}` differs from what {library} computes by "
             f"{comparison.difference:.1e} at {at}, where {rtol:g} is allowed"
         )
-    yield Finding("lab-parity", entry, message, help=_CHAOS if config["states"] else "")
+    yield CurveFinding("lab-parity", entry, message, help=_CHAOS if config["states"] else "")
 
 
 def _place(config: Mapping[str, Any], t: float) -> str:

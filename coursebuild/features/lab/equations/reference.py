@@ -58,7 +58,7 @@ def evaluate(program: Program, env: Sequence[Any]) -> Any:
     return stack[0]
 
 
-class Comparison(Struct, frozen=True):
+class CurveComparison(Struct, frozen=True):
     """How far two computations of a run are apart."""
 
     difference: float = 0.0
@@ -70,7 +70,7 @@ class Comparison(Struct, frozen=True):
     """Why they cannot be compared, or what is there in one alone."""
 
 
-class Run(Struct, frozen=True):
+class CurveRun(Struct, frozen=True):
     """A run of the page's own code, sampled; `None` stands for what is not finite."""
 
     times: list[float]
@@ -95,25 +95,27 @@ def environment(
     return env
 
 
-def compare_values(config: dict[str, Any], values: Sequence[float], run: Run) -> Comparison:
+def compare_values(
+    config: dict[str, Any], values: Sequence[float], run: CurveRun
+) -> CurveComparison:
     """Compare what plots show with NumPy's values of the same formulas."""
     times = np.array(run.times)
     env = environment(config, values, times, [_array(states) for states in run.states])
-    worst = Comparison()
+    worst = CurveComparison()
     for plot, data in zip(config["plots"], run.plots, strict=True):
         for trace, line in zip(plot["traces"], data["traces"], strict=True):
             expected = np.broadcast_to(evaluate(trace["value"], env), times.shape)
             values_shown, is_known = _array(line), np.isfinite(expected)
             if (is_known != np.isfinite(values_shown)).any():
                 at = float(times[is_known != np.isfinite(values_shown)][0])
-                return Comparison(math.inf, trace["label"], at, "has a value in one alone")
+                return CurveComparison(math.inf, trace["label"], at, "has a value in one alone")
             if not is_known.any():
                 continue
             size = np.abs(expected[is_known]) + np.median(np.abs(expected[is_known])) + 1e-300
             difference = np.abs(values_shown - expected)[is_known] / size
             if (largest := float(difference.max())) > worst.difference:
                 at = float(times[is_known][int(difference.argmax())])
-                worst = Comparison(largest, trace["label"], at)
+                worst = CurveComparison(largest, trace["label"], at)
     return worst
 
 
@@ -176,8 +178,8 @@ class _Equations:
         if is_latest or first == 0:
             before = self.before[1] if is_latest and self.before is not None else 0.0
             delta = 1e-7 * length
-            moved = [a + delta * b for a, b in zip(y, self.rates(start, y), strict=True)]
-            change = self.quantity(index, start + delta, moved) - first
+            neighbour = [a + delta * b for a, b in zip(y, self.rates(start, y), strict=True)]
+            change = self.quantity(index, start + delta, neighbour) - first
             if abs(first) <= 10 * abs(before) + abs(change):
                 first = float(np.sign(change)) or float(-direction)
 
@@ -199,8 +201,8 @@ class _Equations:
 
 
 def compare_states(
-    config: dict[str, Any], values: Sequence[float], run: Run, until: float, patience: float
-) -> Comparison:
+    config: dict[str, Any], values: Sequence[float], run: CurveRun, until: float, patience: float
+) -> CurveComparison:
     """Compare the states with SciPy's solution, event by event, up to a place on the axis.
 
     `patience`: the processor time of this thread at which it is given up, s.
@@ -211,7 +213,7 @@ def compare_states(
     t, most = config["axis"]["min"], config["axis"]["max"]
     env = environment(config, values, t, [0.0] * len(sizes))
     y = [float(evaluate(state["start"], env)) for state in config["states"]]
-    close, worst, first = 1e-6 * (most - t), Comparison(), 0
+    close, worst, first = 1e-6 * (most - t), CurveComparison(), 0
     # A sample stands on either side of each event.
     cuts = [i + 1 for i, (a, b) in enumerate(pairwise(run.times)) if a == b]
     for k, last in enumerate([*cuts, len(times)]):
@@ -224,7 +226,7 @@ def compare_states(
             limit = end if index is None else min(end + 0.05 * (end - t), most)
             solution = equations.solve(t, max(limit, t), y, sizes, end - t)
             if isinstance(solution, str):
-                return Comparison(math.inf, "", t, solution)
+                return CurveComparison(math.inf, "", t, solution)
             event_index = next((i for i, at in enumerate(solution.t_events or ()) if len(at)), None)
             stop = float(solution.t[-1])
             if event_index != index or abs(stop - end) > close:
@@ -232,7 +234,7 @@ def compare_states(
                     "no event" if i is None else f"event {i + 1}" for i in (index, event_index)
                 ]
                 problem = f"there is {names[0]} at {end:.9g}, and {names[1]} at {stop:.9g}"
-                return Comparison(math.inf, "", end, problem)
+                return CurveComparison(math.inf, "", end, problem)
             computed = solution.sol(np.clip(times[first:last], t, stop))
             y = solution.y[:, -1].tolist()
         difference = np.abs(computed - columns[:, first:last]) / sizes[:, None]
@@ -240,7 +242,7 @@ def compare_states(
         if difference.size and (largest := float(difference.max())) > worst.difference:
             state, at = np.unravel_index(int(difference.argmax()), difference.shape)
             name = config["states"][int(state)]["name"]
-            worst = Comparison(largest, name, float(times[first + int(at)]))
+            worst = CurveComparison(largest, name, float(times[first + int(at)]))
         t, first = stop, last
         if index is not None:
             y = equations.assign(index, t, y)

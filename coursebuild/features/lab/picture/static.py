@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from coursebuild.core.drawing.scales import Scale, separate_labels, typeset_number
 from coursebuild.core.drawing.scales import markup_text as _text
-from coursebuild.features.lab.equations.reference import Run
+from coursebuild.features.lab.equations.reference import CurveRun
 from coursebuild.features.lab.files import LabRecord
 from coursebuild.features.lab.model import ODE, Lab
 from coursebuild.features.lab.picture.draw import FreeCamera, draw
@@ -115,7 +115,7 @@ def lab_record(lab: Lab, main: MainRun) -> LabRecord:
     return LabRecord(_size(lab), scale, first["time"], readouts, last["time"], plots)
 
 
-def equation_record(lab: Lab, config: dict[str, Any], run: Run) -> LabRecord:
+def equation_record(lab: Lab, config: dict[str, Any], run: CurveRun) -> LabRecord:
     """Make the record of a lab without an engine from what follows from its start."""
     plots = []
     for plot, data, source in zip(lab.fields.plots, run.plots, config["plots"], strict=True):
