@@ -38,6 +38,7 @@ export class Desk {
     const { min, max } = config.axis
     const isNatural = config.kind === 'ode' && max - min >= NATURAL[0] && max - min <= NATURAL[1]
     this.rate = isNatural && !config.play ? 1 : (max - min) / (config.play ?? LENGTH)
+    this.unit = config.axis.unit ? `\u00a0${config.axis.unit}` : ''
     this.digits = Math.min(10, Math.max(0, 3 - Math.ceil(Math.log10(max - min))))
     this.tick = (now) => this.advance(now)
     this.build()
@@ -84,7 +85,8 @@ export class Desk {
           progress: this.progress,
           say: (text) => this.notices.say(text),
           show: () => this.begin(config.goal.values),
-          text: (x) => this.textOf(x),
+          unit: this.unit,
+          format: (x) => formatNumber(x, this.digits).trim(),
         })
       : null
     const charts = h('div', { class: 'lab-charts', role: 'group', tabIndex: 0 }, ...this.charts.map((chart) => chart.element))
@@ -160,8 +162,7 @@ export class Desk {
 
   /** A place on the axis with its unit. */
   textOf(x) {
-    const { unit } = this.config.axis
-    return `${formatNumber(x, this.digits).trim()}${unit ? `\u00a0${unit}` : ''}`
+    return `${formatNumber(x, this.digits).trim()}${this.unit}`
   }
 
   // --- actions of the reader

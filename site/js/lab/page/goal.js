@@ -9,11 +9,12 @@ export class GoalView {
    * @param {HTMLElement} still the goal in the lab's static form
    * @param {{hold: number}} goal of the lab's JSON
    * @param {(key: string, values?: Record<string, any>) => string} words
-   * @param {{progress: Record<string, any> | null, say: (text: string) => void, show: () => void, text?: (time: number) => string}}
-   *   services `progress`: see progress/store.js; `text`: a time with its unit
+   * @param {{progress: Record<string, any> | null, say: (text: string) => void, show: () => void, unit?: string, format?: (time: number) => string}}
+   *   services `progress`: see progress/store.js; `unit` and `format` of times
    */
-  constructor(still, { hold }, words, { progress, say, show, text = (time) => `${formatTime(time)} s` }) {
-    this.textOf = text
+  constructor(still, { hold }, words, { progress, say, show, unit = ' s', format = formatTime }) {
+    this.unit = unit
+    this.textOf = (time) => `${format(time)}${unit}`
     this.hold = hold
     this.words = words
     this.progress = progress
@@ -51,7 +52,7 @@ export class GoalView {
   draw() {
     const { words, hold, status } = this
     const { held, reached, counts } = status
-    let text = hold > 0 ? words('lab.live.goal_held', { t: this.textOf(held), hold: this.textOf(hold) }) : ''
+    let text = hold > 0 ? words('lab.live.goal_held', { t: this.textOf(held), hold: `${hold}${this.unit}` }) : ''
     if (reached !== null) text = words('lab.live.goal_reached', { t: this.textOf(reached) })
     else if (this.isStored) text = `${words('lab.live.goal_kept')} ${text}`
     if (!counts && !this.isStored) text += ` ${words('lab.live.goal_other')}`
