@@ -5,7 +5,7 @@
  *
  * Sources are the js/, css/ and licences/ folders beside this file. In OUT, in this order:
  *
- *   js/NAME.js           one ES module for each js/NAME.js; js/lab-trial.js is a classic script for V8 without a page
+ *   js/NAME.js           one ES module for each js/NAME.js; of js/NAME-trial.js a classic script for V8 without a page
  *   css/NAME.css         css/site.css with its imports, and css/preview.css and css/scorm.css, which only the preview and packages have
  *   mujoco/mujoco.wasm   the physics engine of js/lab-worker.js and js/lab-trial.js
  *   temml/temml.min.js   a classic script that defines the global `temml`
@@ -45,8 +45,8 @@ const FONTS = [
   { name: '@fontsource/stix-two-math', sheets: { '400.css': ['latin'] }, whole: true },
 ]
 
-/** The script for a bare V8, which has neither modules nor URLs. */
-const TRIAL = 'lab-trial.js'
+/** Whether a script is for a bare V8, which has neither modules nor URLs. */
+const isTrial = (file) => file.endsWith('-trial.js')
 
 /** A mistake in the sources or the packages, reported without a stack. */
 class BuildError extends Error {}
@@ -111,8 +111,8 @@ async function bundleScripts(out) {
   const options = { outdir: join(out, 'js'), platform: 'browser', target: 'es2022', plugins: [withoutNode] }
   const names = new Set()
   for (const [format, group, define] of [
-    ['esm', entries.filter((file) => file !== TRIAL), {}],
-    ['iife', entries.filter((file) => file === TRIAL), { 'import.meta.url': '"file:///engine.js"' }],
+    ['esm', entries.filter((file) => !isTrial(file)), {}],
+    ['iife', entries.filter(isTrial), { 'import.meta.url': '"file:///engine.js"' }],
   ]) {
     if (group.length === 0) continue
     const entryPoints = group.map((file) => join('js', file))

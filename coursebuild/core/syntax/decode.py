@@ -368,7 +368,8 @@ def require_one_of(
     foreign = node.members.keys() - set(type.__struct_fields__)
     # A field that is surely a misspelling of one of the names was already reported.
     if not members and not any(nearest(key, names) for key in foreign):
-        choice = ", ".join(f"`{name}`" for name in names[:-1]) + f" or `{names[-1]}`"
+        choice = ", ".join(f"`{name}`" for name in names[:-1])
+        choice = f"{choice} or `{names[-1]}`" if choice else f"`{names[-1]}`"
         yield diagnose("field-missing", node.mark, f"{choice} is missing")
     for second in members[1:] if only else ():
         first, help = members[0].key, "leave one of them out"

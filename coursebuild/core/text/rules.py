@@ -211,7 +211,7 @@ _SUMMARIES = {
     "lab-model": "A lab names a model that is not in models/.",
     "lab-name": "A lab or its code names something that does not exist, such as a keyframe, a "
     "control or `data.qps`.",
-    "lab-code": "A piece of a lab's code is not JavaScript.",
+    "lab-code": "A piece of a lab's code is not JavaScript, or an expression cannot be read.",
     "lab-throws": "A piece of a lab's code ends with an exception.",
     "lab-value": "An expression of a lab does not give a finite number.",
     "lab-warning": "MuJoCo raised a warning while a lab was tried.",
@@ -220,7 +220,9 @@ _SUMMARIES = {
     "lab-shallow": "A lab says `deep`, but no bodies lay deep in each other.",
     "lab-expect": "A claim of a lab does not hold.",
     "lab-goal": "A lab's goal is reached by doing nothing, or not by its log.",
-    "lab-parity": "A lab runs differently in the browser's engine and natively.",
+    "lab-parity": "A lab runs differently in the browser and natively, or than SciPy computes.",
+    "lab-endless": "The equations of a lab take too many steps, or its events do not end.",
+    "lab-points": "Numbers that a script printed do not lie on the curve of a lab.",
     "lab-far": "Motion is small in the picture of a lab.",
     "lab-reset": "A reset does not lead a lab back to where it started.",
     "lab-shared": "A lab changes what all labs of a page share: objects of JavaScript or of the "

@@ -3,7 +3,8 @@
 A `lab` fence holds JSON (`schema`). `parse` makes a `Lab` of it (`model`), `checks` compares it
 with the course and its models, `page` and `markdown` show it. `trial` runs it in the engine that
 browsers use and natively; `picture` draws what was recorded, and `export` writes the lab as a
-Python script.
+Python script. Labs of formulas and equations, which need no engine, are read and tried in
+`equations`.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from coursebuild.core.features import (
     TrialRun,
     Trials,
 )
+from coursebuild.features.lab.equations.declared import OdeLab, PlotLab
 from coursebuild.features.lab.files import publish_labs
 from coursebuild.features.lab.inputs import lab_trials, trial_inputs
 from coursebuild.features.lab.markdown import lab_markdown
@@ -69,6 +71,10 @@ FEATURE = Feature(
     check_models=check_model_names,
     parts=(_LIVE,),
     trials=Trials(find=lab_trials, start=start, inputs=trial_inputs, publish=publish_labs),
-    schemas={"lab": (SimLab, "A lab fence of the kind simlab")},
+    schemas={
+        "lab": (SimLab, "A lab fence of the kind simlab"),
+        "lab-plot": (PlotLab, "A lab fence of the kind plot"),
+        "lab-ode": (OdeLab, "A lab fence of the kind ode"),
+    },
     refine_schema=refine_schema,
 )

@@ -151,7 +151,7 @@ def _config(lab: Lab, name: str) -> dict[str, Any]:
     config = {"id": name} | {field: getattr(fields, field) for field in _FIELDS}
     config |= {
         "overlays": _overlays(fields),
-        "controls": [_control_data(control) for control in fields.controls],
+        "controls": [control_data(control) for control in fields.controls],
         "readouts": [{"label": r.label, "digits": r.digits} for r in fields.readouts],
         "plots": [_plot_data(plot) for plot in fields.plots],
         "expect": [
@@ -193,7 +193,8 @@ _CONTROL = {
 """Fields of a control, of whatever kind, and their defaults."""
 
 
-def _control_data(control: Control) -> dict[str, Any]:
+def control_data(control: Control) -> dict[str, Any]:
+    """Return a control as the page needs it."""
     fields = to_builtins(control)
     if isinstance(control, Select):
         fields["value"] = control.start

@@ -16,6 +16,7 @@ from msgspec import Struct
 
 from coursebuild.core.model.results import OutputFile, PublishedTrials, Results
 from coursebuild.core.pages.assets import Assets, hashed_name
+from coursebuild.features.lab.model import ODE, PLOT
 
 _FOLDER = "assets/labs"
 
@@ -25,8 +26,9 @@ class LabRecord(Struct, frozen=True):
 
     size: tuple[int, int]
     """Width and height of the picture, pixels."""
-    scale: tuple[float, float]
-    """Length of the bar that shows the picture's scale: in m, and in pixels."""
+    scale: tuple[float, float] | None
+    """Length of the bar that shows the picture's scale: in m, and in pixels. `None` for a lab
+    without an engine, whose picture is that of its plots."""
     time: float
     """Simulated time of the picture, s."""
     readouts: tuple[tuple[str, str], ...]
@@ -35,6 +37,8 @@ class LabRecord(Struct, frozen=True):
     """Simulated time of the readouts and of the end of the plots, s."""
     plots: tuple[Markup, ...]
     """One SVG element for each plot."""
+    place: str = ""
+    """Where on the axis the readouts were taken, for a lab without an engine."""
 
 
 class LabOutput(Struct, frozen=True):
@@ -48,7 +52,7 @@ class LabOutput(Struct, frozen=True):
     """The model."""
     record: LabRecord | None = None
     picture: bytes = b""
-    """PNG on a transparent ground, if there is a record."""
+    """PNG on a transparent ground, if there is a record; SVG of a lab without an engine."""
     script: tuple[str, str] | None = None
     """Name and text of a Python script that does the same; `{{control:N}}` in it stands for the
     value of control N."""
@@ -80,14 +84,25 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
         files[path] = OutputFile(path, data)
         return path
 
-    script = publish("lab.js", assets.file("js/lab.js"))
-    worker = publish("worker.js", assets.file("js/lab-worker.js"))
-    wasm = publish("mujoco.wasm", assets.file("mujoco/mujoco.wasm"))
+    trials = [(t.line, t.output) for t in results.trials if isinstance(t.output, LabOutput)]
+    kinds = {lab.config.get("kind") in (PLOT, ODE) for _, lab in trials}
+    if True in kinds:
+        equation_script = publish("equations.js", assets.file("js/equation-lab.js"))
+    if False in kinds:
+        lab_script = publish("lab.js", assets.file("js/lab.js"))
+        worker = publish("worker.js", assets.file("js/lab-worker.js"))
+        wasm = publish("mujoco.wasm", assets.file("mujoco/mujoco.wasm"))
     labs = {}
-    for trial in results.trials:
-        if not isinstance(trial.output, LabOutput):
+    for line, lab in trials:
+        name = line.name
+        if lab.config.get("kind") in (PLOT, ODE):
+            data = {key: value for key, value in lab.config.items() if key not in _CLAIMS}
+            picture = publish(f"{name}.svg", lab.picture) if lab.record is not None else ""
+            address = publish(f"{name}.json", _json(data))
+            labs[name] = PublishedLab(
+                name, address, equation_script, lab.record, picture, line.tried, line.parity
+            )
             continue
-        name, lab = trial.line.name, trial.output
         is_editable, model = (
             "xml" in lab.config,
             lab.config.get("model") or name,
@@ -103,10 +118,17 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
         config = lab.config | addresses
         if lab.script is not None:
             config["exportPython"] = dict(zip(("name", "text"), lab.script, strict=True))
-        text = json.dumps(config, ensure_ascii=False, separators=(",", ":"))
         picture = publish(f"{name}.png", lab.picture) if lab.record is not None else ""
-        address = publish(f"{name}.json", text.encode())
+        address = publish(f"{name}.json", _json(config))
         labs[name] = PublishedLab(
-            name, address, script, lab.record, picture, trial.line.tried, trial.line.parity
+            name, address, lab_script, lab.record, picture, line.tried, line.parity
         )
     return PublishedTrials(labs, tuple(files.values()))
+
+
+_CLAIMS = ("expect", "verify")
+"""Data of a lab without an engine that only its trial needs."""
+
+
+def _json(data: dict[str, Any]) -> bytes:
+    return json.dumps(data, ensure_ascii=False, separators=(",", ":")).encode()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from importlib.metadata import version
 from typing import Any
 
 from coursebuild.core.features import Trial
@@ -16,8 +17,12 @@ from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.source import key_of
 from coursebuild.features.lab.compile import LabModule, compile_lab
-from coursebuild.features.lab.engines.native import engine_digest, lab_digest
-from coursebuild.features.lab.model import BUILT_IN_KINDS, Lab
+from coursebuild.features.lab.engines.native import (
+    engine_digest,
+    equation_script_digest,
+    lab_digest,
+)
+from coursebuild.features.lab.model import BUILT_IN_KINDS, ODE, PLOT, Lab
 from coursebuild.features.lab.page import gallery_labs
 
 _DISPLAY_FIELDS = ("id", "title", "model", "height", "toggles")
@@ -38,6 +43,8 @@ def trial_inputs(trial: Trial) -> Inputs | None:
     lab = trial.block
     if not isinstance(lab, Lab) or lab.kind not in BUILT_IN_KINDS:
         return None
+    if lab.kind in (PLOT, ODE):
+        return equation_inputs(lab, trial.name)
     return inputs_of(lab, compile_lab(lab, trial.name))
 
 
@@ -55,6 +62,16 @@ def inputs_of(lab: Lab, module: LabModule) -> Inputs:
         ("the browser's engine and its trial", engine_digest()[:12]),
     )
     return Inputs(f"lab {module.name}", text, (), LIMITS.lab, (), conditions)
+
+
+def equation_inputs(lab: Lab, name: str) -> Inputs:
+    """Return what the trial of a lab without an engine depends on."""
+    conditions = (
+        ("SciPy", version("scipy")),
+        ("how a lab without an engine is tried", lab_digest("equations")[:12]),
+        ("the page's own code", equation_script_digest()[:12]),
+    )
+    return Inputs(f"lab {name}", key_of(lab.config), (), LIMITS.lab, (), conditions)
 
 
 def trial_data(module: LabModule) -> dict[str, Any]:

@@ -59,10 +59,10 @@ def _write_recording(writer: MarkdownWriter, recorded: RecordedView) -> Iterator
 def _describe(writer: MarkdownWriter, view: LabView) -> str:
     """Say what is simulated, from which start, and until when."""
     words = writer.words
-    text = f"{words('lab.static_xml')}."
+    text = f"{escape_marks(view.subject)}."
     if view.model is not None:
         name = link(escape_marks(view.model), writer.locate(view.model_href))
-        text = f"{words('lab.static')} {name}."
+        text = f"{escape_marks(view.subject)} {name}."
     if view.start:
         text += f" {words('lab.start')} {code_span(view.start)}."
     if view.stop is not None:

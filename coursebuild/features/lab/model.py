@@ -1,15 +1,17 @@
 """A lab as a value.
 
-Entry point: `Lab`.
+Entry points: `Lab`; `values_in`, the values of its JSON or TOML with their paths.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TypeAlias
 
 from msgspec.structs import replace
 
 from coursebuild.core.model import Block, FeatureBlock, Inline
+from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode
 from coursebuild.core.text.source import Excerpt, Span, key_of
 from coursebuild.features.lab.schema import SimLab, Verify
 
@@ -17,7 +19,9 @@ SIMLAB = "simlab"
 """The kind of a lab that does not name one."""
 MJCF = "mjcf"
 """The kind of a lab whose model the reader edits."""
-BUILT_IN_KINDS = (SIMLAB, MJCF)
+PLOT, ODE = "plot", "ode"
+"""The kinds that need no engine."""
+BUILT_IN_KINDS = (SIMLAB, MJCF, PLOT, ODE)
 """The kinds that have trials; any other kind is a course's own."""
 START = "if (model.nkey > 0) mj.mj_resetDataKeyframe(model, data, 0);"
 """A `setup` that starts from the model's first keyframe, for labs whose author writes none."""
@@ -34,7 +38,8 @@ class Lab(FeatureBlock, frozen=True):
     """`simlab`, `mjcf`, or the name of a kind that the course adds."""
     kind_span: Span
     config: str
-    """JSON on one line, which only the kind's own code may understand; or MJCF as written."""
+    """JSON on one line, which only the kind's own code may understand; MJCF as written; of a lab
+    without an engine, the data that its page runs."""
     fields: SimLab
     """What the author wrote; for a course's own kind, only the fields that all labs have."""
     note: tuple[Block, ...] = ()
@@ -93,3 +98,15 @@ class Lab(FeatureBlock, frozen=True):
     def mjcf(self) -> Excerpt | None:
         """The model that it holds, if it holds one."""
         return self.xml
+
+
+def values_in(node: Node, path: Entry) -> Iterator[tuple[Entry, Node]]:
+    """Yield every value inside a node, with the path to it."""
+    parts: list[tuple[str | int, Node]] = []
+    if isinstance(node, ObjectNode):
+        parts = [(name, member.value) for name, member in node.members.items()]
+    elif isinstance(node, ArrayNode):
+        parts = list(enumerate(node.items))
+    for name, value in parts:
+        yield (*path, name), value
+        yield from values_in(value, (*path, name))

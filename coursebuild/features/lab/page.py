@@ -33,7 +33,7 @@ from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.urls import Place
 from coursebuild.features.lab.files import LabRecord, PublishedLab
-from coursebuild.features.lab.model import MJCF, SIMLAB, START, Lab
+from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab
 from coursebuild.features.lab.schema import Control, Overlay, Plot, Select, SimLab, Slider
 
 if TYPE_CHECKING:
@@ -58,6 +58,8 @@ class LabView(Struct, frozen=True):
     """A lab in its static form, apart from what its author wrote about it."""
 
     kind: str
+    subject: str
+    """What it is of, in words that the name of its model may follow."""
     title: str
     key: str
     """Its name in the course; like `config` and `script` (addresses), empty if it cannot run."""
@@ -110,8 +112,10 @@ def lab_view(
     """The view of a lab for the page at a place; `live` is the lab as it was published."""
     fields = block.fields
     title = fields.title or words("lab.untitled")
+    model_subject = "lab.static_xml" if fields.model is None else "lab.static"
     return LabView(
         kind=block.kind,
+        subject=words(_SUBJECTS.get(block.kind, model_subject)),
         title=title,
         key=live.name if live is not None else "",
         config=place.href(live.config) if live is not None else "",
@@ -126,6 +130,9 @@ def lab_view(
         overlays=tuple(words(f"overlay.{name}") for name in fields.toggles),
         recorded=_recorded_view(words, place, title, live, engine),
     )
+
+
+_SUBJECTS = {PLOT: "lab.static_plot", ODE: "lab.static_ode"}
 
 
 def _source(page: PageContext, block: Lab) -> Markup:
@@ -165,6 +172,15 @@ def _recorded_view(
     record = live.record if live is not None else None
     if live is None or record is None:
         return None
+    if record.scale is None:
+        return RecordedView(
+            record,
+            place.href(live.picture),
+            words("lab.curves", title=title),
+            "",
+            words("lab.at_place", place=record.place),
+            words("lab.computed", tried=str(live.attempt_count), parity=live.parity),
+        )
     return RecordedView(
         record,
         place.href(live.picture),

@@ -2,7 +2,8 @@
 
 Entry points: `parse_fence`, `sim_lab` (a lab that stands inside other JSON, as in a quiz).
 
-1. The text of a fence `lab mjcf` is a model, and keys say the rest; the text of any other is JSON.
+1. The text of a fence `lab mjcf` is a model, and keys say the rest; `equations` reads labs without
+   an engine; the text of any other is JSON.
 2. The JSON is read into nodes, and these into the declared fields.
 3. A `simlab` is checked completely; of another kind only the fields that all labs have are checked,
    since the rest is for its own code.
@@ -11,7 +12,7 @@ Entry points: `parse_fence`, `sim_lab` (a lab that stands inside other JSON, as 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from msgspec import Struct, ValidationError, convert
@@ -20,10 +21,11 @@ from coursebuild.core.model.fields import Positive
 from coursebuild.core.syntax.decode import decode
 from coursebuild.core.syntax.fence import Fence, Prose, TextParser, Word, kind_of
 from coursebuild.core.syntax.json_text import parse_json, to_one_line
-from coursebuild.core.syntax.nodes import JSON, ArrayNode, Node, ObjectNode, StringNode
+from coursebuild.core.syntax.nodes import JSON, ObjectNode, StringNode
 from coursebuild.core.text.diagnostics import Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Span
-from coursebuild.features.lab.model import MJCF, SIMLAB, START, Entry, Lab
+from coursebuild.features.lab.equations.equation_lab import parse_equations
+from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab, values_in
 from coursebuild.features.lab.relations import check_lab
 from coursebuild.features.lab.schema import (
     OVERLAYS,
@@ -53,7 +55,8 @@ def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Lab | None]:
     if name is not None and name.key == MJCF:
         return _parse_mjcf(fence, name)
     kind, place = (SIMLAB, kind_of(fence.info).span()) if name is None else (name.key, name.span)
-    lab = parse_lab(fence.span, kind, place, fence.body, texts)
+    parse = parse_equations if kind in (PLOT, ODE) else parse_lab
+    lab = parse(fence.span, kind, place, fence.body, texts)
     return Parsed(lab.value, (*keys.diagnostics, *lab.diagnostics))
 
 
@@ -124,22 +127,10 @@ def sim_lab(
         note=prose.blocks(node.get("note")),
         goal=prose.inlines(goal.get("text") if isinstance(goal, ObjectNode) else None),
         xml=xml.excerpt if isinstance(xml, StringNode) else None,
-        places=tuple((path, value.mark) for path, value in _values(node, ())),
+        places=tuple((path, value.mark) for path, value in values_in(node, ())),
         code=tuple(
             (path, value.excerpt)
-            for path, value in _values(node, ())
+            for path, value in values_in(node, ())
             if isinstance(value, StringNode) and path[-1] in _CODE
         ),
     )
-
-
-def _values(node: Node, path: Entry) -> Iterator[tuple[Entry, Node]]:
-    """Yield every value inside a node, with the path to it."""
-    parts: list[tuple[str | int, Node]] = []
-    if isinstance(node, ObjectNode):
-        parts = [(name, member.value) for name, member in node.members.items()]
-    elif isinstance(node, ArrayNode):
-        parts = list(enumerate(node.items))
-    for name, value in parts:
-        yield (*path, name), value
-        yield from _values(value, (*path, name))

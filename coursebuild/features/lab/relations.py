@@ -1,7 +1,8 @@
 """Checks how the fields of a `simlab` fit together, and labs with their course.
 
-Entry points: `check_lab(node, structs)`; `check_steps`, for a field that presses and sets controls;
-`check_labs`, their kind and model exist; `check_model_names`, once models are compiled.
+Entry points: `check_lab(node, structs)`, and its parts for labs of other kinds, `check_controls`,
+`check_axes`; `check_steps`, for a field that presses and sets controls; `check_labs`, their kind
+and model exist; `check_model_names`, once models are compiled.
 
 Every part whose own fields are right is checked, so that a misspelt field does not hide what is
 wrong elsewhere.
@@ -26,7 +27,7 @@ from coursebuild.core.syntax.nodes import (
 )
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.features.lab.model import BUILT_IN_KINDS, Lab
-from coursebuild.features.lab.schema import Button, Expect, Plot, Select, SimLab, Slider
+from coursebuild.features.lab.schema import Button, Expect, Select, SimLab, Slider
 
 Structs = Mapping[ObjectNode, Struct]
 Controls = Mapping[str, Struct | None]
@@ -39,26 +40,9 @@ def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
     for name in ("toggles", "overlays"):
         strings = [(item.value, item.span) for item in node.strings(name)]
         yield from check_unique(strings, "field-value", "the overlay `{}` is named twice")
-    control_nodes = node.objects("controls")
-    pairs = [(c.get("label"), structs.get(c)) for c in control_nodes]
-    labelled = [(label, struct) for label, struct in pairs if isinstance(label, StringNode)]
-    spans = [(label.value, label.span) for label, _ in labelled]
-    yield from check_unique(spans, "field-value", "two controls are called `{}`")
-    for control in control_nodes:
-        match structs.get(control):
-            case Slider() as slider:
-                yield from require_one_of(control, Slider, ("set", "apply", "param"))
-                yield from _check_slider(control, slider)
-            case Select() as select:
-                yield from require_one_of(control, Select, ("set", "apply", "param"))
-                yield from _check_select(control, select)
-            case _:
-                pass
-    for plot in node.objects("plots"):
-        struct = structs.get(plot)
-        if isinstance(struct, Plot):
-            yield from _check_axis(plot, struct)
-    controls = {label.value: struct for label, struct in labelled}
+    controls = known_controls(node, structs)
+    yield from check_controls(node, structs, ("set", "apply", "param"))
+    yield from check_axes(node, structs)
     for claim in node.objects("expect"):
         yield from _check_expect(claim, controls, structs)
     goal = node.get("goal")
@@ -66,10 +50,40 @@ def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
         yield from _check_log(goal, controls)
 
 
-def _check_axis(node: ObjectNode, plot: Plot) -> Iterator[Diagnostic]:
-    if plot.ymin is not None and plot.ymax is not None and not plot.ymin < plot.ymax:
-        message = f"`ymax` must be greater than `ymin`, which is {plot.ymin:g}"
-        yield diagnose("field-value", node.place("ymax"), message)
+def known_controls(node: ObjectNode, structs: Structs) -> Controls:
+    """The controls that the node of a lab lists."""
+    pairs = ((c.get("label"), structs.get(c)) for c in node.objects("controls"))
+    return {label.value: struct for label, struct in pairs if isinstance(label, StringNode)}
+
+
+def check_controls(
+    node: ObjectNode, structs: Structs, targets: tuple[str, ...]
+) -> Iterator[Diagnostic]:
+    """Check the controls of a lab, which set one of the `targets`."""
+    labels = [control.get("label") for control in node.objects("controls")]
+    spans = [(label.value, label.span) for label in labels if isinstance(label, StringNode)]
+    yield from check_unique(spans, "field-value", "two controls are called `{}`")
+    for control in node.objects("controls"):
+        match structs.get(control):
+            case Slider() as slider:
+                yield from require_one_of(control, Slider, targets)
+                yield from _check_slider(control, slider)
+            case Select() as select:
+                yield from require_one_of(control, Select, targets)
+                yield from _check_select(control, select)
+            case _:
+                pass
+
+
+def check_axes(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
+    """Check that the bounds of plots leave something between them."""
+    for plot in node.objects("plots"):
+        struct = structs.get(plot)
+        for low, high in (("ymin", "ymax"), ("xmin", "xmax")):
+            least, most = getattr(struct, low, None), getattr(struct, high, None)
+            if least is not None and most is not None and not least < most:
+                message = f"`{high}` must be greater than `{low}`, which is {least:g}"
+                yield diagnose("field-value", plot.place(high), message)
 
 
 def _check_slider(node: ObjectNode, slider: Slider) -> Iterator[Diagnostic]:

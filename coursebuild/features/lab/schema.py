@@ -158,17 +158,22 @@ class RefLine(Struct, frozen=True, forbid_unknown_fields=True):
     label: Annotated[str, Meta(description="plain text")] = ""
 
 
-class Plot(Struct, frozen=True, forbid_unknown_fields=True):
-    """Plots against simulated time."""
+class PlotFields(Struct, frozen=True, forbid_unknown_fields=True):
+    """What plots of all kinds have."""
 
     traces: Annotated[tuple[TraceFields, ...], Meta(min_length=1, description="its lines")]
     ylabel: Annotated[str, Meta(description="of the vertical axis")] = ""
     xlabel: Annotated[str, Meta(description="of the horizontal axis")] = ""
-    window: Annotated[Positive | None, Meta(description="seconds shown; else all")] = None
     ymin: Annotated[float | None, Meta(description="the least value shown")] = None
     ymax: Annotated[float | None, Meta(description="the greatest value shown")] = None
     height: Annotated[Annotated[int, Meta(ge=40, le=2000)] | None, Meta(description="in px")] = None
     refLines: tuple[RefLine, ...] = ()  # noqa: N815  # the author's spelling
+
+
+class Plot(PlotFields, frozen=True):
+    """Plots against simulated time."""
+
+    window: Annotated[Positive | None, Meta(description="seconds shown; else all")] = None
 
 
 class Expect(Struct, frozen=True, forbid_unknown_fields=True):

@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
+import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -37,10 +38,16 @@ from coursebuild.core.values import fingerprint
 from coursebuild.features.lab.compile import LabModule, compile_lab, pieces
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError, lab_digest
+from coursebuild.features.lab.equations.equation_trial import (
+    EquationEngine,
+    EquationReply,
+    add_points,
+    run_trial,
+)
 from coursebuild.features.lab.export.trial import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.files import LabOutput
-from coursebuild.features.lab.inputs import inputs_of, trial_data
-from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, Lab
+from coursebuild.features.lab.inputs import equation_inputs, inputs_of, trial_data
+from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
 from coursebuild.features.lab.names import name_diagnostics, references
 from coursebuild.features.lab.reply import MainRun, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
@@ -65,6 +72,7 @@ class Engines:
     def __init__(self, root: Path, limits: Limits = LIMITS) -> None:
         self.native = NativeEngine(root, memory=limits.memory, compiling=limits.models)
         self.browser = LabEngine(limits.memory)
+        self.equations = EquationEngine(limits.memory)
 
     def __enter__(self) -> Self:
         return self
@@ -72,12 +80,14 @@ class Engines:
     def __exit__(self, *error: object) -> None:
         try:
             self.browser.close()
+            self.equations.close()
         finally:
             self.native.__exit__(*error)
 
     def stop(self) -> None:
         """End what runs, and let nothing begin; called from another thread."""
         self.browser.stop()
+        self.equations.stop()
         self.native.interrupt()
 
 
@@ -116,6 +126,8 @@ class LabTrials:
             return None, []  # it claims nothing, and no page is made of it
         if lab.kind not in BUILT_IN_KINDS:
             return self._publish_custom_lab(trial, lab)
+        if lab.kind in (PLOT, ODE):
+            return self._try_equations(trial, lab)
         if lab.xml is not None:
             model = Source("models/.lab.xml", lab.xml.text)
         elif (course_model := _find_model(context, lab.fields.model or "")) is not None:
@@ -125,6 +137,48 @@ class LabTrials:
         lab_trial = _LabTrial(context, self._engines, self._seconds, trial, lab, model)
         result, diagnostics = lab_trial.run()
         return result, diagnostics if lab.is_of_text else []
+
+    def _try_equations(self, trial: Trial, lab: Lab) -> tuple[TrialResult | None, list[Diagnostic]]:
+        """Try a lab without an engine, or read what an earlier trial found."""
+        inputs, runs, start = equation_inputs(lab, trial.name), self._context.run_store, time.time()
+        config = json.loads(lab.config)
+        missing = tuple(add_points(config, self._context.course))
+        key = fingerprint((inputs.text, inputs.conditions, json.dumps(config["plots"])))
+        decode = msgspec.json.Decoder(EquationReply).decode
+        kept_reply = runs.store.get("labs", key, decode, shared=True)
+        reply = kept_reply or run_trial(self._engines.equations, config, self._seconds)
+        if kept_reply is None:
+            seconds = round(time.time() - start, 4)
+            reply = replace(reply, seconds=seconds, timestamp=int(start))
+            if reply.lasting:
+                runs.store.put("labs", key, msgspec.json.encode(reply), shared=True)
+        runs.note_trial(
+            inputs,
+            (lab.span.path,) if any(plot["points"] for plot in config["plots"]) else (),
+            ok=not reply.findings,
+            lasting=reply.lasting,
+            seconds=reply.seconds,
+            timestamp=reply.timestamp,
+        )
+        reply = replace(reply, findings=(*missing, *reply.findings))
+        line = TrialLine(
+            name=trial.name,
+            title=lab.fields.title,
+            lesson=trial.owner,
+            status="failed" if reply.findings else "ok",
+            seconds=reply.seconds,
+            tried=reply.tried,
+            parity=reply.describe(lab.kind),
+            cached=kept_reply is not None,
+        )
+        output = LabOutput("", {"id": trial.name} | config)
+        if self._context.static and not reply.findings and reply.start is not None:
+            from coursebuild.features.lab.picture.static import equation_record, plots_file
+
+            record = equation_record(lab, output.config, reply.start)
+            output = replace(output, record=record, picture=plots_file(record.plots))
+        findings = [finding.diagnostic(lab) for finding in reply.findings]
+        return TrialResult(lab.span, line, output), findings
 
     def _publish_custom_lab(
         self, trial: Trial, lab: Lab

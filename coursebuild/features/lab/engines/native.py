@@ -35,6 +35,17 @@ def engine_digest() -> str:
     return digest.hexdigest()
 
 
+def equation_script_path() -> Path:
+    """The path of the script that tries labs without an engine in V8."""
+    return assets_dir() / "js" / "equation-trial.js"
+
+
+@functools.cache
+def equation_script_digest() -> str:
+    """Return a hash of that script."""
+    return hashlib.sha256(equation_script_path().read_bytes()).hexdigest()
+
+
 @functools.cache
 def lab_digest(*parts: str) -> str:
     """Return a hash of parts of this feature's code: `picture`, `engines/native_worker.py`."""

@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 from coursebuild.core.drawing.scales import Scale, separate_labels, typeset_number
 from coursebuild.core.drawing.scales import markup_text as _text
+from coursebuild.features.lab.equations.reference import CurveRun
 from coursebuild.features.lab.files import LabRecord
-from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.model import ODE, Lab
 from coursebuild.features.lab.picture.draw import FreeCamera, draw
 from coursebuild.features.lab.picture.raster import Floor, round_length
 from coursebuild.features.lab.picture.scenery import scene_solids
@@ -114,6 +115,54 @@ def lab_record(lab: Lab, main: MainRun) -> LabRecord:
     return LabRecord(_size(lab), scale, first["time"], readouts, last["time"], plots)
 
 
+def equation_record(lab: Lab, config: dict[str, Any], run: CurveRun) -> LabRecord:
+    """Make the record of a lab without an engine from what follows from its start."""
+    plots = []
+    for plot, data, source in zip(lab.fields.plots, run.plots, config["plots"], strict=True):
+        axis = config["axis"]
+        ends = (source["xmin"], source["xmax"]) if source["x"] else (axis["min"], axis["max"])
+        horizontal = [0.0 if x is None else x for x in data["x"]]
+        lines = [
+            [None if x is None else y for x, y in zip(data["x"], line, strict=True)]
+            for line in data["traces"]
+        ]
+        points = (source["points"] or {"data": ()})["data"]
+        svg = plot_svg(plot, horizontal, lines, narrow=lab.fields.dock, ends=ends, marks=points)
+        plots.append(Markup(svg))
+    readouts = tuple(
+        (readout.label, _format_value(value, readout.digits))
+        for readout, value in zip(lab.fields.readouts, run.readouts, strict=True)
+    )
+    axis, at = config["axis"], run.end if lab.kind == ODE else config["axis"]["at"]
+    place = f"{axis['name']} = {typeset_number(f'{at:.4g}')} {axis['unit']}".rstrip()
+    size = (round(_WIDE), round(_HEIGHT) * len(plots))
+    return LabRecord(size, None, at, readouts, run.end, tuple(plots), place)
+
+
+_FILE_STYLE = (
+    "svg{font:11px sans-serif;fill:#555}path{fill:none;stroke:#555}.lab-grid{stroke:#ddd}"
+    ".lab-measured{fill:none;stroke:#555}.lab-reference{stroke-dasharray:1 3}"
+    ".lab-trace{stroke-width:1.6}"
+    + "".join(
+        f".lab-trace-{i}{{stroke:{colour}}}"
+        for i, colour in enumerate(("#0072b2", "#b84f00", "#00785a", "#a3487d", "#8a6000"), 1)
+    )
+)
+"""Colours that can be seen on white and on black: a file does not know the page's."""
+
+
+def plots_file(plots: Sequence[Markup]) -> bytes:
+    """Write plots, one below the other, as an SVG file, for copies of a page."""
+    rows = (
+        plot.replace("<svg ", f'<svg y="{_HEIGHT * i:g}" height="{_HEIGHT:g}" ', 1)
+        for i, plot in enumerate(plots)
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDE:g} {_HEIGHT * len(plots):g}">'
+        f"<style>{_FILE_STYLE}</style>{''.join(rows)}</svg>"
+    ).encode()
+
+
 def _format_value(value: Any, digits: int) -> str:
     if isinstance(value, str):
         return value
@@ -141,34 +190,42 @@ def plot_svg(
     traces: Sequence[Sequence[float | None]],
     *,
     narrow: bool = False,
+    ends: tuple[float | None, float | None] = (None, None),
+    marks: Sequence[Sequence[float]] = (),
 ) -> str:
     """Draw a plot as an `svg` element; values that are not finite interrupt their line.
 
-    A narrow plot is for the margin: its text has the same size there. The result is empty if
-    nothing was recorded.
+    A narrow plot is for the margin: its text has the same size there. `ends` are those of the
+    horizontal axis, if they are not where the samples end; `marks` are points beside the lines. The
+    result is empty if nothing was recorded.
     """
     start = -math.inf if plot.window is None or not times else times[-1] - plot.window * (1 + 1e-9)
     samples = [(t, i) for i, t in enumerate(times) if t >= start]
     if not samples:
         return ""
-    low_t, high_t = samples[0][0], samples[-1][0]
+    low_t = min(t for t, _ in samples) if ends[0] is None else ends[0]
+    high_t = max(t for t, _ in samples) if ends[1] is None else ends[1]
     lines = [[(t, line[i]) for t, i in samples] for line in traces]
     values = [v for points in lines for _, v in points if _is_finite(v)]
-    values += [line.y for line in plot.refLines]
+    values += [line.y for line in plot.refLines] + [y for _, y in marks]
     low, high = _range(values, plot.ymin, plot.ymax)
     labels = [trace.label for trace in plot.traces]
     frame = _frame(low_t, high_t if high_t > low_t else low_t + 1.0, low, high, labels, narrow)
     paths: list[str] = []
-    ends: list[tuple[float, str, int]] = []
+    names: list[tuple[float, str, int]] = []
     for n, (trace, points) in enumerate(zip(plot.traces, lines, strict=True)):
         paths.append(_line(frame, points, n, _dash(trace, n)))
         last = next((v for _, v in reversed(points) if _is_finite(v)), None)
         if last is not None:
-            ends.append((frame.y(last), trace.label, n))
+            names.append((frame.y(last), trace.label, n))
     references = [
         _reference(frame, line.y, line.label) for line in plot.refLines if low <= line.y <= high
     ]
-    parts = [*_axes(frame, plot), *references, *paths, *_labels(frame, ends)]
+    parts = [*_axes(frame, plot), *references, *paths, *_labels(frame, names)]
+    parts += [
+        f'<circle class="lab-measured" cx="{frame.x(x):.1f}" cy="{frame.y(y):.1f}" r="3"/>'
+        for x, y in marks
+    ]
     title = f"{plot.ylabel} against {plot.xlabel}" if plot.ylabel else "plot"
     return (
         f'<svg class="lab-plot" viewBox="0 0 {frame.width:g} {_HEIGHT:g}" role="img" '

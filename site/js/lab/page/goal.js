@@ -9,9 +9,12 @@ export class GoalView {
    * @param {HTMLElement} still the goal in the lab's static form
    * @param {{hold: number}} goal of the lab's JSON
    * @param {(key: string, values?: Record<string, any>) => string} words
-   * @param {{progress: Record<string, any> | null, say: (text: string) => void, show: () => void}} services `progress`: see progress/store.js
+   * @param {{progress: Record<string, any> | null, say: (text: string) => void, show: () => void, unit?: string, format?: (time: number) => string}}
+   *   services `progress`: see progress/store.js; `unit` and `format` of times
    */
-  constructor(still, { hold }, words, { progress, say, show }) {
+  constructor(still, { hold }, words, { progress, say, show, unit = ' s', format = formatTime }) {
+    this.unit = unit
+    this.textOf = (time) => `${format(time)}${unit}`
     this.hold = hold
     this.words = words
     this.progress = progress
@@ -40,7 +43,7 @@ export class GoalView {
   }
 
   note(time) {
-    this.say(this.words('lab.live.goal_reached', { t: formatTime(time) }))
+    this.say(this.words('lab.live.goal_reached', { t: this.textOf(time) }))
     if (this.isStored) return
     const lesson = document.querySelector('main')?.dataset.lesson ?? ''
     this.progress?.put(this.key, this.key, { kind: 'goal', given: time, right: true, tries: 1, hints: 0, number: 1, lesson })
@@ -49,8 +52,8 @@ export class GoalView {
   draw() {
     const { words, hold, status } = this
     const { held, reached, counts } = status
-    let text = hold > 0 ? words('lab.live.goal_held', { t: formatTime(held), hold }) : ''
-    if (reached !== null) text = words('lab.live.goal_reached', { t: formatTime(reached) })
+    let text = hold > 0 ? words('lab.live.goal_held', { t: this.textOf(held), hold: `${hold}${this.unit}` }) : ''
+    if (reached !== null) text = words('lab.live.goal_reached', { t: this.textOf(reached) })
     else if (this.isStored) text = `${words('lab.live.goal_kept')} ${text}`
     if (!counts && !this.isStored) text += ` ${words('lab.live.goal_other')}`
     this.bar.value = reached === null ? held : hold

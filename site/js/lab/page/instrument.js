@@ -15,7 +15,7 @@ import { Notices } from './notices.js'
 import { formatReadout, formatTime } from './numbers.js'
 import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
-import { writeLink, writeLog } from './share.js'
+import { copyLink, writeLink, writeLog } from './share.js'
 import { watchSight } from './sight.js'
 import { Simulation } from './simulation.js'
 import { prefersStillness } from './support.js'
@@ -174,7 +174,7 @@ export class Instrument {
   }
 
   sayTime(key) {
-    this.notices.say(this.words(`lab.live.${key}`, { t: formatTime(this.simulation.latest?.time ?? 0) }))
+    this.notices.say(this.words(`lab.live.${key}`, { t: `${formatTime(this.simulation.latest?.time ?? 0)} s` }))
   }
 
   collect({ times, values }, fresh) {
@@ -292,20 +292,9 @@ export class Instrument {
 
   async share(state) {
     const { link, only } = await writeLink(this.config.id, state)
-    const key = await this.copy(link)
+    const key = await copyLink(link)
     if (only === null) this.notices.show(this.words(key), 'note')
     else this.notices.show(`${this.words(key)} ${this.words(`lab.live.link_${only}`)}`, 'warning')
-  }
-
-  /** Put a link into the address bar and, if allowed, the clipboard; returns the key of the message. */
-  async copy(link) {
-    const address = new URL(window.location.href)
-    address.hash = link
-    window.history.replaceState(null, '', address)
-    return navigator.clipboard.writeText(address.href).then(
-      () => 'lab.live.link_copied',
-      () => 'lab.live.link_shown',
-    )
   }
 
   export() {

@@ -36,6 +36,17 @@ export async function writeLink(id, { values, steps, time, physics, text, log = 
   return { link: link(await field(content(state, []))), only: 'controls' }
 }
 
+/** Put a link into the address bar and, if allowed, the clipboard; returns the key of the message. */
+export async function copyLink(link) {
+  const address = new URL(window.location.href)
+  address.hash = link
+  window.history.replaceState(null, '', address)
+  return navigator.clipboard.writeText(address.href).then(
+    () => 'lab.live.link_copied',
+    () => 'lab.live.link_shown',
+  )
+}
+
 function content(head, physics) {
   const line = new TextEncoder().encode(`${JSON.stringify(head)}\n`)
   const floats = new Uint8Array(Float64Array.from(physics).buffer)

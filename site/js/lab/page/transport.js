@@ -46,7 +46,9 @@ export function buildTransport(words, actions) {
       sign.replaceChildren(icon(isPlaying ? 'pause' : 'play'))
     },
     setTime(seconds) {
-      const text = `${formatTime(seconds)} s`
+      this.setText(`${formatTime(seconds)} s`)
+    },
+    setText(text) {
       if (time.textContent !== text) time.textContent = text
     },
     setRatio(ratio) {

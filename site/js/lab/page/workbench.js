@@ -8,7 +8,7 @@
 import { h } from './dom.js'
 import { Editor } from './editor.js'
 import { Instrument } from './instrument.js'
-import { writeLink } from './share.js'
+import { copyLink, writeLink } from './share.js'
 
 export class Workbench extends Instrument {
   build() {
@@ -72,7 +72,7 @@ export class Workbench extends Instrument {
     const { words, notices, config, editor } = this
     const state = { values: [], steps: 0, time: 0, physics: new Float64Array(), text: editor.text }
     const { link, only } = await writeLink(config.id, state)
-    if (only === null) notices.show(words(await this.copy(link)), 'note')
+    if (only === null) notices.show(words(await copyLink(link)), 'note')
     else notices.show(words('lab.live.link_long'), 'warning')
   }
 
