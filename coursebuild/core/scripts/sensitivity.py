@@ -166,9 +166,9 @@ def _find_doubts(
             for changes in (changes_of_base, *changes_by_run)
         )
         if any(value != printed for value in values):
-            moved, finer = values[: len(moved_runs)], values[len(moved_runs) :]
+            count = len(moved_runs)
             yield from _judge_number(
-                first_change.span, (recorded, printed), moved, finer, comparison
+                first_change.span, (recorded, printed), values[:count], values[count:], comparison
             )
 
 
