@@ -403,7 +403,7 @@ def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[Stabl
     """
     scene, half_thickness = pilot.scene, thickness(model)
     duration = scene.declaration.stable_for or scene.scenario.duration
-    low, high = scene.declaration.search or [part * scene.timestep for part in _SEARCH]
+    low, high = sorted(scene.declaration.search or [part * scene.timestep for part in _SEARCH])
     limits = scene.declaration.limits
 
     def declared_limit(integrator: Integrator) -> Limit | None:
