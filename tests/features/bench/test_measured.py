@@ -181,7 +181,13 @@ def test_the_page_begins_with_a_matrix_of_cases_and_integrators(site: dict[str, 
     assert head.count('scope="colgroup"') == 3 and head.count('scope="col"') == 16
     (row,) = (row for row in rest.split("<tr>") if 'href="#spring"' in row)
     cells = re.findall(r"<td[^>]*>(.*?)</td>", row)
-    assert [cells[n] for n in (0, 5, 6, 8, 9)] == ["1.00", "200 ms", "all", "250 ms – 290 ms", "all"]
+    assert [cells[n] for n in (0, 5, 6, 8, 9)] == [
+        "1.00",
+        "200 ms",
+        "all",
+        "250 ms – 290 ms",
+        "all",
+    ]
     assert cells[10:] == [""] * 5  # no run comes to an error of 1e-3
 
 
