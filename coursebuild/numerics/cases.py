@@ -47,11 +47,10 @@ from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.reports.case_report import (
     CaseReport,
     ErrorLine,
-    FigureLine,
     ReferenceLine,
     StepCost,
 )
-from coursebuild.numerics.reports.scene_report import Errors, OrderRow
+from coursebuild.numerics.reports.scene_report import Errors, FigureLine, OrderRow
 from coursebuild.numerics.scene import Scene, SceneError
 from coursebuild.numerics.simulation import (
     EngineStates,

@@ -30,13 +30,13 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.numerics.pilot import apply, with_setting
 from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, RowVerdict, WorkPrecisionRow
 from coursebuild.numerics.reports.shown_errors import setting_text
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.simulation import STATE, full_state, initial_data, silent
-from coursebuild.numerics.stability import apply, with_setting
 
 Clock: TypeAlias = Callable[[], int]
 """Time so far, in ns."""

@@ -24,10 +24,10 @@ from msgspec import Struct
 
 from coursebuild.numerics.problem import Array, Scenario, Setup
 
-_BAD = {
-    mujoco.mjtWarning.mjWARN_BADQPOS: "positions",
-    mujoco.mjtWarning.mjWARN_BADQVEL: "velocities",
-    mujoco.mjtWarning.mjWARN_BADQACC: "accelerations",
+BAD_STATES = {
+    int(mujoco.mjtWarning.mjWARN_BADQPOS): "positions",
+    int(mujoco.mjtWarning.mjWARN_BADQVEL): "velocities",
+    int(mujoco.mjtWarning.mjWARN_BADQACC): "accelerations",
 }
 """The warnings of a simulation that is lost."""
 
@@ -133,8 +133,8 @@ def judge(
     symptoms: list[tuple[RunStatus, str]] = []
     if not peaks.finite:
         symptoms.append((RunStatus.DIVERGED, "the state is not finite"))
-    for kind, subject in _BAD.items():
-        if data.warning[int(kind)].number:
+    for kind, subject in BAD_STATES.items():
+        if data.warning[kind].number:
             symptoms.append((RunStatus.DIVERGED, f"MuJoCo warned of bad {subject}"))
     if not abs(data.time - elapsed) <= model.opt.timestep / 2:
         text = f"the clock says {data.time:.6g} s after {elapsed:.6g} s: the state was reset"

@@ -7,7 +7,9 @@ pilot)`, by cone where something touches; `find_conserved(…)`, `mean_late_ener
    again. Their difference bounds the error of the reference. Both take the same accelerations, so
    the engine in ever smaller steps must tend to the same motion.
 2. A closed form that the scenario names, or that the course has, comes first, and that integration
-   second. Where the two are far apart the formula is not this scene's.
+   second. A course's own is believed after it was checked only: in a smooth scene two integrations
+   that agree, and the engine that tends to them, outvote it; elsewhere the model must come nearer
+   to it the stiffer its contacts and the shorter its timesteps are.
 3. Where accelerations jump, the engine tends elsewhere, or the scene is too stiff for an
    integration in reasonable time, only the engine itself is left: in small steps, and again in
    steps twice as long under another integrator. This reference is called `self`.
@@ -50,7 +52,7 @@ from coursebuild.numerics.measure import (
     momentum_drift,
     visible_error,
 )
-from coursebuild.numerics.pilot import Pilot, position_distances
+from coursebuild.numerics.pilot import CONES, Pilot, position_distances
 from coursebuild.numerics.problem import ROUNDING, Integrator, Setup, Sizes
 from coursebuild.numerics.reports.scene_report import FLOORS
 from coursebuild.numerics.scene import ExactMotion, SceneError
@@ -63,7 +65,6 @@ from coursebuild.numerics.simulation import (
     states_of,
     with_integrator,
 )
-from coursebuild.numerics.stability import CONES
 
 EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
 """Accelerations that a reference may take."""
@@ -74,6 +75,13 @@ PARTING_DISTANCE = 0.01
 extent."""
 FOREIGN = 1e-3
 """The difference from which on a closed form is that of another scene, in the same units."""
+PRECISION, _VOTES = 1e-8, 100.0
+"""How far a course's exact motion may be off, relative to the largest number in it where this is
+over 1, unless its scenario says; and floors of the integration within which it always may."""
+_STIFFER = (2.0, 4.0)
+"""How many times shorter time constants of contacts are when an exact motion is checked."""
+_APPROACH = 0.8
+"""The part of a difference that twice the stiffness may leave."""
 CONSERVED = 1e-8
 """The relative change, over the reference, below which a quantity counts as conserved."""
 _STEP = 1e-6
@@ -133,7 +141,71 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
     if exact is None:
         return reference
     states, source = _exact_states(model, pilot, exact, reference), exact.span.path
-    return _with_closed_form(model, reference, states, source, ROUNDING, f"`{source}`", exact.span)
+    least = _check_exact(model, pilot, exact, states, reference, quick=quick)
+    return _with_closed_form(model, reference, states, source, least, f"`{source}`", exact.span)
+
+
+def _check_exact(
+    model: Any,
+    pilot: Pilot,
+    exact: ExactMotion,
+    states: EngineStates,
+    second: KnownMotion,
+    *,
+    quick: bool,
+) -> Sizes:
+    """How well a course's exact motion is known where no integration says it.
+
+    Raises:
+        SceneError: it is not the motion of the scene.
+    """
+    subject, gap = (
+        f"`{exact.span.path}` is not this scene's motion",
+        _gap(model, states, second.states),
+    )
+    precision = pilot.scene.declaration.precision or PRECISION
+    if second.kind == "ode":
+        for part in ("position", "attitude", "velocity"):
+            column = {"position": second.states.qpos, "velocity": second.states.qvel}.get(part)
+            size = 1.0 if column is None else max(1.0, float(np.abs(column).max(initial=0.0)))
+            error, floor = getattr(gap, part), getattr(second.floor, part)
+            if not error <= max(precision * size, _VOTES * floor):
+                help = (
+                    f"it errs by {error:.2g} in {part}: two integrations of the model agree with "
+                    f"each other to {floor:.1g}, and the engine tends to them; `precision` says "
+                    "how far a formula that is meant to be no more than near may be off"
+                )
+                raise SceneError(subject, exact.span, help)
+        return ROUNDING
+    gaps = [gap.place]
+    for times in _STIFFER:
+        stiff = self_reference(_stiffen(model, times), pilot, quick=quick)
+        count = min(len(states.times), len(stiff.states.times))
+        gaps.append(_gap(model, states.head(count), stiff.states.head(count)).place)
+    if gaps[0] > max(precision, FLOORS * second.floor.place) and not (
+        gaps[2] <= _APPROACH * gaps[1] <= _APPROACH**2 * gaps[0]
+    ):
+        far = ", ".join(f"{number:.2g}" for number in gaps)
+        help = (
+            f"it is {far} (m or rad) from the engine in small steps with contacts as they are, "
+            "twice and four times as stiff: what is exact is what that tends to"
+        )
+        raise SceneError(subject, exact.span, help)
+    # What is left after the law of the last two: the formula is known no better.
+    rest = max(0.0, gaps[2] - (gaps[1] - gaps[2]))
+    return ROUNDING.at_least(Sizes(rest, rest, 0.0)).at_least(second.floor)
+
+
+def _stiffen(model: Any, times: float) -> Any:
+    """A copy of a model whose constraints are stiffer, with a cone and less creep."""
+    stiff = with_integrator(model, Integrator.EULER, float(model.opt.timestep))
+    for name in ("geom_solref", "pair_solref", "eq_solref", "jnt_solref", "dof_solref"):
+        table = getattr(stiff, name)
+        is_time = table[:, 0] > 0
+        table[is_time, 0] /= times
+        table[~is_time] *= times**2, times
+    stiff.opt.cone, stiff.opt.impratio = CONES["elliptic"], stiff.opt.impratio * times**2
+    return stiff
 
 
 def _exact_states(
@@ -238,6 +310,8 @@ def _with_closed_form(
     place: Span,
 ) -> KnownMotion:
     """Put a closed form first, and what was integrated second."""
+    count = min(len(states.times), len(second.states.times))
+    states = states.head(count)
     gap = _gap(model, states, second.states)
     distance = float(position_distances(model, states.qpos, second.states.qpos).max(initial=0.0))
     floor = least

@@ -1,6 +1,7 @@
-"""A first run of a scene in small steps: what acts in it, its horizon, the bounds of its states.
+"""A first run of a scene in small steps: what acts in it, its bounds, and the settings to measure.
 
-Entry point: `run_pilot(model, scene)`.
+Entry points: `run_pilot(model, scene)`; `settings(model, pilot)`, which are measured in a scene,
+`own_setting`, `apply`; `nudges`, of starts nearby.
 
 1. Every step is observed: a contact, a limit that is reached or dry friction makes accelerations
    jump, so that errors follow no power of the timestep and no smooth integration applies.
@@ -9,6 +10,10 @@ Entry point: `run_pilot(model, scene)`.
    there gives about the largest Lyapunov exponent.
 3. The largest positions, and the largest energy where nothing drives the motion, else velocity,
    give the bounds, with room for coarse timesteps.
+4. A setting is what can be chosen without changing the scene: every integrator at every timestep;
+   where a solver runs, also other solvers and fewer iterations; where something touches, also the
+   other cone. These vary one at a time about the model's own: the full product would take hours and
+   say little more.
 """
 
 from __future__ import annotations
@@ -19,11 +24,19 @@ from typing import Any
 import mujoco
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.numerics.detector import Peaks, driving_force, update_peaks
-from coursebuild.numerics.problem import ROOM, Array, Scenario, Setup
+from coursebuild.numerics.problem import STANDARD, Array, Integrator, Scenario, Setup
+from coursebuild.numerics.reports.scene_report import MeasuredSetting
 from coursebuild.numerics.scene import Scene, SceneError
-from coursebuild.numerics.simulation import advance, initial_data, integrator_of, with_integrator
+from coursebuild.numerics.simulation import (
+    advance,
+    initial_data,
+    integrator_of,
+    set_integrator,
+    with_integrator,
+)
 
 NUDGE = 1e-10
 """How far a twin's beginning is off: rad, or relative to the model's extent; velocities per s."""
@@ -34,6 +47,8 @@ PARTING_DISTANCE = 0.1
 model's extent."""
 _REST_SPEED = 0.01
 """A body is at rest below this part of the speed of a fall through the model's extent."""
+_SETTLED = 1e-6
+"""A motion has come to rest below this part of its largest kinetic energy."""
 _PEAK_INTERVAL = 8
 """Steps from one look at how large the state is to the next."""
 
@@ -55,6 +70,8 @@ class Pilot(Struct, frozen=True):
     one that stays near to the end."""
     lyapunov: float | None
     """1/s, of the middle one of the twins that part; `None` where all stay near."""
+    settles: bool = False
+    """Whether it comes to rest."""
 
     @property
     def horizon(self) -> float:
@@ -99,12 +116,13 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
     growth_rates = [rate for rate in rates if rate is not None]
     return Pilot(
         scene=scene,
-        setup=_bounds(variant, scenario, peaks),
+        setup=_bounds(variant, scene, peaks),
         contact=look.contact,
         constrained=look.constrained,
         jumps=look.jumps(variant),
         horizons=(min(horizons), max(horizons)),
         lyapunov=float(np.median(growth_rates)) if growth_rates else None,
+        settles=float(data.energy[1]) < _SETTLED * peaks.kinetic,
     )
 
 
@@ -183,15 +201,21 @@ def _limited_activations(model: Any) -> tuple[Any, Array]:
 
 def _twins(model: Any, scenario: Scenario) -> list[Any]:
     """Copies of the beginning, nudged in positions and velocities, always in the same ways."""
-    directions = np.random.default_rng(1).normal(size=(_DIRECTIONS, 2, int(model.nv)))
-    push, twins = NUDGE * scales(model), []
-    for direction in (*directions, *-directions):
-        size = max(float(np.abs(direction).max(initial=0.0)), mujoco.mjMINVAL)
+    twins = []
+    for position, velocity in nudges(model, 2 * _DIRECTIONS, NUDGE):
         twin = initial_data(scenario, model)
-        mujoco.mj_integratePos(model, twin.qpos, direction[0] / size * push, 1.0)
-        twin.qvel[:] += direction[1] / size * push
+        mujoco.mj_integratePos(model, twin.qpos, position, 1.0)
+        twin.qvel[:] += velocity
         twins.append(twin)
     return twins
+
+
+def nudges(model: Any, count: int, size: float) -> Array:
+    """Changes of positions and velocities, to both sides of random directions: (count, 2, nv)."""
+    directions = np.random.default_rng(1).normal(size=(count // 2, 2, int(model.nv)))
+    largest = np.abs(directions).max(axis=2, initial=mujoco.mjMINVAL)[:, :1, None]
+    directions = directions / largest * size * scales(model)
+    return np.concatenate([directions, -directions])
 
 
 def _horizon(times: Array, gaps: Array) -> tuple[float, float | None]:
@@ -203,19 +227,82 @@ def _horizon(times: Array, gaps: Array) -> tuple[float, float | None]:
     return float(times[max(0, end - 1)]), growth
 
 
-def _bounds(model: Any, scenario: Scenario, peaks: Peaks) -> Setup:
+def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
+    scenario, room = scene.scenario, scene.declaration.room
     extent = float(model.stat.extent)
     fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * extent)
     # A hinge without limits may go round the other way.
     has_hinges = bool(np.any(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE))
     round_and_round = 2 * peaks.velocity * scenario.duration if has_hinges else 0.0
-    is_driven = bool(driving_force(model, scenario))
-    rest_energy = float(model.body_mass.sum()) * max(_REST_SPEED * fall, 1e-3) ** 2
-    return Setup(
+    setup = Setup(
         scenario=scenario,
-        position_bound=2 * peaks.position + ROOM * max(extent, 1.0) + round_and_round,
-        velocity_bound=ROOM * max(peaks.velocity, fall, 1e-3) if is_driven else math.inf,
-        energy_bound=math.inf
-        if is_driven
-        else peaks.energy + ROOM * max(peaks.kinetic, rest_energy),
+        position_bound=2 * peaks.position + room * max(extent, 1.0) + round_and_round,
     )
+    if driving_force(model, scenario):
+        return replace(setup, velocity_bound=room * max(peaks.velocity, fall, 1e-3))
+    rest_energy = float(model.body_mass.sum()) * max(_REST_SPEED * fall, 1e-3) ** 2
+    kinetic = max(peaks.kinetic, rest_energy)
+    return replace(
+        setup, energy_bound=peaks.energy + room * kinetic, energy=peaks.energy, kinetic=kinetic
+    )
+
+
+_SOLVERS = {
+    "PGS": int(mujoco.mjtSolver.mjSOL_PGS),
+    "CG": int(mujoco.mjtSolver.mjSOL_CG),
+    "Newton": int(mujoco.mjtSolver.mjSOL_NEWTON),
+}
+CONES = {
+    "pyramidal": int(mujoco.mjtCone.mjCONE_PYRAMIDAL),
+    "elliptic": int(mujoco.mjtCone.mjCONE_ELLIPTIC),
+}
+_ITERATIONS, _QUICK_ITERATIONS = (1, 2, 4, 10, 30), (1, 4)
+
+
+def own_setting(model: Any, pilot: Pilot) -> MeasuredSetting:
+    """The setting that the model has."""
+    return MeasuredSetting(
+        integrator=integrator_of(model).value,
+        timestep=pilot.scene.timestep,
+        solver=_name(_SOLVERS, int(model.opt.solver)) if pilot.constrained else "",
+        iterations=int(model.opt.iterations) if pilot.constrained else 0,
+        cone=_name(CONES, int(model.opt.cone)) if pilot.contact else "",
+    )
+
+
+def _name(names: dict[str, int], number: int) -> str:
+    return next(name for name, value in names.items() if value == number)
+
+
+def settings(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[MeasuredSetting, ...]:
+    """All settings to measure, each once, the model's own among them."""
+    baseline = own_setting(model, pilot)
+    variants = [
+        replace(baseline, integrator=integrator.value, timestep=step)
+        for integrator in STANDARD
+        for step in reversed(pilot.scene.timesteps)
+    ]
+    if pilot.contact:
+        variants += [replace(baseline, cone=cone) for cone in CONES]
+    if pilot.constrained:
+        variants += [replace(baseline, solver=solver) for solver in _SOLVERS]
+        counts = _QUICK_ITERATIONS if quick else _ITERATIONS
+        variants += [replace(baseline, iterations=n) for n in counts if n < baseline.iterations]
+    return tuple(dict.fromkeys(variants))
+
+
+def apply(model: Any, setting: MeasuredSetting) -> None:
+    """Give a `mjModel` a setting; what is empty in it stays as it is."""
+    set_integrator(model, Integrator(setting.integrator), setting.timestep)
+    if setting.solver:
+        model.opt.solver = _SOLVERS[setting.solver]
+        model.opt.iterations = setting.iterations
+    if setting.cone:
+        model.opt.cone = CONES[setting.cone]
+
+
+def with_setting(model: Any, setting: MeasuredSetting) -> Any:
+    """A copy of a `mjModel` with a setting, and automatic reset off."""
+    variant = with_integrator(model, Integrator(setting.integrator), setting.timestep)
+    apply(variant, setting)
+    return variant

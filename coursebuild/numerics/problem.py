@@ -217,6 +217,10 @@ class Setup(Struct, frozen=True, kw_only=True):
     energy_bound: float = float("inf")
     """Most potential and kinetic energy of a run that is not lost, J; infinite where something
     drives the motion."""
+    energy: float = float("inf")
+    """The most potential and kinetic energy in small steps, J; infinite where something drives."""
+    kinetic: float = 0.0
+    """The most kinetic energy in small steps, J."""
     penetration_bound: float = float("inf")
     """Deepest contact of a run that is not lost, m."""
 

@@ -1,37 +1,43 @@
-"""The largest stable timestep for each integrator, how a run grows beyond, and other settings.
+"""A laboratory of stability: largest stable timesteps by integrator, and what speaks against them.
 
 Entry points: `boundaries(problem)`, of a hard case; `stable_rows(model, pilot)`, of a scene;
-`with_energy_bound(problem)`; `settings(model, pilot)`, which are measured in a scene,
-`own_setting`, `apply`.
+`with_energy_bound(problem)`.
 
 1. Stable is what stays within what can be over a simulated time that is the same for all timesteps,
    by the judgement that every run gets: finite, within bounds, and where nothing drives the motion,
-   without much more energy than it has in small steps. What is just beyond a boundary grows slowly,
-   so the time sets the resolution.
-2. Stability need not be monotone. The largest stable timestep is the largest below which all that
-   were tried are stable: a grid, even in the logarithm, down to a tenth of it; a bisection at its
-   end; then others just below, which lie the closer the nearer they are. Where one of these is
-   lost, the search goes on below it.
-3. A setting is what can be chosen without changing the scene: every integrator at every timestep;
-   where a solver runs, also other solvers and fewer iterations; where something touches, also the
-   other cone. These vary one at a time about the model's own: the full product would take hours and
-   say little more.
+   without much more energy than it has in small steps. What shoots up in the first steps and then
+   decays is a transient of the method and no loss.
+2. One limit has several answers, which need not agree: theory at rest and along a periodic motion;
+   runs from the own start over the span, and over twice the span; runs from starts nearby. All are
+   kept, and only digits on which they agree are shown.
+3. Stability need not be monotone. A grid, even in the logarithm, is tried down to a tenth of the
+   shortest timestep that is lost, and about it from all starts; a bisection follows.
+4. Where nothing drives a scene, its energy cannot rise. The first timestep at which it does is a
+   limit of its own, often far below the first loss.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import mujoco
 import numpy as np
-from msgspec import Struct
+from msgspec import Struct, field
 from msgspec.structs import asdict, replace
 
-from coursebuild.numerics.detector import Peaks, RunStatus, driving_force, judge
-from coursebuild.numerics.pilot import Pilot
+from coursebuild.numerics.detector import (
+    BAD_STATES,
+    Peaks,
+    RunStatus,
+    driving_force,
+    judge,
+    update_peaks,
+)
+from coursebuild.numerics.linearization import Theory, find_theory
+from coursebuild.numerics.pilot import Pilot, nudges
 from coursebuild.numerics.problem import (
     STANDARD,
     Array,
@@ -41,32 +47,42 @@ from coursebuild.numerics.problem import (
     Setup,
 )
 from coursebuild.numerics.reports.case_report import BoundaryLine
-from coursebuild.numerics.reports.scene_report import MeasuredSetting, StableRow
+from coursebuild.numerics.reports.scene_report import StableRow
 from coursebuild.numerics.reports.shown_errors import FEWEST_STEPS
 from coursebuild.numerics.scene import thickness
 from coursebuild.numerics.simulation import (
-    advance_watching,
+    advance,
     compile_model,
     initial_data,
-    integrator_of,
-    set_integrator,
     simulate,
     with_integrator,
 )
 
-_REACH = 10.0
-"""The grid is tried down to this part of the largest stable timestep."""
-_NEAREST, _FARTHEST = 1e-3, 0.5
-"""The relative distances below it between which others are tried."""
+_REACH, _NEAR = 10.0, 2.0
+"""The grid is tried down to this part of the shortest timestep that is lost; from other starts so
+far below and beyond it."""
+_GRID, _FINE = 16, 1e-4
+_QUICK_GRID, _COARSE = 6, 1e-2
+"""The timesteps that are tried in a decade, and the relative width at which a bisection ends."""
+STARTS, QUICK_STARTS, NEARBY = 5, 3, 1e-4
+"""The starts of runs, the own one among them, and how far the others are from it: rad, or relative
+to the model's extent."""
 MOST_STEPS = 200_000
-"""The most steps of one run."""
-_PARTS, _LOOKS = 20, 1000
-"""How often a run is looked at: for its growth, and for whether it is lost."""
+"""The most steps of a span."""
+_LOOKS = 500
+"""How often a run is looked at."""
+_TRANSIENT, _DECAY = 8, 0.75
+"""What shoots up in so many first steps is a transient, if it has decayed after that part of
+a run."""
+_AT_REST = 1e-100
+"""The part of its largest speed below which nothing begins to move: subnormal numbers are slow."""
 _SMALL_STEPS = 100_000
 """Steps of the run that says how much energy there can be, at most."""
-_DENSE, _QUICK = (24, 32, 1e-4), (6, 8, 1e-2)
-"""The numbers of timesteps that are tried in a decade and just below the largest stable one, and
-the relative width at which the bisection ends."""
+_GAIN, _GAIN_RESOLUTION = 0.01, 0.02
+"""The share of the largest kinetic energy that counts as a rise of energy, and the width at which
+its timestep is known."""
+_SETTLED_STEPS = 2000
+"""Steps, at the limit of theory, of a run that comes to rest: growth at rest shows slowly."""
 
 
 class StabilityTrial(Struct, frozen=True):
@@ -78,11 +94,43 @@ class StabilityTrial(Struct, frozen=True):
     growth: float
     """The factor by which velocities grow in a step, from half the run to its end; NaN where the
     run was lost before."""
+    energy: float = -math.inf
+    """The most potential and kinetic energy on the way, J."""
 
     @property
     def stable(self) -> bool:
         """Whether the run stayed within what can be."""
         return self.status is RunStatus.OK
+
+
+class Laboratory(Struct, frozen=True, eq=False):
+    """What runs of an integrator show, by start and timestep."""
+
+    run: Callable[[int, float, float], StabilityTrial]
+    """A start (0 is the own one, the others are near it), a timestep and a time (s) → a run."""
+    span: float
+    """s."""
+    starts: int = 1
+    trials: dict[tuple[int, float], dict[int, StabilityTrial]] = field(default_factory=dict)
+    """By start and timestep, and by the number of spans."""
+
+    def trial(self, start: int, timestep: float, spans: int = 1) -> StabilityTrial:
+        """The run from a start at a timestep (s) over so many spans; each is made once."""
+        runs = self.trials.setdefault((start, timestep), {})
+        if spans not in runs:
+            is_known = 1 in runs and not runs[1].stable  # what is lost stays so
+            runs[spans] = runs[1] if is_known else self.run(start, timestep, spans * self.span)
+        return runs[spans]
+
+    def is_lost(self, start: int, timestep: float, spans: int = 1) -> bool:
+        """Whether it was lost within so many spans."""
+        return not self.trial(start, timestep, spans).stable
+
+    def own_steps(self) -> list[float]:
+        """The timesteps tried from the own start over the span, rising."""
+        return sorted(
+            step for (start, step), runs in self.trials.items() if not start and 1 in runs
+        )
 
 
 def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
@@ -93,11 +141,11 @@ def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
     if problem.search is None:
         return ()
     # Only joints with damping know `eulerdamp`.
-    damped = bool(np.any(compile_model(problem.mjcf, Integrator.EULER, 1e-3).dof_damping))
+    model = compile_model(problem.mjcf, Integrator.EULER, min(problem.timesteps or (1e-3,)))
+    integrators = Integrator if np.any(model.dof_damping) else STANDARD
     problem = with_energy_bound(problem)
-    return tuple(
-        boundary(problem, integrator) for integrator in (Integrator if damped else STANDARD)
-    )
+    theory = find_theory(model, problem.scenario, problem.limit, smooth=problem.smooth)
+    return tuple(boundary(problem, integrator, theory) for integrator in integrators)
 
 
 def with_energy_bound(problem: Problem) -> Problem:
@@ -109,97 +157,159 @@ def with_energy_bound(problem: Problem) -> Problem:
     duration = max(looks * scenario.sample, scenario.duration)
     longer = replace(problem, scenario=replace(scenario, duration=duration))
     energy = simulate(longer, compile_model(problem.mjcf, Integrator.RK4, step)).energy
-    most = energy.sum(axis=1).max() + problem.room * energy[:, 1].max()
-    return replace(problem, energy_bound=float(most))
+    most, kinetic = float(energy.sum(axis=1).max()), float(energy[:, 1].max())
+    return replace(
+        problem, energy_bound=most + problem.room * kinetic, energy=most, kinetic=kinetic
+    )
 
 
-def boundary(problem: Problem, integrator: Integrator) -> BoundaryLine:
+def boundary(
+    problem: Problem, integrator: Integrator, theory: Theory | None = None
+) -> BoundaryLine:
     """Search for the largest stable timestep of a problem with a search interval."""
     assert problem.search is not None
     low, high = problem.search
     search = max(low, problem.span / MOST_STEPS), high
-    trials = scan(lambda step: attempt(problem, integrator, step), search)
-    row = stable_row(integrator, trials, problem, problem.span)
-    theory = None if problem.limit is None else problem.limit(integrator)
-    lost = _first_lost(trials)
+
+    def run(start: int, step: float, span: float) -> StabilityTrial:
+        model = compile_model(problem.mjcf, integrator, step)
+        return run_trial(problem, model, span, start=start)
+
+    laboratory = Laboratory(run, problem.span, STARTS)
+    row = search_row(laboratory, integrator, search, problem, theory or Theory(problem.limit))
+    trials = (laboratory.trial(0, step) for step in laboratory.own_steps())
+    lost = next((trial for trial in trials if not trial.stable), None)
+    difference = row.largest / row.theory - 1 if row.largest and row.theory else None
     return BoundaryLine(
         **asdict(row),
-        theory=None if theory is None else _finite(theory.timestep),
-        formula="" if theory is None else theory.source,
-        difference=_difference(row.largest, theory),
+        difference=difference,
         beyond="" if lost is None else lost.status.value,
         growth=None if lost is None else _finite(lost.growth),
     )
-
-
-def _difference(largest: float | None, theory: Limit | None) -> float | None:
-    """Measured against theory, relative; `None` where one of them is not finite, or 0."""
-    if theory is None or not largest or not 0 < theory.timestep < math.inf:
-        return None
-    return largest / theory.timestep - 1
 
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def scan(
-    attempt: Callable[[float], StabilityTrial],
+def search_row(
+    laboratory: Laboratory,
+    integrator: Integrator,
     search: tuple[float, float],
+    setup: Setup,
+    theory: Theory,
     *,
     quick: bool = False,
-) -> tuple[StabilityTrial, ...]:
-    """Search for the largest stable timestep between two (s); all trials, by rising timestep."""
-    low, high = search
-    in_a_decade, near_count, resolution = _QUICK if quick else _DENSE
-    count = max(2, round(in_a_decade * math.log10(high / low)) + 1)
-    grid = np.geomspace(low, high, count).tolist()
-    trials: dict[float, StabilityTrial] = {}
-    while (step := _next_timestep(trials, grid, near_count, resolution)) is not None:
-        trials[step] = attempt(step)
-    return tuple(trials[step] for step in sorted(trials))
-
-
-def _first_lost(trials: Sequence[StabilityTrial]) -> StabilityTrial | None:
-    return next((trial for trial in trials if not trial.stable), None)
-
-
-def _next_timestep(
-    trials: Mapping[float, StabilityTrial], grid: list[float], near_count: int, resolution: float
-) -> float | None:
-    """The timestep to try next; `None` when the largest stable one is known."""
-    lost = min((step for step, trial in trials.items() if not trial.stable), default=math.inf)
-    least = 0.0 if math.isinf(lost) else lost / _REACH
-    fresh = [step for step in grid if step >= least and step not in trials]
-    stable = max((step for step in trials if step < lost), default=0.0)
-    if not fresh and stable and not math.isinf(lost):
-        if lost / stable > 1 + resolution:
-            return math.sqrt(lost * stable)
-        shorter = [stable * (1 - x) for x in np.geomspace(_NEAREST, _FARTHEST, near_count).tolist()]
-        fresh = [step for step in shorter if step > grid[0] and step not in trials]
-    return max(fresh, default=None)
-
-
-def stable_row(
-    integrator: Integrator, trials: Sequence[StabilityTrial], setup: Setup, span: float
 ) -> StableRow:
-    """The row of an integrator from the trials of a search, over a span (s) of simulated time."""
-    steps = [trial.timestep for trial in trials]
-    stable_steps, largest, lost = steps, None, _first_lost(trials)
-    if lost is not None:
-        stable_steps = [step for step in steps if step < lost.timestep]
-        largest = max(stable_steps, default=0.0)
-    islands = [trial.timestep for trial in trials[len(stable_steps) :] if trial.stable]
+    """Search for the largest stable timestep between two (s), and for what speaks against it.
+
+    1. From the own start over the span: a grid, falling, down to a tenth of the largest timestep
+       below which nothing was lost, and a bisection at its end.
+    2. About that all starts over both spans, which makes the map; then a bisection for the start
+       that is lost first, and one for the own start over the doubled span.
+    3. Where nothing drives the motion, the first timestep at which energy rises.
+    """
+    grid = _grid(search, quick)
+    resolution = _COARSE if quick else _FINE
+    largest = _bisect(partial(laboratory.is_lost, 0), grid, resolution)
+    near = [h for h in grid if h < _NEAR * min(largest, grid[-1])] or grid[:1]
+    estimates = [_bisect(partial(laboratory.is_lost, 0, spans=2), near, resolution, _NEAR)]
+    by_start = {
+        n: _bisect(partial(laboratory.is_lost, n, spans=2), near, math.inf, _NEAR)
+        for n in range(1, laboratory.starts)
+    }
+    if by_start:
+        worst = min(by_start, key=lambda n: by_start[n])
+        is_lost = partial(laboratory.is_lost, worst, spans=2)
+        estimates.append(_bisect(is_lost, near, resolution, _NEAR))
+    bounds = [min(h, grid[-1]) for h in (largest, *estimates)]
+    limit, orbital = theory.limit(integrator, search), theory.orbital(integrator)
+    gain = _first_gain(laboratory, grid, setup)
+    steps = laboratory.own_steps()
+    stable_steps = [h for h in steps if h <= largest]
+    islands = [h for h in steps if h > largest and not laboratory.is_lost(0, h)]
+    is_all = math.isinf(largest)
     return StableRow(
         integrator=integrator.value,
-        largest=largest,
+        largest=None if is_all else largest,
         searched=(steps[0], steps[-1]),
-        islands=(islands[0], islands[-1]) if islands else None,
-        duration=span,
-        steps=step_count(span, max(stable_steps, default=steps[0])),
+        islands=(islands[0], islands[-1]) if islands and not is_all else None,
+        duration=laboratory.span,
+        steps=step_count(laboratory.span, max(stable_steps, default=steps[0])),
         tried=len(stable_steps),
         energy=_finite(setup.energy_bound),
+        bracket=None if min(largest, *estimates) == math.inf else (min(bounds), max(bounds)),
+        theory=None if limit is None else _finite(limit.timestep),
+        formula="" if limit is None else limit.source,
+        orbital=None if orbital is None else _finite(orbital),
+        periodic=orbital is not None,
+        gain=gain,
+        tries=_tries(laboratory),
     )
+
+
+def _grid(search: tuple[float, float], quick: bool) -> list[float]:
+    low, high = search
+    count = max(2, round((_QUICK_GRID if quick else _GRID) * math.log10(high / low)) + 1)
+    return [float(step) for step in np.geomspace(low, high, count)]
+
+
+def _bisect(
+    is_lost: Callable[[float], bool],
+    grid: Sequence[float],
+    resolution: float,
+    reach: float = _REACH,
+) -> float:
+    """The largest timestep below which none is lost: infinite for all of the grid, 0 for none.
+
+    The grid is tried from above, down to `1 / reach` of the shortest that is lost.
+    """
+    lost = math.inf
+    stable = 0.0
+    for step in reversed(grid):
+        if lost < math.inf and step < lost / reach:
+            break
+        if is_lost(step):
+            lost, stable = step, 0.0
+        elif not stable:
+            stable = step
+    if math.isinf(lost) or not stable:
+        return math.inf if math.isinf(lost) else 0.0
+    while lost / stable > 1 + resolution:
+        middle = math.sqrt(lost * stable)
+        lost, stable = (middle, stable) if is_lost(middle) else (lost, middle)
+    return stable
+
+
+def _first_gain(
+    laboratory: Laboratory, grid: Sequence[float], setup: Setup
+) -> tuple[float, float] | None:
+    """The first timestep (s) at which energy rises in a scene that nothing drives, and by how much.
+
+    `None` where it does not, or something drives it.
+    """
+    if not math.isfinite(setup.energy):
+        return None
+    least = _GAIN * setup.kinetic
+
+    def gain(step: float) -> float:
+        trial = laboratory.trial(0, step)
+        return trial.energy - setup.energy
+
+    lossless = _bisect(lambda h: not gain(h) <= least, grid, _GAIN_RESOLUTION, _NEAR)
+    if math.isinf(lossless):
+        return None
+    first = min(h for h in laboratory.own_steps() if h > lossless and not gain(h) <= least)
+    return first, gain(first) if math.isfinite(gain(first)) else 0.0
+
+
+def _tries(laboratory: Laboratory) -> tuple[tuple[float, int, int], ...]:
+    """By timestep the number of runs, from all starts over both spans, and of those lost."""
+    counts: dict[float, tuple[int, int]] = {}
+    for (_, step), runs in laboratory.trials.items():
+        total, lost = counts.get(step, (0, 0))
+        counts[step] = total + len(runs), lost + sum(not run.stable for run in runs.values())
+    return tuple((step, *counts[step]) for step in sorted(counts))
 
 
 def step_count(span: float, timestep: float) -> int:
@@ -209,116 +319,80 @@ def step_count(span: float, timestep: float) -> int:
 
 def attempt(problem: Problem, integrator: Integrator, timestep: float) -> StabilityTrial:
     """Run the problem over its span at a timestep (s)."""
-    return run_trial(problem, compile_model(problem.mjcf, integrator, timestep), problem.span)
+    model = compile_model(problem.mjcf, integrator, timestep)
+    return run_trial(problem, model, problem.span)
 
 
 def run_trial(
-    setup: Setup, model: Any, span: float, thickness: Array | None = None
+    setup: Setup, model: Any, span: float, thickness: Array | None = None, *, start: int = 0
 ) -> StabilityTrial:
     """Run a model over a span (s) with its own timestep, or until it is lost.
 
-    `thickness` is as for `detector.update_peaks`. A command changes with the first step that begins
-    after its time: the timestep need not divide the hold.
+    `thickness` is as for `detector.update_peaks`; `start`: 0 for the scenario's own, else one near
+    it. A command changes with the first step that begins after its time: the timestep need not
+    divide the hold.
     """
     data = initial_data(setup.scenario, model)
+    if start:
+        direction = nudges(model, STARTS - 1, NEARBY)[start - 1]
+        mujoco.mj_integratePos(model, data.qpos, direction[0], 1.0)
+        data.qvel[:] += direction[1]
+        data.act[:] += NEARBY * (-1) ** start
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     timestep = float(model.opt.timestep)
     steps = step_count(span, timestep)
-    interval = max(8, steps // _LOOKS)
+    interval = max(2, steps // _LOOKS)
     commands = {
         min(math.ceil(begin / timestep - 1e-9), steps): command
         for begin, _, command in setup.scenario.holds(span)
     }
-    looks = {steps * part // _PARTS for part in range(_PARTS + 1)}
+    stops = sorted({*range(1, _TRANSIENT + 1), *range(0, steps, interval), steps, *commands})
     sizes: list[tuple[int, float]] = []
-    peaks, total = Peaks(), 0
-    for begin, end in itertools.pairwise(sorted(looks.union(commands))):
-        if commands.get(begin):
-            data.ctrl[:] = commands[begin]
+    limits, count, excess_end, energy, is_lost = setup, 0, 0.0, -math.inf, False
+    peak_speed = 0.0
+    for stop in (stop for stop in stops if stop <= steps):
         try:
-            peaks, steps_made = advance_watching(
-                model, data, end - begin, peaks, thickness, interval=interval, setup=setup
-            )
+            if stop > count:
+                advance(model, data, stop - count)
         except mujoco.FatalError:  # MuJoCo does not run it
             return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan)
-        total += steps_made
-        with np.errstate(over="ignore"):
-            sizes.append((total, float(np.linalg.norm(data.qvel))))
-        if not peaks.is_within(setup):
+        count, now = stop, update_peaks(data, Peaks(), thickness)
+        energy = max(energy, now.energy)
+        if count <= _TRANSIENT:
+            limits = replace(
+                limits,
+                velocity_bound=max(limits.velocity_bound, now.velocity),
+                energy_bound=max(limits.energy_bound, now.energy),
+            )
+        excess_end = excess_end if now.is_within(setup) else count * timestep
+        is_lost = not now.is_within(limits) or any(data.warning[n].number for n in BAD_STATES)
+        if is_lost or (count > max(commands) and now.velocity < _AT_REST * peak_speed):
             break
-    judgement = judge(model, data, total * timestep, peaks, setup)
-    return StabilityTrial(timestep, judgement.status, _growth(sizes))
+        peak_speed = max(peak_speed, now.velocity)
+        if commands.get(stop):
+            data.ctrl[:] = commands[stop]
+        with np.errstate(over="ignore"):
+            sizes.append((count, float(np.linalg.norm(data.qvel))))
+    is_lost = is_lost or excess_end > _DECAY * span  # it shot up, and has not come down
+    status = judge(model, data, count * timestep, now, setup if is_lost else limits).status
+    if is_lost and status is RunStatus.OK:
+        status = RunStatus.SLOW_GROWTH
+    return StabilityTrial(timestep, status, _growth(sizes), energy)
 
 
 def _growth(sizes: list[tuple[int, float]]) -> float:
+    """The factor by which velocities grow in a step, from the middle of a run to its end."""
     if len(sizes) < 2:
         return math.nan
-    (before, small), (after, large) = sizes[len(sizes) // 2 - 1], sizes[-1]
+    middle = next(n for n, (count, _) in enumerate(sizes) if 2 * count >= sizes[-1][0])
+    (before, small), (after, large) = sizes[min(middle, len(sizes) - 2)], sizes[-1]
     if not 0 < small < math.inf or not 0 < large < math.inf:
         return math.nan
     return float((large / small) ** (1 / (after - before)))
 
 
-_SOLVERS = {
-    "PGS": int(mujoco.mjtSolver.mjSOL_PGS),
-    "CG": int(mujoco.mjtSolver.mjSOL_CG),
-    "Newton": int(mujoco.mjtSolver.mjSOL_NEWTON),
-}
-CONES = {
-    "pyramidal": int(mujoco.mjtCone.mjCONE_PYRAMIDAL),
-    "elliptic": int(mujoco.mjtCone.mjCONE_ELLIPTIC),
-}
-_ITERATIONS, _QUICK_ITERATIONS = (1, 2, 4, 10, 30), (1, 4)
 _SEARCH = (0.25, 64.0)
 """The multiples of the model's timestep between which the largest stable one is searched for."""
-
-
-def own_setting(model: Any, pilot: Pilot) -> MeasuredSetting:
-    """The setting that the model has."""
-    return MeasuredSetting(
-        integrator=integrator_of(model).value,
-        timestep=pilot.scene.timestep,
-        solver=_name(_SOLVERS, int(model.opt.solver)) if pilot.constrained else "",
-        iterations=int(model.opt.iterations) if pilot.constrained else 0,
-        cone=_name(CONES, int(model.opt.cone)) if pilot.contact else "",
-    )
-
-
-def _name(names: dict[str, int], number: int) -> str:
-    return next(name for name, value in names.items() if value == number)
-
-
-def settings(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[MeasuredSetting, ...]:
-    """All settings to measure, each once, the model's own among them."""
-    baseline = own_setting(model, pilot)
-    variants = [
-        replace(baseline, integrator=integrator.value, timestep=step)
-        for integrator in STANDARD
-        for step in reversed(pilot.scene.timesteps)
-    ]
-    if pilot.contact:
-        variants += [replace(baseline, cone=cone) for cone in CONES]
-    if pilot.constrained:
-        variants += [replace(baseline, solver=solver) for solver in _SOLVERS]
-        counts = _QUICK_ITERATIONS if quick else _ITERATIONS
-        variants += [replace(baseline, iterations=n) for n in counts if n < baseline.iterations]
-    return tuple(dict.fromkeys(variants))
-
-
-def apply(model: Any, setting: MeasuredSetting) -> None:
-    """Give a `mjModel` a setting; what is empty in it stays as it is."""
-    set_integrator(model, Integrator(setting.integrator), setting.timestep)
-    if setting.solver:
-        model.opt.solver = _SOLVERS[setting.solver]
-        model.opt.iterations = setting.iterations
-    if setting.cone:
-        model.opt.cone = CONES[setting.cone]
-
-
-def with_setting(model: Any, setting: MeasuredSetting) -> Any:
-    """A copy of a `mjModel` with a setting, and automatic reset off."""
-    variant = with_integrator(model, Integrator(setting.integrator), setting.timestep)
-    apply(variant, setting)
-    return variant
 
 
 def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[StableRow, ...]:
@@ -327,19 +401,31 @@ def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[Stabl
     They are searched for as those of the hard cases. No timestep is tried of which the scenario
     has fewer than 20: so few steps would say nothing.
     """
-    duration = pilot.scene.scenario.duration
-    low, high = (part * pilot.scene.timestep for part in _SEARCH)
-    search = (max(low, duration / MOST_STEPS), min(high, duration / FEWEST_STEPS))
-    if search[1] <= search[0]:
-        return ()
-    half_thickness = thickness(model)
+    scene, half_thickness = pilot.scene, thickness(model)
+    duration = scene.declaration.stable_for or scene.scenario.duration
+    low, high = sorted(scene.declaration.search or [part * scene.timestep for part in _SEARCH])
+    limits = scene.declaration.limits
 
-    def row(integrator: Integrator) -> StableRow:
-        def attempt(step: float) -> StabilityTrial:
-            return run_trial(
-                pilot.setup, with_integrator(model, integrator, step), duration, half_thickness
-            )
+    def declared_limit(integrator: Integrator) -> Limit | None:
+        step = limits.get(integrator.value)  # type: ignore[call-overload]
+        return None if step is None else Limit(step, "as the scenario declares")
 
-        return stable_row(integrator, scan(attempt, search, quick=quick), pilot.setup, duration)
+    theory = find_theory(
+        model, scene.scenario, declared_limit if limits else None, smooth=pilot.smooth
+    )
 
-    return tuple(map(row, STANDARD))
+    def row(integrator: Integrator) -> StableRow | None:
+        def run(start: int, step: float, span: float) -> StabilityTrial:
+            variant = with_integrator(model, integrator, step)
+            return run_trial(pilot.setup, variant, span, half_thickness, start=start)
+
+        span, limit = duration, theory.limit(integrator, (low, high))
+        if pilot.settles and pilot.smooth and limit is not None and math.isfinite(limit.timestep):
+            span = max(span, _SETTLED_STEPS * limit.timestep)
+        search = max(low, span / MOST_STEPS), min(high, span / FEWEST_STEPS)
+        if search[1] <= search[0]:
+            return None
+        laboratory = Laboratory(run, span, QUICK_STARTS if quick else STARTS)
+        return search_row(laboratory, integrator, search, pilot.setup, theory, quick=quick)
+
+    return tuple(filter(None, map(row, STANDARD)))

@@ -1,6 +1,6 @@
 """A model with its parameters at other values: its contacts, solver and cost.
 
-Entry point: `measure_sweep(spec, scene, sweep, …)`.
+Entry points: `measure_sweep(spec, scene, sweep, …)`; `with_contacts`, what contacts do in a run.
 
 1. A parameter is a field of the model's elements as `mujoco.MjSpec` names it, so that all that
    follows from it is compiled anew. One is changed at a time.
@@ -172,7 +172,7 @@ def _measure_variant(
     row = replace(row, status=judgement.status.value, reasons=judgement.reasons)
     if not judgement.ok:
         return row
-    row = _with_contacts(scene.scenario, model, row)
+    row = with_contacts(scene.scenario, model, row)
     if base_states is None:
         return row
     row = replace(row, change=visible_error(base, scene, run.states, base_states))
@@ -198,7 +198,7 @@ class _Hit(Struct):
     """Deepest contact, m."""
 
 
-def _with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
+def with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
     """Add what contacts and solver do, step by step."""
     model_copy = _runnable(model)
     model_copy.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_FWDINV)

@@ -15,7 +15,7 @@ Entry point: `measure_scenario(model, scene, quick=…, clock=…, tell=…)`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -42,14 +42,25 @@ from coursebuild.numerics.measure import (
     quantity_values,
     visible_error,
 )
-from coursebuild.numerics.pilot import Pilot, run_pilot
+from coursebuild.numerics.pilot import PARTING_DISTANCE as CHAOS_DISTANCE
+from coursebuild.numerics.pilot import (
+    Pilot,
+    own_setting,
+    position_distances,
+    run_pilot,
+    settings,
+    with_setting,
+)
 from coursebuild.numerics.problem import STANDARD, Sizes
 from coursebuild.numerics.reports.scene_report import (
     FLOORS,
+    Errors,
+    FigureLine,
     MeasuredSetting,
     OrderRow,
     ScenarioReport,
     StableRow,
+    SweepRow,
     WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.shown_errors import setting_text
@@ -62,13 +73,8 @@ from coursebuild.numerics.simulation import (
     refsafe_from,
     simulate,
 )
-from coursebuild.numerics.stability import (
-    own_setting,
-    run_trial,
-    settings,
-    stable_rows,
-    with_setting,
-)
+from coursebuild.numerics.stability import run_trial, stable_rows
+from coursebuild.numerics.sweep import with_contacts
 from mjcourse.spatial import angular_distance
 
 
@@ -154,9 +160,26 @@ def measure_scenario(
         figure=quantity_name(model, scene),
         rows=rows,
         orders=_fit_orders(basis, rows) if pilot.smooth else (),
+        figures=tuple(_measure_expected(basis)),
         stable=largest,
         verdict=judgement,
     )
+
+
+def _measure_expected(basis: Basis) -> Iterator[FigureLine]:
+    """What the scenario knows in theory, under every integrator at its own timestep."""
+    scene = basis.pilot.scene
+    expected = scene.declaration.expected
+    for integrator in STANDARD if expected else ():
+        setting = replace(basis.baseline, integrator=integrator.value)
+        row = SweepRow("integrator", integrator.value, own=False, status="ok")
+        row = with_contacts(scene.scenario, with_setting(basis.model, setting), row)
+        for name, exact in expected.items():
+            unit = "" if name == "restitution" else "m"
+            value = getattr(row, name)
+            if name != "restitution" and value is None:  # nothing touched
+                value = 0.0
+            yield FigureLine(name, unit, integrator.value, value, exact, "as declared")
 
 
 def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
@@ -285,6 +308,12 @@ def _with_errors(
     if row.own and cone.visible_model_error >= 1:
         noticeable = True
     creep = None if cone.sticks is None else measure_slip(model, scene, states, cone.sticks)
+    if basis.pilot.lyapunov is not None:
+        gaps = position_distances(model, states.qpos, reference.states.qpos)
+        far = np.flatnonzero(gaps >= CHAOS_DISTANCE)
+        if far.size:
+            row = replace(row, parted=float(states.times[far[0]]))
+            run_errors = Errors(None, None, None)
     row = replace(
         row,
         **asdict(run_errors),

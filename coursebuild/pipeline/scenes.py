@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from msgspec import Struct
+from msgspec.structs import asdict
 
 from coursebuild.core.checks.compiled import (
     INCLUDED_ROOT,
@@ -27,6 +28,7 @@ from coursebuild.core.checks.compiled import (
 from coursebuild.core.files.read import CourseFiles, read_course
 from coursebuild.core.model import Declarations, Limits, MjcfModel
 from coursebuild.core.model.results import ModelFacts
+from coursebuild.core.model.scenarios import ScenarioTable
 from coursebuild.core.run.mjcf import compile_all, model_files, readable_error
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.declarations import parse_declarations
@@ -123,6 +125,10 @@ def _hash_file(file: Path) -> bytes:
         return b"unreadable"
 
 
+_LATER = ("room", "stable_for", "search", "limits", "expected", "precision")
+_PLAIN = asdict(ScenarioTable("plain"))
+
+
 def _canonical_text(declarations: Declarations) -> str:
     """A text of all declarations that change a measurement, in whatever order the file has them.
 
@@ -136,6 +142,8 @@ def _canonical_text(declarations: Declarations) -> str:
             *(s.sample, s.controls, s.hold, s.observable),
             *(None if s.closed_form else s.reference, s.closed_form),
             *(s.conserved, s.timesteps),
+            # What was added later counts only where it is given.
+            *((name, value) for name in _LATER if (value := getattr(s, name)) != _PLAIN[name]),
         )
         parts.append(repr(fields))
     for sweep in declarations.sweeps:

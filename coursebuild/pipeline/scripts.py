@@ -19,7 +19,7 @@ from coursebuild.core.files.examples import BlockedFile, ExamplesReport, Obstacl
 from coursebuild.core.files.write import remove_leftovers
 from coursebuild.core.model import Course, Recording, find_blocks
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
-from coursebuild.core.model.sensitivity import HALVED_RUN, RUNS, Sensitivity
+from coursebuild.core.model.sensitivity import FINER_RUNS, RUNS, Sensitivity
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.run_store import RunStore, longest_first
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
@@ -225,8 +225,8 @@ def measure_sensitivity(
     """Measure which printed digits repeat when initial states move, of scripts that were run.
 
     Scripts that use MuJoCo and print what is recorded run four times with their initial states
-    moved (`core.run.perturbation`), each with three times the time limit; if `halve`, a fifth time
-    with halved timesteps. All runs are remembered like others.
+    moved (`core.run.perturbation`), each with three times the time limit; if `halve`, twice more
+    with a half and a quarter of the timestep. All runs are remembered like others.
     `documents`: only recorded outputs in documents with these paths count.
     """
     recordings: dict[str, list[Recording]] = {}
@@ -240,7 +240,7 @@ def measure_sensitivity(
         for script, base in pairs
         if is_worth_moving(course, recordings.get(script.path, ()), base)
     ]
-    numbers = (*range(1, RUNS + 1), *((HALVED_RUN,) if halve else ()))
+    numbers = (*range(1, RUNS + 1), *(FINER_RUNS if halve else ()))
     perturbed_runs = _run_perturbed(moved_scripts, options, numbers)
     return tuple(
         sensitivity(
@@ -250,7 +250,7 @@ def measure_sensitivity(
             recordings.get(script.path, ()),
             base,
             perturbed_runs.get(script.path, ())[:RUNS],
-            next(iter(perturbed_runs.get(script.path, ())[RUNS:]), None),
+            perturbed_runs.get(script.path, ())[RUNS:],
         )
         for script, base in pairs
     )
@@ -259,7 +259,7 @@ def measure_sensitivity(
 def _run_perturbed(
     scripts: Sequence[Extraction], options: Options, numbers: Sequence[int]
 ) -> dict[str, list[ScriptRun]]:
-    """Run scripts with moved states or halved timesteps; return the runs by path."""
+    """Run scripts with moved states or shorter timesteps; return the runs by path."""
     runs: dict[str, list[ScriptRun]] = {script.path: [] for script in scripts}
     if not scripts:
         return runs
@@ -269,8 +269,9 @@ def _run_perturbed(
     with ScriptServer(sandbox=options.sandbox) as server:
         server_options = replace(options, run_all=server.run)
         for number in numbers:
-            halving = number == HALVED_RUN
-            stage = "halving timesteps" if halving else f"moving initial states, {number} of {RUNS}"
+            stage = f"moving initial states, {number} of {RUNS}"
+            if number in FINER_RUNS:
+                stage = "halving timesteps" + (" twice" if number == FINER_RUNS[1] else "")
             for script_run in run(scripts, server_options, stage, run_store, perturbation=number):
                 runs[script_run.path].append(script_run)
     return runs

@@ -8,9 +8,10 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import BenchTable
-from coursebuild.numerics.reports.case_report import BoundaryLine, FigureLine
+from coursebuild.numerics.reports.case_report import BoundaryLine
 from coursebuild.numerics.reports.departures import Departure, case_departures, scene_departures
 from coursebuild.numerics.reports.scene_report import (
+    FigureLine,
     FittedOrder,
     OrderRow,
     ScenarioReport,
@@ -202,7 +203,7 @@ def test_what_is_known_exactly_is_compared_by_how_far_it_is_off() -> None:
 
 def test_boundaries_and_runs_of_cases() -> None:
     line = BoundaryLine(
-        "Euler", None, (1e-3, 1.0), (0.3, 0.4), 9.0, 9, 9, None, None, "", None, "reset", 1.5
+        "Euler", None, (1e-3, 1.0), (0.3, 0.4), 9.0, 9, 9, None, beyond="reset", growth=1.5
     )
     old, run = case(), replace(case().errors[0], status="reset")
     new = replace(old, boundaries=(line, *old.boundaries[1:]), errors=(run, *old.errors[1:]))

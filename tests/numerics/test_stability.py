@@ -5,22 +5,32 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
+from typing import Any
 
+import mujoco
 import pytest
 from msgspec.structs import replace
 
+from coursebuild.core.model.scenarios import Declarations, DeclaredScenario
+from coursebuild.core.text.source import Source
 from coursebuild.numerics.detector import RunStatus
-from coursebuild.numerics.problem import Integrator, Scenario, Setup
+from coursebuild.numerics.linearization import Theory, find_rest, find_theory
+from coursebuild.numerics.pilot import run_pilot
+from coursebuild.numerics.problem import STANDARD, Integrator, Scenario, Setup
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.problems.oscillators import rk4_factor, rk4_limit
 from coursebuild.numerics.reports.scene_report import StableRow
+from coursebuild.numerics.reports.shown_errors import limit_text, map_text
+from coursebuild.numerics.scene import scenes
+from coursebuild.numerics.simulation import compile_model
 from coursebuild.numerics.stability import (
+    Laboratory,
     StabilityTrial,
     attempt,
     boundaries,
     boundary,
-    scan,
-    stable_row,
+    search_row,
+    stable_rows,
     with_energy_bound,
 )
 
@@ -60,13 +70,14 @@ def test_a_boundary_is_found_beside_theory() -> None:
         assert line.monotone and line.beyond == "slow-growth"
         assert line.duration == problem.span == 200
         assert line.steps == math.ceil(200 / line.largest)
-        assert line.tried >= 40
+        assert line.tried >= 8
 
 
 def test_where_all_or_none_is_stable() -> None:
     problem = replace(all_problems()["damped-spring-1"], search=(0.05, 0.5))
     line = boundary(problem, Integrator.DISCRETE)
     assert (line.largest, line.searched, line.steps) == (None, (0.05, 0.5), 1000)
+    assert (line.bracket, line.theory, line.formula) == (None, None, DISCRETE)
     line = boundary(replace(problem, search=(0.6, 2.0)), Integrator.EULER)
     assert (line.largest, line.difference, line.tried) == (0.0, None, 0)
     assert boundaries(replace(problem, search=None)) == ()
@@ -76,21 +87,29 @@ def test_where_all_or_none_is_stable() -> None:
     }
 
 
-def search_row(lost: Callable[[float], bool], search: tuple[float, float]) -> StableRow:
-    def attempt_at(step: float) -> StabilityTrial:
-        return StabilityTrial(step, RunStatus.DIVERGED if lost(step) else RunStatus.OK, 1.0)
+DISCRETE = "implicit in positions and velocities"
+
+
+def search(
+    lost: Callable[[int, float, float], bool], interval: tuple[float, float], starts: int = 3
+) -> StableRow:
+    """What a laboratory finds whose runs from a start, at a timestep and over a time, are lost."""
+
+    def run(start: int, step: float, span: float) -> StabilityTrial:
+        status = RunStatus.DIVERGED if lost(start, step, span) else RunStatus.OK
+        return StabilityTrial(step, status, 1.0)
 
     setup = Setup(scenario=Scenario(5.0, 5.0))
-    return stable_row(Integrator.RK4, scan(attempt_at, search), setup, 5.0)
+    laboratory = Laboratory(run, 5.0, starts)
+    return search_row(laboratory, Integrator.RK4, interval, setup, Theory())
 
 
 @pytest.mark.parametrize(
     ("island", "largest"),
     [
-        ((61.9, 61.95), 61.9),  # just below the first boundary
-        ((55.0, 57.0), 55.0),
-        ((11.0, 12.5), 11.0),  # a fifth of it
-        ((8.0, 9.0), 8.0),
+        ((50.0, 57.7), 50.0),
+        ((11.0, 12.7), 11.0),  # a fifth of it
+        ((8.0, 9.3), 8.0),
         ((70.0, 90.0), 62.0),
     ],
 )
@@ -98,12 +117,99 @@ def test_the_largest_is_below_everything_that_is_lost(
     island: tuple[float, float], largest: float
 ) -> None:
     low, high = island
-    row = search_row(lambda step: low < step < high or 62 < step < 100, (1.0, 1000.0))
+    row = search(lambda _, step, span: low < step < high or 62 < step < 100, (1.0, 1000.0))
     assert row.largest == pytest.approx(largest, rel=2e-4)
     assert row.largest <= largest
     assert row.islands is not None and row.islands[1] == pytest.approx(1000.0)
-    assert row.searched[0] <= max(1.001, largest / 8)
+    assert row.searched[0] <= max(1.001, largest / 7)
+    assert row.bracket is not None and row.bracket[0] <= row.largest <= row.bracket[1]
     assert row.steps == math.ceil(5.0 / row.largest)
+
+
+def test_only_digits_on_which_spans_and_starts_agree_are_printed() -> None:
+    """Over twice the time it is lost a little earlier, and from one of the starts much earlier."""
+    row = search(lambda _, step, span: step > 25.4 + 0.4 / span, (1.0, 1000.0))
+    assert limit_text(row) == "25.4 s"
+    assert row.bracket == pytest.approx((25.44, 25.48), abs=5e-3)
+    assert limit_text(replace(row, theory=25.2)) == "25 s"
+    assert limit_text(replace(row, theory=40.0)) == "25.4 s", "that is another limit"
+    row = search(lambda start, step, _: step > (19 if start == 2 else 25.4), (1.0, 1000.0))
+    assert limit_text(row) == "19 s – 25 s"
+    shares = {lost / runs for step, runs, lost in row.tries if 19 < step < 25}
+    assert any(0 < share < 1 for share in shares), "the map shows where some are lost"
+    assert "∘" in map_text(row)
+    row = search(lambda start, step, _: start == 1 and step > 500, (1.0, 1000.0))
+    assert (row.largest, limit_text(row)) == (None, "500 s – 1000 s")
+    assert limit_text(StableRow("RK4", 0.123456, (0.1, 1.0), None, 1.0, 8, 8, None)) == "120 ms"
+
+
+ARM = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>
+<joint name="j" axis="0 1 0" {}/><inertial pos="0 0 0" mass="10" diaginertia="13.33 13.33 13.33"/>
+</body></worldbody>{}</mujoco>"""
+SERVO = '<actuator><position joint="j" kp="2e5" kv="1500"/></actuator>'
+
+
+def rows_of(mjcf: str, *names: str, **fields: Any) -> dict[str, StableRow]:
+    model, source = mujoco.MjModel.from_xml_string(mjcf), Source("m.xml", mjcf)
+    table = DeclaredScenario("s", span=source.span(0, 0), duration=2.0, **fields)
+    (scene,) = scenes(model, Declarations("m", source, (table,)))
+    return {row.integrator: row for row in stable_rows(model, run_pilot(model, scene), quick=True)}
+
+
+def test_a_servo_is_stable_as_far_as_the_spring_and_damper_that_it_is() -> None:
+    """Linear theory: 10.468 ms where damping is explicit, 25.468 where implicit, RK4 21.585."""
+    servo = rows_of(ARM.format("", SERVO), qpos=(0.0,), controls=((0.1,),), hold=2.0)
+    spring = rows_of(ARM.format('stiffness="2e5" damping="1500"', ""), qpos=(0.1,))
+    for rows, expected in (
+        (servo, {"Euler": 10.468, "implicit": 25.468, "RK4": 21.585}),
+        (spring, {"Euler": 25.468, "implicit": 25.468, "RK4": 21.585}),
+    ):
+        for name, limit in expected.items():
+            row = rows[name]
+            assert row.theory == pytest.approx(limit * 1e-3, rel=1e-4), name
+            assert row.bracket is not None
+            assert row.bracket == pytest.approx((limit * 1e-3,) * 2, rel=0.012), name
+        assert (rows["discrete"].theory, rows["discrete"].largest) == (None, None)
+    assert servo["RK4"].gain is None, "a motor drives it"
+    # It overshoots in one step, which no damper does, and decays: a gain, and no loss.
+    assert spring["RK4"].gain is not None and spring["RK4"].gain[0] < 0.021
+
+
+def test_a_state_of_an_actuator_that_nothing_excites_is_lost_from_starts_nearby() -> None:
+    """A filter of 20 ms is explicit under Euler: it is unstable beyond 40 ms."""
+    actuator = '<actuator><general joint="j" dyntype="filter" dynprm="0.02" gainprm="4000"/>'
+    mjcf = ARM.format('stiffness="4000" damping="200"', actuator + "</actuator>")
+    row = rows_of(mjcf, qpos=(0.1,), controls=((0.0,),), hold=2.0)["Euler"]
+    assert row.theory == pytest.approx(0.04, rel=1e-5)
+    assert row.bracket is not None and row.bracket[0] == pytest.approx(0.04, rel=0.02)
+    assert row.bracket[1] > 0.05
+
+
+def test_theory_at_rest_is_that_of_formulas() -> None:
+    mismatches = []
+    for problem in (p for p in all_problems().values() if p.limit is not None and p.case != 3):
+        model = compile_model(problem.mjcf, Integrator.RK4, min(problem.timesteps))
+        theory = find_theory(model, problem.scenario, None, smooth=False)
+        for integrator in STANDARD:
+            computed, exact = theory.limit(integrator, (1e-4, 10.0)), problem.limit(integrator)
+            assert computed is not None and exact is not None, problem.name
+            if computed.timestep != pytest.approx(exact.timestep, rel=1e-4):
+                mismatches.append((problem.name, integrator, computed.timestep, exact.timestep))
+    assert mismatches == []
+
+
+def test_theory_along_a_period_is_where_a_pendulum_is_lost() -> None:
+    """From 179° it goes round beyond 0.168 s; hanging at rest it would be stable to 0.64 s."""
+    problem = all_problems()["pendulum-hinge-179"]
+    model = compile_model(problem.mjcf, Integrator.RK4, min(problem.timesteps))
+    scenario = replace(problem.scenario, duration=10.0)
+    theory = find_theory(model, scenario, None, smooth=True)
+    limit = theory.limit(Integrator.EULER, (1e-3, 1.0))
+    assert limit is not None and limit.timestep == pytest.approx(0.6417, rel=1e-3)
+    assert theory.orbit is not None and theory.orbit.period == pytest.approx(7.86483, rel=1e-4)
+    assert theory.orbital(Integrator.EULER) == pytest.approx(0.168, rel=0.1)
+    falling = find_rest(model, replace(scenario, qpos=(math.pi,)))
+    assert falling is None, "upright it is unstable by itself"
 
 
 def test_energy_that_cannot_be_is_instability() -> None:

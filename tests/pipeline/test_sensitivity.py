@@ -187,7 +187,7 @@ def test_report_as_text(course: Folder, by_path: dict[str, Any]) -> None:
     lines = result.out[result.out.index("digits that repeat") :].splitlines()
     assert lines[:2] == [
         "digits that repeat when initial states are moved by 1e-12 (relative), and",
-        "digits that are converged: half the timestep does not change them",
+        "digits that are converged: half and a quarter of the timestep bear them out",
     ]
     at = next(i for i, line in enumerate(lines) if "examples/fall.py" in line)
     head = (

@@ -102,13 +102,28 @@ def case(name: str = "spring", number: int = 5, **overrides: object) -> CaseRepo
             "closed", "the oscillator", "Bulirsch–Stoer", 1e-13, 0.0, 3.9e-13
         ),
         "boundaries": (
-            BoundaryLine("Euler", 0.2, *search, 0.2001, "2/ω", -5e-4, "diverged", 1.5),
-            replace(
-                BoundaryLine("RK4", 0.28, *search, None, "", None, "slow-growth", None),
-                islands=(0.3, 0.31),
+            BoundaryLine(
+                "Euler",
+                0.2,
+                *search,
+                bracket=(0.2, 0.2),
+                theory=0.2001,
+                formula="2/ω",
+                difference=-5e-4,
+                beyond="diverged",
+                growth=1.5,
             ),
-            BoundaryLine("implicit", None, *search, None, "", None, "", None),
-            BoundaryLine("discrete", None, *search, None, "", None, "", None),
+            BoundaryLine(
+                "RK4",
+                0.28,
+                *search,
+                beyond="slow-growth",
+                bracket=(0.25, 0.29),
+                gain=(0.1, 0.02),
+                tries=((0.2, 10, 0), (0.25, 10, 2), (0.3, 10, 10)),
+            ),
+            BoundaryLine("implicit", None, *search),
+            BoundaryLine("discrete", None, *search),
         ),
         "figures": (
             FigureLine("period", "s", "Euler", 6.283, 6.2831853, "2π√(m/k)"),

@@ -115,6 +115,36 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
         tuple[fields.Positive, ...],
         Meta(description="seconds; instead of a ladder about the model's own"),
     ] = ()
+    limits: Annotated[
+        dict[Literal["Euler", "implicit", "implicitfast", "RK4", "discrete"], fields.Positive],
+        Meta(description="seconds, by integrator: the largest stable timestep in theory"),
+    ] = {}
+    expected: Annotated[
+        dict[Literal["restitution", "penetration", "slip"], float],
+        Meta(
+            description="in theory: of the hardest hit the speed after it over that before; "
+            "the deepest contact and the longest slide, m"
+        ),
+    ] = {}
+    precision: Annotated[
+        fields.Positive | None,
+        Meta(description="by how much `NAME.exact.py` may differ from an integration"),
+    ] = None
+    room: Annotated[
+        fields.Positive,
+        Meta(
+            description="a run is lost beyond so many times the values of small steps: of the "
+            "largest kinetic energy, added to the energy; of velocity, if something drives it"
+        ),
+    ] = 10.0
+    stable_for: Annotated[
+        fields.Positive | None,
+        Meta(description="seconds over which a timestep has to be stable; else the duration"),
+    ] = None
+    search: Annotated[
+        tuple[fields.Positive, fields.Positive] | None,
+        Meta(description="seconds; the timesteps between which the largest stable one is sought"),
+    ] = None
 
     @property
     def observable(self) -> Measured | None:

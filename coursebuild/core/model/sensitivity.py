@@ -1,4 +1,4 @@
-"""How a script's numbers react to perturbed initial states and halved timesteps.
+"""How a script's numbers react to perturbed initial states and shorter timesteps.
 
 Entry point: `Sensitivity`.
 """
@@ -16,8 +16,9 @@ PERTURBATION = 1e-12
 RUNS = 4
 """Runs with moved states of each script: two pairs in opposite directions, the second pair half as
 far away."""
-HALVED_RUN = -1
-"""The number of the run whose timesteps are halved."""
+FINER_RUNS = (-1, -2)
+"""The numbers of the runs in which each step is made as 2 and as 4: two raised to the number less
+its sign."""
 CHAOTIC = 1e8
 """A simulation is chaotic if its states are more than this many times as far apart at the end as at
 the beginning: fewer than eight of a number's sixteen digits are left."""
@@ -55,6 +56,8 @@ class Doubt(Struct, frozen=True):
     """The smallest and the largest value printed in its place with moved initial states."""
     halved: str
     """The text printed in its place with half the timestep; empty where not known."""
+    quartered: str
+    """The same with a quarter of the timestep."""
     instead: str
     """The number with only the digits that repeat and converge; empty if none does, or a count."""
     compared: bool
@@ -83,7 +86,7 @@ class Sensitivity(Struct, frozen=True):
     """The largest growth of the distance between states from beginning to end; `None` where no
     final state is known."""
     unhalved: str = ""
-    """Why nothing is known about half the timestep; empty where something is."""
+    """Why nothing is known about shorter timesteps; empty where something is."""
     doubts: tuple[Doubt, ...] = ()
     flips: tuple[Flip, ...] = ()
 

@@ -1,6 +1,6 @@
 """Run a script with slightly moved initial states or half steps: which printed digits hold?
 
-Entry points: `perturb` or `halve_steps`, in the process of such a run; `note_final_state`, for an
+Entry points: `perturb` or `divide_steps`, in the process of such a run; `note_final_state`, for an
 `MjData` that the script no longer uses. Of moved states:
 
 1. What the script has put into `qpos`, `qvel` and `act` since MuJoCo last computed anything from
@@ -326,33 +326,34 @@ def _model_and_data(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple
     return model, args[1] if len(args) > 1 else keywords["d"]
 
 
-# --- half steps
+# --- shorter steps
 
 
 _INTEGRATORS = ("mj_Euler", "mj_implicit", "mj_RungeKutta")
 """Integrators; a script has computed the accelerations itself before it calls one."""
 
 
-def halve_steps(mujoco: ModuleType, numpy: ModuleType) -> None:
-    """Make each step of this process from now on as two of half the timestep.
+def divide_steps(mujoco: ModuleType, numpy: ModuleType, parts: int) -> None:
+    """Make each step of this process from now on as so many, with that part of the timestep.
 
-    1. Both halves have the commands and forces that the script has set for the whole. Then the
+    1. All parts have the commands and forces that the script has set for the whole. Then the
        clock is set to what it would have been, so that a script that counts steps, or looks at the
        clock, makes as many calls as before.
-    2. The model's timestep is halved only during the step: the script reads and sets its own.
-    3. Rollouts are made with each row of controls twice, and give every second state.
+    2. The model's timestep is divided only during the step: the script reads and sets its own.
+    3. Rollouts are made with each row of controls repeated, and give the state after all parts.
 
     What a script integrates itself, without a function of MuJoCo's that makes a step, stays whole.
     """
-    _HalfSteps(mujoco, numpy)
+    _DividedSteps(mujoco, numpy, parts)
 
 
-class _HalfSteps:
+class _DividedSteps:
     """Replaces MuJoCo's functions when it is made."""
 
-    def __init__(self, mujoco: Any, numpy: Any) -> None:
+    def __init__(self, mujoco: Any, numpy: Any, parts: int) -> None:
         self._mujoco = mujoco
         self._numpy = numpy
+        self._parts = parts
         self._step, self._forward = mujoco.mj_step, mujoco.mj_forward
         self._lock = threading.RLock()  # threads may share a model
         self._replace("mj_step", self._whole)
@@ -362,41 +363,42 @@ class _HalfSteps:
             self._replace(name, self._integrate)
         mujoco_tracing.replace_rollout(self._mujoco, self._rollout)
 
-    def _replace(self, name: str, halved: Callable[..., None]) -> None:
-        """Replace a function that makes a step by one that makes two half steps."""
+    def _replace(self, name: str, divided: Callable[..., None]) -> None:
+        """Replace a function that makes a step by one that makes shorter ones."""
         real = getattr(self._mujoco, name)
 
         def function(m: Any, d: Any, *args: Any, **keywords: Any) -> None:
             if not isinstance(m, self._mujoco.MjModel) or not isinstance(d, self._mujoco.MjData):
                 real(m, d, *args, **keywords)  # it says what is wrong
                 return
-            with self._half([m]):
-                halved(real, m, d, *args, **keywords)
+            with self._part_of([m]):
+                divided(real, m, d, *args, **keywords)
 
         new = mujoco_tracing.wrap_function(function, like=real)
         mujoco_tracing.replace_function(self._mujoco, name, new)
 
     def _whole(self, real: Callable[..., None], model: Any, data: Any, nstep: int = 1) -> None:
         with self._clock(model, data, nstep):
-            real(model, data, 2 * nstep)
+            real(model, data, self._parts * nstep)
 
     def _second(self, real: Callable[..., None], model: Any, data: Any) -> None:
         with self._clock(model, data, 1):
             real(model, data)
-            self._step(model, data)
+            self._step(model, data, self._parts - 1)
 
     def _integrate(self, real: Callable[..., None], model: Any, data: Any, *stages: int) -> None:
         with self._clock(model, data, 1):
             real(model, data, *stages)
-            self._forward(model, data)
-            real(model, data, *stages)
+            for _ in range(1, self._parts):
+                self._forward(model, data)
+                real(model, data, *stages)
 
     @contextlib.contextmanager
-    def _half(self, models: Sequence[Any]) -> Iterator[None]:
+    def _part_of(self, models: Sequence[Any]) -> Iterator[None]:
         with self._lock:
             whole = [float(model.opt.timestep) for model in models]
             for model, timestep in zip(models, whole, strict=True):
-                model.opt.timestep = timestep / 2
+                model.opt.timestep = timestep / self._parts
             try:
                 yield
             finally:
@@ -406,41 +408,41 @@ class _HalfSteps:
     @contextlib.contextmanager
     def _clock(self, model: Any, data: Any, steps: int) -> Iterator[None]:
         """Set the clock to where whole steps lead, unless MuJoCo resets it."""
-        timestep, time = 2 * float(model.opt.timestep), float(data.time)
+        timestep, time = self._parts * float(model.opt.timestep), float(data.time)
         yield
         for _ in range(steps):
             time += timestep
-        if abs(data.time - time) < timestep / 4:
+        if abs(data.time - time) < timestep / (2 * self._parts):
             data.time = time
         mujoco_tracing.note("p")
 
     def _rollout(self, real: Callable[..., None]) -> Callable[..., None]:
-        numpy = self._numpy
+        numpy, parts = self._numpy, self._parts
 
-        def double_rows(array: Any) -> Any:
-            return array if array is None else numpy.repeat(array, 2, axis=1)
+        def repeat_rows(array: Any) -> Any:
+            return array if array is None else numpy.repeat(array, parts, axis=1)
 
         def rollout(of: Any, models: Any, data: Any, nstep: int, spec: int, *rest: Any) -> None:
-            """As MuJoCo's, in half steps."""
+            """As MuJoCo's, in shorter steps."""
             begin, warm, control, *outputs = rest[:5]
-            half_outputs = [double_rows(output) for output in outputs]
-            controls = double_rows(control)
-            with self._half(list({id(model): model for model in models}.values())):
+            all_outputs = [repeat_rows(output) for output in outputs]
+            controls = repeat_rows(control)
+            with self._part_of(list({id(model): model for model in models}.values())):
                 real(
                     of,
                     models,
                     data,
-                    2 * nstep,
+                    parts * nstep,
                     spec,
                     begin,
                     warm,
                     controls,
-                    *half_outputs,
+                    *all_outputs,
                     *rest[5:],
                 )
-            for output, halves in zip(outputs, half_outputs, strict=True):
-                if output is not None and halves is not None:
-                    output[:] = halves[:, 1::2]
+            for output, states in zip(outputs, all_outputs, strict=True):
+                if output is not None and states is not None:
+                    output[:] = states[:, parts - 1 :: parts]
             mujoco_tracing.note("p")
 
         return rollout

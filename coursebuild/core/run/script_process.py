@@ -68,7 +68,7 @@ class Job(TypedDict):
     """MiB that it may take."""
     perturbation: int
     """The direction in which initial states are moved (`perturbation`); 0: none;
-    −1: steps are halved."""
+    −n: each step is made as 2ⁿ."""
 
 
 class PreloadedPackages:
@@ -201,7 +201,7 @@ class ScriptProcess:
         if job["perturbation"] and (mujoco := preloaded.module("mujoco")) is not None:
             numpy = preloaded.module("numpy")
             if job["perturbation"] < 0:
-                perturbation.halve_steps(mujoco, numpy)
+                perturbation.divide_steps(mujoco, numpy, 2 ** -job["perturbation"])
             else:
                 perturbation.perturb(mujoco, numpy, job["perturbation"])
         tracer.has_mujoco = preloaded.module("mujoco") is not None

@@ -8,9 +8,10 @@ Entry points: `sensitivity` (a script), `noise_warnings`.
 2. The spread of a number is how far the values printed in its place are from the one that the
    script prints unmoved. It repeats to the first place of which the spread is no more than half a
    unit. A number that is printed alike by all runs repeats in all its digits.
-   Likewise it is converged to the first place of which twice its change with half the timestep is
-   no more than half a unit: so large is the error of a method of first order, and that of others
-   smaller.
+   Likewise it is converged to the first place of which its error is no more than half a unit. Three
+   timesteps give two changes, of which each says what the error of a method of first order is; the
+   larger one counts. Where the second is not clearly the smaller one, the values do not tend
+   anywhere yet, however near the first two happen to lie: then ten times the larger one counts.
 3. The final states of a pair of runs, which began in opposite directions, show how fast states
    part: relative to the largest positions and velocities since the simulation began, not to those
    that it happens to end with.
@@ -26,6 +27,7 @@ import math
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
+from itertools import pairwise
 
 from msgspec.structs import replace
 
@@ -49,6 +51,9 @@ from coursebuild.core.text.source import Span
 _MAX_NOTES = 20
 _AS_MOVED = 11
 """Digits that repeat of a number that moves at most ten times as far as the initial states."""
+_SHRINKING = Decimal("0.75")
+"""The part of a change that the next one may be where values tend to something: half in first
+order, and some room."""
 _EXACT_DIGITS = sys.float_info.dig
 _WIDTH = 40
 
@@ -60,22 +65,23 @@ def sensitivity(
     recordings: Iterable[Recording],
     base: ScriptRun,
     moved_runs: Sequence[ScriptRun],
-    halved: ScriptRun | None = None,
+    finer_runs: Sequence[ScriptRun] = (),
 ) -> Sensitivity:
-    """What runs of a script with moved states, and one with halved steps, show of its output.
+    """What runs of a script with moved states, and with shorter steps, show of its output.
 
     `base` is its ordinary run; there are no `moved_runs` where they would have no point.
+    `finer_runs`: with half and with a quarter of the timestep, or none.
     """
     compared = _compared_recordings(course, recordings)
     standing = _standing(compared, base, moved_runs)
     if standing is not Standing.MEASURED:
         return Sensitivity(path, owner, standing)
-    reason_unhalved = _reason_unhalved(halved)
-    usable_halved = None if reason_unhalved else halved
+    reason_unhalved = _reason_unhalved(finer_runs)
+    usable_runs = () if reason_unhalved else finer_runs
     findings = [
         finding
         for recording, comparison in compared
-        for finding in _find_doubts(recording, comparison, base, moved_runs, usable_halved)
+        for finding in _find_doubts(recording, comparison, base, moved_runs, usable_runs)
     ]
     numbers = sum(
         len(line.numbers) for r, c in compared for line in printed_lines(r, c.own_filters)
@@ -86,13 +92,16 @@ def sensitivity(
     return Sensitivity(path, owner, standing, numbers, size, reason_unhalved, doubts, flips)
 
 
-def _reason_unhalved(run: ScriptRun | None) -> str:
-    """Why a run with halved steps shows nothing, in words; else empty."""
-    if run is None:
-        return "it was not run with half the timestep"
-    if run.outcome is not Outcome.OK:
-        return "it does not run to its end with half the timestep"
-    return "" if run.trace is not None and run.trace.is_perturbed else "no step of it can be halved"
+def _reason_unhalved(runs: Sequence[ScriptRun]) -> str:
+    """Why runs with shorter steps show nothing, in words; else empty."""
+    if not runs:
+        return "it was not run with shorter timesteps"
+    for run, part in zip(runs, ("half", "a quarter of"), strict=True):
+        if run.outcome is not Outcome.OK:
+            return f"it does not run to its end with {part} the timestep"
+        if run.trace is None or not run.trace.is_perturbed:
+            return "no step of it can be halved"
+    return ""
 
 
 def is_worth_moving(course: Course, recordings: Iterable[Recording], base: ScriptRun) -> bool:
@@ -138,9 +147,9 @@ def _find_doubts(
     comparison: Comparison,
     base: ScriptRun,
     moved_runs: Sequence[ScriptRun],
-    halved: ScriptRun | None,
+    finer_runs: Sequence[ScriptRun],
 ) -> Iterator[Doubt | Flip]:
-    """Numbers and texts of a recording that moved states or halved steps change, in order."""
+    """Numbers and texts of a recording that moved states or shorter steps change, in order."""
     exact = replace(comparison, mode=Mode.EXACT)
 
     def find_changes(run: ScriptRun) -> dict[tuple[int, int], Change]:
@@ -148,7 +157,7 @@ def _find_doubts(
         return {(change.span.start, change.span.end): change for change in changes}
 
     changes_of_base = find_changes(base)
-    changes_by_run = [find_changes(run) for run in (*moved_runs, halved) if run is not None]
+    changes_by_run = [find_changes(run) for run in (*moved_runs, *finer_runs)]
     first_changes = {place: c for changes in changes_by_run[::-1] for place, c in changes.items()}
     for place, first_change in sorted(first_changes.items()):
         recorded = first_change.recorded
@@ -157,23 +166,25 @@ def _find_doubts(
             for changes in (changes_of_base, *changes_by_run)
         )
         if any(value != printed for value in values):
-            half = None if halved is None else values.pop()
-            texts = recorded, printed, half
-            yield from _judge_number(first_change.span, texts, values, comparison)
+            count = len(moved_runs)
+            yield from _judge_number(
+                first_change.span, (recorded, printed), values[:count], values[count:], comparison
+            )
 
 
 def _judge_number(
     span: Span,
-    texts: tuple[str, str, str | None],
+    texts: tuple[str, str],
     values: Sequence[str],
+    finer: Sequence[str],
     comparison: Comparison,
 ) -> Iterator[Doubt | Flip]:
-    """What moved states and halved steps say of a number or text.
+    """What moved states and shorter steps say of a number or text.
 
-    `texts` are what is recorded, what was printed, and what was with halved steps; `values` were
-    printed with moved states.
+    `texts` are what is recorded and what was printed; `values` were printed with moved states,
+    `finer` with half and with a quarter of the timestep.
     """
-    recorded, printed, halved = texts
+    recorded, printed = texts
     recorded_number, number = _only_number(recorded), _only_number(printed)
     numbers = [n for value in values if (n := _only_number(value)) is not None]
     other_value = next((value for value in values if value != printed), None)
@@ -193,7 +204,8 @@ def _judge_number(
             ordered_numbers = sorted((number, *numbers), key=lambda n: n.value)
             least, most = ordered_numbers[0].text, ordered_numbers[-1].text
             repeat = _count_repeating(number, spread)
-    converged = None if halved is None else _count_converged(number, halved)
+    converged = _count_converged(number, finer) if finer else None
+    halved, quartered = (text.strip() for text in finer or ("", ""))
     yield Doubt(
         span,
         number.text,
@@ -202,19 +214,23 @@ def _judge_number(
         converged,
         least,
         most,
-        (halved or "").strip(),
+        halved,
+        quartered,
         _round_to(number, repeat if converged is None else min(repeat, converged)),
         compared,
     )
 
 
-def _count_converged(number: Number, halved_text: str) -> int:
-    """How many digits a run with half the timestep bears out."""
-    halved_number = _only_number(halved_text)
-    if halved_number is None or not halved_number.is_finite or not number.is_finite:
+def _count_converged(number: Number, finer: Sequence[str]) -> int:
+    """How many digits runs with half and with a quarter of the timestep bear out."""
+    numbers = [number, *(n for text in finer if (n := _only_number(text)) is not None)]
+    if len(numbers) < 3 or not all(n.is_finite for n in numbers):
         return 0
-    change = difference(number.value, halved_number.value)
-    return _count_repeating(number, 2 * change) if change else _digits(number)
+    first, second = (difference(a.value, b.value) for a, b in pairwise(numbers))
+    error = max(2 * first, 4 * second)
+    if second > _SHRINKING * first and second > unit(number.place):
+        error = 10 * max(first, second)
+    return _count_repeating(number, error) if error else _digits(number)
 
 
 def _only_number(text: str) -> Number | None:

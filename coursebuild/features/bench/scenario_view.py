@@ -44,6 +44,8 @@ from coursebuild.numerics.reports.shown_errors import (
     Quantity,
     interval_text,
     is_cut_short,
+    limit_text,
+    map_text,
     quantities,
     seconds_text,
     setting_text,
@@ -143,6 +145,10 @@ def _settings_table(words: Strings, report: ScenarioReport) -> Grid:
         (speed, [factor(row.realtime) for row in rows]),
         (time, ["" if r.seconds is None else seconds_text(r.seconds.value, 3) for r in rows]),
         *(error_column(quantity) for quantity in quantities(report) if quantity.is_resolved(rows)),
+        (
+            words("measured.parted"),
+            ["" if r.parted is None else seconds_text(r.parted, 3) for r in rows],
+        ),
         (words("measured.energy"), [percent(row.energy_drift) for row in rows]),
         (words("measured.momentum"), [power(row.momentum_drift, 2) for row in rows]),
         (words("measured.depth"), [power(row.penetration or None, 2) for row in rows]),
@@ -221,7 +227,9 @@ def integrator_table(
     rows = merge_rows(rows) if merge else rows
     columns = [(words("measured.integrator"), [name for name, _ in rows])]
     columns += [(words(key), [cells[n] for _, cells in rows]) for n, key in enumerate(titles)]
-    return grid(label, columns, words=(words("measured.remark"),), parts=parts)
+    return grid(
+        label, columns, words=(words("measured.map"), words("measured.remark")), parts=parts
+    )
 
 
 def _stability_table(words: Strings, report: ScenarioReport) -> Grid | None:
@@ -237,7 +245,15 @@ def _stability_table(words: Strings, report: ScenarioReport) -> Grid | None:
     return integrator_table(words, label, (*STABLE, "measured.remark"), rows)
 
 
-STABLE = ("measured.largest", "measured.steps", "measured.tried")
+STABLE = (
+    "measured.largest",
+    "measured.theory",
+    "measured.orbital",
+    "measured.gain",
+    "measured.map",
+    "measured.steps",
+    "measured.tried",
+)
 """Keys of the titles of `stable_cells`."""
 
 
@@ -249,16 +265,34 @@ def stable_title(words: Strings, row: StableRow) -> str:
     return words("measured.stable_energy", time=time, energy=f"{row.energy:.3g}")
 
 
-def stable_cells(words: Strings, row: StableRow) -> tuple[str, str, str]:
-    """Write a largest stable timestep, the steps of a run with it, and the search for it."""
+def stable_cells(words: Strings, row: StableRow) -> tuple[str, ...]:
+    """Write a largest stable timestep, what else is known of it, and the search for it."""
     low, high = (seconds_text(float(f"{step:.3g}")) for step in row.searched)
     largest = words("measured.stable_all", time=high)
     if row.largest == 0:
         largest = words("measured.stable_none", time=low)
-    elif row.largest is not None:
-        largest = seconds_text(row.largest)
+    elif row.largest is not None or row.bracket is not None:
+        largest = limit_text(row)
     search = words("measured.tried_from", count=row.tried, time=low) if row.tried else ""
-    return largest, str(row.steps), search
+    gain = ""
+    if row.gain is not None:
+        step, energy = row.gain
+        gain = words("measured.gained", time=seconds_text(step, 2), energy=f"{energy:.2g}")
+    return (
+        largest,
+        _theory(words, row.theory, has_theory=bool(row.formula)),
+        _theory(words, row.orbital, has_theory=row.periodic, digits=2),
+        gain,
+        map_text(row),
+        str(row.steps),
+        search,
+    )
+
+
+def _theory(words: Strings, limit: float | None, *, has_theory: bool, digits: int = 5) -> str:
+    if limit:
+        return seconds_text(limit, digits)
+    return words("numerics.all" if limit is None else "numerics.none") if has_theory else ""
 
 
 def stable_again(words: Strings, row: StableRow) -> str:

@@ -3,7 +3,8 @@
 Entry points: `stability(options, names)`, `check_stability`; `stability_text`, what the page of a
 case says, and the errors of its plots.
 
-1. A name means a problem, or a family of them (`damped-spring` is all of its damping ratios).
+1. A name means a problem, or a family of them (`damped-spring` is all of its damping ratios), or a
+   model of the course whose exact motion it gives: what `bench` measures of it is a hard case too.
 2. Measurements are cached by the machine, its versions and the code that measures. `--check`
    measures again.
 3. All problems are recorded in one file. Where some are named, recording them leaves the others as
@@ -26,6 +27,7 @@ from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.pages import urls
 from coursebuild.core.run.script_environment import engine_version, machine, one_processor
 from coursebuild.core.text.diagnostics import nearest
+from coursebuild.features.bench.commands.bench import bench
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
     MeasuringRun,
@@ -38,7 +40,12 @@ from coursebuild.features.bench.commands.measurement import (
     write_records,
 )
 from coursebuild.features.numerics.page import case_view
-from coursebuild.numerics.reports.case_report import CaseReport, ErrorLine
+from coursebuild.numerics.reports.case_report import (
+    CaseReport,
+    ErrorLine,
+    course_cases,
+    exact_file,
+)
 from coursebuild.numerics.reports.departures import RecordCheck, case_departures
 from coursebuild.numerics.reports.records import STABILITY, ReportFailure
 from coursebuild.numerics.reports.report_plots import case_quantities
@@ -53,6 +60,7 @@ _CODE = ("coursebuild/numerics", "mjcourse/spatial")
 EXAMPLES = """\
 examples:
   coursebuild stability impact           one family of hard cases
+  coursebuild stability falling_ball     a model of the course whose exact motion it gives
 """
 
 
@@ -63,7 +71,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "problems",
         nargs="*",
         metavar="PROBLEM",
-        help="a hard case, or a family of them (default: all)",
+        help="a hard case, a family of them, or a model with `NAME.exact.py` (default: all)",
     )
     add_format(parser, "text", "json")
     add_report_options(parser)
@@ -102,10 +110,25 @@ def stability(
     Raises:
         UsageError: no case is called so.
     """
-    measurement = _CaseRun(options).all(_select_problems(names))
-    if record and not measurement.failures:
-        measurement = _record(options, measurement, whole=not names)
-    return measurement
+    own_models = tuple(name for name in names if (options.root / exact_file(name)).is_file())
+    built_in = tuple(name for name in names if name not in own_models)
+    problems = _select_problems(built_in) if built_in or not own_models else []
+    measurement: Measurement[CaseReport] = Measurement(())
+    if problems:
+        measurement = _CaseRun(options).all(problems)
+        if record and not measurement.failures:
+            measurement = _record(options, measurement, whole=not names)
+    if not own_models:
+        return measurement
+    of_course = bench(options, own_models, record=record)
+    reports = (case for scene in of_course.reports for case in course_cases(scene))
+    return replace(
+        measurement,
+        reports=(*measurement.reports, *reports),
+        diagnostics=of_course.diagnostics,
+        failures=(*measurement.failures, *of_course.failures),
+        remarks=(*measurement.remarks, *of_course.remarks),
+    )
 
 
 def _record(

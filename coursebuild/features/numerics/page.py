@@ -39,15 +39,15 @@ from coursebuild.features.bench.scenario_view import (
 from coursebuild.numerics.reports.case_report import (
     BoundaryLine,
     CaseReport,
-    FigureLine,
     course_cases,
 )
 from coursebuild.numerics.reports.records import STABILITY
 from coursebuild.numerics.reports.report_plots import case_quantities, case_svg
-from coursebuild.numerics.reports.scene_report import SceneReport
+from coursebuild.numerics.reports.scene_report import FigureLine, SceneReport
 from coursebuild.numerics.reports.shown_errors import (
     INTEGRATORS,
     Quantity,
+    limit_text,
     seconds_text,
     status_text,
 )
@@ -57,7 +57,6 @@ _RIGHT = 1e-3
 _DIGITS = 3
 _BOUNDARY = (
     *STABLE,
-    "measured.theory",
     "measured.difference",
     "measured.beyond",
     "measured.growth",
@@ -140,9 +139,9 @@ def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[str, ...], ...]:
 def _limit(words: Strings, line: BoundaryLine | None) -> str:
     if line is None:
         return ""
-    if not line.largest:
+    if line.largest == 0 or (line.largest is None and line.bracket is None):
         return words("numerics.all" if line.largest is None else "numerics.none")
-    return seconds_text(line.largest, _DIGITS)
+    return limit_text(line)
 
 
 def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
@@ -190,12 +189,8 @@ def _describe(words: Strings, report: CaseReport, quantities: Sequence[Quantity]
 
 
 def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
-    theory = seconds_text(line.theory, _DIGITS) if line.theory else ""
-    if line.formula and not line.theory:
-        theory = words("numerics.all" if line.theory is None else "numerics.none")
     return (
         *stable_cells(words, line),
-        theory,
         percent(line.difference),
         status_text(line.beyond) if line.beyond else "",
         power(line.growth),

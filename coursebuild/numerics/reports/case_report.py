@@ -14,6 +14,7 @@ from msgspec.structs import asdict
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Interval, Record
 from coursebuild.numerics.reports.scene_report import (
+    FigureLine,
     MeasuredRun,
     OrderRow,
     ScenarioReport,
@@ -26,31 +27,12 @@ from coursebuild.numerics.reports.scene_report import (
 class BoundaryLine(StableRow, frozen=True):
     """The largest stable timestep of an integrator, compared with theory."""
 
-    theory: float | None
-    """s, as `largest`; `None` also where there is no theory and so no formula."""
-    formula: str
-    """Where the theory comes from; empty where there is none."""
-    difference: float | None
+    difference: float | None = None
     """Measured against theory, relative."""
-    beyond: str
+    beyond: str = ""
     """The status of the run with the shortest unstable timestep that was tried."""
-    growth: float | None
+    growth: float | None = None
     """The factor by which velocities grew in a step of that run, where they stayed finite."""
-
-
-class FigureLine(Record, frozen=True):
-    """A quantity that was measured and is known."""
-
-    name: str
-    unit: str
-    integrator: str
-    measured: float | None
-    """`None` where it is not finite."""
-    exact: float | None
-    """`None` where theory does not say it."""
-    source: str
-    spread: tuple[float, float] | None = None
-    """Of an ensemble, the range of its middle eight tenths; `measured` is the median then."""
 
 
 class StepCost(Record, frozen=True):
@@ -134,10 +116,9 @@ def exact_file(model: str) -> str:
 
 
 def course_cases(report: SceneReport) -> tuple[CaseReport, ...]:
-    """The scenarios of a model whose exact motion the course gives."""
-    exact_scenarios = (
-        scenario for scenario in report.scenarios if scenario.source == exact_file(report.model)
-    )
+    """The scenarios of a model whose exact motion the course gives, or of which it knows theory."""
+    file = exact_file(report.model)
+    exact_scenarios = (s for s in report.scenarios if s.source == file or s.figures)
     return tuple(_course_case(report, scenario) for scenario in exact_scenarios)
 
 
@@ -161,13 +142,8 @@ def _course_case(report: SceneReport, scenario: ScenarioReport) -> CaseReport:
         machine=report.machine,
         note="; ".join(scenario.notes),
         reference=ReferenceLine(scenario.reference, scenario.source, scenario.second, *floors),
-        boundaries=tuple(
-            BoundaryLine(
-                **asdict(row), theory=None, formula="", difference=None, beyond="", growth=None
-            )
-            for row in scenario.stable
-        ),
-        figures=(),
+        boundaries=tuple(BoundaryLine(**asdict(row)) for row in scenario.stable),
+        figures=scenario.figures,
         orders=scenario.orders,
         errors=tuple(_error_line(row) for row in rows),
         costs=tuple(StepCost(name, seconds) for name, seconds in steps.items()),

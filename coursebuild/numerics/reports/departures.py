@@ -18,9 +18,10 @@ from typing import TypeAlias
 from msgspec import Struct
 
 from coursebuild.core.model.scenarios import BenchTable
-from coursebuild.numerics.reports.case_report import CaseReport, FigureLine
+from coursebuild.numerics.reports.case_report import CaseReport
 from coursebuild.numerics.reports.scene_report import (
     FLOORS,
+    FigureLine,
     MeasuredRun,
     OrderRow,
     ScenarioReport,
@@ -33,7 +34,8 @@ from coursebuild.numerics.reports.shown_errors import seconds_text, setting_text
 _STABLE = 0.01
 """Relative band of a largest stable timestep: a bisection ends where its bounds are near."""
 _FUZZY = 0.2
-"""The same where timesteps beyond are stable again: rounding decides which is lost first."""
+"""The same where timesteps beyond are stable again, or other starts have other limits: rounding
+decides which is lost first."""
 _ROUNDING = 1e-9
 """The absolute difference that drifts and depths may have: rounding differs between processors."""
 _INVISIBLE = 1e-6
@@ -199,8 +201,10 @@ def _orders(rows: Sequence[OrderRow], band: float) -> _Table:
 
 def _largest(row: StableRow) -> _Figures:
     largest = "all" if row.largest is None else row.largest
+    low, high = row.bracket or (1.0, 1.0)
+    is_sharp = row.monotone and high <= low * (1 + _STABLE)
     return {
-        "largest stable timestep": _Figure(largest, _STABLE if row.monotone else _FUZZY),
+        "largest stable timestep": _Figure(largest, _STABLE if is_sharp else _FUZZY),
         "monotone": _Figure(row.monotone),
     }
 

@@ -176,6 +176,9 @@ class WorkPrecisionRow(MeasuredRun, frozen=True):
     seen: float | None = None
     """The largest displacement or turn of a body in a picture, where 1 is just visible. The front
     is that of cost and the figure, or where none is declared, of cost and this."""
+    parted: float | None = None
+    """In a chaotic scenario, s: when it is a tenth (of a radian, or of the model's extent) from the
+    reference; its errors mean nothing later, and are not given."""
     mean_energy: float | None = None
     """Mean kinetic energy from the horizon to the end, relative to that of a run in small steps,
     less 1; `None` where nothing is beyond the horizon."""
@@ -234,11 +237,42 @@ class StableRow(Record, frozen=True):
     """How many timesteps up to the largest were tried."""
     energy: float | None
     """Most energy that a stable run may have, J; `None` where it is not judged."""
+    bracket: tuple[float, float] | None = None
+    """s: the least and the most of what the own start over the duration, over twice the duration,
+    and the start nearby that is lost first say; `None` where all is stable, or it is not known."""
+    theory: float | None = None
+    """s, as `largest`: of linear theory; `None` also where there is none and so no formula."""
+    formula: str = ""
+    """Where the theory comes from; empty where there is none."""
+    orbital: float | None = None
+    """s: the largest timestep with which a periodic motion is stable; `None` where all are."""
+    periodic: bool = False
+    """Whether the motion is periodic, so that `orbital` is known."""
+    gain: tuple[float, float] | None = None
+    """The first timestep (s) with which a scene that nothing drives gains energy, and how much (J);
+    `None` where none does, or something drives it."""
+    tries: tuple[tuple[float, int, int], ...] = ()
+    """The map: by timestep (s), how many runs there were, and how many of them were lost."""
 
     @property
     def monotone(self) -> bool:
         """Whether all timesteps that were tried beyond the largest are lost."""
         return self.islands is None
+
+
+class FigureLine(Record, frozen=True):
+    """A quantity that was measured and is known."""
+
+    name: str
+    unit: str
+    integrator: str
+    measured: float | None
+    """`None` where it is not finite."""
+    exact: float | None
+    """`None` where theory does not say it."""
+    source: str
+    spread: tuple[float, float] | None = None
+    """Of an ensemble, the range of its middle eight tenths; `measured` is the median then."""
 
 
 class RowVerdict(Record, frozen=True):
@@ -293,6 +327,8 @@ class ScenarioReport(Record, frozen=True):
     """Whether accelerations are a smooth function of the state; else there are no orders."""
     notes: tuple[str, ...] = ()
     """Remarks for reading the figures."""
+    figures: tuple[FigureLine, ...] = ()
+    """What the scenario says is known in theory, measured with its own timestep."""
     horizons: tuple[float, float] | None = None
     """s: the shortest and the longest of runs whose beginnings were nudged in different ways;
     `None` where the scenario is not chaotic."""

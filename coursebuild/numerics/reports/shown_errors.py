@@ -1,6 +1,7 @@
 """Which errors of reports are shown, and the texts of settings, times and statuses.
 
-Entry points: `quantities(report)`, `main_quantity`; `setting_text`, `seconds_text`, `status_text`.
+Entry points: `quantities(report)`, `main_quantity`; `setting_text`, `seconds_text`, `status_text`;
+`limit_text` and `map_text`, of largest stable timesteps.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from coursebuild.numerics.reports.scene_report import (
     MeasuredRun,
     MeasuredSetting,
     ScenarioReport,
+    StableRow,
 )
 
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
@@ -80,11 +82,45 @@ def is_cut_short(report: ScenarioReport) -> bool:
     return any(math.isclose(row.searched[1], longest, rel_tol=1e-9) for row in report.stable)
 
 
+def limit_text(row: StableRow) -> str:
+    """A largest stable timestep with the digits on which theory and all runs agree, or a range.
+
+    Theory at rest counts where it is within a tenth: else the motion is lost far from rest.
+    """
+    assert row.largest is not None or row.bracket is not None
+    if row.bracket is None:  # recorded before runs were compared
+        return seconds_text(row.largest or 0.0, 2)
+    low, high = row.bracket
+    if row.theory and abs(row.theory / high - 1) < _TOGETHER:
+        low, high = min(low, row.theory), max(high, row.theory)
+    if low <= 0 or high / low > 1 + _TOGETHER:
+        return f"{seconds_text(low, 2)} – {seconds_text(high, 2)}"
+    least = max(high - low, low * 10.0**-_MOST_DIGITS)
+    digits = math.floor(math.log10(low)) - math.ceil(math.log10(least) - 1e-9) + 1
+    return seconds_text(low, max(1, digits))
+
+
+_TOGETHER, _MOST_DIGITS = 0.1, 4
+"""How far apart limits may be, relative, that are given as one number, and its most digits."""
+_SIGNS = "·∘•"
+"""Of a timestep in a map: none, some or all of its runs were lost."""
+
+
+def map_text(row: StableRow) -> str:
+    """A sign for each timestep that was tried from all starts, from the shortest to the longest."""
+    most = max((runs for _, runs, _ in row.tries), default=0)
+    tries = [(step, runs, lost) for step, runs, lost in row.tries if 2 * runs > most > 2]
+    if not any(lost for _, _, lost in tries):
+        return ""
+    signs = "".join(_SIGNS[(lost > 0) + (lost == runs)] for _, runs, lost in tries)
+    return f"{seconds_text(tries[0][0], 2)} {signs} {seconds_text(tries[-1][0], 2)}"
+
+
 def seconds_text(value: float, digits: int = 6) -> str:
     """A short time with its unit."""
     for size, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs")):
         if value >= size * 0.9999995:
-            return f"{value / size:.{digits}g} {unit}"
+            return f"{float(f'{value / size:.{digits}g}'):.{max(digits, 6)}g} {unit}"
     return f"{value:.{digits}g} s"
 
 

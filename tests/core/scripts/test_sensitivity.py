@@ -28,11 +28,11 @@ def measure(
     comparison: Comparison = EXACT,
     base: str | None = None,
     filters: tuple[Filter, ...] = (),
-    halved: str | None = None,
+    finer: tuple[str, ...] = (),
 ) -> Sensitivity:
     """What runs that printed this say of a recorded output; four runs, the last repeated.
 
-    `halved` was printed with half the timestep.
+    `finer` was printed with half and with a quarter of the timestep.
     """
     block = recording(recorded) if isinstance(recorded, str) else recorded
     assert base is not None or isinstance(recorded, str)
@@ -42,9 +42,9 @@ def measure(
     sample_course = course(
         document("", "content/lessons/1.1-a.md"), comparison=comparison, filters=filters
     )
-    halved_run = None if halved is None else run(halved)
+    finer_runs = [run(text) for text in finer]
     return sensitivity(
-        sample_course, "examples/a.py", "1.1", [block], run(printed), runs, halved_run
+        sample_course, "examples/a.py", "1.1", [block], run(printed), runs, finer_runs
     )
 
 
@@ -112,23 +112,30 @@ def test_values_within_a_tolerance_are_compared_with_those_of_the_run() -> None:
 
 
 @pytest.mark.parametrize(
-    ("recorded", "moved_output", "halved", "expected"),
+    ("recorded", "moved_output", "finer", "expected"),
     [
         # A pendulum at -3.0662266: its digits repeat, and the last two are not right.
-        ("-3.0662252", "-3.0662252", "-3.0662265", (8, 6, "-3.06623", 8)),
-        ("1.2345", "1.2346", "1.2345", (4, 5, "1.234", 5)),
-        ("1.2345", "1.2346", "1.25", (4, 2, "1.2", 5)),
-        ("1.2345", "1.2345", "1.2345", None),
-        ("1.2345", "1.2345", "7", (5, 0, "", 5)),
-        ("1.2345", "1.2345", "nan", (5, 0, "", 5)),
-        ("26", "26", "27", (2, 1, "", 2)),
+        ("-3.0662252", "-3.0662252", "-3.0662265 -3.0662266", (8, 6, "-3.06623", 8)),
+        ("1.2345", "1.2346", "1.2345 1.2345", (4, 5, "1.234", 5)),
+        ("1.2345", "1.2346", "1.25 1.258", (4, 2, "1.2", 5)),
+        ("1.2345", "1.2345", "1.2345 1.2345", None),
+        ("1.2345", "1.2345", "7 7", (5, 0, "", 5)),
+        ("1.2345", "1.2345", "nan 1.2345", (5, 0, "", 5)),
+        ("26", "26", "27 27", (2, 1, "", 2)),
+        # The first two lie near each other by luck: the truth is 0.69.
+        ("0.89", "0.89", "0.89 0.75", (2, 0, "", 2)),
+        ("0.8874", "0.8874", "0.8886 0.7503", (4, 0, "", 4)),
+        # Changes that do not become smaller show no limit, and those of first order do.
+        ("0.88740", "0.88740", "0.88860 0.88990", (5, 1, "0.9", 5)),
+        ("0.88740", "0.88740", "0.88860 0.88920", (5, 2, "0.89", 5)),
     ],
 )
 def test_digits_that_repeat_and_digits_that_are_converged(
-    recorded: str, moved_output: str, halved: str, expected: tuple[int, int, str, int] | None
+    recorded: str, moved_output: str, finer: str, expected: tuple[int, int, str, int] | None
 ) -> None:
     text = "value {} m"
-    result = measure(text.format(recorded), text.format(moved_output), halved=text.format(halved))
+    half, quarter = map(text.format, finer.split())
+    result = measure(text.format(recorded), text.format(moved_output), finer=(half, quarter))
     values = [(d.repeat, d.converged, d.instead, d.digits) for d in result.doubts]
     assert values == ([] if expected is None else [expected])
     assert result.unhalved == ""
@@ -137,17 +144,19 @@ def test_digits_that_repeat_and_digits_that_are_converged(
 
 def test_reasons_why_convergence_is_not_measured() -> None:
     sample_course, block = course(document("", "content/lessons/1.1-a.md")), recording("x 1.25")
-    for halved_run, reason in (
-        (None, "it was not run with half the timestep"),
-        (run("x 1.24", is_perturbed=False), "no step of it can be halved"),
-        (replace(run(""), outcome=Outcome.TIMEOUT), "it does not run to its end with half the"),
+    lost = replace(run(""), outcome=Outcome.TIMEOUT)
+    for finer_runs, reason in (
+        ([], "it was not run with shorter timesteps"),
+        ([run("x 1.24", is_perturbed=False)] * 2, "no step of it can be halved"),
+        ([lost, lost], "it does not run to its end with half the"),
+        ([run("x 1.24"), lost], "it does not run to its end with a quarter of the"),
     ):
         runs = [run("x 1.26")] * 4
         result = sensitivity(
-            sample_course, "examples/a.py", "1.1", [block], run("x 1.25"), runs, halved_run
+            sample_course, "examples/a.py", "1.1", [block], run("x 1.25"), runs, finer_runs
         )
         assert result.unhalved.startswith(reason)
-        assert [(d.repeat, d.converged, d.halved) for d in result.doubts] == [(2, None, "")]
+        assert [(d.repeat, d.converged, d.quartered) for d in result.doubts] == [(2, None, "")]
 
 
 # --- text

@@ -62,6 +62,57 @@ def test_errors_are_taken_from_the_exact_motion(course: Path) -> None:
     assert report(course, EXACT.format(velocity=""), with_reference).reference == "ode"
 
 
+EQUATIONS = """\
+def acceleration(time, qpos, qvel):
+    return -9.81{} + 0 * qpos
+"""
+
+
+def test_equations_of_motion_are_integrated(course: Path) -> None:
+    scenario = report(course, EQUATIONS.format(""))
+    assert scenario.reference == "closed" and scenario.floor < 1e-11
+    with pytest.raises(CannotMeasureError) as caught:
+        report(course, EQUATIONS.format(" * (1 + 1e-5)"))
+    help = caught.value.diagnostic.help
+    assert help.startswith("it errs by 7.8e-06 in position: two integrations of the model agree")
+    loose = report(course, EQUATIONS.format(" * (1 + 1e-5)"), TOML + "precision = 1e-4\n")
+    assert 1e-6 < loose.floor < 1e-4, "and no error is given that is not known"
+
+
+BOUNCE = """\
+<mujoco>
+  <option timestep="0.002" cone="elliptic"/>
+  <worldbody>
+    <geom type="plane" size="5 5 .1" friction="0.5"/>
+    <body pos="0 0 .1"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>
+    <geom type="box" size=".1 .1 .1" mass="1" friction="0.5"/></body>
+  </worldbody>
+</mujoco>
+"""
+SLIDE = """\
+def motion(time, qpos, qvel):
+    stop = min(time, qvel[0] / (9.81 * {friction}))
+    return [qvel[0] * stop - 9.81 * {friction} / 2 * stop**2, {height}]
+"""
+
+
+def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(course: Path) -> None:
+    write(course / "models" / "ball.xml", BOUNCE)
+    toml = '[[scenario]]\nname = "slide"\nqvel = [1, 0]\nduration = 0.4\nsample = 0.02\n'
+    scenario = report(course, SLIDE.format(friction=0.5, height=0), toml)
+    assert scenario.reference == "closed" and scenario.figures == ()
+    stated = toml + "expected = { penetration = 1e-4 }\nlimits = { Euler = 0.01 }\n"
+    scenario = report(course, SLIDE.format(friction=0.5, height=0), stated)
+    depths = {line.integrator: (line.measured, line.exact) for line in scenario.figures}
+    assert depths["Euler"] == (pytest.approx(2.1e-4, rel=0.2), 1e-4)
+    assert scenario.stable[0].theory == 0.01
+    for mistake in ({"friction": 0.6, "height": 0}, {"friction": 0.5, "height": "time"}):
+        with pytest.raises(CannotMeasureError) as caught:
+            report(course, SLIDE.format(**mistake), toml)
+        assert "is not this scene's motion" in caught.value.diagnostic.message, mistake
+        assert "contacts as they are" in caught.value.diagnostic.help, mistake
+
+
 def test_what_is_not_exact_or_no_motion_is_a_mistake(course: Path) -> None:
     cases = {
         EXACT.format(velocity="").replace("/ 2", "/ 3"): "is not this scene's motion",
