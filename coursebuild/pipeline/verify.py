@@ -31,7 +31,6 @@ from coursebuild.core.model.results import (
     Results,
     ScriptRun,
     TrialLine,
-    Verdict,
 )
 from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.run.memory import Memory
@@ -77,14 +76,18 @@ def verify(
     *,
     static: bool = False,
     shard: Shard | None = None,
+    repeat: bool = False,
     evidence: BindingEvidence | None = None,
     known_runs: Mapping[str, ScriptRun] | None = None,
+    other_runs: Mapping[str, ScriptRun] | None = None,
 ) -> Verification:
     """Verify a course, or only what stands in the documents with these paths.
 
     `static`: with the static forms of labs, which only a build needs. `shard`: only this part of
-    the scripts and labs. `evidence`: the lines by which bound numbers held before. `known_runs`:
-    runs, by path, that are known to hold.
+    the scripts and labs. `repeat`: what is recorded from a script's only run must be borne out by
+    another, now. `evidence`: the lines by which bound numbers held before. A preview has
+    `known_runs`, by path, that are known to hold, and `other_runs` of the same scripts, and repeats
+    nothing here.
     """
     options.store.listen(options.progress.say)
     options = options.for_course(course)
@@ -92,7 +95,16 @@ def verify(
     extractions, trials = _select(course, extracted_scripts.runnable, documents, shard)
     models, model_diagnostics = compile_models(course, options)
     memory = options.memory()
-    run_scripts = functools.partial(run, extractions, options, memory=memory, known_runs=known_runs)
+    is_preview = known_runs is not None
+    run_scripts = functools.partial(
+        run,
+        course,
+        extractions,
+        options,
+        memory=memory,
+        known_runs=known_runs,
+        only_recorded=not is_preview,
+    )
     trial_memory = Memory(options.root, options.store)  # another thread uses it
     context = TrialContext(
         options.root, course, dict(models), trial_memory, model_diagnostics, static
@@ -101,8 +113,15 @@ def verify(
         run_scripts, trials, context, options.progress
     )
     verdicts = compare_all(course, runs)
-    is_first = known_runs is None
-    second_runs = _repeat_drifted(extractions, runs, verdicts, options) if is_first else {}
+    if not is_preview:
+        lines = script_lines(extractions, runs, verdicts, course)
+        doubtful_paths = {line.path for line in lines if _is_doubtful(line, memory, repeat=repeat)}
+        scripts = [e for e in extractions if e.path in doubtful_paths and not e.script.once]
+        other_runs = {run.path: run for run in runs if run.path in doubtful_paths}
+        fresh_memory = options.memory(fresh=True)
+        again = run(course, scripts, options, "running scripts again", fresh_memory)
+        runs = tuple({run.path: run for run in (*runs, *again)}.values())
+        verdicts = compare_all(course, runs) if again else verdicts
     diagnostics = (
         *extracted_scripts.diagnostics,
         *model_diagnostics,
@@ -115,7 +134,7 @@ def verify(
             verdicts,
             evidence,
             extracted_scripts.extractions,
-            second_runs,
+            other_runs,
             [f"models/{name}.xml" for name, model in models if model.error],
         ),
         *repeat_findings(course, extractions, memory.differing_runs),
@@ -160,21 +179,17 @@ def _run_with_trials(
             raise
 
 
-def _repeat_drifted(
-    extractions: Sequence[Extraction],
-    runs: Sequence[ScriptRun],
-    verdicts: Sequence[Verdict],
-    options: Options,
-) -> dict[str, ScriptRun]:
-    """Run quick scripts again whose output has drifted, by path: does it vary by itself?"""
-    drifted_paths = {verdict.recording.script for verdict in verdicts if verdict.status == "drift"}
-    quick = {script_run.path for script_run in runs if script_run.seconds < _QUICK}
-    scripts = [e for e in extractions if e.path in drifted_paths & quick and not e.script.once]
-    if not scripts:
-        return {}
-    memory = options.memory(fresh=True)
-    repeated_runs = run(scripts, options, "running again what differs", memory)
-    return {script_run.path: script_run for script_run in repeated_runs}
+def _is_doubtful(line: ScriptLine, memory: Memory, *, repeat: bool) -> bool:
+    """Whether one run of a script does not say enough, so that it should run once more.
+
+    An output that has drifted though nobody edited its script may vary by itself: that is tried
+    where it is quick, and was not tried before. With `repeat`, it is tried in any case, and what
+    was recorded from the only run must be borne out.
+    """
+    if repeat:
+        return line.status == "drift" or line.unrepeated
+    is_new = not line.cached and line.path not in memory.edited_paths
+    return line.status == "drift" and is_new and line.seconds < _QUICK
 
 
 def _diagnose_nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Diagnostic]:

@@ -95,7 +95,7 @@ def test_update_writes_what_drifted_in_the_chosen_lessons_and_nothing_the_second
     folder = make(*stale, GOOD)
     assert folder.main("check").status == 1
     result = folder.main("update", "1.2", "three", "four")
-    assert "\n3 lessons, 2 scripts run, 1 cached" in result.out
+    assert "\n3 lessons, 0 scripts run, 3 cached" in result.out
     assert folder.text(folder.lesson(1)) == stale[0]
     assert folder.text(folder.lesson(2)) == stale[1].replace("OLD", "b")
     assert folder.text(folder.lesson(3)) == stale[2].replace("OLD", "c")

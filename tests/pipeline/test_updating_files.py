@@ -29,7 +29,7 @@ def test_a_lesson_saved_or_removed_meanwhile_is_not_written(make: Make) -> None:
     assert result.status == 1
     assert f"{first} was changed in the meantime" in result.out
     assert "run the command again" in result.out
-    assert folder.text(first) == before + "savedsaved"
+    assert folder.text(first) == before + "saved"
     assert "2\n```" in folder.text(folder.lesson(2))
     assert f"updated {folder.lesson(2)}" in result.out
     assert f"{third} was removed in the meantime" in result.out

@@ -185,6 +185,8 @@ def reason_forgotten(run: ScriptRun) -> str:
             return f"it needs {', '.join(run.missing)}"
         case Outcome.NORUN:
             return "its lesson says `norun`"
+        case Outcome.UNRECORDED:
+            return "nothing is recorded of it"
         case Outcome.FAILED if _MISSING_MODULE.search(run.stderr):
             return "it did not find a module"
         case Outcome.OK | Outcome.FAILED | Outcome.OUTPUT_LIMIT | Outcome.ENCODING:

@@ -140,7 +140,7 @@ def _failure_wording(extraction: Extraction, run: ScriptRun) -> tuple[str, str, 
     """The rule, the message and the help for a failed run; `None` for any other."""
     path = f"`{extraction.path}`"
     match run.outcome:
-        case Outcome.OK | Outcome.SKIPPED | Outcome.NORUN:
+        case Outcome.OK | Outcome.SKIPPED | Outcome.NORUN | Outcome.UNRECORDED:
             return None
         case Outcome.FAILED:
             return "script-failed", f"{path} exited with status {run.status}", ""
