@@ -32,6 +32,7 @@ from coursebuild.core.scripts.figures import compare_figure
 from coursebuild.core.scripts.findings import count_unproven
 from coursebuild.core.scripts.sensitivity import is_worth_moving, sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.text.source import Span
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.recordings import find_figures, read_recorded, recorded_runs
 from coursebuild.report import ScriptLine
@@ -237,6 +238,19 @@ def _run(
     return runs
 
 
+def find_module(root: Path, name: str) -> str:
+    """Find the file of a module in the course, two folders deep at most; empty if there is none."""
+    excluded = {"examples", "public", "node_modules"}
+    for folder in (root, *sorted(root.glob("*/")), *sorted(root.glob("*/*/"))):
+        parts = folder.relative_to(root).parts
+        if excluded.intersection(parts) or any(part.startswith(".") for part in parts):
+            continue
+        for file in (folder / f"{name}.py", folder / name / "__init__.py"):
+            if file.is_file() and not any((p / "pyvenv.cfg").exists() for p in folder.parents):
+                return file.relative_to(root).as_posix()
+    return ""
+
+
 def recorded_outputs(course: Course, documents: Collection[str] | None = None) -> list[Recording]:
     """Find the recorded outputs in these documents, or in all, that can be compared."""
     return [
@@ -253,12 +267,14 @@ def script_lines(
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
     course: Course,
+    drifted_figures: Collection[Span] = (),
 ) -> tuple[ScriptLine, ...]:
-    """Make the lines of a report about scripts."""
+    """Make the lines of a report about scripts; some figures are not as they are recorded."""
     unproven = count_unproven(course, runs, verdicts)
     drifted_paths = {v.recording.script for v in verdicts if v.status == "drift"}
     recorded_paths = {v.recording.script for v in verdicts if v.status == "verified"}
-    recorded_paths |= {figure.script for figure in find_figures(course, None)}
+    figures = find_figures(course, None)
+    recorded_paths |= {figure.script for figure in figures if figure.span not in drifted_figures}
     lines = []
     for extraction, script_run in zip(extractions, runs, strict=True):
         drift = script_run.outcome is Outcome.OK and script_run.path in drifted_paths

@@ -48,6 +48,7 @@ from coursebuild.pipeline.recordings import (
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
     extract_scripts,
+    find_module,
     recorded_outputs,
     run,
     script_lines,
@@ -206,7 +207,14 @@ class _Updater:
         if new_course is not self.course:
             evidence = collect_evidence(self.course, runs, verdicts(self.course))
         diagnostics = [
-            *script_findings(new_course, extractions, runs, verdicts(new_course), evidence),
+            *script_findings(
+                new_course,
+                extractions,
+                runs,
+                verdicts(new_course),
+                evidence,
+                find_module=functools.partial(find_module, self.options.root),
+            ),
             *figure_findings(new_course, runs, functools.partial(read_recorded, self.options.root)),
         ]
         # A drift that was not updated has its own diagnostic; a dry run leaves all drifts.

@@ -31,6 +31,7 @@ from coursebuild.core.model.results import (
     Results,
     ScriptRun,
     TrialLine,
+    Verdict,
 )
 from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.run.memory import Memory
@@ -45,7 +46,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recordings import check_drawings, check_recorded_runs, read_recorded
-from coursebuild.pipeline.scripts import extract_scripts, run, script_lines
+from coursebuild.pipeline.scripts import extract_scripts, find_module, run, script_lines
 from coursebuild.report import ScriptLine
 
 if TYPE_CHECKING:
@@ -112,16 +113,24 @@ def verify(
     runs, (trial_results, trial_diagnostics) = _run_with_trials(
         run_scripts, trials, context, options.progress
     )
-    verdicts = compare_all(course, runs)
+
+    def judge_runs() -> tuple[tuple[Verdict, ...], list[Diagnostic], tuple[ScriptLine, ...]]:
+        verdicts, read = compare_all(course, runs), functools.partial(read_recorded, options.root)
+        figure_diagnostics = list(figure_findings(course, runs, read))
+        drifted_figures = [diagnostic.span for diagnostic in figure_diagnostics]
+        lines = script_lines(extractions, runs, verdicts, course, drifted_figures)
+        return verdicts, figure_diagnostics, lines
+
+    verdicts, figure_diagnostics, lines = judge_runs()
     if not is_preview:
-        lines = script_lines(extractions, runs, verdicts, course)
         doubtful_paths = {line.path for line in lines if _is_doubtful(line, memory, repeat=repeat)}
         scripts = [e for e in extractions if e.path in doubtful_paths and not e.script.once]
         other_runs = {run.path: run for run in runs if run.path in doubtful_paths}
-        fresh_memory = options.memory(fresh=True)
-        again = run(course, scripts, options, "running scripts again", fresh_memory)
-        runs = tuple({run.path: run for run in (*runs, *again)}.values())
-        verdicts = compare_all(course, runs) if again else verdicts
+        if scripts:
+            fresh_memory = options.memory(fresh=True)
+            again = run(course, scripts, options, "running scripts again", fresh_memory)
+            runs = tuple({run.path: run for run in (*runs, *again)}.values())
+            verdicts, figure_diagnostics, lines = judge_runs()
     diagnostics = (
         *extracted_scripts.diagnostics,
         *model_diagnostics,
@@ -136,18 +145,19 @@ def verify(
             extracted_scripts.extractions,
             other_runs,
             [f"models/{name}.xml" for name, model in models if model.error],
+            functools.partial(find_module, options.root),
         ),
         *repeat_findings(course, extractions, memory.differing_runs),
         *check_runs(course, runs),
         *_diagnose_nothing(course, () if shard is not None else runs),
-        *figure_findings(course, runs, functools.partial(read_recorded, options.root)),
+        *figure_diagnostics,
         *check_drawings(course, options),
     )
     interpreter = options.interpreter
     python = python_version() if interpreter is None else interpreter.version
     engine = engine_version() if interpreter is None else interpreter.engine
     results = Results(runs, verdicts, (), models, python, engine, trial_results)
-    return Verification(results, diagnostics, script_lines(extractions, runs, verdicts, course))
+    return Verification(results, diagnostics, lines)
 
 
 def _run_with_trials(

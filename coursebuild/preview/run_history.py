@@ -84,9 +84,12 @@ class RunHistory:
 
     def doubtful_paths(self) -> dict[str, bool]:
         """The scripts of which one run does not say enough, with whether it was recorded."""
-        lines = [line for line in self.script_lines if line.status == "drift" or line.unrepeated]
         other_runs = self.other_runs()
-        return {line.path: line.unrepeated for line in lines if line.path not in other_runs}
+        return {
+            line.path: line.unrepeated
+            for line in self.script_lines
+            if line.unrepeated or (line.status == "drift" and line.path not in other_runs)
+        }
 
 
 def script_keys(course: Course) -> dict[str, ScriptKey]:

@@ -29,6 +29,7 @@ from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import (
+    FindModule,
     divergence_diagnostics,
     effect_diagnostics,
     failure_diagnostic,
@@ -53,6 +54,7 @@ def script_findings(
     all_extractions: Sequence[Extraction] | None = None,
     other_runs: Mapping[str, ScriptRun] | None = None,
     broken: Collection[str] = (),
+    find_module: FindModule = lambda _: "",
 ) -> tuple[Diagnostic, ...]:
     """The diagnostics of the scripts that were run, and of all that depends on them.
 
@@ -66,6 +68,7 @@ def script_findings(
         other_runs: earlier runs of the same scripts, by path, where there are any.
         broken: files of models that do not compile; a script that reads one is not reported, since
             its failure is nothing new.
+        find_module: see `failure_diagnostic`.
     """
     by_path = {run.path: run for run in runs}
     scripts = {e.path: e for e in all_extractions or extract(course).value}
@@ -73,7 +76,7 @@ def script_findings(
     for extraction in extractions:
         run = by_path.get(extraction.path)
         if run is not None and not (run.trace and {*run.trace.files}.intersection(broken)):
-            diagnostic = failure_diagnostic(extraction, run, scripts)
+            diagnostic = failure_diagnostic(extraction, run, scripts, find_module)
             diagnostics += [] if diagnostic is None else [diagnostic]
             diagnostics += divergence_diagnostics(extraction, run, scripts)
             diagnostics += effect_diagnostics(extraction, run, scripts)
