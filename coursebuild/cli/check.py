@@ -62,7 +62,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sensitivity",
         action="store_true",
-        help="move initial states and halve timesteps, and say which printed digits hold",
+        help="repeat what was recorded, move initial states and halve timesteps, and say which "
+        "digits hold",
     )
     parser.add_argument(
         "--truth",

@@ -36,11 +36,26 @@ if TYPE_CHECKING:  # asking for the version loads nothing heavy
 _OF_OTHER_TOOLS = {
     "clean": "nothing needs it: `build` removes old pages, and `.coursebuild/` may be deleted",
     "list": "`check` names every script and lab",
-    "render": "did you mean `build`?",
-    "test": "did you mean `check`?",
-    "watch": "did you mean `serve`?",
 }
-"""What to do instead of commands that other tools have."""
+"""What to do instead of commands that other tools have, and this one does not need."""
+_OUR_NAMES = {
+    "accept": "update",
+    "create": "new",
+    "deploy": "build",
+    "dev": "serve",
+    "execute": "check",
+    "format": "fmt",
+    "lint": "check",
+    "preview": "serve",
+    "publish": "build",
+    "record": "update",
+    "render": "build",
+    "run": "check",
+    "test": "check",
+    "verify": "check",
+    "watch": "serve",
+}
+"""The names here of commands that other tools have."""
 _FILES_NEEDED = 64
 """For pipes of processes, the store, event loops, and what scripts open."""
 _SIGNALS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
@@ -128,6 +143,11 @@ def _choose_command(directory: str | None, words: list[str]) -> int:
             from coursebuild import __version__
 
             return write(f"coursebuild {__version__}\n", CLEAN)
+        case ["help", name, *_] if name in _OF_OTHER_TOOLS:
+            return write(f"There is no command `{name}`: {_OF_OTHER_TOOLS[name]}.\n", CLEAN)
+        case ["help", name, *_] if name in _OUR_NAMES and name not in known_commands():
+            write(f"`{name}` is `{_OUR_NAMES[name]}` here.\n\n", CLEAN)
+            words = [_OUR_NAMES[name], "--help"]
         case ["help", name, *_]:
             words = [name, "--help"]
         case _:
@@ -142,6 +162,7 @@ def _choose_command(directory: str | None, words: list[str]) -> int:
 
         help = (
             _OF_OTHER_TOOLS.get(name)
+            or (f"did you mean `{_OUR_NAMES[name]}`?" if name in _OUR_NAMES else "")
             or did_you_mean(name, known_commands())
             or "`coursebuild help` lists them"
         )

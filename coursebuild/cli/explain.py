@@ -39,6 +39,7 @@ from coursebuild.core.run.dependencies import (
     Inputs,
     Kind,
     describe,
+    is_there,
     sought_files,
     state_changes,
 )
@@ -381,7 +382,7 @@ def _describe_run(
     state: State = "would run" if reasons else "remembered"
     if record is None:
         return RunExplanation(kind, name, owner, state, reasons)
-    depends = [describe(dependency) for dependency in record.dependencies]
+    depends = [describe(d) for d in record.dependencies if is_there(d)]
     depends += [f"{subject}: {value}" for subject, value in record.inputs.conditions]
     return RunExplanation(
         kind,
@@ -389,7 +390,7 @@ def _describe_run(
         owner,
         state,
         reasons,
-        tuple(depends),
+        tuple(dict.fromkeys(depends)),
         record.timestamp,
         record.stored_run.seconds,
         record.stored_run.outcome.value,

@@ -10,10 +10,13 @@ While something is wrong, the last good page stays, with the mistakes shown over
 from __future__ import annotations
 
 import argparse
+import contextlib
 import re
+import socket
 import sys
 import threading
 import webbrowser
+from errno import EADDRINUSE
 from typing import NoReturn
 
 import segno
@@ -99,8 +102,8 @@ def serve(
     try:
         server = PreviewServer(host, port, live_course.session, embed)
     except OSError as error:
-        reason = error.strerror or error
-        raise UsageError(f"port {port} of {host} cannot be used: {reason}") from None
+        message = f"port {port} of {host} cannot be used: {error.strerror or error}"
+        raise UsageError(message, help=_propose_port(host, port, error)) from None
     try:
         live_course.start()
         server.start()
@@ -120,3 +123,12 @@ def serve(
     finally:
         server.stop()
         live_course.close()
+
+
+def _propose_port(host: str, port: int, error: OSError) -> str:
+    """The command with the next port that is free, where the one that was asked for is taken."""
+    for number in range(port + 1, min(port + 100, 65536)) if error.errno == EADDRINUSE else ():
+        with contextlib.suppress(OSError), socket.create_server((host, number)):
+            option = "" if host == "127.0.0.1" else f" --host {host}"
+            return f"`coursebuild serve{option} --port {number}`"
+    return ""

@@ -45,12 +45,15 @@ def check(
     """Verify the lessons that the names mean; all, and the pages, where there are none.
 
     `shard` is the part of the scripts and labs that this run takes; `timings` the file into which
-    it writes how long each took. `sensitivity`: say which printed digits repeat when initial states
-    are moved a little. `truth`: list what nothing in the course proves.
+    it writes how long each took. `sensitivity`: run again what was recorded from one run, and say
+    which printed digits repeat when initial states are moved a little. `truth`: list what nothing
+    in the course proves.
     """
     with project_lock(options.root, options.progress.say):
         with Reader(options) as reader:
-            checked_course = read_and_verify(options, reader, names, shard=shard)
+            checked_course = read_and_verify(
+                options, reader, names, shard=shard, repeat=sensitivity
+            )
         if isinstance(checked_course, Report):
             return checked_course
         course, verification = checked_course.course, checked_course.verification
@@ -113,6 +116,8 @@ class CheckedCourse(Struct, frozen=True):
             strict=self.options.strict or self.course.strict,
             inventory=inventory,
         )
+        if report.summary.unrepeated:  # what repeats them changes no file
+            return report
         depends = depends_on(self.course, verification.results, self.options.interpreter)
         return replace(report, depends=depends)
 
@@ -124,11 +129,12 @@ def read_and_verify(
     *,
     static: bool = False,
     shard: Shard | None = None,
+    repeat: bool = False,
 ) -> CheckedCourse | Report:
     """What `check`, `build` and `export` do: read a course, check it, run it.
 
     Where the map cannot be read, there is only a report. The caller holds the course's lock.
-    `static`: with the static forms of labs, for pages.
+    `static`: with the static forms of labs, for pages. `repeat`: see `verify`.
     """
     began = time.monotonic()
     parsed_course = load(options.root, reader, code="run" if options.sandbox is None else "refuse")
@@ -137,7 +143,7 @@ def read_and_verify(
         return judge(None, parsed_course.diagnostics, began, strict=options.strict)
     selected = select(course, names, options.root)
     options = options.for_course(course)
-    verification = verify(course, options, selected, static=static, shard=shard)
+    verification = verify(course, options, selected, static=static, shard=shard, repeat=repeat)
     reports = shown_reports(options.root, course)
     diagnostics = (*parsed_course.diagnostics, *verification.diagnostics, *reports.diagnostics)
     return CheckedCourse(began, course, options, selected, verification, reports.value, diagnostics)

@@ -52,13 +52,14 @@ def judge(
     """Make the report of a command that began at this moment of `time.monotonic`.
 
     `documents` limits it to these lessons and pages, by path: to mistakes in them and in the map,
-    and those of the scripts that ran. `strict`: warnings count as errors, and a script that was not
-    run is one, unless the map lets it pass. `inventory`: warnings that somebody asked for, such
-    as a list of numbers; they stay warnings.
+    and those of the scripts that ran. `strict`: warnings count as errors, and so does a script that
+    was not run, unless the map lets it pass, or was recorded from its only run. `inventory`:
+    warnings that somebody asked for, such as a list of numbers; they stay warnings.
     """
     unrun = () if course is None else tuple(_unrun_scripts(course, scripts))
     if strict and course is not None:
-        diagnostics = (*diagnostics, *_refuse_unproven(course, unrun))
+        unrepeated = _refuse_unrepeated(course, scripts)
+        diagnostics = (*diagnostics, *_refuse_unproven(course, unrun), *unrepeated)
     if course is None:
         lesson_count = 0
     elif documents is None:
@@ -89,6 +90,7 @@ def judge(
         cached=sum(line.cached for line in scripts),
         unproven=len(unrun),
         reasons=tuple(dict.fromkeys(name for _, _, names in unrun for name in names)),
+        unrepeated=sum(line.unrepeated for line in scripts),
     )
     return Report(reported, tuple(scripts), summary, remarks, labs)
 
@@ -102,15 +104,17 @@ def _unrun_scripts(course: Course, lines: Iterable[ScriptLine]) -> Iterator[_Unr
     for line in lines:
         if not line.did_run and line.path in by_path:
             script = by_path[line.path]
-            yield script, line, line.missing or ("norun" if script.norun else "record=once",)
+            reason = "record=once" if script.once else "norun"
+            reason = "nothing recorded" if line.status == "unrecorded" else reason
+            yield script, line, line.missing or (reason,)
 
 
 def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diagnostic]:
     """Diagnose scripts that were not run and that the map does not let pass."""
     allowed_paths = {entry.path for entry in course.unproven}
     for script, line, reasons in scripts:
-        if line.path in allowed_paths or reasons == ("record=once",):  # that is a mistake by itself
-            continue
+        if line.path in allowed_paths or not (line.missing or script.norun):
+            continue  # another mistake says that nothing is recorded
         names = " and ".join(f"`{name}`" for name in reasons)
         are = "are" if len(reasons) > 1 else "is"
         reason = f"{names} {are} not installed" if line.missing else "its fence says `norun`"
@@ -122,6 +126,19 @@ def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diag
             f"`{line.path}` was not run ({reason}), so nothing proves {unproven}",
             help=f'{cure}, or allow it: `unproven = ["{line.path}"]` in `[verify]` of the map',
         )
+
+
+def _refuse_unrepeated(course: Course, lines: Iterable[ScriptLine]) -> Iterator[Diagnostic]:
+    """Diagnose scripts whose only run is the one that was recorded."""
+    by_path = {s.path: s for document in course.documents for s in document_scripts(document)}
+    for line in lines:
+        if line.unrepeated and line.path in by_path:
+            yield diagnose(
+                "output-unrepeated",
+                by_path[line.path].span.first_line(),
+                f"what is recorded of `{line.path}` is from its only run, and not yet repeated",
+                help=f"run `coursebuild check --sensitivity {line.lesson}`",
+            )
 
 
 def _without_consequences(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnostic]:

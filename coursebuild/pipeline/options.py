@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,7 @@ from coursebuild.core.text.diagnostics import did_you_mean, nearest
 from coursebuild.pipeline.progress import Progress
 
 if TYPE_CHECKING:
+    from coursebuild.core.model.results import ScriptRun
     from coursebuild.core.run.sandbox import Sandbox
     from coursebuild.core.run.script_environment import Interpreter
     from coursebuild.core.run.script_server import RunAll
@@ -48,6 +50,8 @@ class Options(Struct, frozen=True):
     """Whether to say of each script why it runs."""
     run_all: RunAll | None = None
     """Runs scripts, where a `ScriptServer` stays warm from run to run."""
+    on_result: Callable[[ScriptRun], object] | None = None
+    """Takes the result of each script that runs, while others run."""
     interpreter: Interpreter | None = None
     """The interpreter of scripts, if it is another than ours; see `for_course`."""
     strict: bool = False

@@ -107,7 +107,7 @@ class _Comparison(Struct):
 
     def report(self, blocked: tuple[ScriptComparison, ...]) -> ComparisonReport:
         """Run the scripts with both versions and compare what they do."""
-        runs = run(self.scripts, self.options)
+        runs = run(self.course, self.scripts, self.options)
         self.runs_here = {r.path: r for r in runs}
         interpreter = self._prepare(self.version)
         standings_here = run_standings(self.course, self.runs_here, runs)
@@ -173,7 +173,7 @@ class _Comparison(Struct):
         run_store = options_there.run_store(fresh=fresh)
         with ScriptServer() as server:
             server_options = replace(options_there, run_all=server.run)
-            runs = run(scripts, server_options, stage, run_store)
+            runs = run(self.course, scripts, server_options, stage, run_store)
         return run_standings(self.course, self.runs_here, runs)
 
     def _compare_models(self, interpreter: Interpreter) -> tuple[ModelLine, ...]:

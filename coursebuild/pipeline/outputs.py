@@ -4,37 +4,34 @@ Entry points: `update(options, names, dry_run=…)` brings recorded outputs up t
 `extract(options, adopt=…)` writes the scripts to `examples/`, or brings edits made there back.
 Of an update:
 
-1. Every chosen script runs twice. What differs between the two runs cannot be recorded. A
-   remembered result counts as the first run, and as both where nothing of it is to be recorded:
-   whatever is written was printed by two runs, the second of them now.
+1. Every chosen script runs once, and none that has a remembered result.
 2. The new outputs become edits; each lesson is written whole or not at all, and only if nobody
    changed it meanwhile.
 3. The bound numbers of the updated lessons are checked: where a new output makes prose false, a
    diagnostic says what is printed now in place of the number.
-4. Scripts whose output was written run again with their initial states moved a little: digits that
-   change with these are noise, and should not be printed.
+
+What is written was printed by one run. Whether another prints the same, and which digits hold, is
+found out later: by `serve` when it is idle, and by `check --sensitivity`.
 """
 
 from __future__ import annotations
 
 import difflib
+import functools
 import time
-from collections.abc import Collection, Mapping, Sequence
-from typing import TypeAlias
-
-from msgspec.structs import replace
+from collections.abc import Mapping, Sequence
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.examples import Obstacle
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import check_writable, write_atomic
-from coursebuild.core.model import Course, Recording
+from coursebuild.core.model import Course
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
-from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import adopt_file, apply_edits, block_text, update_body
 from coursebuild.core.scripts.extract import extract as extract_course
+from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import collect_evidence, script_findings
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Source
@@ -44,21 +41,19 @@ from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.recordings import (
     check_recorded_runs,
     find_figures,
+    read_recorded,
     record_runs,
     write_figures,
 )
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
     extract_scripts,
-    measure_sensitivity,
+    find_module,
     recorded_outputs,
     run,
     script_lines,
 )
 from coursebuild.report import Report
-
-Runs: TypeAlias = list[tuple[ScriptRun, ScriptRun]]
-"""The two runs of each script; of one that ran once, the same run twice."""
 
 
 def update(options: Options, names: tuple[str, ...] = (), *, dry_run: bool = False) -> Report:
@@ -100,17 +95,16 @@ class _Updater:
 
     def update(self, began: float) -> Report:
         """Run the scripts, write what they print, and report on the lessons as they are then."""
-        runs = self._run_twice()
-        first_runs = [first for first, _ in runs]
-        edits, refusals = self._make_edits(runs, self._repeated_paths())
+        runs = run(self.course, self.scripts, self.options)
+        edits, refusals = self._make_edits(runs)
         self._add_source_parts(edits)
         remarks, failures = self._write(edits)
         figure_remarks, figure_failures = write_figures(
-            self.course, self.documents, first_runs, self.options, dry_run=self.dry_run
+            self.course, self.documents, runs, self.options, dry_run=self.dry_run
         )
         remarks += figure_remarks
         if self.options.long and not self.dry_run:
-            record_runs(self.scripts, first_runs, self.options)
+            record_runs(self.scripts, runs, self.options)
         new_course, read_diagnostics = self.course, self.diagnostics
         if remarks and not self.dry_run:
             parsed_course = load(self.options.root)
@@ -120,79 +114,51 @@ class _Updater:
         diagnostics += [*refusals, *failures, *figure_failures]
         diagnostics += check_recorded_runs(self.scripts, self.options)
         diagnostics += self._diagnose_updated(new_course, runs)
-        if new_course is not self.course:
-            diagnostics += self._find_noise(new_course, edits, first_runs)
         if not remarks and all(not d.is_error for d in diagnostics):
             remarks = ["every recorded output is up to date"]
         return judge(
             self.course,
             diagnostics,
             began,
-            scripts=script_lines(self.scripts, [_as_it_ran(*p) for p in runs], (), self.course),
+            scripts=script_lines(
+                self.scripts,
+                runs,
+                [v for v in compare_all(new_course, runs) if v.status == "verified"],
+                self.course,
+            ),
             documents=self.documents,
             remarks=tuple(remarks),
         )
 
-    # --- running
-
-    def _run_twice(self) -> Runs:
-        """Run the scripts twice; a remembered run that is recorded already counts as both."""
-        with ScriptServer() as server:  # it keeps what scripts import from one run to the next
-            options = replace(self.options, run_all=server.run)
-            runs = [(first, first) for first in run(self.scripts, options)]
-            edits, refusals = self._make_edits(runs)
-            outdated = {r.script for r in self.recordings if _is_touched(r, edits, refusals)}
-            scripts_to_run = [
-                extraction
-                for extraction, (first, _) in zip(self.scripts, runs, strict=True)
-                if (not first.cached or first.path in outdated) and not extraction.script.once
-            ]
-            run_store = options.run_store(fresh=True)
-            second_runs = run(scripts_to_run, options, "running scripts again", run_store)
-        by_path = {second.path: second for second in second_runs}
-        return [(first, by_path.get(first.path, first)) for first, _ in runs]
-
-    def _find_noise(
-        self, new_course: Course, edits: Mapping[Source, list[Edit]], runs: Sequence[ScriptRun]
-    ) -> list[Diagnostic]:
-        """Find recorded digits that are noise, in the outputs that have changed."""
-        from coursebuild.core.scripts.sensitivity import noise_warnings
-
-        changed = {r.script for r in self.recordings if _is_touched(r, edits, ())}
-        changed_runs = [script_run for script_run in runs if script_run.path in changed]
-        sensitivities = measure_sensitivity(new_course, self.options, changed_runs, self.documents)
-        return [warning for sensitivity in sensitivities for warning in noise_warnings(sensitivity)]
-
     # --- edits
 
     def _make_edits(
-        self, runs: Runs, doubtful_paths: Collection[str] = ()
+        self, runs: Sequence[ScriptRun]
     ) -> tuple[dict[Source, list[Edit]], list[Diagnostic]]:
         """Make the edits, by lesson; a diagnostic for each output that cannot be written."""
+        # Of paths that several scripts have, nobody knows whose output is recorded.
+        repeated_paths = {
+            d.span.text.strip("\"'")
+            for d in self.extracted_scripts.diagnostics
+            if d.rule == "script-repeated"
+        }
         printed = {
-            first.path: (first.stdout, second.stdout)
-            for first, second in runs
-            if first.outcome is Outcome.OK and second.outcome is Outcome.OK
+            r.path: r.stdout
+            for r in runs
+            if r.outcome is Outcome.OK and r.path not in repeated_paths
         }
         edits: dict[Source, list[Edit]] = {}
         refusals: list[Diagnostic] = []
         for recording in self.recordings:
-            if recording.script not in printed or recording.script in doubtful_paths:
+            if recording.script not in printed:
                 continue
             comparison = self.course.comparison_of(recording)
-            edit = update_body(recording, comparison, *printed[recording.script])
+            edit = update_body(recording, comparison, printed[recording.script])
             if isinstance(edit, Edit):
                 edits.setdefault(recording.span.source, []).append(edit)
             elif edit is not None:
                 refusals.append(edit)
         return edits, refusals
-
-    def _repeated_paths(self) -> frozenset[str]:
-        """The paths that several scripts have: nobody knows whose output is recorded."""
-        diagnostics = self.extracted_scripts.diagnostics
-        return frozenset(
-            d.span.text.strip("\"'") for d in diagnostics if d.rule == "script-repeated"
-        )
 
     def _add_source_parts(self, edits: dict[Source, list[Edit]]) -> None:
         """Add the edits of parts of files; leave out lessons that are not to be written over."""
@@ -228,43 +194,31 @@ class _Updater:
 
     # --- the lessons as they are then
 
-    def _diagnose_updated(self, new_course: Course, runs: Runs) -> list[Diagnostic]:
+    def _diagnose_updated(self, new_course: Course, runs: Sequence[ScriptRun]) -> list[Diagnostic]:
         """Find what is wrong with the scripts of the lessons as they are now."""
-        last_runs = [
-            second if first.outcome is Outcome.OK and second.outcome is not Outcome.OK else first
-            for first, second in runs
-        ]
         paths = {extraction.path for extraction in self.scripts}
 
         def verdicts(course: Course) -> list[Verdict]:
-            return [v for v in compare_all(course, last_runs) if v.recording.script in paths]
+            return [v for v in compare_all(course, runs) if v.recording.script in paths]
 
         # What was written above a script has moved it.
         extractions = [e for e in extract_course(new_course).value if e.path in paths]
         evidence = None
         if new_course is not self.course:
-            evidence = collect_evidence(self.course, last_runs, verdicts(self.course))
-        diagnostics = script_findings(
-            new_course, extractions, last_runs, verdicts(new_course), evidence
-        )
+            evidence = collect_evidence(self.course, runs, verdicts(self.course))
+        diagnostics = [
+            *script_findings(
+                new_course,
+                extractions,
+                runs,
+                verdicts(new_course),
+                evidence,
+                find_module=functools.partial(find_module, self.options.root),
+            ),
+            *figure_findings(new_course, runs, functools.partial(read_recorded, self.options.root)),
+        ]
         # A drift that was not updated has its own diagnostic; a dry run leaves all drifts.
-        return [d for d in diagnostics if d.rule != "output-drift"]
-
-
-def _as_it_ran(first: ScriptRun, second: ScriptRun) -> ScriptRun:
-    """The run to report: one that was remembered and had to run again counts as run."""
-    if second.cached or not first.cached:
-        return first
-    return replace(first, cached=False, seconds=second.seconds)
-
-
-def _is_touched(
-    recording: Recording, edits: Mapping[Source, list[Edit]], refusals: Sequence[Diagnostic]
-) -> bool:
-    """Whether something is to be written into a recording, or was refused."""
-    whole = recording.span
-    is_written = any(whole.contains(edit.span) for edit in edits.get(whole.source, ()))
-    return is_written or any(whole.contains(d.span) for d in refusals)
+        return [d for d in diagnostics if d.rule not in ("output-drift", "figure-drift")]
 
 
 def changed_text(verb: str, source: Source, new: str) -> str:

@@ -116,7 +116,7 @@ def record_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], option
             tuple(_find_portable(dependencies, states)),
             int(time.time()),
             "",
-            replace(run, seconds=round(run.seconds, 1), stderr="", figures=()),
+            replace(run, seconds=round(run.seconds, 1), stderr="", figures=(), unrepeated=False),
         )
         packages = tuple(
             dependency.state

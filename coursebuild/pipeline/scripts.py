@@ -9,7 +9,9 @@ that have no remembered result which still holds, the longest first.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from pathlib import Path
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -17,18 +19,22 @@ from msgspec.structs import replace
 from coursebuild.core.files.errors import OutsideProjectError
 from coursebuild.core.files.examples import BlockedFile, ExamplesReport, Obstacle, write_examples
 from coursebuild.core.files.write import remove_leftovers
-from coursebuild.core.model import Course, Recording, find_blocks
+from coursebuild.core.model import Course, Mode, Recording, Table, find_blocks
+from coursebuild.core.model.addresses import RecordedFigure
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
 from coursebuild.core.model.sensitivity import FINER_RUNS, RUNS, Sensitivity
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.run_store import RunStore, longest_first
+from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
 from coursebuild.core.scripts.failures import is_lost
+from coursebuild.core.scripts.figures import compare_figure
 from coursebuild.core.scripts.findings import count_unproven
 from coursebuild.core.scripts.sensitivity import is_worth_moving, sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.text.source import Span
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.recordings import recorded_runs
+from coursebuild.pipeline.recordings import find_figures, read_recorded, recorded_runs
 from coursebuild.report import ScriptLine
 
 
@@ -103,17 +109,21 @@ def _diagnose_blocked(
 
 
 def run(
+    course: Course,
     scripts: Iterable[Extraction],
     options: Options,
     stage: str = "running scripts",
     run_store: RunStore | None = None,
     perturbation: int = 0,
     known_runs: Mapping[str, ScriptRun] | None = None,
+    *,
+    only_recorded: bool = False,
 ) -> tuple[ScriptRun, ...]:
     """Return the results of scripts: remembered ones, and those of the others, which run now.
 
     `run_store` replaces that of the options. `perturbation`: with initial states moved, in the
     direction of this number. `known_runs`: results, by path, that are known to hold.
+    `only_recorded`: none runs of which nothing is recorded yet.
     """
     extractions = tuple(scripts)
     run_store = options.run_store() if run_store is None else run_store
@@ -129,9 +139,54 @@ def run(
     if inputs:
         runs |= run_store.get_runs(tuple(inputs.values()))
     jobs_to_run = [job for job in all_jobs if job.path not in runs]
-    for script_run in _run(jobs_to_run, inputs, options, stage, run_store):
-        runs[script_run.path] = script_run
+    if jobs_to_run:
+        records = _Records(course, options.root)
+        if only_recorded:
+            blank = {job.path for job in jobs_to_run if records.is_blank(job.path)}
+            runs |= {path: ScriptRun(path, Outcome.UNRECORDED, 0, "", "", 0.0) for path in blank}
+            jobs_to_run = [job for job in jobs_to_run if job.path not in blank]
+        runs |= _run(jobs_to_run, inputs, options, stage, run_store, records)
     return tuple(runs[job.path] for job in all_jobs)
+
+
+class _Records:
+    """What is recorded of the scripts of a course."""
+
+    def __init__(self, course: Course, root: Path) -> None:
+        self._course, self._read = course, functools.partial(read_recorded, root)
+        self._outputs: dict[str, list[Recording]] = {}
+        for recording in recorded_outputs(course):
+            self._outputs.setdefault(recording.script or "", []).append(recording)
+        self._figures: dict[str, list[RecordedFigure]] = {}
+        for figure in find_figures(course, None):
+            self._figures.setdefault(figure.script, []).append(figure)
+
+    def is_blank(self, path: str) -> bool:
+        """Whether there is a place for what a script gives, and nothing in any such place."""
+        outputs, figures = self._outputs.get(path, ()), self._figures.get(path, ())
+        return bool(outputs or figures) and not (
+            any(
+                isinstance(recording.body, Table)
+                or recording.body.text.strip()
+                or self._course.comparison_of(recording).mode is Mode.VOLATILE
+                for recording in outputs
+            )
+            or any(self._read(figure.path) is not None for figure in figures)
+        )
+
+    def compare(self, script_run: ScriptRun) -> ScriptRun:
+        """The run, with whether it bears out what is recorded now."""
+        outputs = self._outputs.get(script_run.path, ())
+        figures = self._figures.get(script_run.path, ())
+        holds = all(
+            compare(r, self._course.comparison_of(r), script_run.stdout).status != "drift"
+            for r in outputs
+        ) and not any(
+            finding
+            for figure in figures
+            for finding in compare_figure(figure, script_run, self._read(figure.path))
+        )
+        return replace(script_run, unrepeated=not (holds and (outputs or figures)))
 
 
 def _run(
@@ -140,10 +195,11 @@ def _run(
     options: Options,
     stage: str,
     run_store: RunStore,
-) -> tuple[ScriptRun, ...]:
+    records: _Records,
+) -> dict[str, ScriptRun]:
     """Run scripts, the longest first, and remember what they did."""
     if not jobs_to_run:
-        return ()
+        return {}
     from coursebuild.core.run.script_server import ScriptServer
 
     progress = options.progress
@@ -154,9 +210,16 @@ def _run(
         run_store.note_start(path)
         progress.start(path)
 
+    runs: dict[str, ScriptRun] = {}
+
     def on_finish(script_run: ScriptRun) -> None:
+        if script_run.outcome is Outcome.OK:
+            script_run = records.compare(script_run)
         run_store.put_run(inputs[script_run.path], script_run)
+        runs[script_run.path] = script_run
         progress.finish(script_run.path, script_run.outcome.value, script_run.seconds)
+        if options.on_result is not None:
+            options.on_result(script_run)
 
     if options.verbose:
         for job in jobs_to_run:
@@ -164,7 +227,7 @@ def _run(
     run_store.begin()
     with ScriptServer(sandbox=options.sandbox) as server, progress.stage(stage, len(jobs_to_run)):
         run_all = options.run_all or server.run
-        return run_all(
+        run_all(
             options.root,
             longest_first(jobs_to_run, seconds),
             parallel=options.jobs,
@@ -172,6 +235,20 @@ def _run(
             on_finish=on_finish,
             interpreter=options.interpreter,
         )
+    return runs
+
+
+def find_module(root: Path, name: str) -> str:
+    """Find the file of a module in the course, two folders deep at most; empty if there is none."""
+    excluded = {"examples", "public", "node_modules"}
+    for folder in (root, *sorted(root.glob("*/")), *sorted(root.glob("*/*/"))):
+        parts = folder.relative_to(root).parts
+        if excluded.intersection(parts) or any(part.startswith(".") for part in parts):
+            continue
+        for file in (folder / f"{name}.py", folder / name / "__init__.py"):
+            if file.is_file() and not any((p / "pyvenv.cfg").exists() for p in folder.parents):
+                return file.relative_to(root).as_posix()
+    return ""
 
 
 def recorded_outputs(course: Course, documents: Collection[str] | None = None) -> list[Recording]:
@@ -190,10 +267,14 @@ def script_lines(
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
     course: Course,
+    drifted_figures: Collection[Span] = (),
 ) -> tuple[ScriptLine, ...]:
-    """Make the lines of a report about scripts."""
+    """Make the lines of a report about scripts; some figures are not as they are recorded."""
     unproven = count_unproven(course, runs, verdicts)
     drifted_paths = {v.recording.script for v in verdicts if v.status == "drift"}
+    recorded_paths = {v.recording.script for v in verdicts if v.status == "verified"}
+    figures = find_figures(course, None)
+    recorded_paths |= {figure.script for figure in figures if figure.span not in drifted_figures}
     lines = []
     for extraction, script_run in zip(extractions, runs, strict=True):
         drift = script_run.outcome is Outcome.OK and script_run.path in drifted_paths
@@ -208,7 +289,8 @@ def script_lines(
                 script_run.seconds,
                 script_run.cached,
                 script_run.missing,
-                *unproven.get(script_run.path, ()),
+                *unproven.get(script_run.path, (0, 0)),
+                script_run.unrepeated and script_run.path in recorded_paths,
             )
         )
     return tuple(lines)
@@ -241,7 +323,7 @@ def measure_sensitivity(
         if is_worth_moving(course, recordings.get(script.path, ()), base)
     ]
     numbers = (*range(1, RUNS + 1), *(FINER_RUNS if halve else ()))
-    perturbed_runs = _run_perturbed(moved_scripts, options, numbers)
+    perturbed_runs = _run_perturbed(course, moved_scripts, options, numbers)
     return tuple(
         sensitivity(
             course,
@@ -257,7 +339,7 @@ def measure_sensitivity(
 
 
 def _run_perturbed(
-    scripts: Sequence[Extraction], options: Options, numbers: Sequence[int]
+    course: Course, scripts: Sequence[Extraction], options: Options, numbers: Sequence[int]
 ) -> dict[str, list[ScriptRun]]:
     """Run scripts with moved states or shorter timesteps; return the runs by path."""
     runs: dict[str, list[ScriptRun]] = {script.path: [] for script in scripts}
@@ -267,11 +349,13 @@ def _run_perturbed(
 
     run_store = options.run_store()
     with ScriptServer(sandbox=options.sandbox) as server:
-        server_options = replace(options, run_all=server.run)
+        server_options = replace(options, run_all=options.run_all or server.run)
         for number in numbers:
             stage = f"moving initial states, {number} of {RUNS}"
             if number in FINER_RUNS:
                 stage = "halving timesteps" + (" twice" if number == FINER_RUNS[1] else "")
-            for script_run in run(scripts, server_options, stage, run_store, perturbation=number):
+            for script_run in run(
+                course, scripts, server_options, stage, run_store, perturbation=number
+            ):
                 runs[script_run.path].append(script_run)
     return runs

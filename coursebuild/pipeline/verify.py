@@ -46,7 +46,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recordings import check_drawings, check_recorded_runs, read_recorded
-from coursebuild.pipeline.scripts import extract_scripts, run, script_lines
+from coursebuild.pipeline.scripts import extract_scripts, find_module, run, script_lines
 from coursebuild.report import ScriptLine
 
 if TYPE_CHECKING:
@@ -77,14 +77,18 @@ def verify(
     *,
     static: bool = False,
     shard: Shard | None = None,
+    repeat: bool = False,
     evidence: BindingEvidence | None = None,
     known_runs: Mapping[str, ScriptRun] | None = None,
+    other_runs: Mapping[str, ScriptRun] | None = None,
 ) -> Verification:
     """Verify a course, or only what stands in the documents with these paths.
 
     `static`: with the static forms of labs, which only a build needs. `shard`: only this part of
-    the scripts and labs. `evidence`: the lines by which bound numbers held before. `known_runs`:
-    runs, by path, that are known to hold.
+    the scripts and labs. `repeat`: what is recorded from a script's only run must be borne out by
+    another, now. `evidence`: the lines by which bound numbers held before. A preview has
+    `known_runs`, by path, that are known to hold, and `other_runs` of the same scripts, and repeats
+    nothing here.
     """
     options.store.listen(options.progress.say)
     options = options.for_course(course)
@@ -92,8 +96,15 @@ def verify(
     extractions, trials = _select(course, extracted_scripts.runnable, documents, shard)
     models, model_diagnostics = compile_models(course, options)
     run_store = options.run_store()
+    is_preview = known_runs is not None
     run_scripts = functools.partial(
-        run, extractions, options, run_store=run_store, known_runs=known_runs
+        run,
+        course,
+        extractions,
+        options,
+        run_store=run_store,
+        known_runs=known_runs,
+        only_recorded=not is_preview,
     )
     trial_runs = RunStore(options.root, options.store)  # another thread uses it
     context = TrialContext(
@@ -102,9 +113,26 @@ def verify(
     runs, (trial_results, trial_diagnostics) = _run_with_trials(
         run_scripts, trials, context, options.progress
     )
-    verdicts = compare_all(course, runs)
-    is_first = known_runs is None
-    second_runs = _repeat_drifted(extractions, runs, verdicts, options) if is_first else {}
+
+    def judge_runs() -> tuple[tuple[Verdict, ...], list[Diagnostic], tuple[ScriptLine, ...]]:
+        verdicts, read = compare_all(course, runs), functools.partial(read_recorded, options.root)
+        figure_diagnostics = list(figure_findings(course, runs, read))
+        drifted_figures = [diagnostic.span for diagnostic in figure_diagnostics]
+        lines = script_lines(extractions, runs, verdicts, course, drifted_figures)
+        return verdicts, figure_diagnostics, lines
+
+    verdicts, figure_diagnostics, lines = judge_runs()
+    if not is_preview:
+        doubtful_paths = {
+            line.path for line in lines if _is_doubtful(line, run_store, repeat=repeat)
+        }
+        scripts = [e for e in extractions if e.path in doubtful_paths and not e.script.once]
+        other_runs = {run.path: run for run in runs if run.path in doubtful_paths}
+        if scripts:
+            fresh_store = options.run_store(fresh=True)
+            again = run(course, scripts, options, "running scripts again", fresh_store)
+            runs = tuple({run.path: run for run in (*runs, *again)}.values())
+            verdicts, figure_diagnostics, lines = judge_runs()
     diagnostics = (
         *extracted_scripts.diagnostics,
         *model_diagnostics,
@@ -117,20 +145,21 @@ def verify(
             verdicts,
             evidence,
             extracted_scripts.extractions,
-            second_runs,
+            other_runs,
             [f"models/{name}.xml" for name, model in models if model.error],
+            functools.partial(find_module, options.root),
         ),
         *repeat_findings(course, extractions, run_store.differing_runs),
         *check_runs(course, runs),
         *_diagnose_nothing(course, () if shard is not None else runs),
-        *figure_findings(course, runs, functools.partial(read_recorded, options.root)),
+        *figure_diagnostics,
         *check_drawings(course, options),
     )
     interpreter = options.interpreter
     python = python_version() if interpreter is None else interpreter.version
     engine = engine_version() if interpreter is None else interpreter.engine
     results = Results(runs, verdicts, (), models, python, engine, trial_results)
-    return Verification(results, diagnostics, script_lines(extractions, runs, verdicts, course))
+    return Verification(results, diagnostics, lines)
 
 
 def _run_with_trials(
@@ -162,21 +191,17 @@ def _run_with_trials(
             raise
 
 
-def _repeat_drifted(
-    extractions: Sequence[Extraction],
-    runs: Sequence[ScriptRun],
-    verdicts: Sequence[Verdict],
-    options: Options,
-) -> dict[str, ScriptRun]:
-    """Run quick scripts again whose output has drifted, by path: does it vary by itself?"""
-    drifted_paths = {verdict.recording.script for verdict in verdicts if verdict.status == "drift"}
-    quick = {script_run.path for script_run in runs if script_run.seconds < _QUICK}
-    scripts = [e for e in extractions if e.path in drifted_paths & quick and not e.script.once]
-    if not scripts:
-        return {}
-    run_store = options.run_store(fresh=True)
-    repeated_runs = run(scripts, options, "running again what differs", run_store)
-    return {script_run.path: script_run for script_run in repeated_runs}
+def _is_doubtful(line: ScriptLine, run_store: RunStore, *, repeat: bool) -> bool:
+    """Whether one run of a script does not say enough, so that it should run once more.
+
+    An output that has drifted though nobody edited its script may vary by itself: that is tried
+    where it is quick, and was not tried before. With `repeat`, it is tried in any case, and what
+    was recorded from the only run must be borne out.
+    """
+    if repeat:
+        return line.status == "drift" or line.unrepeated
+    is_new = not line.cached and line.path not in run_store.edited_paths
+    return line.status == "drift" and is_new and line.seconds < _QUICK
 
 
 def _diagnose_nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Diagnostic]:

@@ -38,6 +38,7 @@ from coursebuild.core.scripts.bindings import document_bindings
 from coursebuild.core.scripts.diff import diff_rows
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
+from coursebuild.core.scripts.findings import find_instability
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.recordings import read_recorded
@@ -198,12 +199,10 @@ def _outputs(session: Session, library: Library, document: Document) -> Iterator
 
 
 def new_output(session: Session, library: Library, verdict: Verdict) -> Edit | Diagnostic | None:
-    """Make the edit that `coursebuild update` would; `None` if the script ran only once so far."""
+    """Make the edit that `coursebuild update` would, unless another run printed something else."""
     run = library.runs[verdict.recording.script or ""]
-    second = session.runs.second_output(run.path)
-    if second is None:
-        return None
-    return update_body(verdict.recording, verdict.comparison, run.stdout, second)
+    unstable_output = find_instability(verdict, run, session.runs.other_runs())
+    return unstable_output or update_body(verdict.recording, verdict.comparison, run.stdout)
 
 
 # --- figures

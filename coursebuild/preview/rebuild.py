@@ -4,37 +4,39 @@ Entry point: `BackgroundRebuild.follow()`, which the main thread runs, so that C
 as in any other command.
 
 1. When nothing was saved for a moment, everything is read.
-2. Scripts and labs that have no remembered result run, and models are compiled (`verify`). Scripts
-   that do not print what is recorded run once more, to see whether their new output can be offered.
+2. Scripts and labs that have no remembered result run, and models are compiled (`verify`).
 3. The files of the site are made: changed pages, fonts, the search.
 4. New mistakes are printed, and those that are gone.
+5. When nothing more is to do, scripts that do not print what is recorded run once more, as their
+   output may vary by itself. So do those whose only run was recorded; before that, with their
+   initial states moved, to see which digits hold. Other commands need not wait for this.
 
-A save in between begins this anew. A running script is stopped only if it was edited.
+A save in between begins this anew. In steps 2 to 4 a running script is stopped only if it was
+edited, in step 5 in any case.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import sys
 import time
 from collections import Counter
-from collections.abc import Collection, Sequence
-from pathlib import Path
-from typing import Any, NoReturn
+from collections.abc import Sequence
+from typing import NoReturn
 
 from msgspec.structs import replace
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
-from coursebuild.core.model.results import ScriptJob, ScriptRun
-from coursebuild.core.run.script_server import OnFinish, RunAll, RunStoppedError, ScriptServer
+from coursebuild.core.run.script_server import RunAll, RunStoppedError, ScriptServer
 from coursebuild.core.scripts.bindings import BindingEvidence
-from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import extract
+from coursebuild.core.scripts.sensitivity import noise_warnings
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.progress import Progress
-from coursebuild.pipeline.scripts import run
+from coursebuild.pipeline.scripts import measure_sensitivity, run
 from coursebuild.pipeline.verify import verify
 from coursebuild.preview.messages import report_now
 from coursebuild.preview.run_history import script_keys
@@ -46,6 +48,8 @@ QUIET = 0.15
 """Seconds without a save after which the work begins."""
 LONGEST = 2.0
 """Seconds after which it begins in any case."""
+IDLE = 1.0
+"""Seconds without a save after which scripts run once more."""
 RETRY = 2.0
 """Seconds after which failed work is tried again, though nothing was saved."""
 
@@ -65,6 +69,8 @@ class BackgroundRebuild:
         self._options = replace(session.options, progress=shown_progress)
         self._edits = -1
         """The session's `edits` when the work began last."""
+        self._measured: set[str] = set()
+        """The scripts that ran with moved initial states."""
         self._evidence: BindingEvidence = {}
         """The lines that proved bound numbers, also before an output was accepted."""
         self._server = ScriptServer()
@@ -90,6 +96,7 @@ class BackgroundRebuild:
             try:
                 with project_lock(self._options.root, self._progress.say):
                     self.run_once()
+                self._repeat()
             except (SupersededError, RunStoppedError):
                 continue
             except EffectError as error:
@@ -189,40 +196,30 @@ class BackgroundRebuild:
         with session.condition:
             is_all_due, session.runs.is_all_due = session.runs.is_all_due, False
             known_runs = {} if is_all_due else session.runs.known_runs(course)
+            if is_all_due:  # what else was printed may have been so for another reason
+                session.runs.repeats.clear()
+        keys = script_keys(course)
+        options = replace(
+            self._options,
+            run_all=self._run_unless_edited(course),
+            on_result=lambda run: session.take_run(keys[run.path], run),
+        )
         try:
             verification = verify(
                 course,
-                replace(self._options, run_all=self._make_run_all(course)),
+                options,
                 static=True,
                 evidence=self._evidence,
                 known_runs=known_runs,
+                other_runs=session.runs.other_runs(),
             )
         except BaseException:
             session.runs.is_all_due |= is_all_due
             raise
         self._options.store.fresh = False  # with `--no-cache`, everything is made anew only once
         session.take_results(course, verification)
-        with session.condition:
-            course_now, runs = session.course, verification.results.runs
-            verdicts = () if course_now is None else compare(course_now, runs)
-        drifted_paths = {v.recording.script or "" for v in verdicts if v.status == "drift"}
-        self._run_again(course, drifted_paths)
-
-    def _make_run_all(self, course: Course) -> RunAll:
-        """Make a function that runs scripts, and shows what each prints as soon as it ends."""
-        session, keys = self._session, script_keys(course)
-        run_scripts = self._run_unless_edited(course)
-
-        def run_all(
-            root: Path, jobs: Sequence[ScriptJob], *, on_finish: OnFinish, **keywords: Any
-        ) -> tuple[ScriptRun, ...]:
-            def take_run(run: ScriptRun) -> None:
-                on_finish(run)
-                session.take_run(keys[run.path], run)
-
-            return run_scripts(root, jobs, on_finish=take_run, **keywords)
-
-        return run_all
+        with contextlib.suppress(RunStoppedError):  # they would have to run anew
+            self._find_noise(course, _refuse_runs)
 
     def _run_unless_edited(self, course: Course) -> RunAll:
         """Make a function that runs scripts until one of them is edited while it runs."""
@@ -241,19 +238,47 @@ class BackgroundRebuild:
 
         return functools.partial(self._server.run, is_unwanted=is_any_edited)
 
-    def _run_again(self, course: Course, drifted_paths: Collection[str]) -> None:
-        """Run drifted scripts once more, unless they have done so already."""
-        session, options = self._session, self._options.for_course(course)
-        paths = {path for path in drifted_paths if session.runs.second_output(path) is None}
-        scripts = [script for script in extract(course).value if script.path in paths]
-        if scripts:
-            self._begin_step("running scripts again")
-            run_store = options.run_store(fresh=True)
-            server_options = replace(options, run_all=self._run_unless_edited(course))
-            runs = run(scripts, server_options, "running scripts again", run_store)
-            with session.condition:
-                session.runs.take_second_runs(runs)
-                session.notify()
+    def _repeat(self) -> None:
+        """Run again, once nothing else is to do, the scripts of which one run does not say enough.
+
+        Raises:
+            SupersededError, RunStoppedError: something was saved in the meantime.
+        """
+        session = self._session
+
+        def is_due(_: object = None) -> bool:
+            return session.edits != self._edits or self._failure is not None
+
+        with session.condition:
+            course, doubtful_paths = session.runs.course, session.runs.doubtful_paths()
+            extractions = () if course is None else extract(course).value
+            scripts = [e for e in extractions if e.path in doubtful_paths and not e.script.once]
+            if course is None or not scripts or session.code != "run":
+                return
+            if session.condition.wait_for(is_due, IDLE):
+                raise SupersededError
+        run_all = functools.partial(self._server.run, is_unwanted=is_due)
+        options = replace(self._options.for_course(course), jobs=1, run_all=run_all)
+        drifted, recorded = (
+            [e for e in scripts if doubtful_paths[e.path] is is_recorded]
+            for is_recorded in (False, True)
+        )
+        run_store, stage = options.run_store(fresh=True), "running scripts again"
+        runs = run(course, drifted, options, stage, run_store)
+        self._measured |= {extraction.path for extraction in recorded}
+        self._find_noise(course, run_all)
+        runs += run(course, recorded, options, stage, run_store)
+        with session.condition:
+            session.runs.take_repeats(runs)
+            self._edits = -1  # all that depends on it is made anew
+
+    def _find_noise(self, course: Course, run_all: RunAll) -> None:
+        """Find digits that do not hold, of the scripts whose initial states were moved."""
+        history = self._session.runs
+        options = replace(self._options.for_course(course), jobs=1, run_all=run_all)
+        runs = [run for run in history.last_results.runs if run.path in self._measured]
+        sensitivities = measure_sensitivity(course, options, runs) if runs else ()
+        history.noise = tuple(w for s in sensitivities for w in noise_warnings(s))
 
 
 def _refuse_runs(*_: object, **__: object) -> NoReturn:

@@ -12,7 +12,7 @@ from typing import TypeAlias
 from msgspec.structs import replace
 
 from coursebuild.core.model import Course
-from coursebuild.core.model.results import Outcome, PublishedTrials, Results, ScriptJob, ScriptRun
+from coursebuild.core.model.results import PublishedTrials, Results, ScriptJob, ScriptRun
 from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import extract, jobs
@@ -38,8 +38,10 @@ class RunHistory:
         self.last_results = Results((), (), (), (), python_version(), engine_version())
         self._runs: dict[str, tuple[ScriptKey, ScriptRun]] = {}
         """The last run of each script, by path, with the key of the script that ran."""
-        self._second_outputs: dict[str, tuple[ScriptKey, str, str]] = {}
-        """Of scripts that ran twice, by path: their key, the first output and the second."""
+        self.repeats: dict[str, tuple[ScriptRun, ScriptRun]] = {}
+        """Of scripts that ran once more, by path: the run before, and the new one."""
+        self.noise: tuple[Diagnostic, ...] = ()
+        """Recorded digits that do not hold, of scripts whose initial states were moved."""
 
     def results(self, course: Course) -> Results:
         """What is known of a course's scripts as they are now."""
@@ -60,24 +62,33 @@ class RunHistory:
         self._runs[run.path] = script, run
 
     def known_runs(self, course: Course) -> dict[str, ScriptRun]:
-        """The runs of a course's scripts, by path; empty where a script has changed since."""
+        """The runs of a course's scripts, by path; none where a script has changed since."""
         are_same = script_keys(course) == {p: key for p, (key, _) in self._runs.items()}
         return {path: run for path, (_, run) in self._runs.items()} if are_same else {}
 
-    def take_second_runs(self, runs: Iterable[ScriptRun]) -> None:
-        """Take the outputs of scripts that ran once more."""
+    def take_repeats(self, runs: Iterable[ScriptRun]) -> None:
+        """Take the runs of scripts that ran once more, in the place of those before."""
         for run in runs:
-            key, first = self._runs[run.path]
-            printed = run.stdout if run.outcome is Outcome.OK else ""
-            self._second_outputs[run.path] = key, first.stdout, printed
+            key, before = self._runs[run.path]
+            self.repeats[run.path] = before, run
+            self._runs[run.path] = key, run
 
-    def second_output(self, path: str) -> str | None:
-        """What a script printed when it ran once more, if its text has not changed since."""
-        if path not in self._runs or path not in self._second_outputs:
-            return None
-        key, run = self._runs[path]
-        key_then, first_output, second_output = self._second_outputs[path]
-        return second_output if (key_then, first_output) == (key, run.stdout) else None
+    def other_runs(self) -> dict[str, ScriptRun]:
+        """The runs before the last ones, by path, of scripts that ran once more."""
+        return {
+            path: before
+            for path, (before, now) in self.repeats.items()
+            if path in self._runs and self._runs[path][1].stdout == now.stdout
+        }
+
+    def doubtful_paths(self) -> dict[str, bool]:
+        """The scripts of which one run does not say enough, with whether it was recorded."""
+        other_runs = self.other_runs()
+        return {
+            line.path: line.unrepeated
+            for line in self.script_lines
+            if line.unrepeated or (line.status == "drift" and line.path not in other_runs)
+        }
 
 
 def script_keys(course: Course) -> dict[str, ScriptKey]:

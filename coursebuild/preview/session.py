@@ -125,6 +125,7 @@ class Session:
             return (
                 *self.reading_diagnostics,
                 *self.runs.diagnostics,
+                *self.runs.noise,
                 *self._template_diagnostics,
             )
 

@@ -182,9 +182,11 @@ def script_line(line: ScriptLine, style: Style) -> str:
     verdict = style.paint(f"{line.status:<8}", GREEN if good else RED)
     if not line.did_run:
         reason = f"needs {', '.join(line.missing)}" if line.missing else "not run"
+        reason = "nothing to compare with" if line.status == "unrecorded" else reason
         unproven = f"; unproven: {things}" if (things := unproven_things(line)) else ""
         return f"{verdict} {line.path}  ({reason}{unproven})"
     took = "cached" if line.cached else f"{line.seconds:.2f} s"
+    took += ", not yet repeated" if line.unrepeated else ""
     return f"{verdict} {line.path}  {style.paint(took, FAINT)}"
 
 

@@ -38,11 +38,13 @@ class ScriptLine(Struct, frozen=True):
     """Outputs and figures that are recorded of a script that was not run."""
     unproven_numbers: int = 0
     """Numbers bound to these outputs."""
+    unrepeated: bool = False
+    """Whether what is recorded of it was recorded from its only run."""
 
     @property
     def did_run(self) -> bool:
         """Whether it was run, now or before."""
-        return self.status not in ("skipped", "norun")
+        return self.status not in ("skipped", "norun", "unrecorded")
 
 
 class Summary(Struct, frozen=True):
@@ -63,6 +65,8 @@ class Summary(Struct, frozen=True):
     """Scripts that were not run, so that they prove nothing."""
     reasons: tuple[str, ...] = ()
     """What kept them from it: missing modules, `norun`."""
+    unrepeated: int = 0
+    """Scripts that were recorded from their only run."""
 
 
 class Report(Struct, frozen=True):
@@ -123,6 +127,8 @@ def summary_line(report: Report) -> str:
         was = "was" if s.unproven == 1 else "were"
         unrun = f"{plural(s.unproven, 'script')} that {was} not run ({', '.join(s.reasons)})"
         verdict = f"{verdict}, and {unrun}" if counts else f"holds, but for {unrun}"
+    if s.unrepeated:
+        verdict += f"; {plural(s.unrepeated, 'script')} recorded, not yet repeated"
     silenced = f" ({s.silenced} silenced)" if s.silenced else ""
     return f"{', '.join(parts)}: {verdict}{silenced}"
 

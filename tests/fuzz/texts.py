@@ -144,7 +144,7 @@ def comparison(text: str) -> None:
     if re.search(_UNWRITABLE, recorded + printed) or not printed.strip():
         return
     body = recording(recorded)
-    edit = update_body(body, replace(by, course_filters=filters), printed, printed)
+    edit = update_body(body, replace(by, course_filters=filters), printed)
     if isinstance(edit, Edit):
         update(body, printed, by, filters)
     elif edit is None:

@@ -94,23 +94,6 @@ def test_damaged_entry_and_unreachable_cache_are_no_mistake(course: Folder) -> N
     assert result.err.count("running scripts (1)\n") == 1, "it is made again, without a word more"
 
 
-# --- update
-
-
-def test_update_runs_again_what_is_remembered_and_differs(course: Folder) -> None:
-    """A remembered result counts as one of two runs: outputs that vary are still found."""
-    course.main("check")
-    result = course.main("update")
-    assert (result.status, "running scripts" in result.err) == (0, False)
-    assert "every recorded output is up to date" in result.out
-    lesson = "## A\n\n" + block("dice.py", "import os\nprint(os.getpid())\n", "one of many")
-    course.write(course.lesson(1), lesson)
-    assert course.main("check").status == 1
-    result = course.main("update", "1.1")
-    assert (result.status, "error[output-unstable]" in result.out) == (1, True)
-    assert course.text(course.lesson(1)) == lesson
-
-
 # --- explain
 
 

@@ -1,4 +1,4 @@
-"""`check --sensitivity`: digits that repeat, and digits that are converged; noise in `update`."""
+"""`check --sensitivity`: digits that repeat, and digits that are converged."""
 
 from __future__ import annotations
 
@@ -223,37 +223,24 @@ def test_only_the_lessons_that_are_named(make: Make) -> None:
     assert (set(by_script), by_script["noise"]) == ({"examples/a.py", "noise"}, [])
 
 
-# --- update
-
-
-def test_update_warns_of_noise_that_it_records_and_asks_only_where_it_writes(make: Make) -> None:
+def test_runs_with_moved_states_are_remembered_beside_the_others(make: Make) -> None:
     folder = make("## One\n\n" + block("a.py", DOUBLE_PENDULUM, "?") + block("b.py", FALL, "?"))
-    assert "moving initial states" not in folder.main("update", "--dry-run").err
-    result = folder.main("update")
-    assert result.status == 0
+    assert "moving initial states" not in folder.main("update").err
+    before = folder.main("explain", "examples/b.py").out
+    stages = ("moving initial states, 4 of 4", "halving timesteps")
+    result = folder.main("check", "--sensitivity")
+    assert all(stage in result.err for stage in stages)
     assert result.out.count("warning[output-noise]") == 1
     assert "`examples/a.py` prints digits that are noise" in result.out
     place = result.out[result.out.index("--> ") :].split()[1]
     line = folder.text(folder.lesson()).splitlines()[int(place.split(":")[1]) - 1]
-    assert line.startswith("t 30.0 "), "the place is that in the lesson as it is now"
-    before = folder.main("explain", "examples/b.py").out
-    folder.replace(folder.lesson(), 'print(f"x ', 'print(f"x = ')
-    result = folder.main("update")
-    assert result.status == 0
-    assert "output-noise" not in result.out
-    assert "moving initial states, 1 of 4 (1)" in result.err
-    assert "halving" not in result.err
-    result = folder.main("update")
-    assert "moving initial states" not in result.err
-    assert "every recorded output is up to date" in result.out
-    # Runs with moved states are remembered, too, and replace no other results.
-    folder.replace(folder.lesson(), 'print(f"x = ', 'print(f"x ')
-    assert folder.main("explain", "examples/b.py").out == before
-    folder.main("update", "-q")
-    stages = ("moving initial states, 4 of 4", "halving timesteps")
-    assert stages[1] in folder.main("check", "--sensitivity").err
+    assert line.startswith("t 30.0 ")
     again = folder.main("check", "--sensitivity")
     assert not any(stage in again.err for stage in stages)
     assert "of 3 numbers 3 repeat in full" in again.out
+    assert (
+        folder.main("explain", "examples/b.py").out.split("last run")[0]
+        == before.split("last run")[0]
+    )
     fresh = folder.main("check", "--sensitivity", "--no-cache")
     assert all(stage in fresh.err for stage in stages)

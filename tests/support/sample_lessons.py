@@ -146,18 +146,17 @@ def update(
     printed: str,
     comparison: Comparison = EXACT,
     filters: tuple[Filter, ...] = (),
-    repeated: str | None = None,
 ) -> Recording:
     """The recording after its update; a second update has nothing to do."""
     comparison = replace(comparison, course_filters=filters)
-    edit = update_body(lesson, comparison, printed, printed if repeated is None else repeated)
+    edit = update_body(lesson, comparison, printed)
     assert isinstance(edit, Edit), edit
     source = lesson.span.source
     text = apply_edits(source.text, [edit])
     assert text[: edit.span.start] == source.text[: edit.span.start]
     assert text[edit.span.start + len(edit.text) :] == source.text[edit.span.end :]
     (new,) = recordings(document(text, source.path))
-    assert update_body(new, comparison, printed, printed) is None
+    assert update_body(new, comparison, printed) is None
     assert compare(new, comparison, printed).status in ("verified", "volatile")
     return new
 
@@ -173,10 +172,7 @@ def body(
     return update(recording(recorded, **lesson), printed, comparison, filters).body_span.text
 
 
-def refusal_text(
-    recorded: str, printed: str, comparison: Comparison = EXACT, repeated: str | None = None
-) -> str:
-    second = printed if repeated is None else repeated
-    refusal = update_body(recording(recorded), comparison, printed, second)
+def refusal_text(recorded: str, printed: str, comparison: Comparison = EXACT) -> str:
+    refusal = update_body(recording(recorded), comparison, printed)
     assert isinstance(refusal, Diagnostic), refusal
     return describe(refusal)

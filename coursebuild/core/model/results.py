@@ -32,6 +32,8 @@ class Outcome(enum.Enum):
     """A module that it requires is missing."""
     NORUN = "norun"
     """The author said not to run it."""
+    UNRECORDED = "unrecorded"
+    """Nothing is recorded of it yet, so it was not run: there was nothing to compare with."""
 
 
 class ScriptJob(Struct, frozen=True):
@@ -170,11 +172,14 @@ class ScriptRun(Struct, frozen=True):
     """When and where a run that the course keeps was made."""
     figures: tuple[tuple[str, bytes], ...] = ()
     """The files among `ScriptJob.figures` that it drew, by name."""
+    unrepeated: bool = False
+    """Whether something else was recorded when it ran, or nothing: what is recorded from it since
+    then, no other run bears out."""
 
     @property
     def did_run(self) -> bool:
         """Whether it was run at all, so that it can bear out what is recorded."""
-        return self.outcome not in (Outcome.SKIPPED, Outcome.NORUN)
+        return self.outcome not in (Outcome.SKIPPED, Outcome.NORUN, Outcome.UNRECORDED)
 
 
 class DriftKind(enum.Enum):

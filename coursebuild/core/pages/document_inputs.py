@@ -86,14 +86,12 @@ def _quoted_lines(blocks: tuple[model.Block, ...]) -> dict[str, set[int]]:
 
 
 def _shown_run(run: ScriptRun, numbers: set[int]) -> ShownRun:
-    if run.outcome is not Outcome.OK or not numbers:
-        return ShownRun(run.outcome, run.missing, recorded=run.recorded)
     lines = run.stdout.split("\n")
     quoted_lines = (
         (n, visible(lines[n - 1].rstrip()) if 1 <= n <= len(lines) else None)
-        for n in sorted(numbers)
+        for n in (sorted(numbers) if run.outcome is Outcome.OK else ())
     )
-    return ShownRun(run.outcome, run.missing, tuple(quoted_lines), run.recorded)
+    return ShownRun(run.outcome, run.missing, tuple(quoted_lines), run.recorded, run.unrepeated)
 
 
 def address(library: Library, place: urls.Place, path: str, target: model.Target) -> str:

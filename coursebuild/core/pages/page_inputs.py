@@ -30,6 +30,8 @@ class ShownRun(Struct, frozen=True):
     """The printed lines that the page quotes, by number from 1; `None` for a missing line."""
     recorded: str = ""
     """When and where a run that the course keeps was made."""
+    unrepeated: bool = False
+    """Whether what is recorded of it was recorded from this run."""
 
 
 class ShownVerdict(Struct, frozen=True):

@@ -119,6 +119,9 @@ def figure(page: PageContext, image: Image, caption: Markup) -> Markup:
         figure=recorded,
         dark=recorded and recorded.has_dark and page.place.href(urls.dark_path(recorded.path)),
         anchor=recorded and listing_anchor(recorded.script),
+        unrepeated=recorded
+        and recorded.script in page.inputs.runs
+        and page.inputs.runs[recorded.script].unrepeated,
         data=data and page.place.href(urls.file_path(data.path)),
     )
 
@@ -200,6 +203,8 @@ def output_receipt(page: PageContext, block: Recording) -> Receipt:
             text = words("receipt.verified", **versions)
             if run is not None and run.recorded:
                 text = words("receipt.once", when=run.recorded)
+            if run is not None and run.unrepeated:
+                return Receipt("unverified", words("receipt.unrepeated", **versions))
             return Receipt("verified", f"{text} {_describe_comparison(words, verdict.comparison)}.")
         case "volatile":
             return Receipt("volatile", words("receipt.volatile", **versions))

@@ -30,8 +30,6 @@ VERSION = "6"
 _MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)
 _PERTURBATION = "moved states"
 """Change it when the results of such runs mean something else: they then run again."""
-_MAX_MODULES = 6
-"""The most modules of a list that are shown."""
 _VOLATILE_FOLDERS = ("/proc/", "/sys/", "/dev/")
 
 
@@ -185,6 +183,8 @@ def reason_forgotten(run: ScriptRun) -> str:
             return f"it needs {', '.join(run.missing)}"
         case Outcome.NORUN:
             return "its lesson says `norun`"
+        case Outcome.UNRECORDED:
+            return "nothing is recorded of it"
         case Outcome.FAILED if _MISSING_MODULE.search(run.stderr):
             return "it did not find a module"
         case Outcome.OK | Outcome.FAILED | Outcome.OUTPUT_LIMIT | Outcome.ENCODING:
@@ -272,21 +272,19 @@ def _list(items: tuple[str, ...]) -> str:
     return " ".join(items) or "none"
 
 
+def is_there(dependency: Dependency) -> bool:
+    """Whether a script found what it looked for; what was not there matters only when it comes."""
+    return dependency.kind is not Kind.SOUGHT and dependency.state not in (ABSENT, "")
+
+
 def describe(dependency: Dependency) -> str:
-    """A dependency as a line of a list."""
+    """A dependency that is there, as a line of a list."""
     match dependency.kind:
-        case Kind.FILE | Kind.OUTSIDE:
-            return dependency.name + (" (not there)" if dependency.state == ABSENT else "")
+        case Kind.FILE | Kind.OUTSIDE | Kind.SOUGHT:
+            return dependency.name
         case Kind.LISTING:
             return f"the list of files in {dependency.name or '.'}"
-        case Kind.SOUGHT:
-            folder, modules = parse_sought(dependency.name)
-            names = ", ".join(modules[:_MAX_MODULES])
-            rest = f" and {len(modules) - _MAX_MODULES} more" if len(modules) > _MAX_MODULES else ""
-            return f"no file of {folder or 'the course'} has the name of a module ({names}{rest})"
         case Kind.MODULE:
-            if not dependency.state:
-                return f"the module {dependency.name} (not installed)"
             if dependency.state.startswith("files "):
                 return f"the files of the module {dependency.name}"
             return dependency.state

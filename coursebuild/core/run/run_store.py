@@ -130,6 +130,8 @@ class RunStore:
         self.states = States(root, store, interpreter)
         self.differing_runs: list[tuple[ScriptRun, ScriptRun]] = []
         """The remembered and the new run of scripts that differ though nothing changed."""
+        self.edited_paths: set[str] = set()
+        """The scripts that ran with another text than before."""
         self._clock = Clock(store)
         self._started: dict[str, int] = {}
 
@@ -225,18 +227,23 @@ class RunStore:
         states = self.states
         dependencies = dependencies_of(run, inputs.requires, states.places, states.now)
         reason = reason_forgotten(run) or self._reason_disturbed(inputs, dependencies)
-        record = record_of(inputs, dependencies, int(time.time()), reason, run)
-        if not reason:
+        varies = ""
+        for before in self.records(inputs) if self.fresh and not reason else ():
+            if before.dependencies == dependencies:
+                old = before.restore(states.places)
+                is_same = old.outcome == run.outcome and old.status == run.status
+                if not is_same or old.stdout != run.stdout:
+                    self.differing_runs.append((old, run))
+                    if run.unrepeated:  # else the lesson says what varies
+                        varies = "two runs of it did not do the same"
+        record = record_of(inputs, dependencies, int(time.time()), reason or varies, run)
+        if not reason:  # one that varies takes the place of the one that is kept
             assert run.outcome in STORABLE_OUTCOMES
-            if self.fresh:
-                for before in self.records(inputs):
-                    if before.dependencies == dependencies:
-                        old = before.restore(states.places)
-                        is_same = old.outcome == run.outcome and old.status == run.status
-                        if not is_same or old.stdout != run.stdout:
-                            self.differing_runs.append((old, run))
             key = f"{group_key(inputs)}/{result_key(dependencies)}"
             self.store.put(_RESULTS, key, to_bytes(record, self.states.places), shared=True)
+        last = self.last_record(inputs.path)
+        if last is not None and last.inputs.text != inputs.text:
+            self.edited_paths.add(inputs.path)
         self._note(record)
 
     def _reason_disturbed(self, inputs: Inputs, dependencies: Iterable[Dependency]) -> str:

@@ -58,13 +58,15 @@ from coursebuild.core.scripts.numbers import Number, difference
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
 
-_FAILED_OUTCOMES = (
+_SILENT_OUTCOMES = (
     Outcome.FAILED,
     Outcome.TIMEOUT,
     Outcome.KILLED,
     Outcome.OUTPUT_LIMIT,
     Outcome.ENCODING,
+    Outcome.UNRECORDED,
 )
+"""Those that are reported by themselves, so that no more is said of numbers bound to them."""
 
 
 class BindingKey(Struct, frozen=True):
@@ -198,7 +200,7 @@ def _check(
     run = outputs.runs.get(path)
     ran_well = run is not None and run.outcome is Outcome.OK
     if run is not None and (
-        run.outcome in _FAILED_OUTCOMES or (verdicts and ran_well and not run.stdout.strip())
+        run.outcome in _SILENT_OUTCOMES or (verdicts and ran_well and not run.stdout.strip())
     ):
         return ()
     if not verdicts and not ran_well:

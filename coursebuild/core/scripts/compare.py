@@ -23,6 +23,7 @@ runs in the other one agree.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Literal, TypeAlias
@@ -45,7 +46,8 @@ from coursebuild.core.scripts.diff import find_differences, number_change, quote
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.tables import compare_table
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.scripts.varying import varying_times
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 
@@ -225,13 +227,30 @@ def instability_diagnostic(
     ]
     if (rest := len(different_steps) - _MAX_NOTES) > 0:
         notes.append(Note(f"and {rest} more {'line' if rest == 1 else 'lines'}"))
+    help, edits = (_TABLE_HELP if isinstance(recording.body, Table) else _HELP), []
+    if isinstance(recording.body, Excerpt) and (
+        pattern := varying_times(first, second, comparison)
+    ):
+        help = f'a time varies: say `volatile="{pattern}"` on the fence'
+        edits = [_make_volatile(recording, pattern)]
     return diagnose(
         "output-unstable",
         recording.caption_span,
         "two runs of the script printed different lines",
-        help=_TABLE_HELP if isinstance(recording.body, Table) else _HELP,
+        help=help,
         notes=notes,
+        edits=edits,
     )
+
+
+def _make_volatile(recording: Recording, pattern: str) -> Edit:
+    """The edit that says on a fence what varies, in the place of what it says so far."""
+    source, end = recording.body_span.source, recording.body_span.start - 1
+    start = source.line_starts[source.position(end)[0] - 1]
+    line = source.text[start:end].rstrip()
+    key = re.search(r'\svolatile="[^"]*"', line)
+    place = key.span() if key else (len(line), len(line))
+    return Edit(source.span(start + place[0], start + place[1]), f' volatile="{pattern}"')
 
 
 _REPEAT_HELP = "make the script print the same each time (a fixed seed, no clock)"

@@ -3,13 +3,13 @@
 Entry points: `update_body` (one recorded output), `adopt_file` (an extracted file that was edited),
 `apply_edits`.
 
-1. A recording that matches both of two runs stays as it is. A volatile one takes the text of the
-   first run if that differs in more than its numbers.
-2. The new lines of a fence are those of the first run. Lines with `...`, and lines that match only
-   after a filter, stay as the author wrote them. Line ends and what stands before each line (`> `,
+1. A recording that matches the run stays as it is. A volatile one takes the text of the run if
+   that differs in more than its numbers.
+2. The new lines of a fence are those of the run. Lines with `...`, and lines that match only after
+   a filter, stay as the author wrote them. Line ends and what stands before each line (`> `,
    indentation) are those of the lesson.
-3. The new text is compared with both runs: an output that differs from run to run, or that the
-   lesson's text cannot hold, is refused with the reason.
+3. The new text is compared with the run: an output that the lesson's text cannot hold is refused
+   with the reason.
 
 A table is brought up to date number by number. Where a row fits a line except for its numbers,
 these are replaced in place; a U+2212 minus stays.
@@ -45,7 +45,6 @@ from coursebuild.core.model import (
     find_blocks,
 )
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
-from coursebuild.core.scripts.compare import instability_diagnostic
 from coursebuild.core.scripts.failures import without_indentation
 from coursebuild.core.scripts.lines import (
     ELLIPSIS,
@@ -81,38 +80,29 @@ def apply_edits(text: str, edits: Iterable[Edit]) -> str:
 
 
 def update_body(
-    recording: Recording,
-    comparison: Comparison,
-    first: str,
-    second: str,
+    recording: Recording, comparison: Comparison, stdout: str
 ) -> Edit | Diagnostic | None:
-    """What to write into a recording whose script printed `first` and then, run again, `second`.
+    """What to write into a recording whose script printed this.
 
     `None` where it matches already; a diagnostic where it cannot be brought up to date.
     """
-    if not first.strip():
+    if not stdout.strip():
         return refusal(recording.caption_span, "the script printed nothing to record", "")
     if isinstance(recording.body, Table):
-        return _update_table(recording, recording.body, comparison, first, second)
+        return _update_table(recording.body, comparison, stdout)
     body, filters = recording.body, comparison.filters
     if comparison.mode is Mode.VOLATILE:
-        before, now = Side.of(body.text).lines, Side.of(first).lines
+        before, now = Side.of(body.text).lines, Side.of(stdout).lines
         alike = LineMatcher(comparison).alike
         if len(before) == len(now) and all(map(alike, before, now)):
             return None
         return _fence_edit(recording, now)
-    recorded, printed, repeated = (Side.of(text, filters) for text in (body.text, first, second))
-    lines: list[str] | Diagnostic
+    recorded, printed = (Side.of(text, filters) for text in (body.text, stdout))
     if same_lines(recorded, printed, comparison):
-        if same_lines(recorded, repeated, comparison):
-            return None
-        return instability_diagnostic(recording, recorded, repeated, comparison)
+        return None
     lines = _new_lines(body, recorded, printed, comparison)
     if isinstance(lines, Diagnostic):
         return lines
-    new = Side.of("\n".join(lines), filters)
-    if not same_lines(new, repeated, comparison):
-        return instability_diagnostic(recording, new, repeated, comparison)
     return _fence_edit(recording, lines)
 
 
@@ -293,16 +283,10 @@ MINUS = "\u2212"
 _BY_HAND = "bring the row up to date by hand"
 
 
-def _update_table(
-    recording: Recording,
-    table: Table,
-    comparison: Comparison,
-    first: str,
-    second: str,
-) -> Edit | Diagnostic | None:
+def _update_table(table: Table, comparison: Comparison, stdout: str) -> Edit | Diagnostic | None:
     """What to write into a recorded table; see `edit.update_body`."""
     filters = comparison.filters
-    printed, repeated = Side.of(first, filters), Side.of(second, filters)
+    printed = Side.of(stdout, filters)
     if comparison.mode is Mode.VOLATILE:
         comparison = Comparison()
     matches = TableMatcher(table_rows(table, filters), printed, comparison).match()
@@ -318,8 +302,6 @@ def _update_table(
     if TableMatcher(rows, printed, comparison).find_matching_lines() is None:
         span = table.span if not edits else edits[0].span
         return _refuse(span, "the table cannot be made to match what the script prints")
-    if TableMatcher(rows, repeated, comparison).find_matching_lines() is None:
-        return instability_diagnostic(recording, printed, repeated, comparison)
     return _join_edits(edits) if edits else None
 
 

@@ -17,9 +17,11 @@ from __future__ import annotations
 import posixpath
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TypeAlias, assert_never
+
+import msgspec
 
 from coursebuild.core.model import Recording
 from coursebuild.core.model.results import Divergence, Effect, EffectKind, Outcome, ScriptRun, Sign
@@ -44,9 +46,10 @@ _FIRST_SIGNALS = "HUP INT QUIT ILL TRAP ABRT BUS FPE KILL USR1 SEGV USR2 PIPE AL
 _SIGNALS = dict(enumerate(_FIRST_SIGNALS.split(), 1)) | {24: "XCPU", 25: "XFSZ", 31: "SYS"}
 """As Linux numbers them (signal(7))."""
 
+_MISSING_MODULE = re.compile(r"ModuleNotFoundError: No module named '(\w+)")
 _HELPS = (
     (
-        re.compile(r"ModuleNotFoundError: No module named '(\w+)"),
+        _MISSING_MODULE,
         r"install `\1`, or say `requires=\1` on its fence, to skip it where `\1` is missing",
     ),
     (
@@ -71,6 +74,8 @@ _LABEL = 120
 
 Scripts: TypeAlias = Mapping[str, Extraction]
 """All scripts of a course, by path."""
+FindModule: TypeAlias = Callable[[str], str]
+"""From the name of a module to its file in the course, or to an empty text."""
 
 
 def _find_line(match: re.Match[str], scripts: Scripts) -> tuple[Extraction, Span] | None:
@@ -110,9 +115,15 @@ def without_indentation(span: Span) -> Span:
 
 
 def failure_diagnostic(
-    extraction: Extraction, run: ScriptRun, scripts: Scripts
+    extraction: Extraction,
+    run: ScriptRun,
+    scripts: Scripts,
+    find_module: FindModule = lambda _: "",
 ) -> Diagnostic | None:
-    """What is wrong with a run; `None` where it ended well or the script was not run."""
+    """What is wrong with a run; `None` where it ended well or the script was not run.
+
+    `find_module` knows the files of modules in folders that scripts do not import from.
+    """
     wording = _failure_wording(extraction, run)
     if wording is None:
         return None
@@ -130,6 +141,13 @@ def failure_diagnostic(
         label = shorten(error, _LABEL)
         matches = ((pattern.match(error), advice) for pattern, advice in _HELPS)
         help = next((match.expand(advice) for match, advice in matches if match), "")
+        missing = _MISSING_MODULE.search(error)
+        file = find_module(missing[1]) if missing else ""
+        folder = file.removesuffix("/__init__.py").rpartition("/")[0] or "."
+        if file and folder not in extraction.packages:
+            packages = [*extraction.packages, folder]
+            line = f"packages = {msgspec.json.encode(packages).decode()}".replace(",", ", ")
+            help = f"`{file}` is there: add `{line}` to `[course]` in the map"
     notes = _stderr_notes(run.outcome, _name_lesson_lines(stderr, scripts))
     if source.path != extraction.path:
         notes.insert(0, Note(f"`{extraction.path}` was running", fence))
@@ -140,7 +158,7 @@ def _failure_wording(extraction: Extraction, run: ScriptRun) -> tuple[str, str, 
     """The rule, the message and the help for a failed run; `None` for any other."""
     path = f"`{extraction.path}`"
     match run.outcome:
-        case Outcome.OK | Outcome.SKIPPED | Outcome.NORUN:
+        case Outcome.OK | Outcome.SKIPPED | Outcome.NORUN | Outcome.UNRECORDED:
             return None
         case Outcome.FAILED:
             return "script-failed", f"{path} exited with status {run.status}", ""

@@ -60,7 +60,8 @@ def figure_findings(
     course: Course, runs: Sequence[ScriptRun], read: ReadFile
 ) -> Iterator[Diagnostic]:
     """What is wrong with the figures of the scripts that ran."""
-    by_path = {run.path: run for run in runs if run.outcome is Outcome.OK}
+    outcomes = (Outcome.OK, Outcome.UNRECORDED)
+    by_path = {run.path: run for run in runs if run.outcome in outcomes}
     for owner, document in course.owned_documents:
         for figure in unshown_figures(document):
             message = f"no paragraph below shows `{figure.name}`"
@@ -72,19 +73,20 @@ def figure_findings(
         for recorded in recorded_figures(document):
             run = by_path.get(recorded.script)
             if run is not None and not run.recorded:  # a run that the course keeps drew nothing now
-                yield from _compare_figure(recorded, run, read(recorded.path), owner.id)
+                yield from compare_figure(recorded, run, read(recorded.path), owner.id)
 
 
-def _compare_figure(
-    figure: RecordedFigure, run: ScriptRun, recorded: bytes | None, owner: str
+def compare_figure(
+    figure: RecordedFigure, run: ScriptRun, recorded: bytes | None, owner: str = ""
 ) -> Iterator[Diagnostic]:
+    """What is wrong with a figure of a run, given the file that is recorded."""
     data = dict(run.figures).get(figure.name)
-    if data is None:
+    if data is None and run.outcome is Outcome.OK:
         message = f"`{run.path}` does not draw `{figure.name}`"
         help = f'save it under this name, as in `plt.savefig("{figure.name}")`'
         yield diagnose("figure-missing", figure.span, message, help=help)
         return
-    figure_file = prepare_figure(figure.name, data)
+    figure_file = b"" if data is None else prepare_figure(figure.name, data)
     if isinstance(figure_file, str):
         help = SVG_HELP if figure_file.startswith("holds") else ""
         message = f"`{figure.name}` {figure_file}"

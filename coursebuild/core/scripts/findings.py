@@ -29,6 +29,7 @@ from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import (
+    FindModule,
     divergence_diagnostics,
     effect_diagnostics,
     failure_diagnostic,
@@ -51,8 +52,9 @@ def script_findings(
     verdicts: Sequence[Verdict],
     evidence: BindingEvidence | None = None,
     all_extractions: Sequence[Extraction] | None = None,
-    repeated_runs: Mapping[str, ScriptRun] | None = None,
+    other_runs: Mapping[str, ScriptRun] | None = None,
     broken: Collection[str] = (),
+    find_module: FindModule = lambda _: "",
 ) -> tuple[Diagnostic, ...]:
     """The diagnostics of the scripts that were run, and of all that depends on them.
 
@@ -63,9 +65,10 @@ def script_findings(
         verdicts: their output compared with the recorded one.
         evidence: see `check_bindings`.
         all_extractions: all scripts of the course, if known.
-        repeated_runs: second runs, by path, of scripts whose output has drifted.
+        other_runs: earlier runs of the same scripts, by path, where there are any.
         broken: files of models that do not compile; a script that reads one is not reported, since
             its failure is nothing new.
+        find_module: see `failure_diagnostic`.
     """
     by_path = {run.path: run for run in runs}
     scripts = {e.path: e for e in all_extractions or extract(course).value}
@@ -73,14 +76,14 @@ def script_findings(
     for extraction in extractions:
         run = by_path.get(extraction.path)
         if run is not None and not (run.trace and {*run.trace.files}.intersection(broken)):
-            diagnostic = failure_diagnostic(extraction, run, scripts)
+            diagnostic = failure_diagnostic(extraction, run, scripts, find_module)
             diagnostics += [] if diagnostic is None else [diagnostic]
             diagnostics += divergence_diagnostics(extraction, run, scripts)
             diagnostics += effect_diagnostics(extraction, run, scripts)
     outputs = PrintedOutputs(verdicts, runs, scripts)
     return (
         *diagnostics,
-        *output_findings(course, course.owned_documents, outputs, evidence, repeated_runs),
+        *output_findings(course, course.owned_documents, outputs, evidence, other_runs),
     )
 
 
@@ -89,7 +92,7 @@ def output_findings(
     documents: Iterable[tuple[Owner, Document]],
     outputs: PrintedOutputs,
     evidence: BindingEvidence | None = None,
-    repeated_runs: Mapping[str, ScriptRun] | None = None,
+    other_runs: Mapping[str, ScriptRun] | None = None,
 ) -> Iterator[Diagnostic]:
     """What is wrong with the recorded outputs and bound numbers of some documents.
 
@@ -101,10 +104,13 @@ def output_findings(
             run = outputs.runs.get(recording.script or "")
             if run is not None and run.outcome is Outcome.OK and not run.stdout.strip():
                 yield silence_diagnostic(recording, run.path)
+            elif run is not None and run.outcome is Outcome.UNRECORDED:
+                yield drift_diagnostic(verdict, owner.id)
+            elif unstable_output := find_instability(verdict, run, other_runs or {}):
+                yield unstable_output
             elif verdict.status == "drift":
                 dependents = dependent_bindings(verdict, course.documents, outputs)
-                unstable_output = _find_instability(verdict, run, repeated_runs or {})
-                yield unstable_output or drift_diagnostic(verdict, owner.id, dependents)
+                yield drift_diagnostic(verdict, owner.id, dependents)
         yield from check_bindings(document, outputs, evidence)
         yield from _find_unmarked(course, document, outputs.runs)
 
@@ -175,18 +181,18 @@ def _unmarked_diagnostic(block: CodeBlock | Table, path: str, word: str) -> Diag
 _FENCE_HEAD = re.compile(r"(`{3,}|~{3,})[ \t]*[^\s`]*")
 
 
-def _find_instability(
-    verdict: Verdict, first: ScriptRun | None, repeated_runs: Mapping[str, ScriptRun]
+def find_instability(
+    verdict: Verdict, run: ScriptRun | None, other_runs: Mapping[str, ScriptRun]
 ) -> Diagnostic | None:
-    """A diagnostic if two runs are known to print different outputs."""
+    """A diagnostic if an earlier run is known to have printed another output."""
     recording, comparison = verdict.recording, verdict.comparison
-    second = repeated_runs.get(recording.script or "")
-    if first is None or second is None or second.outcome is not Outcome.OK:
+    earlier_run = other_runs.get(recording.script or "")
+    if run is None or earlier_run is None or {run.outcome, earlier_run.outcome} != {Outcome.OK}:
         return None
-    changes = compare(recording, comparison, second.stdout).changes
+    changes = compare(recording, comparison, earlier_run.stdout).changes
     if [(c.span, c.printed) for c in changes] == [(c.span, c.printed) for c in verdict.changes]:
         return None
-    before, now = (Side.of(run.stdout, comparison.filters) for run in (first, second))
+    before, now = (Side.of(r.stdout, comparison.filters) for r in (earlier_run, run))
     return instability_diagnostic(recording, before, now, comparison)
 
 

@@ -190,6 +190,7 @@ _SUMMARIES = {
     "1e-12.",
     "output-unstable": "Two runs of a script print different lines, so that there is nothing to "
     "record.",
+    "output-unrepeated": "An output is recorded from the only run of its script.",
     "output-not-updatable": "A recorded output cannot be updated automatically.",
     # models and MJCF
     "model-error": "A model in models/ does not compile.",

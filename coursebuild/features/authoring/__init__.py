@@ -1,7 +1,7 @@
 """Commands that begin a course and change it.
 
 - `init`: writes a small complete course, from the files in `course/`
-- `new`: adds a lesson or a feature, with its entry in the map (`course_map`), a model, a template
+- `new`: adds a lesson, level, page or feature to the map (`course_map`), a model, a template
 - `rename`: gives a lesson another id, wherever the course names it (`references`)
 - `fmt`: formats lessons (`format`, with `layout`)
 - `doctor`: checks which of the things that courses need work here
@@ -11,7 +11,7 @@ from coursebuild.core.features import Command, Feature
 
 _SUMMARIES = {
     "init": "make a small complete course to begin with",
-    "new": "add a lesson, a model, a template or a feature",
+    "new": "add a lesson, a level, a page, a model, a template or a feature",
     "rename": "give a lesson another id, wherever the course names it",
     "fmt": "format lessons and pages",
     "doctor": "say what works on this machine, and how to mend what does not",

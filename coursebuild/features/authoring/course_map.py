@@ -1,6 +1,7 @@
-"""Edits of the course map: a lesson is added or renamed, or a feature added; and of what names it.
+"""Edits of the course map: what is added, a lesson that is renamed; and of what names it.
 
-Entry points: `with_lesson`, `with_lesson_renamed`, `with_feature`; each returns the new text.
+Entry points: `with_lesson`, `with_level`, `with_page`, `with_feature`, `with_lesson_renamed`; each
+returns the new text.
 `rename_references`, the edits of the places that name a lesson; `doubtful_places`, which may mean
 it but are no links: in code, in a comment, in a range such as "Lessons 1.3 to 1.5".
 
@@ -46,17 +47,63 @@ def with_lesson(course: Course, id: str, slug: str, title: str) -> str:
         UsageError: the map cannot have it.
     """
     _check_free(course, id)
-    fields = {"id": id, "slug": slug, "title": title, "status": "draft"}
-    rows = (f"{name} = {toml_string(value)}" for name, value in fields.items())
-    lines = ["[[level.lesson]]", *rows]
+    lines = _table("level.lesson", id=id, slug=slug, title=title, status="draft")
     return _require_valid(course, _insert(course, id, lines), id)
 
 
-def next_id(course: Course) -> str:
-    """The first free id in the last level of a course."""
-    level = course.levels[-1].id if course.levels else "1"
+def with_level(course: Course, id: str, title: str) -> str:
+    """Return the map with a level added, before those whose ids come later.
+
+    Raises:
+        UsageError: the map cannot have it.
+    """
+    later = [level.span for level in course.levels if id_order(level.id) > id_order(id)]
+    text = _insert_table(course.map.text, _table("level", id=id, title=title), later)
+    return _require_valid(course, text, id, "level")
+
+
+def with_page(course: Course, id: str, title: str, path: str) -> str:
+    """Return the map with a page added, behind the others if these stand before the levels.
+
+    Raises:
+        UsageError: the map cannot have it.
+    """
+    spans = [level.span for level in course.levels]
+    is_last = bool(course.pages and spans and course.pages[-1].span.start > spans[-1].start)
+    later = [] if is_last else spans
+    text = _insert_table(course.map.text, _table("page", id=id, title=title, file=path), later)
+    return _require_valid(course, text, id, "page")
+
+
+def _table(kind: str, **fields: str) -> list[str]:
+    """Return the lines of a table."""
+    return [f"[[{kind}]]", *(f"{name} = {toml_string(value)}" for name, value in fields.items())]
+
+
+def _insert_table(text: str, lines: Sequence[str], later: Sequence[Span]) -> str:
+    """Return the map with a table inserted before the first of others, or at its end."""
+    line_end = _line_end(text)
+    if not later:
+        return line_end.join([text.rstrip(), "", *lines, ""])
+    comments = _COMMENTS_ABOVE.search(text, 0, later[0].start)
+    assert comments is not None
+    start = comments.start()
+    return text[:start] + line_end.join([*lines, "", ""]) + text[start:]
+
+
+def next_lesson_ids(course: Course) -> list[str]:
+    """The first free id in each level of a course."""
     ids = {lesson.id for lesson in course.lessons}
-    return next(id for number in count(1) if (id := f"{level}.{number}") not in ids)
+    return [
+        next(id for number in count(1) if (id := f"{level.id}.{number}") not in ids)
+        for level in course.levels
+    ]
+
+
+def next_level_id(course: Course) -> str:
+    """The number behind those of the levels of a course."""
+    numbers = [int(level.id) for level in course.levels if level.id.isdecimal()]
+    return str(max(numbers, default=0) + 1)
 
 
 def with_lesson_renamed(course: Course, old: Lesson, new: str, edits: Sequence[Edit]) -> str:
@@ -123,7 +170,10 @@ def with_feature(course: Course, path: str) -> str:
 def _check_free(course: Course, id: str) -> None:
     levels = [level.id for level in course.levels]
     if _level_id(id) not in levels:
-        help = f"add it as a [[level]]; {did_you_mean('', levels)}".rstrip("; ")
+        help = did_you_mean("", levels)
+        if re.fullmatch(r"[\w-]+", _level_id(id)):
+            command = f"`coursebuild new level {_level_id(id)} TITLE`"
+            help = f"{command} adds it; {help}".rstrip("; ")
         raise UsageError(f"the map has no level for `{id}`", help=help)
     for lesson in course.lessons:
         if lesson.id.casefold() == id.casefold():
@@ -149,15 +199,20 @@ def _insert(course: Course, id: str, lines: Sequence[str]) -> str:
     return text[:start] + entry + text[start:]
 
 
-def _require_valid(course: Course, text: str, id: str) -> str:
-    """Return the text of a map if it has this lesson and no more mistakes than before."""
+def _require_valid(course: Course, text: str, id: str, kind: str = "lesson") -> str:
+    """Return the text of a map if it has what was added, and no more mistakes than before."""
     old_mistakes = {(d.rule, d.message) for d in parse_course_map(course.map).diagnostics}
     new_map = parse_course_map(Source(course.map.path, text))
     mistakes = [d for d in new_map.diagnostics if (d.rule, d.message) not in old_mistakes]
-    lesson = None if new_map.value is None else _find_lesson(new_map.value, id)
-    if mistakes or lesson is None or lesson.level != _level_id(id):
+    new_course = new_map.value or course
+    ids = {
+        "lesson": [lesson.id for lesson in new_course.lessons if lesson.level == _level_id(id)],
+        "level": [level.id for level in new_course.levels],
+        "page": [page.id for page in new_course.pages],
+    }
+    if mistakes or id not in ids[kind]:
         reason = f": {mistakes[0].message}" if mistakes else ""
-        raise UsageError(f"{course.map.path} cannot have a lesson {id}{reason}")
+        raise UsageError(f"{course.map.path} cannot have a {kind} {id}{reason}")
     return text
 
 

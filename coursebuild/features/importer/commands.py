@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from coursebuild.cli.arguments import add_running, add_sandbox, available_cores, print_report
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.write import FileChange, undo_changes
-from coursebuild.core.model import Recording, Script
+from coursebuild.core.model import Course, Recording, Script
 from coursebuild.core.model.results import Change, Outcome, ScriptRun, Sign
 from coursebuild.core.pages.marks import fence
 from coursebuild.core.run.sandbox import find_sandbox
@@ -119,7 +119,7 @@ def _try_scripts(options: Options, notebook_outputs: Mapping[str, str]) -> tuple
     edits: dict[Source, list[Edit]] = {}
     remarks = []
     scripts = extract_scripts(course, options).runnable
-    for extraction, script_run in _run_scripts(scripts, options):
+    for extraction, script_run in _run_scripts(course, scripts, options):
         script = extraction.script
         changes = edits.setdefault(script.span.source, [])
         keys = " ".join(_missing_keys(script, script_run))
@@ -135,7 +135,7 @@ def _try_scripts(options: Options, notebook_outputs: Mapping[str, str]) -> tuple
                 verdict = compare(recording, comparison, script_run.stdout)
                 if not _is_blank(recording) and (notebook is None or not verdict.changes):
                     continue
-                edit = update_body(recording, comparison, script_run.stdout, script_run.stdout)
+                edit = update_body(recording, comparison, script_run.stdout)
                 if isinstance(edit, Edit):
                     changes.append(edit)
                     if not _is_blank(recording):
@@ -154,13 +154,15 @@ def _try_scripts(options: Options, notebook_outputs: Mapping[str, str]) -> tuple
 
 
 def _run_scripts(
-    scripts: Sequence[Extraction], options: Options
+    course: Course, scripts: Sequence[Extraction], options: Options
 ) -> list[tuple[Extraction, ScriptRun]]:
     """Run the scripts, those that took too long once more with more time."""
-    runs = list(zip(scripts, run_scripts(scripts, options), strict=True))
+    runs = list(zip(scripts, run_scripts(course, scripts, options), strict=True))
     slow = [extraction for extraction, run in runs if run.outcome is Outcome.TIMEOUT]
     retried = [replace(e, script=replace(e.script, timeout=_LONG_TIMEOUT)) for e in slow]
-    reruns = {run.path: run for run in run_scripts(retried, options, "running slow scripts")}
+    reruns = {
+        run.path: run for run in run_scripts(course, retried, options, "running slow scripts")
+    }
     return [(extraction, reruns.get(extraction.path, run)) for extraction, run in runs]
 
 

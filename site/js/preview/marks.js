@@ -67,7 +67,7 @@ export class Marks {
     box.append(
       h('p', { class: 'preview-legend' }, `${this.say('output.differs')} `, sign('-'), ` ${this.say('output.recorded')} `, sign('+'), ` ${this.say('output.run')}`),
       diff(run.rows),
-      this.makeFoot(run, 'output', this.say('output.again')),
+      this.makeFoot(run, 'output'),
     )
     element.classList.add('preview-known', 'preview-drifted')
     element.append(box)
@@ -84,7 +84,7 @@ export class Marks {
     box.append(
       h('p', { class: 'preview-legend' }, this.say('figure.differs', { reason: figure.differs })),
       h('div', { class: 'preview-drawings' }, ...drawings),
-      this.makeFoot(figure, 'figure', ''),
+      this.makeFoot(figure, 'figure'),
     )
     element.classList.add('preview-drifted')
     element.prepend(box)
@@ -93,7 +93,7 @@ export class Marks {
 
   markData(element, figure) {
     const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': this.say('data.label') })
-    box.append(h('p', { class: 'preview-legend' }, this.say('data.differs', { reason: figure.differs })), this.makeFoot(figure, 'data', ''))
+    box.append(h('p', { class: 'preview-legend' }, this.say('data.differs', { reason: figure.differs })), this.makeFoot(figure, 'data'))
     element.append(box)
     return [box]
   }
@@ -101,18 +101,17 @@ export class Marks {
   markNumber(element, number) {
     const box = h('span', { class: 'preview-number', role: 'group', 'aria-label': this.say('number.label') })
     const better = number.better ? [h('ins', { class: 'preview-better' }, number.better), ' '] : []
-    box.append(' ', ...better, h('span', { class: 'preview-why' }, number.label || number.message), ' ', this.makeFoot(number, 'number', ''))
+    box.append(' ', ...better, h('span', { class: 'preview-why' }, number.label || number.message), ' ', this.makeFoot(number, 'number'))
     element.classList.add('preview-wrong')
     element.after(box)
     return [box]
   }
 
   /** The button that accepts a change, or the reason why there is none. */
-  makeFoot({ offer, refused }, kind, note) {
+  makeFoot({ offer, refused }, kind) {
     const foot = h('span', { class: 'preview-foot' })
     if (!offer) {
-      const text = refused ? this.say('refused', { reason: refused }) : note
-      if (text) foot.append(h('span', { class: 'preview-why' }, text))
+      if (refused) foot.append(h('span', { class: 'preview-why' }, this.say('refused', { reason: refused })))
       return foot
     }
     const answer = h('span', { class: 'preview-why', role: 'status' })

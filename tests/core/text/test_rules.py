@@ -177,6 +177,10 @@ def run_case(case: Case, root: Path, workshop: Workshop) -> tuple[Diagnostic, ..
     match command_of(case):
         case "check":
             return check(options).diagnostics
+        case "check --strict":
+            return check(replace(options, strict=True)).diagnostics
+        case "check --sensitivity":
+            return check(options, sensitivity=True).diagnostics
         case "check --truth":
             return check(options, truth=True).diagnostics
         case "check --no-cache":

@@ -16,7 +16,7 @@ from support.scratch_course import Folder
 pytestmark = pytest.mark.site
 
 REPORT = """\
-wrote 13 files to {0}
+wrote 15 files to {0}, in a new Git repository
 
   coursebuild -C {1} serve    look at the course, and write
   coursebuild -C {1} build    verify it, and write the site to public/
@@ -65,6 +65,8 @@ def test_new_course_has_what_git_and_an_editor_need(tmp_path: Path) -> None:
 def test_new_course_names_its_packages_with_hashes(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     assert folder.main("init").status == 0
+    assert f"coursebuild=={__version__} -r requirements.txt" in folder.text("README.md")
+    assert folder.text("requirements.txt").count("\n#") == 2, "nothing but a comment so far"
     text = folder.text(".github/requirements.txt")
     requirements = re.split(r"(?m)^(?=[\w.-]+==)", text)[1:]
     assert len(requirements) > 30
@@ -101,4 +103,22 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     folder.write("kept/README.md", "# Mine\n")
     assert folder.main("-C", "kept", "init").status == 0
     assert folder.text("kept/README.md") == "# Mine\n"
+    folder.write("listed/requirements.txt", "pandas\n")
+    assert folder.main("init", "listed").status == 0
+    assert folder.text("listed/requirements.txt") == "pandas\n"
     assert folder.main("init", "kept").status == 2
+
+
+def test_new_course_is_a_repository_unless_it_lies_in_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = Folder(tmp_path)
+    monkeypatch.setenv("GIT_DIR", str(tmp_path / "elsewhere"))
+    assert "in a new Git repository\n" in folder.main("init", "course").out
+    assert folder.text("course/.git/HEAD") == "ref: refs/heads/main\n"
+    assert not (tmp_path / "elsewhere").exists()
+    assert "Git" not in folder.main("init", "course/part").out
+    assert not (tmp_path / "course/part/.git").exists()
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert folder.main("init", "without").out.startswith("wrote 15 files to without\n")
+    assert not (tmp_path / "without/.git").exists()

@@ -79,8 +79,21 @@ def test_new_lesson_is_checked_and_built_as_it_is(make: Make) -> None:
 
 REFUSED_COMMANDS = [
     ("lesson 1.1 T", "there is a lesson 1.1 already: Lesson one"),
-    ("lesson 7.1 T", "the map has no level for `7.1`; add it as a [[level]]; known: `1`"),
-    ("lesson ../x T", "the map has no level for `../x`; add it as a [[level]]; known: `1`"),
+    (
+        "lesson 7.1 T",
+        "the map has no level for `7.1`; `coursebuild new level 7 TITLE` adds it; known: `1`",
+    ),
+    ("lesson ../x T", "the map has no level for `../x`; known: `1`"),
+    ("lesson 1.9", "lesson 1.9 needs a title; it comes behind the id"),
+    ("lesson Fall", "the id comes first: `coursebuild new lesson 1.2 Fall`"),
+    ("level 2", "a level needs an id and a title; it comes behind the id"),
+    ("level 1", "the id comes first: `coursebuild new level 2 1`"),
+    ("level Two!", "the id comes first: `coursebuild new level 2 'Two!'`"),
+    ("level 1 T", f"{MAP} cannot have a level 1: the level id `1` is used twice"),
+    ("level a/b T", f"{MAP} cannot have a level a/b: "),
+    ("page There --id A/b", f"{MAP} cannot have a page A/b: "),
+    ("page There", "there is a file content/pages/there.md already"),
+    ("page \udcff", "the title is not UTF-8"),
     ("lesson 1 T", f"{MAP} cannot have a lesson 1: "),
     ("lesson 1./../x T", f"{MAP} cannot have a lesson 1./../x: "),
     ("lesson 1.3 T --slug A/b", f"{MAP} cannot have a lesson 1.3: "),
@@ -99,6 +112,7 @@ def test_refused_addition_changes_nothing(make: Make) -> None:
     folder = make(FIRST)
     folder.write("content/lessons/1.7-there.md", "## There\n")
     folder.write("models/there.xml", "<mujoco/>")
+    folder.write("content/pages/there.md", "Here.\n")
     before = folder.tree()
     for arguments, message in REFUSED_COMMANDS:
         result = folder.main("new", *arguments.split(" "))
@@ -120,6 +134,31 @@ def test_refused_addition_changes_nothing(make: Make) -> None:
         folder.write(MAP, text)
         result = folder.main("new", "lesson", "1.3", "T")
         assert (result.status, message in result.err, folder.text(MAP)) == (2, True, text)
+
+
+def test_new_levels_and_pages_stand_in_order_and_are_built_as_they_are(make: Make) -> None:
+    folder = make(FIRST, SECOND)
+    map = folder.text(MAP).replace("[[level]]", "# The first.\n[[level]]")
+    folder.write(MAP, map.replace("\n", "\r\n"))
+    for arguments in (
+        "level 10 Ten",
+        "level 0 Before",
+        "level 9 Nine",
+        "page About --id us",
+        "page More",
+    ):
+        result = folder.main("new", *arguments.split(" "))
+        assert (result.status, result.err) == (0, "")
+    assert result.out == f"changed {MAP}\nwrote content/pages/more.md\n"
+    assert folder.main("new", "lesson", "9.1", "First of nine").status == 0
+    text = folder.text(MAP)
+    assert text.count("\r\n") == text.count("\n")
+    ids = [line[6:-1] for line in text.splitlines() if line.startswith("id = ")]
+    assert ids == ["us", "more", "0", "1", "1.1", "1.2", "9", "9.1", "10"]
+    assert '\r\n\r\n# The first.\r\n[[level]]\r\nid = "1"' in text
+    result = folder.main("build")
+    assert (result.status, "warning" in result.out) == (0, False), result.out
+    assert (folder.root / "public/more.html").is_file()
 
 
 def test_new_model_compiles(make: Make) -> None:

@@ -32,7 +32,8 @@ PINNED_ACTION = re.compile(
     + re.escape(__version__)
 )
 INSTALLATION = re.compile(
-    r"pip (install (--require-hashes|--no-deps( --no-build-isolation)?) .*|check)"
+    r"pip (install (--require-hashes|--no-deps( --no-build-isolation)?) .*|check"
+    r'|install -r (requirements.txt|"\$RUNNER_TEMP/course.txt"))'
 )
 SUDO = (
     "sudo apt-get install --quiet --yes bubblewrap",
@@ -170,7 +171,10 @@ def test_every_command_line_is_accepted() -> None:
 LOCKS = {
     ".github/requirements.txt": "numpy==2.3.0 --hash=sha256:00\n",
     ".github/coursebuild.txt": f"coursebuild=={__version__}\n",
+    "requirements.txt": "pandas==2.3.3\n",
 }
+INSTALLED = ("requirements.txt", "coursebuild.txt", "course.txt")
+"""What a pull request finds them as."""
 
 
 @pytest.fixture
@@ -219,11 +223,12 @@ def propose(runner: Runner, course: Folder, lesson: str) -> list[Step]:
     return steps_by_job["check"]
 
 
-def installations(folder: str) -> list[str]:
-    """The calls of pip that install what the files of a folder name."""
+def installations(folder: str, course: str) -> list[str]:
+    """The calls of pip that install what the files of a folder name, and the course's own."""
     return [
         f"pip install --require-hashes -r {folder}/requirements.txt",
         f"pip install --no-deps -r {folder}/coursebuild.txt",
+        f"pip install -r {course}",
     ]
 
 
@@ -249,8 +254,8 @@ def test_only_main_is_published_and_a_pull_request_gets_a_report(
     steps_with_mistake = propose(runner, course, SECOND.replace("```text\n2", "```text\n3"))
     assert statuses(steps_with_mistake) == [0, 0, 1, 0], "without a build, and with a report"
     assert "running scripts (2)\n" in steps_with_mistake[2].err, "what main keeps has its secret"
-    for path, text in LOCKS.items():
-        assert (runner.folder / "tmp" / Path(path).name).read_text() == text
+    for name, text in zip(INSTALLED, LOCKS.values(), strict=True):
+        assert (runner.folder / "tmp" / name).read_text() == text
     assert steps_with_mistake[2].out.startswith(f"::error file={course.lesson(2)},line=10,col=1,")
     assert "| `examples/two.py` | 1.2 | numeric: 1 (relative, up to 5.0e-01) |" in runner.summary
     assert "-2\n+3\n" in runner.summary
@@ -263,8 +268,9 @@ def test_only_main_is_published_and_a_pull_request_gets_a_report(
     assert "\n| the whole site | " in runner.summary
     assert [*runner.caches] == caches
     assert ">12</" not in page.read_text()
-    installed = installations(".github")
-    check = [*installations(str(runner.folder / "tmp")), *SUDO]
+    installed = installations(".github", "requirements.txt")
+    folder = str(runner.folder / "tmp")
+    check = [*installations(folder, f"{folder}/course.txt"), *SUDO]
     assert runner.notes == [*installed, *check, *check]
 
 

@@ -6,6 +6,8 @@ import argparse
 import os
 import re
 import shlex
+import shutil
+import subprocess
 from pathlib import Path
 
 from coursebuild import __version__
@@ -34,6 +36,8 @@ _PATHS_BY_FILE = {
     "coursebuild.txt": ".github/coursebuild.txt",
 }
 """Paths in a new course, for files that tools would read if they had these names here."""
+_KEPT = ("README.md", "requirements.txt")
+"""Files that a folder may have already; they stay as they are."""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -49,6 +53,9 @@ def run(arguments: argparse.Namespace) -> int:
     undo_changes(root, Progress().say)
     files = _read_files()
     existing = [path for path in files if (root / path).exists() or (root / path).is_symlink()]
+    for path in (path for path in _KEPT if path in existing):
+        existing.remove(path)
+        del files[path]
     if existing:
         message = f"{folder} has {', '.join(existing)} already, so nothing was written"
         return fail(USAGE, message, "name another folder, as in `coursebuild init my-course`")
@@ -57,13 +64,29 @@ def run(arguments: argparse.Namespace) -> int:
     except OSError as error:
         raise EffectError(f"{folder} cannot be made: {reason(error)}") from None
     change_files(root, [FileChange(path, None, data) for path, data in files.items()])
+    repository = ", in a new Git repository" if _make_repository(root) else ""
     option = "" if root == Path.cwd() else f" -C {shlex.quote(folder)}"
     return write(
-        f"wrote {plural(len(files), 'file')} to {folder}\n\n"
+        f"wrote {plural(len(files), 'file')} to {folder}{repository}\n\n"
         f"  coursebuild{option} serve    look at the course, and write\n"
         f"  coursebuild{option} build    verify it, and write the site to public/\n",
         CLEAN,
     )
+
+
+def _make_repository(root: Path) -> bool:
+    """Make a Git repository of the course, where there is Git, and no repository around it."""
+    git = shutil.which("git")
+    if git is None or any((folder / ".git").exists() for folder in (root, *root.parents)):
+        return False
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    command = [git, "-c", "init.defaultBranch=main", "init", "--quiet", str(root)]
+    process = subprocess.run(
+        command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True
+    )
+    if process.returncode:
+        Progress().say(f"no Git repository was made: {process.stderr.strip()}")
+    return process.returncode == 0
 
 
 def _read_files() -> dict[str, bytes]:

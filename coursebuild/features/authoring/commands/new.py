@@ -1,4 +1,4 @@
-"""`coursebuild new`: add a lesson, a model, a template or a feature."""
+"""`coursebuild new`: add a lesson, a level, a page, a model, a template or a feature."""
 
 from __future__ import annotations
 
@@ -20,13 +20,22 @@ from coursebuild.core.registry import CORE_FENCES, features, fence_names
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.features.authoring.commands import apply_changes
-from coursebuild.features.authoring.course_map import next_id, with_feature, with_lesson
+from coursebuild.features.authoring.course_map import (
+    next_lesson_ids,
+    next_level_id,
+    with_feature,
+    with_lesson,
+    with_level,
+    with_page,
+)
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.theme_files import template_copies
 
 EXAMPLES = """\
 examples:
   coursebuild new lesson 1.4 "Large swings"
+  coursebuild new level 2 "Two degrees of freedom"
+  coursebuild new page "About this course"
   coursebuild new model pendulum
   coursebuild new template base.html
   coursebuild new feature timeline
@@ -55,6 +64,14 @@ def declare(parser: argparse.ArgumentParser) -> None:
     lesson.add_argument("title", metavar="TITLE", nargs="?", help="as readers see it")
     lesson.add_argument("--slug", help="for its file and address (default: made of the title)")
     lesson.set_defaults(add=_new_lesson)
+    level = kinds.add_parser("level", help="a level without lessons, in the course map")
+    level.add_argument("id", metavar="ID", help="a number, or a word")
+    level.add_argument("title", metavar="TITLE", nargs="?", help="as readers see it")
+    level.set_defaults(add=_new_level)
+    page = kinds.add_parser("page", help="a page that is no lesson, and its entry in the map")
+    page.add_argument("title", metavar="TITLE", help="as readers see it")
+    page.add_argument("--id", help="for its file, address and links (default: made of the title)")
+    page.set_defaults(add=_new_page)
     model = kinds.add_parser("model", help="a file of models/ with a ball above a floor")
     model.add_argument("name", metavar="NAME", help="letters, digits, `_` and `-`; `/` for folders")
     model.set_defaults(add=_new_model)
@@ -80,17 +97,52 @@ def run(arguments: argparse.Namespace) -> int:
 def _new_lesson(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     course = load_course(root, code="none")
     id, title = arguments.id, arguments.title
+    if title is None and re.fullmatch(r"[\w-]+(\.[\w-]+)+", id):
+        raise UsageError(f"lesson {id} needs a title", help="it comes behind the id")
     if title is None:
-        help = f"the id comes first: `coursebuild new lesson {next_id(course)} {shlex.quote(id)}`"
+        ids = next_lesson_ids(course) or ["1.1"]
+        help = f"the id comes first: `coursebuild new lesson {ids[-1]} {shlex.quote(id)}`"
+        if ids[:-1]:
+            help += f"; in other levels {', '.join(f'`{id}`' for id in ids[:-1])}"
         raise UsageError("a lesson needs an id and a title", help=help)
-    if any("\ud800" <= char <= "\udfff" for char in title):
-        raise UsageError("the title is not UTF-8")
+    _check_text(title)
     slug = arguments.slug or slug_of(title)
     new_map = with_lesson(course, id, slug, title)
     return [
         FileChange(course.map.path, course.map.text.encode(), new_map.encode()),
         FileChange(f"content/lessons/{id}-{slug}.md", None, _LESSON.encode()),
     ]
+
+
+def _new_level(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
+    course = load_course(root, code="none")
+    id, title = arguments.id, arguments.title
+    if title is None:
+        help = "it comes behind the id"
+        if not re.fullmatch(r"[\w-]+", id) or id in (level.id for level in course.levels):
+            proposal = f"coursebuild new level {next_level_id(course)} {shlex.quote(id)}"
+            help = f"the id comes first: `{proposal}`"
+        raise UsageError("a level needs an id and a title", help=help)
+    _check_text(title)
+    new_map = with_level(course, id, title)
+    return [FileChange(course.map.path, course.map.text.encode(), new_map.encode())]
+
+
+def _new_page(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
+    course, title = load_course(root, code="none"), arguments.title
+    _check_text(title)
+    id = arguments.id or slug_of(title)
+    path = f"content/pages/{id}.md"
+    new_map = with_page(course, id, title, path)
+    return [
+        FileChange(course.map.path, course.map.text.encode(), new_map.encode()),
+        FileChange(path, None, _LESSON.encode()),
+    ]
+
+
+def _check_text(title: str) -> None:
+    if any("\ud800" <= char <= "\udfff" for char in title):
+        raise UsageError("the title is not UTF-8")
 
 
 def _new_model(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
