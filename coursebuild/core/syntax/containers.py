@@ -216,7 +216,7 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
 
 
 def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterator[Diagnostic]:
-    """Report a block that is repeated, a quotation torn from its callout, and lost list marks.
+    """Report a heading that is repeated, a quotation torn from its callout, and lost list marks.
 
     A `>` is lost on the empty line between the two where one sentence goes on, or where other
     empty lines of theirs have it.
@@ -225,11 +225,9 @@ def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterat
     if before is None:
         return
     gap = Span(source, before.span.end, block.span.start)
-    text = block.span.text.strip()
-    if isinstance(block, model.Heading | model.Paragraph) and text == before.span.text.strip():
-        kind = "heading" if isinstance(block, model.Heading) else "paragraph"
-        message, help = f"this {kind} stands here twice", "delete it once"
-        yield diagnose("text-repeated", block.span.first_line(), message, help=help)
+    if isinstance(block, model.Heading) and block.span.text.strip() == before.span.text.strip():
+        place, message = block.span.first_line(), "this heading stands here twice"
+        yield diagnose("text-repeated", place, message, help="delete it once")
     if isinstance(before, model.Callout) and isinstance(block, model.BlockQuote):
         last = before.span.text.rstrip(" \t\r\n>")[-1:]
         text = f"{before.span.text}\n{block.span.text}"

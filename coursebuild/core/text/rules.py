@@ -94,7 +94,7 @@ _SUMMARIES = {
     "math-brackets": "A formula has more opening brackets than closing ones, or fewer.",
     "math-unclosed": "Display math is never closed.",
     "math-unread": "A text has a dollar sign that was meant for a formula.",
-    "text-repeated": "A line begins with the same words twice, or a block stands twice.",
+    "text-repeated": "A line begins with the same words twice, or a heading stands twice.",
     "markup-unread": "Markdown, or an attribute in braces, is not whole, so that readers would see "
     "it as it is written.",
     "markup-foreign": "A text has markup of another tool, which would show it as it is written.",

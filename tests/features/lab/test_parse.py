@@ -66,7 +66,7 @@ def test_a_complete_lab() -> None:
     assert (json.loads(lab.config), "\n" in lab.config) == (json.loads(COMPLETE), False)
     note = lab.note[0]
     assert isinstance(note, Paragraph) and note.span.text == "Press *Play*."
-    assert (lab.xml, lab.models(), lab.is_docked()) == (None, ("tumbling_box",), True)
+    assert (lab.xml, lab.models(), lab.fields.dock) == (None, ("tumbling_box",), True)
     fields = lab.fields
     assert fields.camera == Camera(-70.0, 20.0, 0.8, (0.0, 0.0, 0.5))
     assert fields.overlays == Overlays(frames=True)
@@ -93,7 +93,7 @@ def test_the_least_that_a_lab_needs() -> None:
     lab = parse('{"model": "m"}').value
     assert lab is not None
     assert (lab.note, lab.fields) == ((), SimLab(model="m"))
-    assert (lab.fields.height, lab.is_docked(), lab.verify) == (300, False, Verify())
+    assert (lab.fields.height, lab.fields.dock, lab.verify) == (300, False, Verify())
     assert parse('{"model": "m", "overlays": ["com"], "camera": {"azimuth": 1}}').diagnostics == ()
 
 
@@ -125,7 +125,7 @@ def test_a_model_that_readers_edit() -> None:
     assert lab.xml is not None
     fields = lab.fields
     assert (lab.kind, lab.xml.text, lab.xml.span().line) == ("mjcf", "<mujoco/>\n", 2)
-    assert (fields.title, fields.height, lab.is_docked()) == ("A ball", 100, True)
+    assert (fields.title, fields.height, lab.fields.dock) == ("A ball", 100, True)
     assert (lab.verify, fields.expect) == (Verify(2.0, 1e-6, True), (Expect(3.0, diverges=True),))
     diagnostics = parse("<mujoco/>", "mjcf height=\udc80").diagnostics
     assert "fence-key-value" in {diagnostic.rule for diagnostic in diagnostics}, "half a character"
