@@ -97,7 +97,10 @@ WRONG_USAGE = [
     ("check --jobs 1025", "'1025' is not a number of jobs"),
     ("serve --port 65536", "'65536' is not a port"),
     ("serve --port http", "'http' is not a port"),
-    ("schema nosuch", "there is no schema 'nosuch': choose from course, lab, model, quiz"),
+    (
+        "schema nosuch",
+        "there is no schema 'nosuch': choose from course, lab, lab-ode, lab-plot, model, quiz",
+    ),
     ("-C", "`-C` takes a folder"),
     ("check -C", "expected one argument"),
     ("check -C no/such", "there is no folder no/such"),

@@ -356,7 +356,14 @@ def test_words_are_completed_by_where_they_stand(course: Folder, tmp_path: Path)
     assert complete(course, "update", "1.1", "1") == ["1.1", "1.2"]
     assert complete(course, "bench", "--quick", "") == ["pendulum"]
     assert complete(course, "explain", "output-d") == ["output-drift"]
-    assert complete(course, "schema", "") == ["course", "lab", "model", "quiz"]
+    assert complete(course, "schema", "") == [
+        "course",
+        "lab",
+        "lab-ode",
+        "lab-plot",
+        "model",
+        "quiz",
+    ]
     assert "epub" in complete(course, "export", "")
     assert complete(course, "nosuch", "") == []
     elsewhere = ("-C", str(course.root), "check", "1")

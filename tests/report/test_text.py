@@ -246,6 +246,7 @@ def test_json_has_diagnostics_scripts_labs_and_a_summary() -> None:
         "missing": [],
         "unproven_outputs": 0,
         "unproven_numbers": 0,
+        "unrepeated": False,
     }
     assert value["labs"][0] == {
         "name": "1.1-lab-1",

@@ -155,7 +155,10 @@ REFUSED_COMMANDS = [
     ("1.9 1.8", "no lesson is called `1.9`"),
     ("1.2 1.2", "there is a lesson 1.2 already: Lesson two"),
     ("1.2 1.3", "there is a lesson 1.3 already: Lesson three"),
-    ("1.2 9.9", "the map has no level for `9.9`; add it as a [[level]]; known: `1`"),
+    (
+        "1.2 9.9",
+        "the map has no level for `9.9`; `coursebuild new level 9 TITLE` adds it; known: `1`",
+    ),
     ("1.2 1.a/b", f"{MAP} cannot have a lesson 1.a/b: "),
     ("1.2 1.8", "there is a file content/lessons/1.8-two.md already"),
 ]

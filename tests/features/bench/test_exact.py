@@ -101,8 +101,8 @@ def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(course: P
     toml = '[[scenario]]\nname = "slide"\nqvel = [1, 0]\nduration = 0.4\nsample = 0.02\n'
     scenario = report(course, SLIDE.format(friction=0.5, height=0), toml)
     assert scenario.reference == "closed" and scenario.figures == ()
-    stated = toml + "expected = { penetration = 1e-4 }\nlimits = { Euler = 0.01 }\n"
-    scenario = report(course, SLIDE.format(friction=0.5, height=0), stated)
+    toml_with_figures = toml + "expected = { penetration = 1e-4 }\nlimits = { Euler = 0.01 }\n"
+    scenario = report(course, SLIDE.format(friction=0.5, height=0), toml_with_figures)
     depths = {line.integrator: (line.measured, line.exact) for line in scenario.figures}
     assert depths["Euler"] == (pytest.approx(2.1e-4, rel=0.2), 1e-4)
     assert scenario.stable[0].theory == 0.01
