@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import os
 import re
 import socket
@@ -73,8 +74,8 @@ def run(arguments: argparse.Namespace) -> int:
     Where the course is served so already, only say where.
     """
     options = options_of(arguments)
-    served = ask_preview(str(options.root)) if not arguments.embed else None
-    if served is not None and arguments.host == served["host"]:
+    served = ask_preview(str(options.root))
+    if served is not None and arguments.host == served["host"] and not arguments.embed:
         link = served["links"][0]
         if arguments.port in (_PORT, 0, served["port"]):
             say(CLEAN, f"serving {link} already (process {served['process']})")
@@ -88,6 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
         tuple(arguments.embed),
         style_of(sys.stderr),
         browse=arguments.open,
+        takes_commands=served is None,
     )
 
 
@@ -111,11 +113,12 @@ def serve(
     style: Style,
     *,
     browse: bool,
+    takes_commands: bool,
 ) -> NoReturn:
     """Serve until interrupted.
 
     `embed`: origins whose pages may show the preview in a frame. `style`: how mistakes are printed.
-    `browse`: open a browser.
+    `browse`: open a browser. `takes_commands`: do what is given in other terminals.
     """
     live_course = LiveCourse(options, style)
     try:
@@ -125,13 +128,14 @@ def serve(
         raise UsageError(message, help=_propose_port(host, port, error)) from None
     links = server.links
     preview = {"host": host, "port": server.access.port, "links": links, "process": os.getpid()}
-    commands = CommandServer(options.root, preview)  # now, while this process has no threads
+    # Now, while this process has no threads.
+    commands = CommandServer(options.root, preview) if takes_commands else None
     try:
         live_course.start()
         server.start()
-        threading.Thread(
-            target=commands.follow, args=(live_course.tell_command,), name="commands", daemon=True
-        ).start()
+        if commands is not None:
+            follow = functools.partial(commands.follow, live_course.tell_command)
+            threading.Thread(target=follow, name="commands", daemon=True).start()
         draw = options.progress.live
         first, *other_links = links
         print(f"serving {first} (stop with Ctrl-C)", file=sys.stderr, flush=True)
@@ -145,7 +149,8 @@ def serve(
             ).start()
         live_course.rebuild()
     finally:
-        commands.close()
+        if commands is not None:
+            commands.close()
         server.stop()
         live_course.close()
 

@@ -167,11 +167,13 @@ class ScriptServer:
         log = work.root / _LOG
         had_log = os.path.lexists(log)
         try:
-            while busy or work.pending:
+            while True:
                 while len(busy) < max(parallel, 1) and (index := work.take_job()) is not None:
                     worker = self._get_worker(work)
                     busy[worker.reports] = worker
                     work.give(worker, index)
+                if not busy and not work.pending:
+                    break
                 patience = None if is_unwanted is None and not work.pending else _PATIENCE
                 for ready in wait(busy, patience if self._sandbox is None else _VIGILANCE):
                     self._handle_report(busy[ready], busy, work)  # type: ignore[index]
