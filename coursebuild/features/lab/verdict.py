@@ -11,7 +11,6 @@ from collections.abc import Iterator
 
 from coursebuild.core.checks.compiled import line_span
 from coursebuild.core.run.mjcf import error_line, readable_error
-from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.lab.compile import LabCode
 from coursebuild.features.lab.model import MJCF, Entry, Lab
@@ -108,11 +107,8 @@ _HELP = {
 
 
 def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Report what a lab cannot be published with: failures, other engines, untrue fields."""
+    """Report what a lab cannot be published with: failures, and untrue fields."""
     yield from _check_failures(lab, trial)
-    if trial.version != engine_version():
-        message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
-        yield diagnose("lab-engine", lab.span.first_line(), message)
     yield from _check_depth_claim(lab, trial)
     if trial.main is not None and trial.main["parity"] is not None:
         yield from _check_parity(lab, trial.main["parity"])
