@@ -34,7 +34,7 @@ def folder(tmp_path: Path, stores: Path) -> Folder:
 
 
 @pytest.fixture
-def other(tmp_path: Path) -> dict[str, str]:
+def variables(tmp_path: Path) -> dict[str, str]:
     """Variables under which another MuJoCo is installed, and pip finds none."""
     info = tmp_path / "packages" / f"mujoco-{OTHER}.dist-info"
     info.mkdir(parents=True)
@@ -55,24 +55,26 @@ def test_version_is_that_of_the_bundled_engine(tmp_path: Path) -> None:
 
 
 def test_other_mujoco_of_scripts_leaves_labs_to_an_environment_of_their_own(
-    folder: Folder, other: dict[str, str]
+    folder: Folder, variables: dict[str, str]
 ) -> None:
     code = PREFIX.format(str(folder.root))
     prefix = subprocess.check_output(
-        [sys.executable, "-c", code], env=folder.environment(other), text=True
+        [sys.executable, "-c", code], env=folder.environment(variables), text=True
     ).strip()
     venv.create(prefix, symlinks=True)
     packages = next(Path(prefix, "lib").glob("python*/site-packages"))
     lines = (f"import site; site.addsitedir({path!r})\n" for path in site_folders())
     (packages / "here.pth").write_text("".join(lines))
-    result = folder.run("build", env=other)
+    result = folder.run("build", env=variables)
     assert result.status == 0, result.out + result.err
     (page,) = folder.root.glob("public/lessons/1.2-*.html")
     assert f"Tried with MuJoCo {LAB_ENGINE} in the browser" in page.read_text()
 
 
-def test_without_network_it_is_said_what_is_missing(folder: Folder, other: dict[str, str]) -> None:
-    result = folder.run("check", env=other)
+def test_without_network_it_is_said_what_is_missing(
+    folder: Folder, variables: dict[str, str]
+) -> None:
+    result = folder.run("check", env=variables)
     python = "{}.{}".format(*sys.version_info)
     assert result.status == 1
     assert f"coursebuild: pip finds no MuJoCo {LAB_ENGINE} for Python {python} on " in result.err
