@@ -135,7 +135,10 @@ class _Epub:
         for level in self._course.written_levels:
             yield _page_item(_level_name(level), self._level(level))
             for lesson in level.lessons:
-                chapter = self._chapter(lesson)
+                place = urls.Place(urls.lesson_path(lesson))
+                rules = RewriteRules(place, self._address, self._picture, xml_id)
+                text = render_lesson(self._context, lesson, rules, to_xml, "_top")
+                chapter = self._page(f"{lesson.id} {lesson.title}", text, "bodymatter")
                 properties = [key for key in ("mathml", "svg") if f"<{key[:4]}".encode() in chapter]
                 yield _page_item(_lesson_name(lesson), chapter, " ".join(properties))
         for path, name in self._pictures.items():
@@ -155,12 +158,6 @@ class _Epub:
         return "\n".join((style, *_FONT_FACE.findall(site), *uses, *_STYLE_RULE.findall(site), ""))
 
     # --- pages
-
-    def _chapter(self, lesson: Lesson) -> bytes:
-        place = urls.Place(urls.lesson_path(lesson))
-        rules = RewriteRules(place, self._address, self._picture, xml_id)
-        text = render_lesson(self._context, lesson, rules, to_xml, "_top")
-        return self._page(f"{lesson.id} {lesson.title}", text, "bodymatter")
 
     def _page(self, title: str, body: Markup, kind: str) -> bytes:
         return self._render("epub-page", title=title, body=body, kind=kind)

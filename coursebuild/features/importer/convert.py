@@ -195,7 +195,8 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
     shown_end = 0
     for number, segment in enumerate(text.segments):
         if number == last:
-            script_path = _script_path(text)
+            words = re.findall("[a-z0-9]+", f"{text.id}-{text.slug}".lower())
+            script_path = f"examples/{'' if words[0].isalpha() else 'l'}{'_'.join(words)}.py"
             script = join_cells(codes.values(), text.title)
             parts[shown_end:] = [fence(f"python file={script_path}", script)]
             output = join_outputs((text.segments[cell], code) for cell, code in codes.items())
@@ -216,11 +217,6 @@ def _write_cell(cell: Segment) -> str:
         return fence(magic[1], cell.text[magic.end() :].strip("\n"))
     text = code_for_readers(cell)
     return fence("python fragment", text) if text else ""
-
-
-def _script_path(text: ImportedText) -> str:
-    words = re.findall("[a-z0-9]+", f"{text.id}-{text.slug}".lower())
-    return f"examples/{'' if words[0].isalpha() else 'l'}{'_'.join(words)}.py"
 
 
 def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator[tuple[str, bytes]]:

@@ -127,7 +127,18 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "role":
             return _convert_role(match["name"], match["body"], context)
         case "image":
-            return _convert_image(match["alt"], match["source"], context)
+            alt = match["alt"]
+            source = match["source"]
+            if re.match("[a-z]+://|//", source):
+                context.add_leftover(f"a picture from another host, `{source}`; it is a link now")
+                return f"[{alt or source}]({source})"
+            name, path = source.removeprefix("attachment:"), context.resolve_path(source)
+            if name in context.pictures:
+                return f"![{alt}]({context.add_picture(name)})"
+            if path in context.files:
+                return f"![{alt}]({context.add_file(path)})"
+            context.add_leftover(f"the picture `{source}`, which is not in the folder")
+            return alt
         case "link":
             text = _rewrite_line(match["text"], context)
             return _write_link(text, context.resolve_link(match["address"]), match["title"] or "")
@@ -136,7 +147,16 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
         case "cross":
-            return _convert_reference(match["kind"], match["label"], whole, context)
+            kind = match["kind"]
+            label = match["label"]
+            if kind == "eq":
+                return _write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
+            if kind == "sec":
+                return _write_link(
+                    "this section", context.resolve_anchor(f"sec-{to_anchor(label)}")
+                )
+            context.add_leftover(f"the reference `{whole}`: figures and tables have no numbers")
+            return {"fig": "the figure", "tbl": "the table", "lst": "the listing"}[kind]
         case "cite" | "substitution":
             context.add_leftover(f"`{whole}`, which is shown as code")
             return f"`{whole}`"
@@ -176,25 +196,3 @@ def _convert_role(name: str, body: str, context: LessonContext) -> str:
         case _:
             context.add_leftover(f"the role `{{{name}}}`; its text is shown as code")
             return f"`{body}`"
-
-
-def _convert_image(alt: str, source: str, context: LessonContext) -> str:
-    if re.match("[a-z]+://|//", source):
-        context.add_leftover(f"a picture from another host, `{source}`; it is a link now")
-        return f"[{alt or source}]({source})"
-    name, path = source.removeprefix("attachment:"), context.resolve_path(source)
-    if name in context.pictures:
-        return f"![{alt}]({context.add_picture(name)})"
-    if path in context.files:
-        return f"![{alt}]({context.add_file(path)})"
-    context.add_leftover(f"the picture `{source}`, which is not in the folder")
-    return alt
-
-
-def _convert_reference(kind: str, label: str, text: str, context: LessonContext) -> str:
-    if kind == "eq":
-        return _write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
-    if kind == "sec":
-        return _write_link("this section", context.resolve_anchor(f"sec-{to_anchor(label)}"))
-    context.add_leftover(f"the reference `{text}`: figures and tables have no numbers")
-    return {"fig": "the figure", "tbl": "the table", "lst": "the listing"}[kind]

@@ -326,7 +326,14 @@ class _LabTrial(Struct, frozen=True):
         remarks, main = tuple(remark_diagnostics(lab, reply)), reply.main
         output = LabOutput(module.code, _add_camera(module.config, main))
         if self.context.static and not failures and main is not None:
-            picture = self._draw_picture(key, main)
+            # Draw the start of the main run
+            from coursebuild.features.lab.picture.static import draw_picture
+
+            picture_key = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
+            store = self.context.run_store.store
+            picture = store.get_or_make(
+                "pictures", picture_key, lambda: draw_picture(self.lab, main)
+            )
             output = replace(output, record=lab_record(lab, main), picture=picture)
         return _Evaluation(reply, failures, remarks, output)
 
@@ -390,14 +397,6 @@ class _LabTrial(Struct, frozen=True):
         if trial.main is None or self.lab.kind == MJCF:
             return LabExport(None)
         return export_lab(self.context, self.engines.native, self.trial, self.lab, trial.main)
-
-    def _draw_picture(self, key: str, main: MainRun) -> bytes:
-        """Draw the start of the main run."""
-        from coursebuild.features.lab.picture.static import draw_picture
-
-        picture_key = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
-        store = self.context.run_store.store
-        return store.get_or_make("pictures", picture_key, lambda: draw_picture(self.lab, main))
 
 
 def _add_camera(config: dict[str, Any], main: MainRun | None) -> dict[str, Any]:

@@ -109,7 +109,13 @@ _HELP = {
 
 def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report what a lab cannot be published with: failures, other engines, untrue fields."""
-    yield from _check_failures(lab, trial)
+    # Report each failure of a trial at its entry. MuJoCo warns of the main run again in every
+    # attempt; to report it once is enough
+    failures = [f for f in trial.failures if f.kind != "deep" and not _is_claimed(lab, f)]
+    of_main_run = {f.kind for f in failures if f.entry == () and f.kind in ("warning", "diverged")}
+    for failure in failures:
+        if failure.entry == () or failure.kind not in of_main_run:
+            yield _make_diagnostic(lab, failure)
     if trial.version != engine_version():
         message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
         yield diagnose("lab-engine", lab.span.first_line(), message)
@@ -120,21 +126,22 @@ def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 
 def remark_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report what is to be said of a lab that can be published."""
-    yield from _check_depth(lab, trial)
+    # Report bodies that lie deep in each other; only once if the main run has some
+    if not lab.verify.deep:
+        failures = [f for f in trial.failures if f.kind == "deep"]
+        of_main_run = [f for f in failures if f.entry == ()]
+        yield from (_make_diagnostic(lab, failure) for failure in of_main_run or failures)
     yield from _check_reset(lab, trial)
-    yield from _check_framing(lab, trial)
-
-
-def _check_failures(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Report each failure of a trial at its entry.
-
-    MuJoCo warns of the main run again in every attempt; to report it once is enough.
-    """
-    failures = [f for f in trial.failures if f.kind != "deep" and not _is_claimed(lab, f)]
-    of_main_run = {f.kind for f in failures if f.entry == () and f.kind in ("warning", "diverged")}
-    for failure in failures:
-        if failure.entry == () or failure.kind not in of_main_run:
-            yield _make_diagnostic(lab, failure)
+    # Report a camera of the lab's own that shows what moves too small
+    main = trial.main
+    if main is None or (fill := main["fill"]) is None or (most := main["mostFill"]) is None:
+        return
+    if fill < _SMALL and fill < most / 2:
+        message = (
+            f"motion fills {100 * fill:.2g} % of the picture and could fill {100 * most:.2g} %"
+        )
+        help = "without `distance` and `target` the camera fits the motion"
+        yield diagnose("lab-far", lab.place(("camera",)), message, help=help)
 
 
 def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
@@ -153,32 +160,11 @@ def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
             return from_start
 
 
-def _check_depth(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Report bodies that lie deep in each other; only once if the main run has some."""
-    if not lab.verify.deep:
-        failures = [f for f in trial.failures if f.kind == "deep"]
-        of_main_run = [f for f in failures if f.entry == ()]
-        yield from (_make_diagnostic(lab, failure) for failure in of_main_run or failures)
-
-
 def _check_depth_claim(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     if lab.verify.deep and not any(failure.kind == "deep" for failure in trial.failures):
         message = "the lab says `deep`, but no bodies lay deep in each other"
         span = lab.place(("verify", "deep"))
         yield diagnose("lab-shallow", span, message, help="take `deep` away")
-
-
-def _check_framing(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Report a camera of the lab's own that shows what moves too small."""
-    main = trial.main
-    if main is None or (fill := main["fill"]) is None or (most := main["mostFill"]) is None:
-        return
-    if fill < _SMALL and fill < most / 2:
-        message = (
-            f"motion fills {100 * fill:.2g} % of the picture and could fill {100 * most:.2g} %"
-        )
-        help = "without `distance` and `target` the camera fits the motion"
-        yield diagnose("lab-far", lab.place(("camera",)), message, help=help)
 
 
 _SMALL = 0.1

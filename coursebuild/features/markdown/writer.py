@@ -62,16 +62,45 @@ class DocumentWriter(BlockWriter):
         """Write one of the course's own blocks."""
         match block:
             case model.Callout():
-                return self._callout(block)
+                label = f"**{escape_marks(self.page.inputs.callouts[block.kind].label)}**"
+                title = self.inlines(block.title)
+                head = f"{label} {title}" if title else label
+                inner = self.blocks(block.blocks)
+                return block_quote(f"{head}\n\n{inner}" if inner else head)
             case model.PlainCode():
                 return fence("python", block.code.text)
             case model.Script():
-                return self._script(block)
+                href = self.locate(self.page.place.href(block.path))
+                name = link(code_span(block.path), href)
+                if self.notebook:
+                    return self.words("exports.cell_below", path="\ue000").replace("\ue000", name)
+                command = code_span(shlex.join(("python", block.path, *block.args)))
+                run = f"{self.words('code.run')}: {command}"
+                if block.requires:
+                    run += f" ({self.words('code.requires', modules=', '.join(block.requires))})"
+                parts = [f"{name}:", fence("python", block.code.text), run]
+                recordings = self.page.script_outputs.get(block.span.start, ())
+                parts += [self.recording(recording) for recording in recordings]
+                if not recordings:
+                    receipt = script_receipt(self.page, block)
+                    parts.append(f"*{escape_marks(receipt.text)}*")
+                return "\n\n".join(parts)
             case model.Recording():
                 is_joined = any(block in outputs for outputs in self.page.script_outputs.values())
                 return "" if is_joined else self.recording(block)
             case model.Mjcf():
-                return self._mjcf(block)
+                engine = self.page.inputs.engine
+                label = (
+                    self.words("mjcf.fragment", element=block.fragment)
+                    if block.fragment
+                    else self.words("mjcf.label")
+                )
+                receipt = f"*{self.words('mjcf.compiles', engine=engine)}*"
+                if block.error is not None:
+                    receipt = (
+                        f"*{self.words('mjcf.fails', engine=engine)}* {code_span(block.error)}"
+                    )
+                return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{receipt}"
             case model.FeatureBlock():
                 return kind_of_block(block).markdown(self, block)
             case _:
@@ -87,43 +116,7 @@ class DocumentWriter(BlockWriter):
 
     # --- callouts, io, MJCF
 
-    def _callout(self, block: model.Callout) -> str:
-        label = f"**{escape_marks(self.page.inputs.callouts[block.kind].label)}**"
-        title = self.inlines(block.title)
-        head = f"{label} {title}" if title else label
-        inner = self.blocks(block.blocks)
-        return block_quote(f"{head}\n\n{inner}" if inner else head)
-
-    def _mjcf(self, block: model.Mjcf) -> str:
-        engine = self.page.inputs.engine
-        label = (
-            self.words("mjcf.fragment", element=block.fragment)
-            if block.fragment
-            else self.words("mjcf.label")
-        )
-        receipt = f"*{self.words('mjcf.compiles', engine=engine)}*"
-        if block.error is not None:
-            receipt = f"*{self.words('mjcf.fails', engine=engine)}* {code_span(block.error)}"
-        return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{receipt}"
-
     # --- scripts and outputs
-
-    def _script(self, block: model.Script) -> str:
-        href = self.locate(self.page.place.href(block.path))
-        name = link(code_span(block.path), href)
-        if self.notebook:
-            return self.words("exports.cell_below", path="\ue000").replace("\ue000", name)
-        command = code_span(shlex.join(("python", block.path, *block.args)))
-        run = f"{self.words('code.run')}: {command}"
-        if block.requires:
-            run += f" ({self.words('code.requires', modules=', '.join(block.requires))})"
-        parts = [f"{name}:", fence("python", block.code.text), run]
-        recordings = self.page.script_outputs.get(block.span.start, ())
-        parts += [self.recording(recording) for recording in recordings]
-        if not recordings:
-            receipt = script_receipt(self.page, block)
-            parts.append(f"*{escape_marks(receipt.text)}*")
-        return "\n\n".join(parts)
 
     def recording(self, block: model.Recording) -> str:
         """Write an output with its caption and its receipt."""
