@@ -34,16 +34,16 @@ from coursebuild.features.importer.blocks import (
     join_outputs,
     runnable_code,
 )
-from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
-from coursebuild.features.importer.prose import find_anchors
-from coursebuild.features.importer.source_files import TEXTS, SourceFiles
-from coursebuild.features.importer.values import (
+from coursebuild.features.importer.prose import LessonContext, find_anchors
+from coursebuild.features.importer.source_files import (
+    TEXTS,
     ImportedCourse,
     ImportedLevel,
     ImportedText,
     Leftover,
     Segment,
+    SourceFiles,
     read_yaml,
     stem_of,
     title_of_file,

@@ -19,7 +19,7 @@ from mdit_py_plugins.admon import admon_plugin
 from msgspec.structs import replace
 
 from coursebuild.core.files.errors import UsageError
-from coursebuild.features.importer.values import Segment, read_yaml
+from coursebuild.features.importer.source_files import Segment, read_yaml
 
 _COLONS = re.compile(r" {0,3}(:{3,})[ \t]*(.*?)[ \t]*\n?")
 _CELL = re.compile(r"\{code-cell\b.*|\{(?:python|ipython3?)[^}]*\}")

@@ -21,12 +21,12 @@ from coursebuild.core.features import (
 from coursebuild.features.lab.equations.declared import OdeLab, PlotLab
 from coursebuild.features.lab.files import publish_labs
 from coursebuild.features.lab.inputs import lab_trials, trial_inputs
-from coursebuild.features.lab.markdown import lab_markdown
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.page import (
     draw_lab,
     draw_model,
     index_lab,
+    lab_markdown,
     lab_picture,
     model_picture,
     model_view,

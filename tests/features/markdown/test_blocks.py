@@ -8,20 +8,18 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.core.model import Callout, Document, PlainCode, Target
+from coursebuild.core.model import Block, Callout, Document, Target
 from coursebuild.core.pages.marks import (
     block_quote,
     code_span,
     escape_marks,
-    fence,
     guard_lines,
     link,
     picture,
 )
-from coursebuild.core.pages.markup import SpecialBlock
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
-from coursebuild.features.markdown.writer import BlockWriter
+from coursebuild.features.markdown.writer import DocumentWriter
 from support.plain_html import PlainWriter, plain_html
 
 ROOT = Path(__file__).parents[3]
@@ -30,8 +28,11 @@ EXAMPLE = re.compile(r"^`{32} example\n(.*?)^\.\n(.*?)^`{32}$", re.MULTILINE | r
 DIFFERENT = {39: "a line's end that is written as a character reference becomes one"}
 
 
-class Context(BlockWriter):
+class Context(DocumentWriter):
     """Addresses stay as they are written."""
+
+    def __init__(self) -> None:
+        pass
 
     def href(self, target: Target) -> str:
         return PlainWriter().href(target)
@@ -48,12 +49,11 @@ class Context(BlockWriter):
     def formula_number(self, start: int) -> str:
         return ""
 
-    def own_block(self, block: SpecialBlock) -> str:
+    def block(self, block: Block, previous: Block | None = None) -> str:
         if isinstance(block, Callout):
             title = guard_lines(self.inlines(block.title))
             return block_quote("\n\n".join(filter(None, (title, self.blocks(block.blocks)))))
-        assert isinstance(block, PlainCode), f"no test has a {type(block).__name__}"
-        return fence("python", block.code.text)
+        return super().block(block, previous)
 
 
 def read(markdown: str) -> Document:

@@ -9,8 +9,15 @@ import pytest
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.page_list import page_list
-from coursebuild.features.search.page import note_page, page_sections, text_and_terms, weigh_terms
-from coursebuild.features.search.sections import Section, SectionPiece, SectionReader
+from coursebuild.features.search.page import (
+    Section,
+    SectionPiece,
+    SectionReader,
+    note_page,
+    page_sections,
+    text_and_terms,
+    weigh_terms,
+)
 from support.rendered_course import Make
 
 LESSON = """Before any *heading*, at $I_{xx}$.[^n]

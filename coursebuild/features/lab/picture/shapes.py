@@ -63,13 +63,13 @@ def surface(kind: Kind, size: tuple[float, ...], mesh: Surface | None = None) ->
         case "box":
             square = ((-1, -1), (1, -1), (1, 1), (-1, 1))
             sides = [(axis, sign) for axis in range(3) for sign in (1.0, -1.0)]
-            corners = [
+            vertices = [
                 np.roll((sign, a * sign, b), axis) for axis, sign in sides for a, b in square
             ]
-            normals = [np.roll((sign, 0.0, 0.0), axis) for axis, sign in sides]
+            outward = [np.roll((sign, 0.0, 0.0), axis) for axis, sign in sides]
             faces = 4 * np.arange(6)[:, None, None] + ((0, 1, 2), (0, 2, 3))
             return Surface(
-                np.array(corners) * size[:3], np.repeat(normals, 4, axis=0), faces.reshape(-1, 3)
+                np.array(vertices) * size[:3], np.repeat(outward, 4, axis=0), faces.reshape(-1, 3)
             )
         case "cylinder":
             radius, half = size[:2]
