@@ -152,12 +152,12 @@ class DocumentWriter:
                     if block.fragment
                     else self.words("mjcf.label")
                 )
-                compiled = f"*{self.words('mjcf.compiles', engine=engine)}*"
+                verdict = f"*{self.words('mjcf.compiles', engine=engine)}*"
                 if block.error is not None:
-                    compiled = (
+                    verdict = (
                         f"*{self.words('mjcf.fails', engine=engine)}* {code_span(block.error)}"
                     )
-                return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{compiled}"
+                return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{verdict}"
             case model.FeatureBlock():
                 return kind_of_block(block).markdown(self, block)
             case _:

@@ -18,9 +18,9 @@ from coursebuild.features.lab.schema import (
     Slider,
     Verify,
 )
-from support.json_fences import parse_lab as parse
 from support.lab_values import lab_of
-from support.positioned_nodes import format_diagnostics
+from support.text_cases import format_diagnostics
+from support.text_cases import parse_lab as parse
 
 COMPLETE = r"""{
   "title": "The flip", "note": "Press *Play*.", "height": 240, "dock": true,

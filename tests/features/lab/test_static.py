@@ -15,7 +15,7 @@ from coursebuild.features.lab.picture.scenery import scene_solids
 from coursebuild.features.lab.picture.static import draw_picture, lab_record
 from coursebuild.features.lab.reply import unpack_arrays
 from support.lab_values import Bench, make_lab
-from support.png_files import read_png
+from support.model_files import read_png
 
 pytestmark = pytest.mark.engine
 
