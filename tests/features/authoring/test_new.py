@@ -13,6 +13,7 @@ import pytest
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.course_map import with_lesson
+from support.fixture_cases import fixture_text
 from support.scratch_course import FIRST, ROOT, SECOND, CommandResult, Folder, Make, block
 
 pytestmark = pytest.mark.site
@@ -200,26 +201,7 @@ def test_tests_of_new_features_pass_as_made(make: Make) -> None:
 
 
 MAP = "content/course.toml"
-LINKS = """## Links
-
-Lesson 1.2 and Lessons 1.1, 1.2 and 1.3; Lesson
-1.2; Lesson&#32;1.2. A [link](lesson:1.2), [with anchor](lesson:1.2#two "1.2"),
-[by file](1.2-two.md#two), [a reference][r], [the same][r],
-*[in **emphasis**](../lessons/1.2-two.md)*. Lesson 1.20 is another, 1.2 a number.[^n]
-
-[r]: lesson:1.2
-[^n]: In a note: [there](lesson:1.2).
-
-> [!note] Lesson 1.2
-> | a | Lesson 1.2 |
-> | --- | --- |
-> | b | [c](<lesson:1.2>) |
-
-```quiz
-{"id": "1.2-check", "questions": [
- {"kind": "numeric", "q": "As in Lesson 1.2, or [\\u0061](lesson:1.2)?", "answer": 1.2}]}
-```
-"""
+LINKS = fixture_text("documents/links.md")
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ from coursebuild.features.book.chapters import RewriteRules, rewrite
 from coursebuild.features.book.epub import xml_id
 from support.archives import epub_messages
 from support.built_sites import BuiltCourses
+from support.fixture_cases import fixture_text
 from support.hostile_html import PAGES
 from support.scratch_course import Folder, Make
 
@@ -31,21 +32,7 @@ def export(folder: Folder, kind: str) -> Path:
 
 HOSTILE = "<b>\\\"&amp;' \\u0007 ]](x) $x$ ‮ `"
 """A title, as TOML has it."""
-WILD = """## One {#a:b}
-
-<p class=x onclick="alert(1)">Its end is left out, <b>bold</b><br>a line
-<img src="dot.png">
-<svg viewBox="0 0 1 1"><path d="M0 0h1"/></svg>
-<table><tr><td>1<td>2<tr><td colspan=2>3</table> &nbsp;&eacute;&#1;
-<custom-thing @x="1">own</custom-thing>
-<button>press</button><input type=text value=x>
-
-[a file](data.csv), [a section](#a:b), [itself](lesson:1.9), [another](lesson:1.1), Level 1.[^x]
-
-![a dot](dot.png "A dot") $x < y \\,\\&\\, z$
-
-[^x]: A note with `code`.
-"""
+WILD = fixture_text("documents/wild.md")
 
 
 DOT = bytes.fromhex(

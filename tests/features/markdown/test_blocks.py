@@ -27,7 +27,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.markdown.copies import markdown_href
 from coursebuild.features.markdown.writer import DocumentWriter
-from support.fixture_cases import check_text
+from support.fixture_cases import check_text, fixture_text
 from support.plain_html import PlainWriter, plain_html
 from support.rendered_course import Make
 
@@ -170,65 +170,7 @@ def test_files_that_raw_html_shows_have_the_address_of_the_copy() -> None:
     )
 
 
-LESSON = """## Part {#part}
-
-See Lesson 1.1, [there](lesson:1.1#more), [the box](model:box), [the page](page:about) and
-[here](#part). It is `1.5`{out=examples/a.py}.[^n]
-
-```io
-INPUT: a *number*
-PROCESS: none
-OUTPUT: `two`
-```
-
-```python file=examples/a.py args="--n 'a b'"
-print("one")
-print("```")
-```
-
-Output:
-
-```text
-one
-two
-```
-
-> [!derivation]- By hand
-> $$x = 1$$
->
-> ```python file=examples/in_callout.py
-> print("one")
-> ```
->
-> Output:
->
-> ```text
-> one
-> two
-> ```
-
-```mjcf fragment="worldbody" error="bad"
-<body/>
-```
-
-```quiz
-{"id": "q", "title": "Check", "questions": [
- {"kind": "mcq", "q": "Which?", "options": ["$a$", "b"], "answer": 1, "hints": ["Think."],
-  "feedback": ["no", "yes"], "explain": "So."},
- {"kind": "numeric", "q": "How many?", "answer": 2, "tol": 0.1, "unit": "kg m^2"},
- {"kind": "open", "q": "Why?", "reference": "Hence."},
- {"kind": "output", "q": "What?", "of": "examples/a.py", "line": 2},
- {"kind": "order", "q": "Sort.", "items": ["a", "b"]}]}
-```
-
-### Never
-
-```python file=examples/never.py norun requires=torch,mjx
-raise SystemExit
-```
-
-[^n]: A note with $y$.
-"""
+LESSON = fixture_text("documents/copied.md")
 NEXT_LESSON = """## More {#more}
 
 Back to [it](lesson:0.1#part).

@@ -34,6 +34,7 @@ from coursebuild.features.search.words import (
     shelf_of,
     terms_of,
 )
+from support.fixture_cases import fixture_text
 from support.rendered_course import Make
 from support.search_shards import read_shard
 
@@ -265,44 +266,7 @@ def test_any_formula_can_be_read(formula: str) -> None:
     assert all(name.isalpha() for name in names)
 
 
-LESSON = """Before any *heading*, at $I_{xx}$.[^n]
-
-## Outer {#out}
-
-- One `mj_step` item
-- Two
-
-> [!warning] Mind
-> In a [callout](lesson:1.1).
-
-### Inner <b>bold</b>
-
-$$
-\\tau = \\dot{L}
-$$
-
-| h | k |
-| - | - |
-| a | $b$ |
-
-```python file=examples/a.py norun
-import mujoco
-```
-
-```quiz
-{"id": "q", "title": "Check", "questions": [
-  {"kind": "mcq", "q": "Which <b>one</b>?", "options": ["This", "That"], "answer": 1,
-   "explain": "The secret.", "hints": ["A secret hint."]},
-  {"kind": "order", "q": "Sort", "items": ["zeta", "alpha"]}
-]}
-```
-
-## Empty
-
-<div>raw <i>text</i> &amp; more<script>hidden()</script></div>
-
-[^n]: A *note*.
-"""
+LESSON = fixture_text("documents/searched.md")
 
 
 def sections_of(make: Make, text: str) -> tuple[Section, ...]:
