@@ -10,41 +10,12 @@ from typing import Any
 import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptRun, Trace
+from support.fixture_cases import fixture_text
 from support.runners import Run, both_ways
 
 pytestmark = pytest.mark.site
 
-HEAD = """\
-import json
-import mujoco
-import numpy as np
-
-SPRING = '''
-<mujoco model="spring">
-  <option gravity="0 0 0"/>
-  <worldbody>
-    <body><joint name="j" type="slide" stiffness="10"/><geom size="0.1" mass="1"/></body>
-    <body pos="1 0 0"><joint type="slide" stiffness="10"/><geom size="0.1" mass="1"/></body>
-  </worldbody>
-  <keyframe><key name="pulled" qpos="0.5 0" qvel="0 2"/></keyframe>
-</mujoco>
-'''
-BODY = '''
-<mujoco model="body">
-  <worldbody>
-    <body pos="0 0 1"><freejoint/><geom type="box" size="0.1 0.2 0.3"/></body>
-    <body pos="5 0 1"><joint type="ball"/><geom size="0.1" pos="0.2 0 0"/></body>
-  </worldbody>
-</mujoco>
-'''
-told = {}
-
-def tell(name, values):
-    told[name] = np.asarray(values, float).ravel().tolist()
-
-model = mujoco.MjModel.from_xml_string(SPRING)
-data = mujoco.MjData(model)
-"""
+HEAD = fixture_text("scripts/moved_states.txt")
 SIZE = 1e-12
 FORWARD = "mujoco.mj_forward(model, data)\n"
 STEP = "mujoco.mj_step(model, data)\n"
@@ -294,23 +265,7 @@ def test_states_are_compared_by_the_largest_since_the_simulation_began(run_pertu
     assert sizes("data.qpos[:] = 0.01\n" + steps)[0] == pytest.approx(0.01, rel=1e-3)
 
 
-SPRING_HEAD = """\
-import json
-import mujoco
-import numpy as np
-
-SPRING = '''
-<mujoco>
-  <option timestep="0.1" gravity="0 0 0"/>
-  <worldbody><body><joint name="j" type="slide" stiffness="10"/><geom size="0.1" mass="1"/></body>
-  </worldbody>
-  <actuator><motor joint="j"/></actuator>
-</mujoco>
-'''
-model = mujoco.MjModel.from_xml_string(SPRING)
-data = mujoco.MjData(model)
-data.qpos[0] = 1
-"""
+SPRING_HEAD = fixture_text("scripts/spring.txt")
 TEN = {
     "one by one": "for _ in range(10):\n    mujoco.mj_step(model, data)\n",
     "many at once": "mujoco.mj_step(model, data, nstep=10)\n",
