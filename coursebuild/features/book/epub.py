@@ -133,7 +133,9 @@ class _Epub:
             licence = OutputFile(f"{_FOLDER}fonts/licence-{number}.txt", family.licence.data)
             yield EpubItem(licence, "text/plain")
         for level in self._course.written_levels:
-            yield _page_item(_level_name(level), self._level(level))
+            body = self._library.render("book/epub-level.html", level=level)
+            page = self._page(f"{level.id} {level.title}", body, "bodymatter")
+            yield _page_item(_level_name(level), page)
             for lesson in level.lessons:
                 place = urls.Place(urls.lesson_path(lesson))
                 rules = RewriteRules(place, self._address, self._picture, xml_id)
@@ -170,10 +172,6 @@ class _Epub:
             **values,
         )
         return visible(text).encode()
-
-    def _level(self, level: Level) -> bytes:
-        body = self._library.render("book/epub-level.html", level=level)
-        return self._page(f"{level.id} {level.title}", body, "bodymatter")
 
     def _cover(self) -> bytes:
         """Draw the title of the course as a picture, with a bar in the accent colour."""

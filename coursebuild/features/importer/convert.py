@@ -77,7 +77,10 @@ def convert(files: SourceFiles) -> ConvertedCourse:
         course = read_course_json(map_path, files)
     course = read_texts(course, files)
     lessons = [lesson for level in course.levels for lesson in level.lessons]
-    texts, ids = (*lessons, *course.pages), _new_ids(lessons)
+    texts = (*lessons, *course.pages)
+    ids = {lesson.slug: lesson.id for lesson in lessons}
+    ids |= {lesson.id: lesson.id for lesson in lessons}
+    ids |= {lesson.old_id: lesson.id for lesson in lessons if lesson.old_id}
     out, context = _convert_texts(course, texts, ids, files)
     leftovers = context.leftovers
     if map_path is not None:
@@ -139,13 +142,6 @@ def change_tried_lessons(target: Path, changes: Sequence[FileChange], store: Sto
 def _encode(text: str) -> bytes:
     """Return UTF-8; JSON may name characters that there are none of, half of a pair."""
     return text.encode("utf-8", "replace")
-
-
-def _new_ids(lessons: Sequence[ImportedText]) -> dict[str, str]:
-    """Return the new ids of lessons, by their old ids, their new ids and their slugs."""
-    by_old_id = {lesson.old_id: lesson.id for lesson in lessons if lesson.old_id}
-    slugs = {lesson.slug: lesson.id for lesson in lessons}
-    return slugs | {lesson.id: lesson.id for lesson in lessons} | by_old_id
 
 
 def _convert_texts(

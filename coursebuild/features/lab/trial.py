@@ -267,7 +267,9 @@ class _LabTrial(Struct, frozen=True):
             diagnostic = diagnose("lab-engine", lab.place(()), f"native MuJoCo {error}")
             return self._fail(module, [diagnostic])
         reply, failures = evaluation.reply, evaluation.failures
-        export = LabExport(None) if failures else self._export(reply)
+        export = LabExport(None)
+        if not failures and reply.main is not None and self.lab.kind != MJCF:
+            export = export_lab(self.context, self.engines.native, self.trial, self.lab, reply.main)
         files = model_files(self.context.root, self.model.path, self.model.text)
         self.context.run_store.note_trial(
             inputs,
@@ -393,11 +395,6 @@ class _LabTrial(Struct, frozen=True):
         if self.lab.verify.rtol is not None:
             return steps
         return min(steps, max(1, round(_PARITY_SECONDS / float(main["timestep"]))))
-
-    def _export(self, trial: TrialReply) -> LabExport:
-        if trial.main is None or self.lab.kind == MJCF:
-            return LabExport(None)
-        return export_lab(self.context, self.engines.native, self.trial, self.lab, trial.main)
 
 
 def _add_camera(config: dict[str, Any], main: MainRun | None) -> dict[str, Any]:

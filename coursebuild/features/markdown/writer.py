@@ -98,7 +98,8 @@ class DocumentWriter:
         """Write a block, without its last line end; may be empty."""
         match block:
             case model.Heading():
-                return self._heading(block)
+                text = _LAST_MARKS.sub(r"\1\\\2", self.inlines(block.children))
+                return f"{'#' * block.level} {text}".rstrip()
             case model.Paragraph():
                 return self._inlines(block.children)
             case model.HtmlFlow():
@@ -117,7 +118,9 @@ class DocumentWriter:
                 tex, tag = _remove_empty_lines(block.tex.text), self._tag(block.span.start)
                 return "\n".join(filter(None, ("$$", tex, tag, "$$")))
             case model.Table():
-                return self._table(block)
+                rows = (map(self._cell, row) for row in block.rows)
+                header, align = map(self._cell, block.header), (mark or "" for mark in block.align)
+                return table(header, rows, align)
             case model.Callout():
                 label = f"**{escape_marks(self.page.inputs.callouts[block.kind].label)}**"
                 title = self.inlines(block.title)
@@ -169,10 +172,6 @@ class DocumentWriter:
             return escape(inline.text)
         return self._inline(inline, "block")
 
-    def _heading(self, heading: model.Heading) -> str:
-        text = _LAST_MARKS.sub(r"\1\\\2", self.inlines(heading.children))
-        return f"{'#' * heading.level} {text}".rstrip()
-
     def _list(self, block: model.ListBlock, *, after_list: bool) -> str:
         """Write a list; directly after another list it has different marks, to stay separate."""
         number, mark = block.start, "*" if after_list else "-"
@@ -196,10 +195,6 @@ class DocumentWriter:
         elif item.blocks and isinstance(item.blocks[0], model.ListBlock):
             text = f"\n{text}"  # three marks on one line would be a thematic break
         return hang(mark, text, len(mark))
-
-    def _table(self, block: model.Table) -> str:
-        rows = (map(self._cell, row) for row in block.rows)
-        return table(map(self._cell, block.header), rows, (align or "" for align in block.align))
 
     def _cell(self, cell: model.Cell) -> str:
         return self._inlines(cell.children, "cell").replace("\n", " ")
