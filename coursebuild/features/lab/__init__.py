@@ -19,7 +19,6 @@ from coursebuild.core.features import (
     Trials,
 )
 from coursebuild.features.lab.equations.declared import OdeLab, PlotLab
-from coursebuild.features.lab.files import publish_labs
 from coursebuild.features.lab.inputs import lab_trials, trial_inputs
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.page import (
@@ -33,6 +32,7 @@ from coursebuild.features.lab.page import (
 )
 from coursebuild.features.lab.parse import parse_fence
 from coursebuild.features.lab.relations import check_labs, check_model_names
+from coursebuild.features.lab.reply import publish_labs
 from coursebuild.features.lab.schema import SimLab, refine_schema
 
 

@@ -41,8 +41,8 @@ from coursebuild.core.pages.quantities import number
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.urls import Place
-from coursebuild.features.lab.files import LabRecord, PublishedLab
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab
+from coursebuild.features.lab.reply import LabRecord, PublishedLab
 from coursebuild.features.lab.schema import Control, Overlay, Plot, Select, SimLab, Slider
 
 if TYPE_CHECKING:

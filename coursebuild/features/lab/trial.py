@@ -45,10 +45,9 @@ from coursebuild.features.lab.equations.equation_trial import (
     run_trial,
 )
 from coursebuild.features.lab.export.script import LabExport, export_lab, record_for_export
-from coursebuild.features.lab.files import LabOutput
 from coursebuild.features.lab.inputs import equation_inputs, inputs_of, trial_data
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
-from coursebuild.features.lab.reply import MainRun, TrialReply, read_reply, reply_bytes
+from coursebuild.features.lab.reply import LabOutput, MainRun, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 from coursebuild.features.lab.verdict import (
     code_diagnostic,

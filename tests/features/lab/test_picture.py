@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from coursebuild.features.lab.picture.draw import FreeCamera, Solid, draw
-from coursebuild.features.lab.picture.raster import Floor
+from coursebuild.features.lab.picture.raster import Floor, TextureMapping, texture_of
 from coursebuild.features.lab.picture.shapes import (
     Kind,
     flat_surface,
@@ -25,7 +25,6 @@ from coursebuild.features.lab.picture.shapes import (
     surface,
 )
 from coursebuild.features.lab.picture.static import png
-from coursebuild.features.lab.picture.textures import TextureMapping, texture_of
 from support.model_files import read_png
 
 FRONT = FreeCamera(azimuth=90, elevation=0, distance=4, target=(0, 0, 0))

@@ -5,7 +5,7 @@ Entry point: `draw(solids, camera, size, light)` → pixels.
 1. Every solid's triangles are brought into the camera's frame (MuJoCo's free camera) and projected
    (`raster.py`). Each sample keeps the nearest surface, with its place, normal and texture
    coordinates there. A pixel has 2 × 2 samples.
-2. The samples are coloured by texture and light (`light.py`), and the first shiny plane or box
+2. The samples are coloured by texture and light, and the first shiny plane or box
    shows what the camera's mirror image sees.
 3. Transparent solids are mixed in, the farthest first, and the sky is put behind all.
 
@@ -28,11 +28,14 @@ from coursebuild.features.lab.picture.raster import (
     Eye,
     Floor,
     GBuffer,
+    Texture,
+    TextureMapping,
     draw_edges,
     rotate,
+    sharpness,
+    sky,
 )
 from coursebuild.features.lab.picture.shapes import Array, Light, Material, Surface, shade, studio
-from coursebuild.features.lab.picture.textures import Texture, TextureMapping, sharpness, sky
 
 _SAMPLES = 2
 _NEAR_SHARE = 0.01
