@@ -289,8 +289,6 @@ def _mix(colour: Array, grey: float, alpha: Array) -> None:
 
 _CUBE, SKY = 1, 2
 """mjtTexture."""
-_SHARPER = 4.0
-"""How much longer than wide a sample may be on a surface before the texture is blurred."""
 _LID = 0.9
 
 
@@ -378,12 +376,10 @@ class TextureMapping(Struct, frozen=True):
 
     def _coordinates(self, unit: Array, places: Array, normals: Array, uv: Array) -> Array:
         repeat = np.array(self.repeat)
-        coordinates: Array
-        if self.has_uv:
-            coordinates = uv * repeat
-        elif self.endless:
+        coordinates: Array = uv * repeat
+        if self.endless and not self.has_uv:
             coordinates = (1 + repeat * places[:, :2] * (1, -1)) / 2
-        else:
+        elif not self.has_uv:
             scale = self.size[:2] if self.uniform else 1.0
             coordinates = self._unrepeated_coordinates(unit, places, normals) * repeat * scale
         return coordinates
@@ -410,12 +406,6 @@ class TextureMapping(Struct, frozen=True):
             case "sphere" | "ellipsoid":
                 u, v = angle, np.arccos(np.clip(z, -1.0, 1.0)) / np.pi
         return np.column_stack((u, v))
-
-
-def sharpness(cosines: Array) -> Array:
-    """Return by how much to blur a surface that is seen at an angle, given the cosines."""
-    longer = 1 / np.maximum(np.abs(cosines), 1e-3)
-    return np.maximum(longer / _SHARPER, 1.0)
 
 
 def sky(texture: Texture, directions: Array) -> Array:
