@@ -24,6 +24,7 @@ import re
 import struct
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
 
 from coursebuild.core.drawing.safe_svg import SVG, XLINK, read_svg
 from coursebuild.core.model import Course
@@ -209,6 +210,8 @@ def _words(root: ET.Element) -> Iterator[str]:
 
 def _png_size(data: bytes) -> tuple[int, int] | str:
     """Width and height of a PNG; or why it cannot be shown, in words."""
+    if find_spec("PIL") is None:
+        return "needs the package Pillow: run `pip install 'coursebuild[figures]'`"
     from PIL import Image
 
     width, height = (int.from_bytes(data[at : at + 4], "big") for at in (16, 20))
@@ -234,12 +237,12 @@ def _png_drawing(data: bytes) -> bytes:
 
 
 def _png_difference(old: bytes, new: bytes) -> str:
-    from PIL import Image, ImageChops, ImageStat
-
     old, new = _png_drawing(old), _png_drawing(new)
     old_size, new_size = _png_size(old), _png_size(new)
     if isinstance(old_size, str) or isinstance(new_size, str):
         return f"the recorded file {old_size}" if isinstance(old_size, str) else str(new_size)
+    from PIL import Image, ImageChops, ImageStat
+
     if old_size != new_size:
         return "it has {}×{} pixels where {}×{} are recorded".format(*new_size, *old_size)
     images = [Image.open(io.BytesIO(data)).convert("RGBA") for data in (old, new)]
