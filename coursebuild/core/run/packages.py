@@ -141,7 +141,16 @@ def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str
     decode = functools.partial(msgspec.json.decode, type=dict[str, str])
     names = store.peek("installed", key, decode)
     if names is None:
-        names = _scan(folders)
+        names_by_module: dict[str, set[str]] = {}
+        seen_names: set[str] = set()
+        for distribution in importlib.metadata.distributions(path=list(folders)):
+            name = distribution.metadata["Name"] or ""
+            if name in seen_names or name == _TOOL_PACKAGE:  # the first on the path counts
+                continue
+            seen_names.add(name)
+            for module in _modules(distribution):
+                names_by_module.setdefault(module, set()).add(f"{name} {distribution.version}")
+        names = {module: ", ".join(sorted(names)) for module, names in names_by_module.items()}
         store.put_value("installed", key, names)
     return names
 
@@ -152,19 +161,6 @@ def _names(folder: str) -> list[str]:
         return sorted(os.listdir(folder))  # noqa: PTH208
     except OSError:
         return []
-
-
-def _scan(folders: Sequence[str]) -> dict[str, str]:
-    names_by_module: dict[str, set[str]] = {}
-    seen_names: set[str] = set()
-    for distribution in importlib.metadata.distributions(path=list(folders)):
-        name = distribution.metadata["Name"] or ""
-        if name in seen_names or name == _TOOL_PACKAGE:  # the first on the path counts
-            continue
-        seen_names.add(name)
-        for module in _modules(distribution):
-            names_by_module.setdefault(module, set()).add(f"{name} {distribution.version}")
-    return {module: ", ".join(sorted(names)) for module, names in names_by_module.items()}
 
 
 def _modules(distribution: importlib.metadata.Distribution) -> set[str]:
@@ -252,7 +248,11 @@ def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> 
                 say(f"installing MuJoCo {engine} into {prefix}")
                 _create_environment(prefix, engine)
             os.utime(prefix)
-            _remove_unused(folder, prefix)
+            # Remove all environments except those that were used last
+            rest = [path for path in folder.iterdir() if path != prefix]
+            rest.sort(key=lambda path: path.stat().st_mtime, reverse=True)
+            for path in rest[_MAX_ENVIRONMENTS - 1 :]:
+                shutil.rmtree(path, ignore_errors=True)
     except OSError as error:
         raise EffectError(f"{prefix.name} cannot be made: {reason(error)}") from None
     return Interpreter(
@@ -378,11 +378,3 @@ def _run(command: Sequence[str]) -> tuple[int, str]:
                 os.killpg(process.pid, signal.SIGKILL)
             raise
     return process.returncode, output
-
-
-def _remove_unused(folder: Path, current: Path) -> None:
-    """Remove all environments except those that were used last."""
-    rest = [path for path in folder.iterdir() if path != current]
-    rest.sort(key=lambda path: path.stat().st_mtime, reverse=True)
-    for path in rest[_MAX_ENVIRONMENTS - 1 :]:
-        shutil.rmtree(path, ignore_errors=True)

@@ -175,7 +175,11 @@ def _svg_difference(old_data: bytes, new_data: bytes) -> str:
     old_words, new_words = list(_words(old_root)), list(_words(new_root))
     if len(old_words) != len(new_words):
         return f"it has {len(new_words)} parts where {len(old_words)} are recorded"
-    size = _size(old_root)
+    # The longer side of a drawing, in its own units
+    box = [float(n) for n in _NUMBER.findall(old_root.get("viewBox", ""))]
+    lengths = (_NUMBER.match(old_root.get(side, "")) for side in ("width", "height"))
+    sides = box[2:4] or [float(number[0]) for number in lengths if number is not None]
+    size = max([side for side in sides if math.isfinite(side) and side > 0], default=1.0)
     numbers, texts, worst = 0, 0, 0.0
     for old_word, new_word in zip(old_words, new_words, strict=True):
         if old_word == new_word:
@@ -199,14 +203,6 @@ def _words(root: ET.Element) -> Iterator[str]:
         yield element.tag
         yield from (f"{key}={value}" for key, value in sorted(element.attrib.items()))
         yield " ".join(f"{element.text or ''} {element.tail or ''}".split())
-
-
-def _size(root: ET.Element) -> float:
-    """The longer side of a drawing, in its own units."""
-    box = [float(n) for n in _NUMBER.findall(root.get("viewBox", ""))]
-    lengths = (_NUMBER.match(root.get(side, "")) for side in ("width", "height"))
-    sides = box[2:4] or [float(number[0]) for number in lengths if number is not None]
-    return max([side for side in sides if math.isfinite(side) and side > 0], default=1.0)
 
 
 # --- PNG
