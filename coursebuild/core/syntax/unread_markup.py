@@ -23,13 +23,17 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose, misspelt, ne
 from coursebuild.core.text.source import Excerpt, Span
 
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
-_SIGNS = re.compile(
-    r"[{}\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f]|[!?=:._']{2}|:\w|[´‘’]{3}"
-    r"|\((?:out|given)\)|\A_\Z|\A[a-rt-z](?!\w)|^\d{1,2}[.,;)][^\d\s]|^\d{1,2}[,;] |^-[A-Z]"
-    r"|^[0=_] |^h\d\. |^[A-Z?!]> |^1 |^import |Lesson \d",
-    re.MULTILINE,
+_MARKS = r"{}\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f"
+_SIGN = re.compile(
+    rf"[{_MARKS}!?=:._'´‘’(](?:(?<=[{_MARKS}])|(?<=[!?=:._'])[!?=:._']|(?<=:)\w"
+    r"|(?<=[´‘’])[´‘’]{2}|(?<=\()(?:out|given)\))"
 )
-"""What all unread markup has at least once, so that most texts are passed over quickly."""
+_FIRST_SIGN = re.compile(
+    r"\d{1,2}[.,;)][^\d\s]|\d{1,2}[,;] |-[A-Z]|[0=_] |h\d\. |[A-Z?!]> |1 |import |_\Z"
+)
+"""What all unread markup has at least once, in a text or where a line of it begins, so that most
+texts are passed over quickly; or it has "Lesson ", or is a letter directly after a formula."""
+_LETTER = re.compile(r"[a-rt-z](?!\w)")
 _DOLLAR = re.compile(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
 """A dollar sign that no amount of money follows."""
 _TEX = re.compile(r"\\[A-Za-z]{2,}|[A-Za-z)}\]][_^](?:[0-9]|\{)")
@@ -73,7 +77,7 @@ def check_unread_markup(
     """
     whole = content.text
     has_escaped_bracket = "\\(" in whole or "\\[" in whole
-    if not has_escaped_bracket and not any(_SIGNS.search(text) for _, text in texts):
+    if not has_escaped_bracket and not any(_may_be_unread(whole, *text) for text in texts):
         return
     masked = _mask_all_but(texts, whole)
     dollars = [*_check_dollars(content, texts, masked)]
@@ -89,6 +93,15 @@ def check_unread_markup(
         if diagnostic is not None:
             reported |= ONCE.intersection([name])
             yield diagnostic
+
+
+def _may_be_unread(whole: str, at: int, text: str) -> bool:
+    return (
+        _SIGN.search(text) is not None
+        or any(map(_FIRST_SIGN.match, text.split("\n")))
+        or "Lesson " in text
+        or (at > 0 and whole[at - 1] == "$" and _LETTER.match(text) is not None)
+    )
 
 
 def _check_dollars(
