@@ -14,6 +14,7 @@ from __future__ import annotations
 import ast
 import functools
 import re
+from collections import Counter
 from collections.abc import Iterator
 from typing import Literal, TypeAlias
 
@@ -43,7 +44,7 @@ _FILE = re.compile(r"(?:content|examples|models)/(?!.*[A-Z]{3})[\w./-]*\w\.[a-z]
 _NEAR_FILE = re.compile(r"(?!.*[A-Z]{3})[\w.-]+/[\w./-]*\w\.(?:md|py|toml|xml)")
 """What is a file of the course only if it is like the name of one."""
 _CODE_WORD = re.compile(
-    r"\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
+    r"\b\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
 )
 """A word of code that inline code could mean."""
 _CODE = (
@@ -51,6 +52,8 @@ _CODE = (
 ) | model.Recording
 _PLAIN = re.compile(r"(?<![\w.\\/-])[A-Za-z]\w+[^\W_](?:\.(?:md|py|toml|xml)\b)?(?![\w./\\-])")
 """A word of inline code that is no part of a path."""
+_MOST_PLAIN = 3
+"""How many uses of a plain word are kept of a document: what is used again is no slip."""
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
 
 
@@ -109,6 +112,7 @@ def document_names(document: model.Document) -> DocumentNames | None:
     words: set[str] = set()
     names = CodeNames((), frozenset(), {}, {}, {}, {})
     inner: set[int] = set()
+    plain_counts = Counter[str]()
     for block in model.document_blocks(document):
         if isinstance(block, model.FeatureBlock):
             inner |= {id(part) for part in model.walk_blocks(block.child_blocks())}
@@ -127,6 +131,10 @@ def document_names(document: model.Document) -> DocumentNames | None:
                 link_parts |= {id(child) for child in model.walk_inlines(inline.children)}
             elif isinstance(inline, model.CodeSpan) and not inline.literal:
                 for claim, place in claims_of(inline):
+                    if claim.kind == "plain":
+                        plain_counts[claim.name] += 1
+                        if plain_counts[claim.name] > _MOST_PLAIN:
+                            continue
                     claims.append(
                         replace(
                             claim, linked=may_link and claim.linked and id(inline) not in link_parts
