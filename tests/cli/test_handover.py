@@ -136,10 +136,10 @@ def test_a_command_writes_to_its_own_terminal(make: Make, runtime: str) -> None:
         preview.wait_for_line("checked: ")
         assert run_in_terminal() == alone
         preview.wait_for_line("done: `coursebuild check content/lessons/1.1-one.md`")
-        closed = subprocess.run(
+        result = subprocess.run(
             f"{' '.join(command('check'))} >&-", shell=True, cwd=folder.root, env=env
         )
-        assert closed.returncode == 1
+        assert result.returncode == 1
     assert b"\x1b[" in alone
 
 
@@ -393,8 +393,8 @@ def test_what_others_may_have_put_there_is_passed_over(
 
 def test_a_runtime_folder_that_others_can_enter_is_not_used(place: Path) -> None:
     place.parent.parent.chmod(0o755)
-    other = socket_place(".")
-    assert other is None or not other.startswith(str(place.parent))
+    other_place = socket_place(".")
+    assert other_place is None or not other_place.startswith(str(place.parent))
 
 
 @pytest.mark.parametrize("answer", [b"", b"\0\0\0\2{]", b"\0\0\0\2[]", b"\0\0\1"])

@@ -366,8 +366,8 @@ def test_several_offers_are_accepted_at_once_or_not_at_all(make: Make) -> None:
     with serve_preview(folder) as preview, preview.events() as events:
         events.until(lambda page: sum(bool(o.get("offer")) for o in page.news["outputs"]) == 2)
         ids = [output["offer"] for output in events.news["outputs"]]
-        for wrong in ("", " ", f"{ids[0]} {'0' * 24}"):
-            assert preview.accept_offer(wrong)[0] == 409
+        for bad_ids in ("", " ", f"{ids[0]} {'0' * 24}"):
+            assert preview.accept_offer(bad_ids)[0] == 409
         assert folder.text(folder.lesson()) == lesson
         assert preview.accept_offer(" ".join(ids)) == (200, {"message": ""})
         changed = lesson.replace("```text\n2\n", "```text\n1\n").replace(
