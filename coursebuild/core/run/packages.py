@@ -237,16 +237,8 @@ def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> 
     Raises:
         EffectError: it cannot be made.
     """
-    parts = [sys.version, sys.base_prefix, site_folders()]
-    name = f"mujoco-{engine}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
-    state = state_folder(str(root))
-    if state is None:
-        raise EffectError(
-            f"there is no place for an environment with MuJoCo {engine}",
-            help="HOME or XDG_STATE_HOME gives one, outside of the course",
-        )
-    folder = Path(state, _FOLDER)
-    prefix = folder / name
+    prefix = environment_prefix(root, engine)
+    folder = prefix.parent
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with folder_lock(folder):
@@ -264,7 +256,7 @@ def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> 
     except OSError as error:
         raise EffectError(f"{prefix.name} cannot be made: {reason(error)}") from None
     return Interpreter(
-        name,
+        prefix.name,
         f"{prefix}/bin/python",
         str(prefix),
         sys.base_prefix,
@@ -272,6 +264,23 @@ def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> 
         engine,
         (str(_packages(prefix)), *site_folders()),
     )
+
+
+def environment_prefix(root: Path, engine: str) -> Path:
+    """Where the environment with a version of MuJoCo is, or would be.
+
+    Raises:
+        EffectError: there is no place for it.
+    """
+    parts = [sys.version, sys.base_prefix, site_folders()]
+    name = f"mujoco-{engine}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
+    state = state_folder(str(root))
+    if state is None:
+        raise EffectError(
+            f"there is no place for an environment with MuJoCo {engine}",
+            help="HOME or XDG_STATE_HOME gives one, outside of the course",
+        )
+    return Path(state, _FOLDER, name)
 
 
 def _packages(prefix: Path) -> Path:

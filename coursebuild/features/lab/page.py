@@ -41,6 +41,7 @@ from coursebuild.core.pages.quantities import number
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.urls import Place
+from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab
 from coursebuild.features.lab.reply import LabRecord, PublishedLab
 from coursebuild.features.lab.schema import Control, Overlay, Plot, Select, SimLab, Slider
@@ -110,14 +111,12 @@ def page_view(page: PageContext, block: Lab) -> LabView:
     """The view of a lab of a document on its page."""
     trial, model = page.inputs.trials.get(block.span.start), block.fields.model
     live = trial if isinstance(trial, PublishedLab) else None
-    view = lab_view(page.renderer.words, page.place, block, live, page.inputs.engine)
+    view = lab_view(page.renderer.words, page.place, block, live)
     href = "" if model is None else page.href(ModelTarget(model))
     return replace(view, model_href=href, start=_start(page, block))
 
 
-def lab_view(
-    words: Strings, place: Place, block: Lab, live: PublishedLab | None, engine: str
-) -> LabView:
+def lab_view(words: Strings, place: Place, block: Lab, live: PublishedLab | None) -> LabView:
     """The view of a lab for the page at a place; `live` is the lab as it was published."""
     fields = block.fields
     title = fields.title or words("lab.untitled")
@@ -137,7 +136,7 @@ def lab_view(
         readouts=tuple(readout.label for readout in fields.readouts),
         plots=tuple(_plot(words, plot) for plot in fields.plots),
         overlays=tuple(words(f"overlay.{name}") for name in fields.toggles),
-        recorded=_recorded_view(words, place, title, live, engine),
+        recorded=_recorded_view(words, place, title, live),
     )
 
 
@@ -175,7 +174,7 @@ def index_lab(reader: IndexReader, lab: Lab) -> None:
 
 
 def _recorded_view(
-    words: Strings, place: Place, title: str, live: PublishedLab | None, engine: str
+    words: Strings, place: Place, title: str, live: PublishedLab | None
 ) -> RecordedView | None:
     """Describe what the trial recorded; `None` if it did not come to its end."""
     record = live.record if live is not None else None
@@ -196,7 +195,7 @@ def _recorded_view(
         words("lab.picture", title=title, t=number(record.time, 4)),
         f"{number(record.scale[0])} m",
         words("lab.at", t=number(round(record.end, 3))),
-        words("lab.proven", engine=engine, tried=str(live.attempt_count), parity=live.parity),
+        words("lab.proven", engine=LAB_ENGINE, tried=str(live.attempt_count), parity=live.parity),
     )
 
 
@@ -284,7 +283,7 @@ def model_view(library: Library, place: urls.Place, model: MjcfModel) -> LabView
     lab, publication = _find_lab(library, model)
     if publication is None or publication.record is None:
         return None
-    view = lab_view(library.words, place, lab, publication, library.results.engine)
+    view = lab_view(library.words, place, lab, publication)
     return replace(view, model_href=place.href(place.path))
 
 

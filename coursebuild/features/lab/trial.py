@@ -18,7 +18,7 @@ from __future__ import annotations
 import functools
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -69,8 +69,13 @@ _TRANSIENT = ("timeout", "engine")
 class Engines:
     """The browser's engine and the native one; each starts when it is first needed."""
 
-    def __init__(self, root: Path, limits: Limits = LIMITS) -> None:
-        self.native = NativeEngine(root, memory=limits.memory, compiling=limits.models)
+    def __init__(
+        self,
+        root: Path,
+        limits: Limits = LIMITS,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self.native = NativeEngine(root, memory=limits.memory, compiling=limits.models, say=say)
         self.browser = LabEngine(limits.memory)
         self.equations = EquationEngine(limits.memory)
 
@@ -100,7 +105,7 @@ class LabTrials:
         """`seconds`: the processor time that a trial may take; by default, what the map says."""
         self._context = context
         self._seconds = seconds or context.course.limits.lab
-        self._engines = engines or Engines(context.root, context.course.limits)
+        self._engines = engines or Engines(context.root, context.course.limits, context.say)
 
     def run(self, trials: Sequence[Trial]) -> TrialOutcome:
         """Run the trials in turn, and end the engines."""

@@ -17,7 +17,6 @@ from tree_sitter import Node
 
 from coursebuild.core.checks.compiled import line_span
 from coursebuild.core.run.mjcf import error_line, readable_error
-from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.lab.compile import LabCode, pieces
@@ -116,7 +115,7 @@ _HELP = {
 
 
 def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Report what a lab cannot be published with: failures, other engines, untrue fields."""
+    """Report what a lab cannot be published with: failures, and untrue fields."""
     # Report each failure of a trial at its entry. MuJoCo warns of the main run again in every
     # attempt; to report it once is enough
     failures = [f for f in trial.failures if f.kind != "deep" and not _is_claimed(lab, f)]
@@ -124,9 +123,6 @@ def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     for failure in failures:
         if failure.entry == () or failure.kind not in of_main_run:
             yield _make_diagnostic(lab, failure)
-    if trial.version != engine_version():
-        message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
-        yield diagnose("lab-engine", lab.span.first_line(), message)
     yield from _check_depth_claim(lab, trial)
     if trial.main is not None and trial.main["parity"] is not None:
         yield from _check_parity(lab, trial.main["parity"])
