@@ -219,6 +219,29 @@ class NamedPath(Struct, frozen=True):
     span: Span
 
 
+class Launch(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where readers can run the notebooks of lessons, which lie in a repository of the site."""
+
+    repository: Annotated[
+        fields.WebPlace | None,
+        Meta(description="with the built site; without it, that of `[course]`"),
+    ] = None
+    branch: Annotated[fields.Text, Meta(description="the branch with the built site")] = "gh-pages"
+    folder: Annotated[
+        str, Meta(description="the folder of the built site in it, as in `docs`; else the top")
+    ] = ""
+    colab: Annotated[bool, Meta(description="a button for Google Colab; needs GitHub")] = False
+    binder: Annotated[
+        fields.WebPlace | None,
+        Meta(description="a button for this Binder, as in `https://mybinder.org`"),
+    ] = None
+    jupyterhub: Annotated[
+        fields.WebPlace | None,
+        Meta(description="a button for this JupyterHub, which needs nbgitpuller"),
+    ] = None
+    codespaces: Annotated[bool, Meta(description="a button for GitHub Codespaces")] = False
+
+
 class Limits(Struct, frozen=True, forbid_unknown_fields=True):
     """How much reading and trying the course may take."""
 
@@ -298,6 +321,8 @@ class Course(Struct, frozen=True):
     html: Literal["none", "safe", "trusted"] = "safe"
     """The raw HTML that lessons and pages may have."""
     limits: Limits = Limits()
+    launch: Launch | None = None
+    """Where notebooks can be run; its `repository` is set."""
     theme: Theme = Theme()
     words: Words = Words()
 

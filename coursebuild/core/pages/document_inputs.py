@@ -254,6 +254,11 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
             (copy.text, place.href(urls.copy_path(place.path, copy.ending)), copy.download)
             for copy in page_copies()
         ),
+        "services": tuple(
+            service
+            for copy in page_copies()
+            for service in copy.services(library.course, urls.copy_path(place.path, copy.ending))
+        ),
         "edit": edit_address(library, lesson.path),
     }
     data = lesson_data(library, lesson)
