@@ -288,6 +288,10 @@ def stub_inputs(library: Library, lesson: Lesson) -> PageInputs:
 def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, object]:
     """The values that the pages of written and planned lessons share."""
     order, position = library.order, library.positions[lesson.id]
+    # A reader is led to what can be read.
+    before = (one for one in reversed(order[:position]) if one.document is not None)
+    after = (one for one in order[position + 1 :] if one.document is not None)
+    previous, following = next(before, None), next(after, None)
     return {
         "lesson": lesson_link(library, place, lesson, whole=True),
         "level": level_view(library, place, library.levels[lesson.level]),
@@ -297,10 +301,8 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
         ),
         "graph": neighbourhood(library, place, lesson),
         "referrers": owner_links(place, library.referrers.get(lesson.id, ())),
-        "previous": lesson_link(library, place, order[position - 1]) if position else None,
-        "following": lesson_link(library, place, order[position + 1])
-        if position + 1 < len(order)
-        else None,
+        "previous": previous and lesson_link(library, place, previous),
+        "following": following and lesson_link(library, place, following),
     }
 
 

@@ -203,7 +203,6 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
         "galleries": tuple(galleries),
         "levels": tuple(level_view(library, place, level, whole=True) for level in course.levels),
         "start": lesson_link(library, place, written_lessons[0]) if written_lessons else None,
-        "total": len(library.order),
         "written": len(written_lessons),
         "models": len(course.models),
         "gallery": place.href(library.gallery) if library.gallery else "",

@@ -103,7 +103,8 @@ def _facts(inputs: PageInputs, lesson: LessonLink, words: Strings, locate: Locat
     if isinstance(level, LevelView):
         name = f"{words('level.label', id=level.id)}: {level.title}"
         facts.append(link(escape_line(name), locate(level.href)))
-    facts.append(escape_line(words(f"status.{lesson.status}")))
+    if lesson.status != "complete":
+        facts.append(escape_line(words(f"status.{lesson.status}")))
     if lesson.minutes:
         facts.append(escape_line(words("lesson.minutes", n=lesson.minutes)))
     if lesson.further:
