@@ -1,7 +1,7 @@
 """The moving picture of the README: a save that is refused, and mended.
 
 Entry point: run it as a file: `.venv/bin/python docs/moving_picture.py`. It writes
-docs/images/refused.svg, a drawing that moves by itself wherever SVG is shown, and holds still for
+docs/images/refused.svg, a drawing that moves by itself wherever SVG is end, and holds still for
 who asks for less motion.
 
 1. The course of the README is written into a scratch folder, and `update` records its output.
@@ -74,19 +74,19 @@ def play() -> list[Scene]:
         lesson = next(course.glob("content/lessons/*.md"))
         printed(course, "update")
         right = lesson.read_text(encoding="utf-8")
-        wrong = right.replace(f"fallen {RIGHT} m", f"fallen {WRONG} m")
-        lesson.write_text(wrong, encoding="utf-8")
+        mistaken_text = right.replace(f"fallen {RIGHT} m", f"fallen {WRONG} m")
+        lesson.write_text(mistaken_text, encoding="utf-8")
         refused = printed(course, "check")
         lesson.write_text(right, encoding="utf-8")
         mended = printed(course, "check")
     ask = ["$ coursebuild check"]
-    shown, shown_wrong = (text.rstrip().splitlines()[-6:] for text in (right, wrong))
+    end, end_with_mistake = (text.rstrip().splitlines()[-6:] for text in (right, mistaken_text))
     return [
-        Scene(shown, "", ["$"]),
-        Scene(shown_wrong, WRONG, ask),
-        Scene(shown_wrong, WRONG, ask + refused),
-        Scene(shown, RIGHT, ask),
-        Scene(shown, RIGHT, ask + mended),
+        Scene(end, "", ["$"]),
+        Scene(end_with_mistake, WRONG, ask),
+        Scene(end_with_mistake, WRONG, ask + refused),
+        Scene(end, RIGHT, ask),
+        Scene(end, RIGHT, ask + mended),
     ]
 
 
@@ -96,14 +96,14 @@ def draw(scenes: list[Scene]) -> str:
     height = fold + 30 + LINE * max(len(scene.terminal) for scene in scenes)
     groups, rules, begin, whole = [], [], 0.0, sum(SECONDS)
     for number, (scene, seconds) in enumerate(zip(scenes, SECONDS, strict=True), 1):
-        texts = [_marked(line, 50 + n * LINE, scene.word) for n, line in enumerate(scene.lesson)]
+        texts = [_draw_line(line, 50 + n * LINE, scene.word) for n, line in enumerate(scene.lesson)]
         for n, line in enumerate(scene.terminal):
             look = "changed" if line.startswith("error") else "right" if "holds" in line else "ink"
             texts.append(_text(LEFT, fold + 28 + n * LINE, escape(line), look))
         groups.append(f'<g class="scene scene-{number}">{"".join(texts)}</g>')
         first, last = 100 * begin / whole, 100 * (begin + seconds) / whole
         frames = {0.0: 0, first: 1, last: 0}
-        path = " ".join(f"{at:.2f}% {{ opacity: {seen}; }}" for at, seen in frames.items())
+        path = " ".join(f"{at:.2f}% {{ opacity: {opacity}; }}" for at, opacity in frames.items())
         rules.append(f"@keyframes s{number} {{ {path} }}")
         rules.append(f".scene-{number} {{ animation-name: s{number}; }}")
         begin += seconds
@@ -117,7 +117,7 @@ def draw(scenes: list[Scene]) -> str:
     )
 
 
-def _marked(line: str, y: int, word: str) -> str:
+def _draw_line(line: str, y: int, word: str) -> str:
     """A line of the lesson, with the word that was changed in it."""
     before, word, after = line.partition(word or "\n")  # no line has a line break
     look = "changed" if word == WRONG else "right"

@@ -151,9 +151,9 @@ def test_course_and_manual_link_to_no_placeholder() -> None:
     lines = git(
         "grep", "-nE", "//[^ ]*(OWNER|/example.org)", ":/*.toml", ":/*.py", ":/*.yml", ":/README.md"
     )
-    named = ("tests/", "benchmarks/", "docs/")
+    examples = ("tests/", "benchmarks/", "docs/")
     assert [
-        line for line in lines.splitlines() if not line.removeprefix("../").startswith(named)
+        line for line in lines.splitlines() if not line.removeprefix("../").startswith(examples)
     ] == []
 
 
@@ -166,10 +166,10 @@ def test_the_picture_is_there_and_small() -> None:
 
 @pytest.mark.site
 def test_the_moving_picture_is_what_the_commands_print(tmp_path: Path) -> None:
-    shown = DOCS / "images/refused.svg"
-    script = [sys.executable, DOCS / "moving_picture.py", tmp_path / shown.name]
+    picture = DOCS / "images/refused.svg"
+    script = [sys.executable, DOCS / "moving_picture.py", tmp_path / picture.name]
     subprocess.run(script, capture_output=True, check=True)
-    assert (tmp_path / shown.name).read_text("utf-8") == shown.read_text("utf-8")
+    assert (tmp_path / picture.name).read_text("utf-8") == picture.read_text("utf-8")
 
 
 @pytest.mark.slow

@@ -289,9 +289,9 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
     """The values that the pages of written and planned lessons share."""
     order, position = library.order, library.positions[lesson.id]
     # A reader is led to what can be read.
-    before = (one for one in reversed(order[:position]) if one.document is not None)
-    after = (one for one in order[position + 1 :] if one.document is not None)
-    previous, following = next(before, None), next(after, None)
+    earlier = (x for x in reversed(order[:position]) if x.document is not None)
+    later = (x for x in order[position + 1 :] if x.document is not None)
+    previous, following = next(earlier, None), next(later, None)
     return {
         "lesson": lesson_link(library, place, lesson, whole=True),
         "level": level_view(library, place, library.levels[lesson.level]),

@@ -334,28 +334,20 @@ def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
 def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
     """The inputs of a page that is not a lesson; its document's summary is enough."""
     place = urls.Place(urls.page_path(page))
-    listed = (
-        [p for p in library.course.pages if p.section and not p.is_home] if page.section else []
-    )
-    position = next((n for n, other in enumerate(listed) if other.id == page.id), 0)
-    links = [_page_link(place, other) for other in listed]
+    pages = [p for p in library.course.pages if p.section and not p.is_home] if page.section else []
+    links = {p.id: NamedLink(place.href(urls.page_path(p)), p.title) for p in pages}
+    order = list(links)
+    position = order.index(page.id) if page.id in order else 0
     values = {
         "title": page.title,
         "edit": edit_address(library, page.path),
         "current": page.id,
         "sections": tuple(
-            (
-                title,
-                tuple(
-                    (p.id, link)
-                    for p, link in zip(listed, links, strict=True)
-                    if p.section == title
-                ),
-            )
-            for title in dict.fromkeys(other.section for other in listed)
+            (title, tuple((p.id, links[p.id]) for p in pages if p.section == title))
+            for title in dict.fromkeys(p.section for p in pages)
         ),
-        "previous": links[position - 1] if position else None,
-        "following": links[position + 1] if position + 1 < len(links) else None,
+        "previous": links[order[position - 1]] if position else None,
+        "following": links[order[position + 1]] if position + 1 < len(order) else None,
     }
     return PageInputs(
         PageHead(place.path, "page", page.title, ""),
@@ -363,10 +355,6 @@ def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
         values,
         document_inputs=document_inputs(library, place, document),
     )
-
-
-def _page_link(place: urls.Place, page: Page) -> NamedLink:
-    return NamedLink(place.href(urls.page_path(page)), page.title)
 
 
 def not_found_inputs(library: Library) -> PageInputs:

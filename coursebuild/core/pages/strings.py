@@ -58,8 +58,10 @@ class Strings(Struct, frozen=True):
 
     def prefer(self, prefix: str) -> Strings:
         """The texts in which one of the key `prefix` + KEY replaces that of KEY."""
-        own = {k.removeprefix(prefix): t for k, t in self.texts.items() if k.startswith(prefix)}
-        return Strings(dict(sorted((dict(self.texts) | own).items())), self.language)
+        preferred = {
+            k.removeprefix(prefix): t for k, t in self.texts.items() if k.startswith(prefix)
+        }
+        return Strings(dict(sorted((dict(self.texts) | preferred).items())), self.language)
 
     def has(self, key: str) -> bool:
         """Whether there is a text of this key."""

@@ -409,9 +409,9 @@ def test_pages_in_sections_make_a_manual(make: Make) -> None:
     files = make("", course=manual_map(), second="Two.", third="Three.").site()
     site = pages(files)
     assert steps_of(site["second.html"]) == {"prev": "about.html", "next": "third.html"}
-    (listed,) = re.findall(r'<nav class="level-nav".*?</nav>', site["second.html"], re.DOTALL)
-    assert re.findall(r'<p class="label">(.*?)</p>', listed) == ["Begin", "Reference"]
-    assert re.findall(r'<a href="(\w+).html"(?: aria-current="page")?>', listed) == [
+    (page_list,) = re.findall(r'<nav class="level-nav".*?</nav>', site["second.html"], re.DOTALL)
+    assert re.findall(r'<p class="label">(.*?)</p>', page_list) == ["Begin", "Reference"]
+    assert re.findall(r'<a href="(\w+).html"(?: aria-current="page")?>', page_list) == [
         "about",
         "second",
         "third",
