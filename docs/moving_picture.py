@@ -1,7 +1,7 @@
 """The moving picture of the README: a save that is refused, and mended.
 
 Entry point: run it as a file: `.venv/bin/python docs/moving_picture.py`. It writes
-docs/images/refused.svg, a drawing that moves by itself wherever SVG is end, and holds still for
+docs/images/refused.svg, a drawing that moves by itself wherever SVG is shown, and holds still for
 who asks for less motion.
 
 1. The course of the README is written into a scratch folder, and `update` records its output.
