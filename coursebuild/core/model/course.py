@@ -159,6 +159,8 @@ class Page(Struct, frozen=True):
     """Whether it is in the menu of every page."""
     names: bool = True
     """Whether names in its inline code have to be known."""
+    section: str = ""
+    """The heading under which it stands among the pages; empty where it is in no list."""
 
     @property
     def is_home(self) -> bool:
@@ -346,6 +348,11 @@ class Course(Struct, frozen=True):
     def lessons(self) -> tuple[Lesson, ...]:
         """All lessons in the order of the map."""
         return tuple(lesson for level in self.levels for lesson in level.lessons)
+
+    @property
+    def is_manual(self) -> bool:
+        """Whether it is made of pages alone, in sections."""
+        return not self.lessons and any(page.section for page in self.pages)
 
     @property
     def written_levels(self) -> tuple[Level, ...]:

@@ -133,7 +133,9 @@ def _build_course(
         silences=fields.silence,
         levels=levels,
         pages=tuple(
-            Page(node.span, page.id, page.title, page.file, None, page.menu, page.names)
+            Page(
+                node.span, page.id, page.title, page.file, None, page.menu, page.names, page.section
+            )
             for node, page in zip(root.objects("page"), fields.page, strict=True)
         ),
         models=(),
