@@ -129,6 +129,9 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """What `parse` makes."""
     parse: Callable[[Fence, TextParser], Parsed[B | None]]
     """The block and its diagnostics. Without a block the text is shown as code."""
+    label: str = ""
+    """The prefix of its labels, one of `LABEL_KINDS`; without one it has no number. What it draws
+    and writes shows the number, `PageContext.number`, with the id of the label."""
     nested: bool = False
     """Whether it may be inside a text of another block, where `update` cannot edit lines."""
     values: Callable[[Library, Place, B], Struct] | None = None

@@ -63,11 +63,22 @@ class NumberBinding(Struct, frozen=True):
     """Its source from `{given="…"}`, perhaps empty; `None` where a script has printed it."""
 
 
+LABEL_KINDS = {
+    "eq": "a formula",
+    "fig": "a figure",
+    "tab": "a table",
+    "lst": "a listing",
+    "lab": "a lab",
+}
+"""What can have a label, by the prefix of the label's id."""
+
+
 class Label(Struct, frozen=True):
-    """`{#eq:euler}` after a formula on a line of its own: its id, colon included."""
+    """`{#eq:euler}` after a formula on a line of its own, `{#fig:flip}` at the end of a caption."""
 
     span: Span
     id: str
+    """With its prefix and colon."""
     source: str | None = None
     """The source of its numbers from `given="…"`, perhaps empty; `None` where none is given."""
     check: Span | None = None

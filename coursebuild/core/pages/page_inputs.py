@@ -52,8 +52,10 @@ class DocumentInputs(Struct, frozen=True):
     python: str = ""
     hrefs: Mapping[Target, str] = field(default_factory=dict)
     """Addresses of links, relative to the page."""
-    equations: Mapping[Target, str] = field(default_factory=dict)
-    """The texts of links to formulas on other pages that have none of their own."""
+    names: Mapping[Target, str] = field(default_factory=dict)
+    """The texts of links to numbered items of other pages that have none of their own."""
+    number_prefix: str = ""
+    """What stands before the numbers of figures: `4.2.` in a lesson."""
     callouts: Mapping[str, CalloutKind] = field(default_factory=dict)
     runs: Mapping[str, ShownRun] = field(default_factory=dict)
     """By path of the script."""

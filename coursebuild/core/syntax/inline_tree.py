@@ -39,7 +39,6 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.syntax.attributes import (
     collapse_spaces,
-    read_label,
     read_meaning,
     read_term,
     term_id,
@@ -47,6 +46,7 @@ from coursebuild.core.syntax.attributes import (
 from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_parser import inline_tokens
+from coursebuild.core.syntax.labels import take_label
 from coursebuild.core.syntax.mentions import (
     TextPiece,
     check_scheme,
@@ -302,9 +302,7 @@ class _TokenReader:
         braces, report = self.content.slice(*token.meta["braces"]), self.report
         if not display:
             return Math(span, tex, display, None, *read_meaning(braces, report))
-        label = read_label(braces, report)
-        if label is not None:
-            self.state.anchors.take(label.id, label.span)
+        label = take_label(braces, "eq", self.state)
         return Math(span, tex, display, label)
 
     def _read_number(self, token: PositionedToken, span: Span) -> NumberBinding:

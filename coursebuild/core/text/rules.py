@@ -101,7 +101,8 @@ _SUMMARIES = {
     "control-character": "A text has a character that no reader can see.",
     "merge-conflict": "A file of the course holds both versions of a merge, with the marks between "
     "them.",
-    "equation-label": "The label of a formula cannot be read, or stands where none may.",
+    "label-attribute": "The label of a formula, figure, table, listing or lab cannot be read, or "
+    "stands where none may.",
     # terms and symbols
     "term-attribute": "The attribute by which a text defines a term cannot be read.",
     "term-place": "A term is defined outside a paragraph of the text.",

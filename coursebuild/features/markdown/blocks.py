@@ -69,6 +69,10 @@ class BlockWriter(ABC):
     def formula_number(self, start: int) -> str:
         """Return the number to be shown with the formula at an offset; empty for none."""
 
+    def number(self, label: model.Label | None) -> str:
+        """Return the name that a label gives, such as "Figure 4.2.3"; empty for none."""
+        return ""
+
     @abstractmethod
     def own_block(self, block: SpecialBlock) -> str:
         """Write one of the course's own blocks, without its last line end; may be empty."""
@@ -107,7 +111,11 @@ class BlockWriter(ABC):
             case model.Heading():
                 return self._heading(block)
             case model.Paragraph():
-                return self._inlines(block.children)
+                text = self._inlines(block.children)
+                if number := self.number(block.label):
+                    text = text.removeprefix("Figure:").lstrip()
+                    text = f"**{escape_marks(number)}:** {text}"
+                return text
             case model.HtmlFlow():
                 return "".join(map(self._in_html, block.children))
             case model.ListBlock():
@@ -115,7 +123,8 @@ class BlockWriter(ABC):
             case model.BlockQuote():
                 return block_quote(self.blocks(block.blocks))
             case model.CodeBlock():
-                return fence(re.sub(r"[\s`]", "", block.language), block.code.text)
+                code = fence(re.sub(r"[\s`]", "", block.language), block.code.text)
+                return self.below_caption(block, code)
             case model.HtmlBlock():
                 return raw_html(block, self.url).rstrip("\n")
             case model.ThematicBreak():
@@ -124,9 +133,15 @@ class BlockWriter(ABC):
                 tex, tag = _remove_empty_lines(block.tex.text), self._tag(block.span.start)
                 return "\n".join(filter(None, ("$$", tex, tag, "$$")))
             case model.Table():
-                return self._table(block)
+                return self.below_caption(block, self._table(block), self.inlines(block.caption))
             case _:
                 return self.own_block(block)
+
+    def below_caption(self, block: model.Labelled, text: str, caption: str = "") -> str:
+        """Write a block below its number and its caption, if it has one of the two."""
+        if number := self.number(block.label):
+            caption = f"**{escape_marks(number)}:** {caption}".rstrip()
+        return f"{caption}\n\n{text}" if caption else text
 
     def _in_html(self, inline: model.Inline) -> str:
         """Write an inline within HTML, where text is no Markdown."""

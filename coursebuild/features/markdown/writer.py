@@ -55,8 +55,12 @@ class DocumentWriter(BlockWriter):
 
     def formula_number(self, start: int) -> str:
         """Return the number of a formula that does not show one itself."""
-        equation = self.page.equations.get(start)
-        return equation.number if equation is not None and equation.has_margin_number else ""
+        item = self.page.numbered_items.get(start)
+        return item.number if item is not None and item.has_margin_number else ""
+
+    def number(self, label: model.Label | None) -> str:
+        """Return the name that a label gives."""
+        return self.page.number(label)
 
     def own_block(self, block: SpecialBlock) -> str:
         """Write one of the course's own blocks."""
@@ -64,7 +68,7 @@ class DocumentWriter(BlockWriter):
             case model.Callout():
                 return self._callout(block)
             case model.PlainCode():
-                return fence("python", block.code.text)
+                return self.below_caption(block, fence("python", block.code.text))
             case model.Script():
                 return self._script(block)
             case model.Recording():
@@ -73,7 +77,8 @@ class DocumentWriter(BlockWriter):
             case model.Mjcf():
                 return self._mjcf(block)
             case model.FeatureBlock():
-                return kind_of_block(block).markdown(self, block)
+                text = kind_of_block(block).markdown(self, block)
+                return self.below_caption(block, text)
             case _:
                 assert_never(block)
 
@@ -104,13 +109,17 @@ class DocumentWriter(BlockWriter):
         receipt = f"*{self.words('mjcf.compiles', engine=engine)}*"
         if block.error is not None:
             receipt = f"*{self.words('mjcf.fails', engine=engine)}* {code_span(block.error)}"
-        return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{receipt}"
+        return self.below_caption(
+            block, f"{label}:\n\n{fence('xml', block.code.text)}\n\n{receipt}"
+        )
 
     # --- scripts and outputs
 
     def _script(self, block: model.Script) -> str:
         href = self.locate(self.page.place.href(block.path))
         name = link(code_span(block.path), href)
+        if number := self.number(block.label):
+            name = f"**{escape_marks(number)}** {name}"
         if self.notebook:
             return self.words("exports.cell_below", path="\ue000").replace("\ue000", name)
         command = code_span(shlex.join(("python", block.path, *block.args)))
