@@ -109,7 +109,7 @@ dist: $(VENV)/.dev
 lock: $(VENV)/.dev
 	$(LOCK) pyproject.toml -o requirements.txt
 	$(LOCK) --group build -c requirements.txt -o requirements-build.txt
-	$(LOCK) pyproject.toml --extra cache --extra lsp --group dev -c requirements.txt -c requirements-build.txt \
+	$(LOCK) pyproject.toml --extra cache --extra lsp --extra references --group dev -c requirements.txt -c requirements-build.txt \
 	  -o requirements-dev.txt
 
 clean:

@@ -14,7 +14,8 @@ scripts, recorded outputs, bound numbers, blocks of features, MJCF, callouts, li
 pictures, raw HTML.
 
 1. Blocks come out of their containers, since no other page asks what contains what.
-2. Of inlines only links, without their text, pictures, bound numbers, terms and raw HTML stay.
+2. Of inlines only links, without their text, citations, pictures, bound numbers, terms and raw HTML
+   stay.
 3. Formulas are left out, except those in recorded tables: they are checked in the whole document.
 4. If only prose was left out, a thematic break stands for it, so that the summary is not blank.
 """
@@ -50,6 +51,7 @@ from coursebuild.core.model.blocks import (
     ThematicBreak,
 )
 from coursebuild.core.model.inlines import (
+    Citation,
     Emphasis,
     Image,
     Inline,
@@ -248,7 +250,7 @@ def find_inlines(document: Document, kind: type[AnyInline]) -> Iterator[AnyInlin
     return (inline for inline in document_inlines(document) if isinstance(inline, kind))
 
 
-_SUMMARY_INLINES = frozenset((Link, Image, NumberBinding, RawInline, Term))
+_SUMMARY_INLINES = frozenset((Citation, Link, Image, NumberBinding, RawInline, Term))
 
 
 def without_prose(document: Document) -> Document:

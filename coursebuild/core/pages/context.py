@@ -17,9 +17,11 @@ from urllib.parse import unquote
 
 from markupsafe import Markup
 from msgspec import Struct
+from msgspec.structs import asdict
 
 from coursebuild.core.model import (
     Block,
+    Citation,
     CodeSpan,
     Course,
     Document,
@@ -121,6 +123,18 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
         if isinstance(target, UrlTarget) and target.url.startswith("#"):
             return self._names.get(unquote(target.url[1:]), "")
         return self.inputs.names.get(target, "")
+
+    def citation(self, citation: Citation) -> Markup:
+        """A citation, with links to the references below the text."""
+        texts = self.inputs.citations.texts
+        return texts.get(citation.span.start) or super().citation(citation)
+
+    def references(self) -> Markup:
+        """The sources that the document cites; empty if there are none."""
+        citations = self.inputs.citations
+        if not citations.entries:
+            return Markup()
+        return self.template("blocks/references.html", **asdict(citations))
 
     def code_href(self, code: CodeSpan) -> str:
         """The address of what inline code names."""

@@ -27,7 +27,7 @@ from coursebuild.core.pages.page_inputs import (
     ShownRun,
     ShownVerdict,
 )
-from coursebuild.core.registry import code_links, kind_of_block, page_copies, page_kind
+from coursebuild.core.registry import citations, code_links, kind_of_block, page_copies, page_kind
 from coursebuild.core.text.characters import visible
 
 
@@ -66,6 +66,7 @@ def document_inputs(
         verdicts={start: ShownVerdict(v.status, v.comparison) for start, v in verdicts if v},
         trials={start: value for start, value in trials if value is not None},
         blocks={b.span.start: make(library, place, b) for b, make in values if make is not None},
+        citations=citations(library, place, document),
         code_links=code_links(library, place, document),
         keyframes={n: library.facts[n].keyframes for n in models if n in library.facts},
         address=urls.absolute(library.course.base_url, place.path),
@@ -146,9 +147,9 @@ def owner_link(place: urls.Place, owner: Owner, anchor: str = "") -> OwnerLink:
     return OwnerLink(place.href(urls.owner_path(owner), anchor or None), id, owner.title)
 
 
-def owner_links(place: urls.Place, owners: Sequence[Owner]) -> OwnerLinks:
-    """The links to lessons and pages."""
-    visible = tuple(owner_link(place, owner) for owner in owners[:MAX_LINKS])
+def owner_links(place: urls.Place, owners: Sequence[Owner], anchor: str = "") -> OwnerLinks:
+    """The links to lessons and pages, or to an anchor that each of them has."""
+    visible = tuple(owner_link(place, owner, anchor) for owner in owners[:MAX_LINKS])
     return OwnerLinks(visible, max(0, len(owners) - MAX_LINKS))
 
 

@@ -105,6 +105,10 @@ class HtmlWriter:
         """A formula on a line of its own, at an offset in the document."""
         return Markup(rf'<span class="math">\[{escape(tex)}\]</span>')
 
+    def citation(self, citation: model.Citation) -> Markup:
+        """A citation of sources."""
+        return Markup(escape(citation.span.text))
+
     def code_href(self, code: model.CodeSpan) -> str:
         """The address of what inline code names; mostly empty."""
         return ""
@@ -329,6 +333,8 @@ class HtmlWriter:
                 return self.binding(inline)
             case model.FootnoteRef():
                 return self._reference(inline)
+            case model.Citation():
+                return self.citation(inline)
             case _:
                 assert_never(inline)
 

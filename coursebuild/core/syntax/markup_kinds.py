@@ -87,8 +87,9 @@ FOREIGN = {
     ),
     "citation": MarkupKind(
         r"(?<!\\)\[(?:[^\[\]\n\0@]*[\s-])?@[\w:./-]+[^\[\]\n\0]*\]",
-        "there is no list of sources",
-        "link to the source, or put it into a footnote: `[^name]`",
+        "no source is cited in this way",
+        "a citation is `[@key]` or `[see @key, p. 12; @other]`; the sources are listed in "
+        "content/references.bib",
     ),
     "crossref": MarkupKind(
         r"(?<![\w.@])@(?:fig|tbl|eq|sec|lst|thm)[-:][\w-]+",

@@ -88,7 +88,7 @@ _SUMMARIES = {
     "fence-kind-near": "The kind of a code block looks like a misspelt one.",
     "fence-unread": "A code block of a kind that nothing reads holds a JSON object.",
     "feature-broken": "A feature of the course's own cannot be loaded.",
-    "feature-missing": "A fence needs a feature that is not installed.",
+    "feature-missing": "A fence or the list of sources needs something that is not installed.",
     "math-syntax": "A formula does not parse.",
     "math-command": "A command of a formula has lost its backslash.",
     "math-brackets": "A formula has more opening brackets than closing ones, or fewer.",

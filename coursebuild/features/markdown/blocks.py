@@ -69,6 +69,10 @@ class BlockWriter(ABC):
     def formula_number(self, start: int) -> str:
         """Return the number to be shown with the formula at an offset; empty for none."""
 
+    def citation(self, citation: model.Citation) -> str:
+        """Return a citation of sources."""
+        return escape_marks(citation.span.text)
+
     def number(self, label: model.Label | None) -> str:
         """Return the name that a label gives, such as "Figure 4.2.3"; empty for none."""
         return ""
@@ -225,6 +229,8 @@ class BlockWriter(ABC):
                 return _escape_pipes(raw_html(inline, self.url), room)
             case model.FootnoteRef():
                 return self.reference(inline.number)
+            case model.Citation():
+                return _escape_pipes(self.citation(inline), room)
             case _:
                 assert_never(inline)
 

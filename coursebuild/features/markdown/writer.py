@@ -17,7 +17,7 @@ from markupsafe import Markup
 
 from coursebuild.core import model
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.marks import block_quote, code_span, escape_marks, fence, link
+from coursebuild.core.pages.marks import block_quote, code_span, escape_marks, fence, hang, link
 from coursebuild.core.pages.markup import SpecialBlock
 from coursebuild.core.pages.page_writer import output_receipt, script_receipt
 from coursebuild.core.registry import kind_of_block
@@ -61,6 +61,16 @@ class DocumentWriter(BlockWriter):
     def number(self, label: model.Label | None) -> str:
         """Return the name that a label gives."""
         return self.page.number(label)
+
+    def citation(self, citation: model.Citation) -> str:
+        """Return a citation, with links to the references below the text."""
+        return self.html(self.page.citation(citation))
+
+    def references(self) -> str:
+        """Return the list of the sources that the document cites; perhaps empty."""
+        entries = (self.html(entry.html) for entry in self.page.inputs.citations.entries)
+        items = "\n".join(hang("- ", entry) for entry in entries)
+        return f"**{self.words('references.title')}**\n\n{items}" if items else ""
 
     def own_block(self, block: SpecialBlock) -> str:
         """Write one of the course's own blocks."""
