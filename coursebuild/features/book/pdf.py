@@ -28,7 +28,7 @@ from urllib.parse import unquote_to_bytes
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.context import ExportContext
-from coursebuild.features.book.page import page_file
+from coursebuild.features.book.chapters import page_file
 
 MARK = "/Keywords (coursebuild: the whole course"
 """The note that replaces that of the time."""
