@@ -225,6 +225,10 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
         tuple[FeaturePath, ...],
         Meta(description="features of the course's own, as files in `features/`"),
     ] = ()
+    folds: Annotated[
+        Literal["open", "closed"],
+        Meta(description="whether folded parts are printed in full, in `export page` and `pdf`"),
+    ] = "open"
     packages: Annotated[
         tuple[FolderPath, ...],
         Meta(

@@ -122,6 +122,7 @@ def _build_course(
         base_url=settings.base_url or "",
         repository=settings.repository or "",
         licence=settings.licence,
+        folds=settings.folds,
         id=settings.id or "",
         engine=settings.engine,
         engine_span=table.place("engine"),
