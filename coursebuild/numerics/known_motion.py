@@ -116,6 +116,45 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
     Raises:
         SceneError: the scenario names a closed form that is not this scene's.
     """
+    reference = _find_computed(model, pilot, quick=quick)
+    declaration = pilot.scene.declaration
+    if declaration.closed_form:
+        problem, motion = closed_motion(model, pilot.scene, declaration, reference.states.times)
+        states = states_of(model, motion, reference.states)
+        subject = f"the closed form of `{declaration.closed_form}`"
+        place, source = declaration.place("reference"), problem.reference.source
+        return _with_closed_form(model, reference, states, source, floor(problem), subject, place)
+    exact = None if declaration.reference else pilot.scene.exact
+    if exact is None:
+        return reference
+    states, source = _exact_states(model, pilot, exact, reference), exact.span.path
+    least = _check_exact(model, pilot, exact, states, reference, quick=quick)
+    return _with_closed_form(model, reference, states, source, least, f"`{source}`", exact.span)
+
+
+def find_nearby(
+    model: Any, pilot: Pilot, known: KnownMotion, *, quick: bool
+) -> EngineStates | None:
+    """The states of a scene's reference from another start; `None` where nobody knows them.
+
+    `known`: the reference from the start that is declared, which was checked.
+    """
+    if pilot.scene.declaration.closed_form:
+        return None
+    try:
+        reference = _find_computed(model, pilot, quick=quick)
+    except SceneError:
+        return None
+    exact = pilot.scene.exact if known.kind == "closed" else None
+    return reference.states if exact is None else _exact_states(model, pilot, exact, reference)
+
+
+def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
+    """The reference without closed forms: an integration, or the engine in small steps.
+
+    Raises:
+        SceneError: the scenario wants an integration, and there is none.
+    """
     declaration = pilot.scene.declaration
     reference, note = None, ""
     if pilot.smooth and declaration.reference != "self":
@@ -131,18 +170,7 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         raise _no_integration(f"there is {' and '.join(pilot.jumps)}", declaration)
     if reference is None:
         reference = replace(self_reference(model, pilot, quick=quick), note=note)
-    if declaration.closed_form:
-        problem, motion = closed_motion(model, pilot.scene, declaration, reference.states.times)
-        states = states_of(model, motion, reference.states)
-        subject = f"the closed form of `{declaration.closed_form}`"
-        place, source = declaration.place("reference"), problem.reference.source
-        return _with_closed_form(model, reference, states, source, floor(problem), subject, place)
-    exact = None if declaration.reference else pilot.scene.exact
-    if exact is None:
-        return reference
-    states, source = _exact_states(model, pilot, exact, reference), exact.span.path
-    least = _check_exact(model, pilot, exact, states, reference, quick=quick)
-    return _with_closed_form(model, reference, states, source, least, f"`{source}`", exact.span)
+    return reference
 
 
 def _check_exact(

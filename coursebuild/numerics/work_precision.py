@@ -9,13 +9,14 @@ Entry point: `measure_scenario(model, scene, quick=…, clock=…, tell=…)`.
    error of a lost run is not given; no other is below ten floors of the reference. Errors count to
    the horizon, and what should be conserved is watched to the end. Errors are also given as a
    learner sees them: how far bodies are displaced or turned in a picture, where 1 is just visible.
-4. Orders are fitted, stability limits looked for, the front drawn.
+4. Orders are fitted, stability limits looked for, the front drawn. What a verdict says has to hold
+   from starts nearby.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -23,12 +24,21 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from coursebuild.numerics.costs import Clock, costs, front, verdict
+from coursebuild.numerics.costs import (
+    COST_SLACK,
+    Clock,
+    FrontPoint,
+    costs,
+    front,
+    mark_luck,
+    verdict,
+)
 from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.known_motion import (
     Cone,
     KnownMotion,
     find_conserved,
+    find_nearby,
     find_references,
     mean_late_energy,
 )
@@ -45,16 +55,16 @@ from coursebuild.numerics.measure import (
 from coursebuild.numerics.pilot import PARTING_DISTANCE as CHAOS_DISTANCE
 from coursebuild.numerics.pilot import (
     Pilot,
+    nudges,
     own_setting,
     position_distances,
     run_pilot,
     settings,
     with_setting,
 )
-from coursebuild.numerics.problem import STANDARD, Sizes
+from coursebuild.numerics.problem import STANDARD, Integrator, Sizes
 from coursebuild.numerics.reports.scene_report import (
     FLOORS,
-    Errors,
     FigureLine,
     MeasuredSetting,
     OrderRow,
@@ -63,11 +73,13 @@ from coursebuild.numerics.reports.scene_report import (
     SweepRow,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.shown_errors import setting_text
+from coursebuild.numerics.reports.shown_errors import setting_text, solving_parts
 from coursebuild.numerics.scene import Scene, thickness
 from coursebuild.numerics.simulation import (
     EngineStates,
     Run,
+    advance,
+    initial_data,
     motion_of,
     refsafe_active,
     refsafe_from,
@@ -91,6 +103,10 @@ class Basis(Struct, frozen=True, eq=False):
     momentum_conserved: bool
     late_energy: float | None
     """Mean kinetic energy after the horizon, J; `None` where it is the end."""
+    least_seen: float
+    """Below this nothing is known of what is seen."""
+    least_figure: float
+    """The same of the declared quantity."""
 
     @property
     def reference(self) -> KnownMotion:
@@ -126,21 +142,44 @@ def measure_scenario(
     reference = cones[baseline.cone].reference
     conserved = find_conserved(model, pilot, reference)
     late_energy = mean_late_energy(model, pilot, reference)
-    basis = Basis(model, pilot, baseline, cones, *conserved, late_energy)
-    measurements = []
-    for setting in settings(model, pilot, quick=quick):
+    leasts = zip(
+        *(_least_known(model, scene, cone.reference) for cone in cones.values()), strict=True
+    )
+    basis = Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
+    every = settings(model, pilot, quick=quick)
+    rows, noticeable, same = [], [], set()
+    base_states = simulate(pilot.setup, with_setting(model, baseline)).states
+    own_solving = baseline.solver_settings
+    # Other solvers come last, and of them those at the own timestep first.
+    for setting in sorted(
+        every,
+        key=lambda s: (s.solver_settings != own_solving, s.timestep != baseline.timestep),
+    ):
+        if setting.solver_settings in same and setting.timestep != baseline.timestep:
+            continue  # what changes no bit at its own timestep is not crossed with others
         tell(f"{scene.name}: {setting_text(setting)}")
-        measurements.append(_measure_setting(basis, setting))
-    rows = tuple(row for row, _ in measurements)
+        row, sees, states = _measure_setting(basis, setting)
+        rows, noticeable = [*rows, row], [*noticeable, sees]
+        is_variant = (
+            setting.timestep == baseline.timestep and setting.integrator == baseline.integrator
+        )
+        if is_variant and states is not None and _are_same(states, base_states):
+            same |= {setting.solver_settings} - {own_solving}
+    order = sorted(range(len(rows)), key=lambda n: every.index(rows[n].setting))
+    rows, noticeable = [rows[n] for n in order], [noticeable[n] for n in order]
+    cost_of = None
     if clock is not None:
         tell(f"{scene.name}: times")
-        rows = _with_costs(basis, rows, clock, quick)
+        rows, cost_of = _with_costs(basis, rows, clock, quick)
     tell(f"{scene.name}: stable timesteps")
     largest = stable_rows(model, pilot, quick=quick)
-    rows = front(rows)
-    judgement = verdict(rows, [noticeable for _, noticeable in measurements])
-    if not any(row.own and row.status == "ok" for row in rows):  # nothing to compare costs with
-        rows = tuple(replace(row, cost=None) for row in rows)
+    limits = {row.integrator: row.largest for row in largest if row.largest is not None}
+    least = basis.least_figure if quantity_name(model, scene) else basis.least_seen
+    rows, noticeable, idle = _without_idle(rows, noticeable, same)
+    rows = front(mark_luck(rows, limits, least))
+    judgement = verdict(
+        rows, noticeable, least, lambda setting: _holds(basis, rows, setting, quick)
+    )
     return ScenarioReport(
         name=scene.name,
         title=scene.title,
@@ -156,14 +195,89 @@ def measure_scenario(
         lyapunov=pilot.lyapunov,
         horizons=None if pilot.lyapunov is None else pilot.horizons,
         smooth=pilot.smooth,
-        notes=_notes(basis, largest),
+        notes=_notes(basis, largest, idle, cost_of),
         figure=quantity_name(model, scene),
         rows=rows,
         orders=_fit_orders(basis, rows) if pilot.smooth else (),
         figures=tuple(_measure_expected(basis)),
         stable=largest,
         verdict=judgement,
+        least_seen=basis.least_seen,
+        least_figure=basis.least_figure,
+        cost_of=cost_of,
     )
+
+
+def _are_same(first: EngineStates, second: EngineStates) -> bool:
+    return np.array_equal(first.qpos, second.qpos) and np.array_equal(first.qvel, second.qvel)
+
+
+def _without_idle(
+    rows: Sequence[WorkPrecisionRow], noticeable: Sequence[bool | None], same: Collection[object]
+) -> tuple[list[WorkPrecisionRow], list[bool | None], list[MeasuredSetting]]:
+    """Rows, and what is noticed of each, without those that change no bit and save no time."""
+    idle = [
+        row.setting
+        for row in rows
+        if row.setting.solver_settings in same
+        and (row.cost is None or row.cost.high > 1 / (1 + COST_SLACK))
+    ]
+    kept = [n for n, row in enumerate(rows) if row.setting not in idle]
+    return [rows[n] for n in kept], [noticeable[n] for n in kept], idle
+
+
+def _least_known(model: Any, scene: Scene, reference: KnownMotion) -> tuple[float, float]:
+    """Below which nothing is known of what is seen, and of the declared quantity."""
+    states, second_states = reference.states, reference.second_states
+    seen = FLOORS * visible_error(model, scene, states, second_states)
+    if not quantity_name(model, scene):
+        return seen, 0.0
+    values = (quantity_values(model, scene, s) for s in (states, second_states))
+    exact, second = values
+    return seen, FLOORS * float(np.linalg.norm(exact - second, axis=1).max())
+
+
+def _holds(
+    basis: Basis, rows: Sequence[WorkPrecisionRow], better: MeasuredSetting, quick: bool
+) -> bool:
+    """Whether another setting is better than the scene's own from starts nearby too."""
+    model, pilot = basis.model, basis.pilot
+    scene, scenario = pilot.scene, pilot.scene.scenario
+    places = [next(row for row in rows if row.setting == s) for s in (better, basis.baseline)]
+    for position, velocity in nudges(model, 2 * (_QUICK_STARTS if quick else _STARTS), _NEARBY):
+        data = initial_data(scenario, model)
+        mujoco.mj_integratePos(model, data.qpos, position, 1.0)
+        start = {"qpos": tuple(data.qpos), "qvel": tuple(data.qvel + velocity)}
+        moved = replace(scenario, **start)
+        setup = replace(pilot.setup, scenario=moved)
+        near = replace(pilot, scene=replace(scene, scenario=moved), setup=setup)
+        points = []
+        for row in places:
+            base = with_setting(model, replace(basis.baseline, cone=row.setting.cone))
+            known = basis.cones[row.setting.cone].reference
+            exact = find_nearby(base, near, known, quick=quick)
+            if exact is None:
+                return True
+            run = simulate(setup, with_setting(model, row.setting), thickness(model))
+            if not run.judgement.ok or row.cost is None:
+                return False
+            states = run.states.head(len(exact.times))
+            error = visible_error(model, scene, states, exact)
+            if quantity_name(model, scene):
+                values = (quantity_values(model, near.scene, s) for s in (states, exact))
+                one, other = values
+                error = float(np.linalg.norm(one - other, axis=1).max())
+            least = basis.least_figure if quantity_name(model, scene) else basis.least_seen
+            points.append(FrontPoint(row.cost, max(error, least)))
+        if not points[0].beats(points[1]):
+            return False
+    return True
+
+
+_NEARBY = 1e-4
+"""How far starts nearby are off: rad, or relative to the extent; velocities per s."""
+_STARTS, _QUICK_STARTS = 2, 1
+"""From how many random directions starts nearby come, each to both sides."""
 
 
 def _measure_expected(basis: Basis) -> Iterator[FigureLine]:
@@ -182,10 +296,21 @@ def _measure_expected(basis: Basis) -> Iterator[FigureLine]:
             yield FigureLine(name, unit, integrator.value, value, exact, "as declared")
 
 
-def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
+def _notes(
+    basis: Basis,
+    largest: Sequence[StableRow],
+    idle: Sequence[MeasuredSetting],
+    cost_of: MeasuredSetting | None,
+) -> tuple[str, ...]:
     """Remarks for reading the figures."""
     model, pilot, reference = basis.model, basis.pilot, basis.reference
     notes = [reference.note]
+    if cost_of is not None:
+        text = setting_text(cost_of)
+        notes.append(f"costs are relative to {text}, as the scene's own setting does not run")
+    if idle:
+        parts = (", ".join(solving_parts(setting, basis.baseline)) for setting in idle)
+        notes.append(f"without a difference in motion or time: {'; '.join(parts)}")
     if pilot.jumps:
         reasons = ", ".join(pilot.jumps)
         notes.append(f"errors follow no power of the timestep, because of {reasons}")
@@ -211,20 +336,26 @@ def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
 
 def _with_costs(
     basis: Basis, rows: Sequence[WorkPrecisionRow], clock: Clock, quick: bool
-) -> tuple[WorkPrecisionRow, ...]:
-    """Add the costs of usable settings, relative to the scene's own, or to the first without it."""
+) -> tuple[list[WorkPrecisionRow], MeasuredSetting | None]:
+    """Add the costs of usable settings, relative to the scene's own.
+
+    Where that one was lost they are relative to the longest timestep under its integrator that
+    runs, or else to the first setting that does; this is returned.
+    """
+    timed_rows = list(rows)
     usable = [index for index, row in enumerate(rows) if row.status == "ok"]
     if not usable:
-        return tuple(rows)
-    baseline = next((n for n, index in enumerate(usable) if rows[index].own), 0)
-    settings = [rows[index].setting for index in usable]
+        return timed_rows, None
+    settings, own = [rows[index].setting for index in usable], basis.baseline
+    alike = [s for s in settings if s == replace(own, timestep=s.timestep)]
+    base = max(alike, key=lambda s: s.timestep, default=settings[0])
+    base = own if own in settings else base
     scene = basis.pilot.scene
-    timings = costs(basis.model, scene, settings, baseline, clock, quick=quick)
-    timed_rows = list(rows)
+    timings = costs(basis.model, scene, settings, settings.index(base), clock, quick=quick)
     for index, timing in zip(usable, timings, strict=True):
         seconds = timing.nanoseconds.scale(1e-9 / scene.scenario.duration)
         timed_rows[index] = replace(rows[index], cost=timing.ratio, seconds=seconds)
-    return tuple(timed_rows)
+    return timed_rows, None if base == own else base
 
 
 def _fit_orders(basis: Basis, rows: Sequence[WorkPrecisionRow]) -> tuple[OrderRow, ...]:
@@ -250,11 +381,11 @@ def _fit_orders(basis: Basis, rows: Sequence[WorkPrecisionRow]) -> tuple[OrderRo
 
 def _measure_setting(
     basis: Basis, setting: MeasuredSetting
-) -> tuple[WorkPrecisionRow, bool | None]:
+) -> tuple[WorkPrecisionRow, bool | None, EngineStates | None]:
     """Run a scene under a setting and compare it with its reference; the cost is added later.
 
     The flag says whether a learner sees the error, for the scene's own setting with that of its
-    cone; `None` where the reference is not known well enough.
+    cone; `None` where the reference is not known well enough. The states are those of the run.
     """
     model, pilot, cone = basis.model, basis.pilot, basis.cones[setting.cone]
     variant = with_setting(model, setting)
@@ -268,6 +399,8 @@ def _measure_setting(
         "model_error": cone.model_error,
         "refsafe": pilot.constrained and refsafe_active(variant),
         "steps": steps,
+        "evaluations": steps * (4 if setting.integrator == Integrator.RK4.value else 1),
+        "lucky": "",
         "own": setting == basis.baseline,
         "front": False,
     }
@@ -275,7 +408,7 @@ def _measure_setting(
     try:
         run = simulate(pilot.setup, variant, thickness(model))
     except mujoco.FatalError as error:
-        return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None
+        return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None, None
     row = replace(
         row,
         status=run.judgement.status.value,
@@ -289,8 +422,22 @@ def _measure_setting(
         variant = with_setting(model, setting)
         growth = run_trial(pilot.setup, variant, pilot.setup.scenario.duration).growth
         has_grown = math.isfinite(growth) and growth > 1
-        return replace(row, growth=growth if has_grown else None), None
-    return _with_errors(basis, row, run)
+        return replace(row, growth=growth if has_grown else None), None, None
+    if pilot.constrained:
+        row = replace(row, iterations=_count_iterations(basis, row))
+    return *_with_errors(basis, row, run), run.states
+
+
+def _count_iterations(basis: Basis, row: WorkPrecisionRow) -> float:
+    """Iterations of the solver in the scenario; a step of RK4 has four times those of its last."""
+    scenario, model = basis.pilot.scene.scenario, with_setting(basis.model, row.setting)
+    data, count = initial_data(scenario, model), 0
+    for command in scenario.commands(row.setting.timestep):
+        if command:
+            data.ctrl[:] = command
+        advance(model, data)
+        count += int(data.solver_niter.sum())
+    return float(count) * row.evaluations / max(row.steps, 1)
 
 
 def _with_errors(
@@ -302,7 +449,7 @@ def _with_errors(
     states = run.states.head(len(reference.states.times))
     exact = motion_of(model, reference.states)
     run_errors = errors(motion_of(model, states), exact, reference.floor)
-    floor = FLOORS * visible_error(model, scene, reference.states, reference.second_states)
+    floor = basis.least_seen
     visible = visible_error(model, scene, states, reference.states)
     noticeable = None if max(1, visible) <= floor else visible >= 1
     if row.own and cone.visible_model_error >= 1:
@@ -312,8 +459,8 @@ def _with_errors(
         gaps = position_distances(model, states.qpos, reference.states.qpos)
         far = np.flatnonzero(gaps >= CHAOS_DISTANCE)
         if far.size:
-            row = replace(row, parted=float(states.times[far[0]]))
-            run_errors = Errors(None, None, None)
+            # How far apart they are later depends on the last digit of the start.
+            return replace(row, parted=float(states.times[far[0]]), slip=creep), noticeable
     row = replace(
         row,
         **asdict(run_errors),
@@ -339,9 +486,6 @@ def _quantity_error(
     model, scene = basis.model, basis.pilot.scene
     if not quantity_name(model, scene):
         return None
-    exact, second = (
-        quantity_values(model, scene, s) for s in (reference.states, reference.second_states)
-    )
-    floor = FLOORS * float(np.linalg.norm(exact - second, axis=1).max())
+    exact, floor = quantity_values(model, scene, reference.states), basis.least_figure
     distances = np.linalg.norm(quantity_values(model, scene, states) - exact, axis=1)
     return max(float(distances.max()), floor), max(float(distances[-1]), floor)

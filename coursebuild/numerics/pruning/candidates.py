@@ -2,17 +2,19 @@
 
 Entry points: `unread_elements(text, scenarios)`, of which no motion is computed;
 `unreachable_contacts(text)`, where nothing can touch; `idle_contacts`, `far_bodies`,
-`other_settings`, for which only runs speak.
+`resting_joints`, `couplings`, `inner_geoms`, `other_settings`, for which only runs speak.
 
 1. The proof of a kind holds only if MuJoCo compiles the model without the thing, so that no other
    element refers to it. The survey checks that nothing else in the compiled model changes.
 2. What has no proof is tried by running. The integrator and the timestep are not candidates: they
    change an error, which is judged against a reference, never against the model.
+3. What touched, along any chain, a body that can move and is left is no candidate, however little
+   that seems to have changed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import PurePosixPath
 from typing import Any
@@ -20,9 +22,11 @@ from typing import Any
 import mujoco
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
-from coursebuild.numerics.problem import Scenario
-from coursebuild.numerics.pruning.comparison import WatchedRun
+from coursebuild.numerics.pilot import scales
+from coursebuild.numerics.problem import Array, Scenario
+from coursebuild.numerics.pruning.comparison import ALIKE, WatchedRun, watch
 from coursebuild.numerics.pruning.model_text import ModelText, section_of, thing_kind
 from coursebuild.numerics.pruning.reachability import Pair, find_separate, iterate_pairs
 from coursebuild.numerics.pruning.xml_edits import (
@@ -33,6 +37,8 @@ from coursebuild.numerics.pruning.xml_edits import (
     set_option,
 )
 from coursebuild.numerics.reports.diet_report import name_list
+from coursebuild.numerics.scene import Scene
+from coursebuild.numerics.simulation import initial_data
 
 MOST_PAIRS = 100_000
 """With so many pairs of geoms no contact is examined."""
@@ -109,13 +115,25 @@ KINDS = {
         "what the scene is about moves in the same way without the {}", "body", "Body"
     ),
     "contact-idle": FindingKind("contacts are searched for, and nothing touched"),
+    "contact-left": FindingKind("contacts are searched for, and without {} nothing touched"),
     "collision-idle": FindingKind(
         "contacts are searched for on the {}, and nothing touched there", "geom"
     ),
+    "resting-joint": FindingKind("nothing moved in the {}", "joint", "Joint"),
+    "coupling-idle": FindingKind("what the scene shows is the same without the {}", "coupling"),
+    "geom-inside": FindingKind("another geom of its body encloses the {}", "geom", "Geom"),
+    "mesh-primitive": FindingKind(
+        "a simple shape can stand for the mesh of the {}", "geom", "Geom"
+    ),
     "sleep": FindingKind("bodies at rest can sleep"),
     "island": FindingKind("all constraints can be solved at once, without islands"),
+    "multiccd": FindingKind("one contact of two meshes at a time does"),
     "solver": FindingKind("the solver {} does"),
     "cone": FindingKind("{} friction cones do"),
+    "jacobian": FindingKind("{} Jacobians do"),
+    "iterations": FindingKind("{} iterations of the solver do"),
+    "tolerance": FindingKind("a tolerance of {} of the solver does"),
+    "noslip_iterations": FindingKind("the solver does without its iterations against slip"),
 }
 """What uses other things comes before them, so that they can go with it."""
 
@@ -222,7 +240,7 @@ def _is_forceless_actuator(
     return True
 
 
-_OF_TENDONS = (
+_FORCES_OF_TENDONS = (
     *("stiffness", "stiffnesspoly", "damping", "dampingpoly", "frictionloss", "armature"),
     "limited",
 )
@@ -230,7 +248,9 @@ _OF_TENDONS = (
 
 
 def _is_forceless_tendon(model: Any, ids: Collection[int]) -> bool:
-    return not any(np.any(getattr(model, f"tendon_{name}")[i]) for name in _OF_TENDONS for i in ids)
+    return not any(
+        np.any(getattr(model, f"tendon_{name}")[i]) for name in _FORCES_OF_TENDONS for i in ids
+    )
 
 
 def unreachable_contacts(text: ModelText) -> list[Item]:
@@ -249,6 +269,9 @@ def idle_contacts(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
     return _without_contact(text, pairs, touching, "contact-idle", "collision-idle")
 
 
+_UNTOUCHABLE = (("contype", "0"), ("conaffinity", "0"))
+
+
 def _without_contact(
     text: ModelText, pairs: Collection[Pair], touching: Collection[Pair], whole: str, part: str
 ) -> list[Item]:
@@ -264,16 +287,18 @@ def _without_contact(
     explicit = {int(g) for g in (*text.model.pair_geom1, *text.model.pair_geom2)}
     idle = {geom for pair in pairs for geom in pair} - explicit
     idle -= {geom for pair in touching for geom in pair}
-    none = (("contype", "0"), ("conaffinity", "0"))
     return [
-        Item(part, display_name(element), element, edits=set_attributes(element, none))
+        Item(part, display_name(element), element, edits=set_attributes(element, _UNTOUCHABLE))
         for element, ids in text.things("geom")
         if idle.issuperset(ids)
     ]
 
 
 def far_bodies(
-    text: ModelText, code_names: Collection[str], runs: Collection[WatchedRun]
+    text: ModelText,
+    code_names: Collection[str],
+    scenarios: Collection[Scenario],
+    runs: Collection[WatchedRun],
 ) -> list[Item]:
     """Bodies that the scene is not about.
 
@@ -288,7 +313,7 @@ def far_bodies(
         name.rstrip("0123456789") for name in used_names
     }  # what is repeated has a number
     ranks: dict[int, int] = {}
-    for case in (run.scene.scenario for run in runs):
+    for case in scenarios:
         velocity = np.array(case.qvel)
         if not case.qvel and case.keyframe >= 0:
             velocity = model.key_qvel[case.keyframe]
@@ -303,13 +328,32 @@ def far_bodies(
             if int(model.tree_bodyadr[number]) in ids:
                 roots.setdefault(element, []).append(number)
     most = max(ranks.values(), default=0)
-    items = []
-    for element, numbers in roots.items():
-        is_viewpoint = any(inner.tag in ("camera", "light") for inner in element.walk())
-        if not is_viewpoint and all(ranks[number] < most for number in numbers):
-            removals = (element, *_pairs_and_sensors_of(text, element))
-            items.append(Item("far-body", display_name(element), element, removals))
-    return items
+    far = {
+        element: set(numbers)
+        for element, numbers in roots.items()
+        if all(ranks[number] < most for number in numbers)
+        and not any(inner.tag in ("camera", "light") for inner in element.walk())
+    }
+    touching = {
+        frozenset(tree[model.geom_bodyid[[*pair]]].tolist())
+        for run in runs
+        for pair in run.touching_pairs
+    }
+    while True:  # what touched a body that is left may have moved it, and so on
+        gone = {number for numbers in far.values() for number in numbers}
+        near = {
+            number
+            for trees in touching
+            if -1 not in trees and len(trees & gone) == 1 < len(trees)
+            for number in trees & gone
+        }
+        if not near:
+            break
+        far = {element: numbers for element, numbers in far.items() if not numbers & near}
+    return [
+        Item("far-body", display_name(element), element, (element, *_users(text, element)))
+        for element in far
+    ]
 
 
 _NOT_REFERENCES = frozenset(("name", "class", "childclass", "material", "mesh", "file", "type"))
@@ -328,34 +372,318 @@ def _references(element: Element, code_names: Collection[str]) -> Iterator[str]:
         )
 
 
-def _pairs_and_sensors_of(text: ModelText, body: Element) -> list[Element]:
-    """The pairs and sensors that refer to something in a body, and go with it."""
-    names = {element.get("name") for element in body.walk()} - {None, ""}
-    return [
+def _users(
+    text: ModelText,
+    thing: Element,
+    sections: Collection[str] = ("contact", "sensor"),
+    references: str = "",
+) -> list[Element]:
+    """The elements of some sections that refer to something, and go with it.
+
+    `references`: the attributes that may do so; any where none is named.
+    """
+    names = {element.get("name") for element in thing.walk()} - {None, ""}
+    users = [
         element
         for element in text.elements
-        if section_of(element) in ("contact", "sensor")
+        if section_of(element) in sections
         and any(
-            attribute.value in names for attribute in element.attributes if attribute.name != "name"
+            attribute.value in names
+            for attribute in element.attributes
+            if (attribute.name in references.split() if references else attribute.name != "name")
         )
+    ]
+    actuators = [user for user in users if section_of(user) == "actuator"]
+    return users + [s for a in actuators for s in _users(text, a, ("sensor",), "actuator")]
+
+
+_USERS = ("sensor", "actuator", "equality")
+_OF_JOINTS, _OF_TENDONS = "joint joint1 joint2 jointinparent", "tendon tendon1 tendon2"
+"""Attributes that refer to joints, and to tendons."""
+_TURNS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
+"""Attributes by which a body is turned."""
+_STILL = 1e-9
+"""rad or m: a joint that begins so near to where it is drawn needs no other drawing."""
+
+
+def resting_joints(text: ModelText, runs: Sequence[WatchedRun]) -> list[Item]:
+    """The joints of each body that never move, though they might: without them it is welded.
+
+    Where a rest is only luck, as that of a pole on its tip, a start that is off by a millionth
+    shows it.
+    """
+    model = text.model
+    if not runs or not model.nv:
+        return []
+    still = np.all(
+        [run.displacements <= ALIKE * _visible(model, run.scene) for run in runs], axis=0
+    )
+    for run in runs:
+        nudged = initial_data(run.scene.scenario, model)
+        off = _LUCK * np.random.default_rng(3).choice((-1.0, 1.0), model.nv) * still
+        mujoco.mj_integratePos(model, nudged.qpos, off, 1.0)
+        scenario = replace(run.scene.scenario, qpos=tuple(nudged.qpos))
+        run = watch(model, replace(run.scene, scenario=scenario))
+        still &= run.displacements <= ALIKE * _visible(model, run.scene)
+    starts = [initial_data(run.scene.scenario, model).qpos for run in runs]
+    items = []
+    for body, body_ids in text.things("body"):
+        joints = {}
+        for joint in body.children:
+            ids = text.ids(joint) if thing_kind(joint) == "joint" else ()
+            if ids and all(np.all(still[model.dof_jntid == i]) for i in ids):
+                joints[joint] = ids
+        moved = [joint for joint in joints if _is_drawn_elsewhere(model, joints[joint], starts)]
+        edits: tuple[ModelEdit, ...] = ()
+        if moved and (
+            len(body_ids) != 1
+            or len(joints) < int(model.body_jntnum[body_ids[0]])
+            or body.parent is None
+            or body.parent.tag not in ("body", "worldbody")
+            or any(np.max(np.abs(start - starts[0])) > _STILL for start in starts)
+        ):
+            joints = {joint: ids for joint, ids in joints.items() if joint not in moved}
+        elif moved:
+            edits = _draw_at(model, body, body_ids[0], starts[0])
+        if joints:
+            users = [u for joint in joints for u in _users(text, joint, _USERS, _OF_JOINTS)]
+            name = name_list([display_name(joint) for joint in joints])
+            drops = tuple((body, turn) for turn in _TURNS[1:] if edits and body.attribute(turn))
+            removals = (*joints, *users)
+            items.append(Item("resting-joint", name, next(iter(joints)), removals, drops, edits))
+    return items
+
+
+_LUCK = 1e-6
+"""rad or m: by how much joints that rest are off where their rest is tried."""
+
+
+def _visible(model: Any, scene: Scene) -> Array:
+    """What is just visible of each degree of freedom (nv,): rad, or m."""
+    angle = np.radians(scene.bench.visible_angle)
+    units = scales(model)
+    return np.where(units == 1.0, angle, scene.bench.visible * units)
+
+
+def _is_drawn_elsewhere(model: Any, ids: Iterable[int], starts: Iterable[Any]) -> bool:
+    """Whether one of these joints begins elsewhere than the model is drawn."""
+    off = np.zeros(model.nv)
+    for start in starts:
+        mujoco.mj_differentiatePos(model, off, 1.0, model.qpos0, start)
+        if any(np.max(np.abs(off[model.dof_jntid == i])) > _STILL for i in ids):
+            return True
+    return False
+
+
+def _draw_at(model: Any, body: Element, number: int, start: Any) -> tuple[ModelEdit, ...]:
+    """Draw a body where it is at the beginning."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = start
+    mujoco.mj_kinematics(model, data)
+    parent = int(model.body_parentid[number])
+    back, place, turn = np.zeros(4), np.zeros(3), np.zeros(4)
+    mujoco.mju_negQuat(back, data.xquat[parent])
+    mujoco.mju_rotVecQuat(place, data.xpos[number] - data.xpos[parent], back)
+    mujoco.mju_mulQuat(turn, back, data.xquat[number])
+    values = {"pos": place, "quat": turn}
+    texts = [(key, " ".join(f"{x:.17g}" for x in value)) for key, value in values.items()]
+    return set_attributes(body, texts)
+
+
+def couplings(text: ModelText) -> list[Item]:
+    """Equalities, and tendons that could exert a force: each is tried, whatever it carries."""
+    return [
+        Item("coupling-idle", display_name(element), element, (element, *users))
+        for kind in ("equality", "tendon")
+        for element, ids in text.things(kind)
+        if kind == "equality" or not _is_forceless_tendon(text.model, ids)
+        for users in [_users(text, element, _USERS, _OF_TENDONS) if kind == "tendon" else []]
+        if not any(section_of(user) == "actuator" for user in users)
     ]
 
 
-_SETTINGS = (
+def inner_geoms(text: ModelText) -> list[Item]:
+    """Geoms that lie wholly inside another one of their body, and collide as it does.
+
+    One that has mass only stops colliding.
+    """
+    model, items = text.model, []
+    for element, ids in text.things("geom"):
+        if not all(_is_enclosed(model, i) for i in ids):
+            continue
+        body = element.parent
+        has_inertia = body is not None and any(child.tag == "inertial" for child in body.children)
+        if has_inertia or (element.get("mass") or element.get("density")) == "0":
+            removed = (element,)
+            items.append(Item("geom-inside", display_name(element), element, removed))
+        elif any(model.geom_contype[i] or model.geom_conaffinity[i] for i in ids):
+            edits = set_attributes(element, _UNTOUCHABLE)
+            items.append(Item("geom-inside", display_name(element), element, edits=edits))
+    return items
+
+
+def contact_of_rest(text: ModelText, items: Sequence[Item]) -> list[Item]:
+    """Contact as a whole, together with items without which nothing may touch any more."""
+    if not items:
+        return []
+    removals = tuple(element for item in items for element in item.removals)
+    drops = tuple(drop for item in items for drop in item.drops)
+    edits = [edit for item in items for edit in item.edits]
+    edits += set_option(text.main, "flag", "contact", "disable")
+    kinds = " and ".join(dict.fromkeys(f"`{item.kind}`" for item in items))
+    return [Item("contact-left", f"what {kinds} names", None, removals, drops, tuple(edits))]
+
+
+def _is_enclosed(model: Any, inner: int) -> bool:
+    """Whether a geom lies inside another one of its body."""
+    centre, turn = model.geom_pos[inner], np.zeros(9)
+    mujoco.mju_quat2Mat(turn, model.geom_quat[inner])
+    points, radius = _outline(model, inner)
+    points = centre + points @ turn.reshape(3, 3).T
+    for outer in np.flatnonzero(model.geom_bodyid == model.geom_bodyid[inner]):
+        masks = (model.geom_contype, model.geom_conaffinity)
+        if outer == inner or any(mask[outer] & mask[inner] != mask[inner] for mask in masks):
+            continue
+        mujoco.mju_quat2Mat(turn, model.geom_quat[outer])
+        local = (points - model.geom_pos[outer]) @ turn.reshape(3, 3)
+        if len(points) and _depths(model, int(outer), local).min() >= radius:
+            return True
+    return False
+
+
+_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+
+
+def _outline(model: Any, geom: int) -> tuple[Array, float]:
+    """Points (n, 3) in a geom's frame, and a radius about them, whose hull contains it."""
+    size = model.geom_size[geom]
+    match mujoco.mjtGeom(int(model.geom_type[geom])):
+        case mujoco.mjtGeom.mjGEOM_SPHERE:
+            return np.zeros((1, 3)), float(size[0])
+        case mujoco.mjtGeom.mjGEOM_CAPSULE:
+            return np.array([[0, 0, -size[1]], [0, 0, size[1]]]), float(size[0])
+        case mujoco.mjtGeom.mjGEOM_CYLINDER:
+            return _CORNERS * (size[0], size[0], size[1]), 0.0
+        case mujoco.mjtGeom.mjGEOM_BOX | mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+            return _CORNERS * size, 0.0
+        case mujoco.mjtGeom.mjGEOM_MESH:
+            return mesh_vertices(model, int(model.geom_dataid[geom])), 0.0
+        case _:
+            return np.zeros((0, 3)), 0.0
+
+
+def mesh_vertices(model: Any, mesh: int) -> Array:
+    """The vertices (n, 3) of a mesh, in its own frame, m."""
+    first = int(model.mesh_vertadr[mesh])
+    vertices: Array = model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])]
+    return vertices.astype(np.float64)
+
+
+def _depths(model: Any, geom: int, points: Array) -> Array:
+    """How deep points (n, 3), in a geom's frame, lie in it, m; negative for those outside."""
+    size, along = model.geom_size[geom], np.abs(points)
+    radial = np.linalg.norm(points[:, :2], axis=1)
+    match mujoco.mjtGeom(int(model.geom_type[geom])):
+        case mujoco.mjtGeom.mjGEOM_SPHERE:
+            return np.asarray(size[0] - np.linalg.norm(points, axis=1))
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            return np.asarray((size - along).min(axis=1))
+        case mujoco.mjtGeom.mjGEOM_CAPSULE:
+            beyond = np.maximum(along[:, 2] - size[1], 0.0)
+            return np.asarray(size[0] - np.hypot(radial, beyond))
+        case mujoco.mjtGeom.mjGEOM_CYLINDER:
+            return np.asarray(np.minimum(size[0] - radial, size[1] - along[:, 2]))
+        case mujoco.mjtGeom.mjGEOM_ELLIPSOID:  # not less than it is
+            return np.asarray((1 - np.linalg.norm(points / size, axis=1)) * size.min())
+        case mujoco.mjtGeom.mjGEOM_MESH:  # of its hull, which is what collides
+            mesh = int(model.geom_dataid[geom])
+            first, count = int(model.mesh_polyadr[mesh]), int(model.mesh_polynum[mesh])
+            faces = slice(first, first + count)
+            normals = model.mesh_polynormal[faces].astype(np.float64)
+            corners = model.mesh_polyvert[model.mesh_polyvertadr[faces]]
+            heights = (normals * mesh_vertices(model, mesh)[corners]).sum(axis=1)
+            return np.asarray((heights - points @ normals.T).min(axis=1, initial=np.inf))
+        case _:
+            return np.full(len(points), -np.inf)
+
+
+_FIT = 0.05
+"""How far a shape may be off, relative to a mesh's size."""
+_SHAPES = ("sphere", "capsule", "cylinder", "box", "ellipsoid")
+
+
+def primitive_meshes(text: ModelText) -> list[Item]:
+    """Meshes that collide, each with the shape that MuJoCo fits to it best.
+
+    Its surface is off by as much as is said; whether that shows is tried by running.
+    """
+    model, items = text.model, []
+    for element, ids in text.things("geom"):
+        if element.get("type") != "mesh" or not all(
+            model.geom_contype[i] or model.geom_conaffinity[i] for i in ids
+        ):
+            continue
+        fits, body = [], element.parent
+        own = (
+            [child for child in body.children if child.tag in ("geom", "inertial")] if body else []
+        )
+        mass = (("mass", f"{float(model.body_mass[model.geom_bodyid[ids[0]]]):.17g}"),)
+        for shape in _SHAPES:  # with the mass that the mesh has
+            edits = set_attributes(element, (("type", shape), *(mass if len(own) == 1 else ())))
+            try:
+                variant = text.compile(edits)
+            except ValueError:
+                continue
+            turn, i = np.zeros(9), ids[0]
+            whole_turn, vertices = np.zeros(9), mesh_vertices(model, int(model.geom_dataid[i]))
+            mujoco.mju_quat2Mat(whole_turn, model.geom_quat[i])
+            mujoco.mju_quat2Mat(turn, variant.geom_quat[i])
+            places = model.geom_pos[i] + vertices @ whole_turn.reshape(3, 3).T
+            local = (places - variant.geom_pos[i]) @ turn.reshape(3, 3)
+            fits.append((float(np.abs(_depths(variant, i, local)).max()), shape, edits))
+        if fits:
+            off, shape, edits = min(fits)
+            name = f"{display_name(element)} ({shape}, off by {off:.2g} m)"
+            if off < _FIT * min(model.geom_rbound[i] for i in ids):
+                items.append(Item("mesh-primitive", name, element, edits=edits))
+    return items
+
+
+_OTHER_SETTINGS = (
     ("flag", "sleep", "enable"),
     ("flag", "island", "disable"),
+    ("flag", "multiccd", "disable"),
     ("option", "solver", "Newton"),
     ("option", "solver", "CG"),
     ("option", "cone", "pyramidal"),
     ("option", "cone", "elliptic"),
+    ("option", "jacobian", "dense"),
+    ("option", "jacobian", "sparse"),
+    ("option", "iterations", "10"),
+    ("option", "tolerance", "1e-6"),
+    ("option", "noslip_iterations", "0"),
 )
+
+SETTINGS = frozenset(name for _, name, _ in _OTHER_SETTINGS)
+"""Kinds of findings that are about settings rather than things."""
 
 
 def other_settings(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
-    """Other solver settings, for a model in which a constraint was ever active."""
+    """Other solver settings, for a model in which a constraint was ever active.
+
+    None asks for more work than the model's own.
+    """
     if not any(run.constrained for run in runs):
         return []
+    option = text.model.opt
+    own = {
+        "iterations": option.iterations <= 10,
+        "tolerance": option.tolerance >= 1e-6,
+        "noslip_iterations": option.noslip_iterations == 0,
+        "multiccd": bool(option.disableflags & int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)),
+    }
     return [
         Item(name, value, None, edits=set_option(text.main, tag, name, value))
-        for tag, name, value in _SETTINGS
+        for tag, name, value in _OTHER_SETTINGS
+        if not own.get(name, False)
     ]

@@ -8,8 +8,8 @@ Entry points: `plot_svg(report, …)`, of a scenario, from `work_precision(repor
    scene's own solver, iterations and cone; the rows with others are small marks beside it.
 2. A mark is filled where the setting is on the Pareto front, and hollow where another one is
    better. A ring is around the scene's own setting. Bars are the intervals of the costs.
-3. The cost of a row that was not timed is estimated from its number of steps. Where nothing at all
-   was timed, the number of steps stands in for the cost.
+3. The cost of a row that was not timed is estimated from the evaluations of the forward dynamics.
+   Where nothing at all was timed, these stand in for the cost.
 4. A sweep has a row for each value, and for each figure a scale beside it. A dot is a figure, a bar
    its interval; a line joins the values of one parameter, and a ring marks the model's own value. A
    scale is logarithmic where its figures differ by much.
@@ -96,11 +96,11 @@ def work_precision(report: ScenarioReport) -> Chart | None:
     return Chart(
         title=(
             f"{report.title or report.name}: error of {quantity.label} "
-            f"against {'cost' if timed else 'steps'}"
+            f"against {'cost' if timed else 'evaluations'}"
         ),
         text=" ".join(_describe(report, quantity, lines)),
         axes=(
-            "cost, relative to the scene’s own setting" if timed else "steps",
+            _cost_axis(report) if timed else "evaluations of the forward dynamics",
             f"error: {quantity.label}",
         ),
         lines=lines,
@@ -108,6 +108,12 @@ def work_precision(report: ScenarioReport) -> Chart | None:
         unit_label="just visible" if quantity.name == "seen" else "",
         marks=tuple(_marks(report, lines)),
     )
+
+
+def _cost_axis(report: ScenarioReport) -> str:
+    base = report.cost_of
+    name = "the scene’s own setting" if base is None else setting_text(base, report.own_setting)
+    return f"cost, relative to {name}"
 
 
 def _line(
@@ -136,13 +142,17 @@ def _line(
 
 
 def _cost(row: WorkPrecisionRow, timed: Sequence[WorkPrecisionRow]) -> Interval:
-    """The cost of a row; estimated from its number of steps where it was not timed."""
+    """The cost of a row; estimated from its evaluations, or steps, where it was not timed."""
     if row in timed and row.cost is not None:
         return row.cost
     peers = [peer for peer in timed if peer.setting.integrator == row.setting.integrator] or timed
-    rates = [peer.cost.value / max(peer.steps, 1) for peer in peers if peer.cost is not None]
-    value = max(row.steps, 1) * (statistics.median(rates) if rates else 1.0)
+    rates = [peer.cost.value / _work(peer) for peer in peers if peer.cost is not None]
+    value = _work(row) * (statistics.median(rates) if rates else 1.0)
     return Interval(value, value, value)
+
+
+def _work(row: WorkPrecisionRow) -> int:
+    return max(row.evaluations or row.steps, 1)
 
 
 def _marks(report: ScenarioReport, lines: Sequence[Line]) -> Iterator[Entry]:
@@ -199,6 +209,12 @@ def _point_title(
     elif timed:
         yield "not timed"
     yield f"{row.steps} steps"
+    if row.evaluations > row.steps:
+        yield f"{row.evaluations} evaluations"
+    if row.iterations is not None:
+        yield f"{row.iterations:.6g} iterations of the solver"
+    if row.lucky:
+        yield f"luck: {row.lucky}"
     if row.own:
         yield "the scene’s own setting"
     if row.front:

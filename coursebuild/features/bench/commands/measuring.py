@@ -14,7 +14,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +44,7 @@ from coursebuild.numerics.reports.scene_report import (
 from coursebuild.numerics.scene import EXACT_SCRIPT, ExactMotion, SceneError, scenes
 from coursebuild.numerics.scene import Scene as PhysicsScene
 from coursebuild.numerics.simulation import silent
-from coursebuild.numerics.sweep import measure_sweep
+from coursebuild.numerics.sweep import THREADS, measure_sweep
 from coursebuild.numerics.work_precision import measure_scenario
 from coursebuild.pipeline.scenes import CourseScene
 
@@ -112,9 +112,18 @@ def run_sweep(
     """
     tell(sweep.name)
     clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
-    scenarios = (s for s in compiled_scene.scenarios if sweep.scenario in (None, s.name))
+    scenario = next(s for s in compiled_scene.scenarios if sweep.scenario in (None, s.name))
+    threads = tuple(part for part in sweep.variations if part.parameter == THREADS)
+    others = tuple(part for part in sweep.variations if part.parameter != THREADS)
+    reports = []
     with report_errors(compiled_scene.scene):
-        return measure_sweep(compiled_scene.spec, next(scenarios), sweep, clocks, quick=quick)
+        for variations in filter(None, (others, threads)):
+            part = replace(sweep, variations=variations)
+            # One processor, unless what is measured is how it goes on several.
+            with one_processor() if variations is others else nullcontext():
+                report = measure_sweep(compiled_scene.spec, scenario, part, clocks, quick=quick)
+            reports.append(report)
+    return replace(reports[0], rows=tuple(row for report in reports for row in report.rows))
 
 
 @contextmanager
