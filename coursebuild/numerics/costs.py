@@ -278,12 +278,12 @@ def mark_luck(
         luck, is_usual = "", setting.solver_settings == own.solver_settings
         if place is not None and is_usual and setting.timestep > limit * (1 + 1e-9):
             luck = f"it is beyond its largest stable timestep, {seconds_text(limit, 3)}"
-        for other in rows if place is not None and not luck else ():
-            work = _more_work(other.setting, setting)
-            error = _error(other)
-            if work and error is not None and error > max(place * (1 + ERROR_SLACK), least):
+        for other in rows:
+            work, error = _more_work(other.setting, setting), _error(other)
+            if luck or not work or place is None or error is None:
+                continue
+            if error > max(place * (1 + ERROR_SLACK), least):
                 luck = f"its error rises with {work}"
-                break
         marked.append(replace(row, lucky=luck))
     return tuple(marked)
 

@@ -125,10 +125,18 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         place, source = declaration.place("reference"), problem.reference.source
         return _with_closed_form(model, reference, states, source, floor(problem), subject, place)
     exact = None if declaration.reference else pilot.scene.exact
-    if exact is None:
+    motions = {} if exact is None else _exact_states(model, pilot, exact, reference)
+    if exact is None or not motions:
         return reference
-    states, source = _exact_states(model, pilot, exact, reference), exact.span.path
-    least = _check_exact(model, pilot, exact, states, reference, quick=quick)
+    least, gaps = ROUNDING, []
+    for name, states in motions.items():
+        subject = f"`{exact.span.path}`, `{name}`," if len(motions) > 1 else f"`{exact.span.path}`"
+        checked = _check_exact(model, pilot, (exact, subject), states, reference, quick=quick)
+        least = least.at_least(checked)
+        gaps.append(_gap(model, states, next(iter(motions.values()))))
+    # The formula comes first, and the equations bound it, where there are both.
+    states, source = next(iter(motions.values())), exact.span.path
+    least = least.at_least(gaps[-1])
     return _with_closed_form(model, reference, states, source, least, f"`{source}`", exact.span)
 
 
@@ -146,7 +154,9 @@ def find_nearby(
     except SceneError:
         return None
     exact = pilot.scene.exact if known.kind == "closed" else None
-    return reference.states if exact is None else _exact_states(model, pilot, exact, reference)
+    if exact is None:
+        return reference.states
+    return next(iter(_exact_states(model, pilot, exact, reference).values()))
 
 
 def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
@@ -176,21 +186,19 @@ def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
 def _check_exact(
     model: Any,
     pilot: Pilot,
-    exact: ExactMotion,
+    named_exact: tuple[ExactMotion, str],
     states: EngineStates,
     second: KnownMotion,
     *,
     quick: bool,
 ) -> Sizes:
-    """How well a course's exact motion is known where no integration says it.
+    """How well a course's exact motion, given with its name, is known where no integration says it.
 
     Raises:
         SceneError: it is not the motion of the scene.
     """
-    subject, gap = (
-        f"`{exact.span.path}` is not this scene's motion",
-        _gap(model, states, second.states),
-    )
+    exact, name = named_exact
+    subject, gap = f"{name} is not this scene's motion", _gap(model, states, second.states)
     precision = pilot.scene.declaration.precision or PRECISION
     if second.kind == "ode":
         for part in ("position", "attitude", "velocity"):
@@ -238,15 +246,16 @@ def _stiffen(model: Any, times: float) -> Any:
 
 def _exact_states(
     model: Any, pilot: Pilot, exact: ExactMotion, second: KnownMotion
-) -> EngineStates:
-    """The course's exact motion; where it gives no velocities, with those of the second one."""
+) -> dict[str, EngineStates]:
+    """The course's exact motions; where it gives no velocities, with those of the second one."""
     data, states = initial_data(pilot.scene.scenario, model), second.states
-    qpos, qvel = exact.states(states.times, data.qpos.copy(), data.qvel.copy())
-    course_states = replace(states, qpos=qpos, qvel=states.qvel if qvel is None else qvel)
-    if (course_states.qpos.shape, course_states.qvel.shape) != (
-        states.qpos.shape,
-        states.qvel.shape,
-    ):
+    motions = exact.states(states.times, data.qpos.copy(), data.qvel.copy()).motions
+    course_states = {
+        name: replace(states, qpos=qpos, qvel=states.qvel if qvel is None else qvel)
+        for name, (qpos, qvel) in motions.items()
+    }
+    shapes = (states.qpos.shape, states.qvel.shape)
+    if any((motion.qpos.shape, motion.qvel.shape) != shapes for motion in course_states.values()):
         message = f"`{exact.span.path}` gives other numbers of coordinates than the model has"
         raise SceneError(message, exact.span, "they are those of `qpos`, and perhaps of `qvel`")
     return course_states

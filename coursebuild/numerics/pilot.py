@@ -238,6 +238,8 @@ def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
         scenario=scenario,
         position_bound=2 * peaks.position + room * max(extent, 1.0) + round_and_round,
     )
+    if (bound := scene.declaration.energy_bound) is not None:
+        return replace(setup, energy_bound=bound, energy=peaks.energy, kinetic=peaks.kinetic)
     if driving_force(model, scenario):
         return replace(setup, velocity_bound=room * max(peaks.velocity, fall, 1e-3))
     rest_energy = float(model.body_mass.sum()) * max(_REST_SPEED * fall, 1e-3) ** 2

@@ -16,16 +16,17 @@ Entry point: `measure_scenario(model, scene, quick=…, clock=…, tell=…)`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from typing import Any
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, get_args
 
 import mujoco
 import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
+from coursebuild.core.model.scenarios import Expected
 from coursebuild.numerics.costs import (
-    COST_SLACK,
     Clock,
     FrontPoint,
     costs,
@@ -62,7 +63,7 @@ from coursebuild.numerics.pilot import (
     settings,
     with_setting,
 )
-from coursebuild.numerics.problem import STANDARD, Integrator, Sizes
+from coursebuild.numerics.problem import STANDARD, Integrator, Setup, Sizes
 from coursebuild.numerics.reports.scene_report import (
     FLOORS,
     FigureLine,
@@ -73,8 +74,8 @@ from coursebuild.numerics.reports.scene_report import (
     SweepRow,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.shown_errors import setting_text, solving_parts
-from coursebuild.numerics.scene import Scene, thickness
+from coursebuild.numerics.reports.shown_errors import is_idle, setting_text, solving_parts
+from coursebuild.numerics.scene import Scene, SceneError, thickness
 from coursebuild.numerics.simulation import (
     EngineStates,
     Run,
@@ -146,37 +147,18 @@ def measure_scenario(
         *(_least_known(model, scene, cone.reference) for cone in cones.values()), strict=True
     )
     basis = Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
-    every = settings(model, pilot, quick=quick)
-    rows, noticeable, same = [], [], set()
-    base_states = simulate(pilot.setup, with_setting(model, baseline)).states
-    own_solving = baseline.solver_settings
-    # Other solvers come last, and of them those at the own timestep first.
-    for setting in sorted(
-        every,
-        key=lambda s: (s.solver_settings != own_solving, s.timestep != baseline.timestep),
-    ):
-        if setting.solver_settings in same and setting.timestep != baseline.timestep:
-            continue  # what changes no bit at its own timestep is not crossed with others
-        tell(f"{scene.name}: {setting_text(setting)}")
-        row, sees, states = _measure_setting(basis, setting)
-        rows, noticeable = [*rows, row], [*noticeable, sees]
-        is_variant = (
-            setting.timestep == baseline.timestep and setting.integrator == baseline.integrator
-        )
-        if is_variant and states is not None and _are_same(states, base_states):
-            same |= {setting.solver_settings} - {own_solving}
-    order = sorted(range(len(rows)), key=lambda n: every.index(rows[n].setting))
-    rows, noticeable = [rows[n] for n in order], [noticeable[n] for n in order]
+    measurements = _measure_settings(basis, settings(model, pilot, quick=quick), tell)
+    measured = [row for row, _ in measurements]
+    noticeable = [sees for _, sees in measurements]
     cost_of = None
     if clock is not None:
         tell(f"{scene.name}: times")
-        rows, cost_of = _with_costs(basis, rows, clock, quick)
+        measured, cost_of = _with_costs(basis, measured, clock, quick)
     tell(f"{scene.name}: stable timesteps")
     largest = stable_rows(model, pilot, quick=quick)
     limits = {row.integrator: row.largest for row in largest if row.largest is not None}
     least = basis.least_figure if quantity_name(model, scene) else basis.least_seen
-    rows, noticeable, idle = _without_idle(rows, noticeable, same)
-    rows = front(mark_luck(rows, limits, least))
+    rows = front(mark_luck(measured, limits, least))
     judgement = verdict(
         rows, noticeable, least, lambda setting: _holds(basis, rows, setting, quick)
     )
@@ -195,7 +177,7 @@ def measure_scenario(
         lyapunov=pilot.lyapunov,
         horizons=None if pilot.lyapunov is None else pilot.horizons,
         smooth=pilot.smooth,
-        notes=_notes(basis, largest, idle, cost_of),
+        notes=_notes(basis, largest, rows, cost_of),
         figure=quantity_name(model, scene),
         rows=rows,
         orders=_fit_orders(basis, rows) if pilot.smooth else (),
@@ -208,22 +190,39 @@ def measure_scenario(
     )
 
 
+def _measure_settings(
+    basis: Basis, every: Sequence[MeasuredSetting], tell: Callable[[str], None]
+) -> list[tuple[WorkPrecisionRow, bool | None]]:
+    """The rows of settings in their order, and what is noticed of each.
+
+    What changes no bit at the own timestep is not crossed with others.
+    """
+    own, found, same = basis.baseline, {}, set()
+    base_states: EngineStates | None = None
+    # Other solvers come last, and of them those at the own timestep first.
+    for setting in sorted(
+        every,
+        key=lambda s: (
+            s != own,
+            s.solver_settings != own.solver_settings,
+            s.timestep != own.timestep,
+        ),
+    ):
+        if setting.solver_settings in same and setting.timestep != own.timestep:
+            continue
+        tell(f"{basis.pilot.scene.name}: {setting_text(setting)}")
+        row, sees, states = _measure_setting(basis, setting)
+        base_states = states if row.own else base_states
+        is_alike = (setting.timestep, setting.integrator) == (own.timestep, own.integrator)
+        if states is not None and base_states is not None and is_alike and not row.own:
+            row = replace(row, same=_are_same(states, base_states))
+            same |= {setting.solver_settings} if row.same else set()
+        found[setting] = row, sees
+    return [found[setting] for setting in every if setting in found]
+
+
 def _are_same(first: EngineStates, second: EngineStates) -> bool:
     return np.array_equal(first.qpos, second.qpos) and np.array_equal(first.qvel, second.qvel)
-
-
-def _without_idle(
-    rows: Sequence[WorkPrecisionRow], noticeable: Sequence[bool | None], same: Collection[object]
-) -> tuple[list[WorkPrecisionRow], list[bool | None], list[MeasuredSetting]]:
-    """Rows, and what is noticed of each, without those that change no bit and save no time."""
-    idle = [
-        row.setting
-        for row in rows
-        if row.setting.solver_settings in same
-        and (row.cost is None or row.cost.high > 1 / (1 + COST_SLACK))
-    ]
-    kept = [n for n, row in enumerate(rows) if row.setting not in idle]
-    return [rows[n] for n in kept], [noticeable[n] for n in kept], idle
 
 
 def _least_known(model: Any, scene: Scene, reference: KnownMotion) -> tuple[float, float]:
@@ -281,25 +280,72 @@ _STARTS, _QUICK_STARTS = 2, 1
 
 
 def _measure_expected(basis: Basis) -> Iterator[FigureLine]:
-    """What the scenario knows in theory, under every integrator at its own timestep."""
+    """What is known in theory, under every integrator at the scene's own timestep."""
     scene = basis.pilot.scene
-    expected = scene.declaration.expected
+    expected: dict[str, tuple[float, str]] = {
+        name: (value, "as declared") for name, value in scene.declaration.expected.items()
+    }
+    if scene.exact is not None:
+        data = initial_data(scene.scenario, basis.model)
+        known = scene.exact.states(np.zeros(0), data.qpos.copy(), data.qvel.copy()).expected
+        unknown = sorted(known.keys() - set(get_args(Expected)))
+        if unknown:
+            message = f"`{scene.exact.span.path}` expects `{unknown[0]}`, which is not measured"
+            help = f"known: {', '.join(get_args(Expected))}"
+            raise SceneError(message, scene.exact.span, help)
+        expected |= {name: (value, scene.exact.span.path) for name, value in known.items()}
     for integrator in STANDARD if expected else ():
         setting = replace(basis.baseline, integrator=integrator.value)
+        model = with_setting(basis.model, setting)
         row = SweepRow("integrator", integrator.value, own=False, status="ok")
-        row = with_contacts(scene.scenario, with_setting(basis.model, setting), row)
-        for name, exact in expected.items():
-            unit = "" if name == "restitution" else "m"
-            value = getattr(row, name)
-            if name != "restitution" and value is None:  # nothing touched
-                value = 0.0
-            yield FigureLine(name, unit, integrator.value, value, exact, "as declared")
+        row = with_contacts(scene.scenario, model, row)
+        readings = _reading_figures(scene, model) if expected.keys() & _OF_READINGS else {}
+        for name, (exact, source) in expected.items():
+            unit = {"penetration": "m", "slip": "m"}.get(name, "")
+            if name in _OF_READINGS:
+                unit = "s" if name == "crossing" else _UNIT.sub(r"\1", quantity_name(model, scene))
+                value = readings.get(name)
+            elif (value := getattr(row, name)) is None and name != "restitution":
+                value = 0.0  # nothing touched
+            yield FigureLine(name, unit, integrator.value, value, exact, source)
+
+
+_OF_READINGS = frozenset(("crossing", "last", "largest", "smallest"))
+"""Quantities of what a sensor reads at every step."""
+_UNIT = re.compile(r"[^\[]*(?:\[(.*)\])?")
+
+
+def _reading_figures(scene: Scene, model: Any) -> dict[str, float]:
+    """When a sensor's reading first changes its sign, its last value, the largest and smallest."""
+    from scipy.interpolate import CubicSpline
+
+    quantity = scene.declaration.observable
+    if quantity is None or quantity.kind != "sensor" or model.sensor(quantity.name).dim != 1:
+        message = "a quantity of a reading is expected, and `measure` names no sensor of one number"
+        raise SceneError(message, scene.declaration.place("expected"))
+    every_step = replace(scene.scenario, sample=float(model.opt.timestep))
+    run = simulate(Setup(scenario=every_step), model, thickness(model))
+    if not run.judgement.ok:
+        return {}
+    readings = quantity_values(model, replace(scene, scenario=every_step), run.states)[:, 0]
+    figures = {
+        "last": float(readings[-1]),
+        "largest": float(readings.max()),
+        "smallest": float(readings.min()),
+    }
+    changes = np.flatnonzero(readings[:-1] * readings[1:] < 0)
+    if changes.size:
+        part = slice(max(0, int(changes[0]) - 3), int(changes[0]) + 5)
+        times = run.states.times[part]
+        roots = CubicSpline(times, readings[part]).roots(extrapolate=False)
+        figures["crossing"] = float(roots[np.argmin(np.abs(roots - run.states.times[changes[0]]))])
+    return figures
 
 
 def _notes(
     basis: Basis,
     largest: Sequence[StableRow],
-    idle: Sequence[MeasuredSetting],
+    rows: Sequence[WorkPrecisionRow],
     cost_of: MeasuredSetting | None,
 ) -> tuple[str, ...]:
     """Remarks for reading the figures."""
@@ -308,9 +354,9 @@ def _notes(
     if cost_of is not None:
         text = setting_text(cost_of)
         notes.append(f"costs are relative to {text}, as the scene's own setting does not run")
+    idle = [", ".join(solving_parts(r.setting, basis.baseline)) for r in rows if is_idle(r)]
     if idle:
-        parts = (", ".join(solving_parts(setting, basis.baseline)) for setting in idle)
-        notes.append(f"without a difference in motion or time: {'; '.join(parts)}")
+        notes.append(f"no bit of the motion is other, and no time saved, with {'; '.join(idle)}")
     if pilot.jumps:
         reasons = ", ".join(pilot.jumps)
         notes.append(f"errors follow no power of the timestep, because of {reasons}")

@@ -89,7 +89,9 @@ def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:
 def test_bodies_deep_in_each_other_are_named_with_the_time() -> None:
     text = """<mujoco><worldbody><body name="torso"><geom name="t" size=".2"/></body>
       <body name="leg" pos="0 0 .3"><joint type="slide" axis="0 0 1"/><geom size=".02" mass="9"
-      contype="0" conaffinity="0"/><body><geom size=".05" mass="0" solref=".5 1" priority="1"/></body></body></worldbody></mujoco>"""
+      contype="0" conaffinity="0"/><body>
+      <geom size=".05" mass="0" solref=".5 1" priority="1"/></body></body>
+      </worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(text)
     run = simulate(Setup(scenario=Scenario(0.5, 0.1)), model, thickness(model))
     (reason,) = run.judgement.reasons

@@ -44,6 +44,7 @@ from coursebuild.numerics.reports.shown_errors import (
     Quantity,
     interval_text,
     is_cut_short,
+    is_idle,
     limit_text,
     map_text,
     quantities,
@@ -128,7 +129,7 @@ def _describe(words: Strings, report: ScenarioReport) -> list[str]:
 
 
 def _settings_table(words: Strings, report: ScenarioReport) -> Grid:
-    rows = report.rows
+    rows = [row for row in report.rows if not is_idle(row)]
 
     def error_column(quantity: Quantity) -> tuple[str, list[str]]:
         errors: list[str] = [bounded(quantity.value_of(row), quantity.least) for row in rows]

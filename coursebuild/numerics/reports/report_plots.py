@@ -64,6 +64,7 @@ from coursebuild.numerics.reports.shown_errors import (
     INTEGRATORS,
     Quantity,
     interval_text,
+    is_idle,
     main_quantity,
     seconds_text,
     setting_text,
@@ -89,6 +90,8 @@ def work_precision(report: ScenarioReport) -> Chart | None:
     if quantity is None:
         return None
     timed = [row for row in report.rows if row.cost is not None and row.cost.value > 0]
+    is_counted = any(row.evaluations for row in report.rows)
+    work = "evaluations of the forward dynamics" if is_counted else "steps"
     integrators = {row.setting.integrator for row in report.rows}
     lines = tuple(
         _line(report, quantity, timed, name) for name in INTEGRATORS if name in integrators
@@ -96,11 +99,11 @@ def work_precision(report: ScenarioReport) -> Chart | None:
     return Chart(
         title=(
             f"{report.title or report.name}: error of {quantity.label} "
-            f"against {'cost' if timed else 'evaluations'}"
+            f"against {'cost' if timed else work}"
         ),
         text=" ".join(_describe(report, quantity, lines)),
         axes=(
-            _cost_axis(report) if timed else "evaluations of the forward dynamics",
+            _cost_axis(report) if timed else work,
             f"error: {quantity.label}",
         ),
         lines=lines,
@@ -124,7 +127,7 @@ def _line(
 ) -> Line:
     baseline = report.own_setting
     points = []
-    rows = [row for row in report.rows if row.setting.integrator == name]
+    rows = [r for r in report.rows if r.setting.integrator == name and not is_idle(r)]
     for row in sorted(rows, key=lambda row: -row.setting.timestep):
         error = quantity.value_of(row) if row.status == "ok" else None
         points.append(

@@ -191,6 +191,8 @@ class WorkPrecisionRow(MeasuredRun, frozen=True):
     """Iterations of the solver in the scenario; `None` where none runs."""
     lucky: str = ""
     """Why its error says nothing of what the setting does; empty where it does."""
+    same: bool = False
+    """Whether the motion is that of the scene's own setting, to the bit."""
 
     @property
     def realtime(self) -> float | None:

@@ -18,6 +18,7 @@ from coursebuild.numerics.reports.scene_report import (
     MeasuredSetting,
     ScenarioReport,
     StableRow,
+    WorkPrecisionRow,
 )
 
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
@@ -62,6 +63,15 @@ def quantities(report: ScenarioReport) -> tuple[Quantity, ...]:
         for quantity in candidates
         if any(quantity.value_of(row) is not None for row in report.rows)
     )
+
+
+def is_idle(row: WorkPrecisionRow) -> bool:
+    """Whether a setting changes no bit of the motion and saves no time: it is not shown."""
+    return row.same and (row.cost is None or row.cost.high > 1 - _SAVING)
+
+
+_SAVING = 0.03
+"""Times differ by less of themselves from one measurement to the next."""
 
 
 def main_quantity(report: ScenarioReport) -> Quantity | None:

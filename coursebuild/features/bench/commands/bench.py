@@ -46,6 +46,7 @@ from coursebuild.numerics.reports.scene_report import (
     SweepReport,
     WorkPrecisionRow,
 )
+from coursebuild.numerics.reports.shown_errors import is_idle
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.pipeline.shown_reports import read_record
@@ -290,7 +291,8 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
     for text in (*texts, *report.notes):
         lines += style.wrap(text, 2 * _INDENT)
     legend = f"{_OWN_MARK} the scene's own   {_FRONT_MARK} on the Pareto front"
-    lines += _table(view.settings, map(_mark, report.rows), legend, style)
+    shown_rows = (row for row in report.rows if not is_idle(row))
+    lines += _table(view.settings, map(_mark, shown_rows), legend, style)
     colour = GREEN if report.verdict.on_front and not report.verdict.noticeable else YELLOW
     if report.verdict.text:
         lines += ["", *style.wrap(report.verdict.text, 2 * _INDENT, colour)]

@@ -41,7 +41,13 @@ from coursebuild.numerics.reports.scene_report import (
     SceneReport,
     SweepReport,
 )
-from coursebuild.numerics.scene import EXACT_SCRIPT, ExactMotion, SceneError, scenes
+from coursebuild.numerics.scene import (
+    EXACT_SCRIPT,
+    ExactMotion,
+    ExactStates,
+    SceneError,
+    scenes,
+)
 from coursebuild.numerics.scene import Scene as PhysicsScene
 from coursebuild.numerics.simulation import silent
 from coursebuild.numerics.sweep import THREADS, measure_sweep
@@ -163,23 +169,35 @@ def _exact_motion(root: Path, scene: CourseScene) -> ExactMotion | None:
         return None
     span = Source(path, "").span(0, 0)
 
-    def states(times: Array, qpos: Array, qvel: Array) -> tuple[Array, Array | None]:
+    def states(times: Array, qpos: Array, qvel: Array) -> ExactStates:
         request = {"times": times.tolist(), "qpos": qpos.tolist(), "qvel": qvel.tolist()}
         script = os.path.relpath(EXACT_SCRIPT, root)
         job = ScriptJob(script, (path, json.dumps(request)), _SECONDS, ())
         with ScriptServer() as server:
             (run,) = server.run(root, (job,), parallel=1)
         try:
-            rows = msgspec.json.decode(run.stdout, type=list[list[list[float]]])
-            parts = [np.array(part) for part in zip(*rows, strict=True)]
+            answer = msgspec.json.decode(run.stdout, type=_Answer)
+            motions = {}
+            for name in ("motion", "acceleration"):
+                if (rows := getattr(answer, name)) is not None:
+                    qpos, *rest = (np.array(part) for part in zip(*rows, strict=True))
+                    motions[name] = (qpos, rest[0] if rest else None)
         except (msgspec.DecodeError, ValueError):
             last = run.stderr.strip().splitlines()[-1:] or [run.outcome.value]
             message = f"`{path}` says no motion: {last[0]}"
             help = "it defines `motion(time, qpos, qvel)`, which gives the positions at a time in s"
             raise SceneError(message, span, help) from None
-        return parts[0], parts[1] if len(parts) > 1 else None
+        return ExactStates(motions, answer.expected)
 
     return ExactMotion(span, states)
+
+
+class _Answer(Struct, frozen=True):
+    """What the script that evaluates an exact motion says; each part where its file has it."""
+
+    motion: list[list[list[float]]] | None = None
+    acceleration: list[list[list[float]]] | None = None
+    expected: dict[str, float] = {}
 
 
 def add_card(
