@@ -172,7 +172,13 @@ def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
             reference = _integrate(model, pilot, quick)
         except NoConvergenceError as error:
             note = f"no integration: {error}"
-        if reference is not None and not _engine_agrees(model, pilot, reference):
+        if reference is not None and not tends_to(
+            model,
+            _with_duration(pilot.setup, float(reference.states.times[-1])),
+            reference.states,
+            min(pilot.scene.timesteps),
+            PARTING_DISTANCE,
+        ):
             reference, note = None, f"no integration: {_TENDS_ELSEWHERE}"
             if declaration.reference == "ode":
                 raise _no_integration(_TENDS_ELSEWHERE, declaration)
@@ -285,11 +291,6 @@ def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:
     source = "Bulirsch–Stoer over mj_forward"
     second_states, second = run(dop853), "DOP853 over mj_forward"
     return _combine(model, "ode", source, states, second, second_states)
-
-
-def _engine_agrees(model: Any, pilot: Pilot, reference: KnownMotion) -> bool:
-    setup = _with_duration(pilot.setup, float(reference.states.times[-1]))
-    return tends_to(model, setup, reference.states, min(pilot.scene.timesteps), PARTING_DISTANCE)
 
 
 def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMotion:

@@ -16,16 +16,14 @@ Entry point: `measure_scenario(model, scene, quick=…, clock=…, tell=…)`.
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, get_args
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from coursebuild.core.model.scenarios import Expected
 from coursebuild.numerics.costs import (
     Clock,
     FrontPoint,
@@ -63,19 +61,17 @@ from coursebuild.numerics.pilot import (
     settings,
     with_setting,
 )
-from coursebuild.numerics.problem import STANDARD, Integrator, Setup, Sizes
+from coursebuild.numerics.problem import STANDARD, Integrator, Sizes
 from coursebuild.numerics.reports.scene_report import (
     FLOORS,
-    FigureLine,
     MeasuredSetting,
     OrderRow,
     ScenarioReport,
     StableRow,
-    SweepRow,
     WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.shown_errors import is_idle, setting_text, solving_parts
-from coursebuild.numerics.scene import Scene, SceneError, thickness
+from coursebuild.numerics.scene import Scene, thickness
 from coursebuild.numerics.simulation import (
     EngineStates,
     Run,
@@ -87,7 +83,7 @@ from coursebuild.numerics.simulation import (
     simulate,
 )
 from coursebuild.numerics.stability import run_trial, stable_rows
-from coursebuild.numerics.sweep import with_contacts
+from coursebuild.numerics.sweep import measure_expected
 from mjcourse.spatial import angular_distance
 
 
@@ -181,7 +177,7 @@ def measure_scenario(
         figure=quantity_name(model, scene),
         rows=rows,
         orders=_fit_orders(basis, rows) if pilot.smooth else (),
-        figures=tuple(_measure_expected(basis)),
+        figures=tuple(measure_expected(model, scene, baseline)),
         stable=largest,
         verdict=judgement,
         least_seen=basis.least_seen,
@@ -215,14 +211,11 @@ def _measure_settings(
         base_states = states if row.own else base_states
         is_alike = (setting.timestep, setting.integrator) == (own.timestep, own.integrator)
         if states is not None and base_states is not None and is_alike and not row.own:
-            row = replace(row, same=_are_same(states, base_states))
+            pairs = ((states.qpos, base_states.qpos), (states.qvel, base_states.qvel))
+            row = replace(row, same=all(np.array_equal(a, b) for a, b in pairs))
             same |= {setting.solver_settings} if row.same else set()
         found[setting] = row, sees
     return [found[setting] for setting in every if setting in found]
-
-
-def _are_same(first: EngineStates, second: EngineStates) -> bool:
-    return np.array_equal(first.qpos, second.qpos) and np.array_equal(first.qvel, second.qvel)
 
 
 def _least_known(model: Any, scene: Scene, reference: KnownMotion) -> tuple[float, float]:
@@ -277,69 +270,6 @@ _NEARBY = 1e-4
 """How far starts nearby are off: rad, or relative to the extent; velocities per s."""
 _STARTS, _QUICK_STARTS = 2, 1
 """From how many random directions starts nearby come, each to both sides."""
-
-
-def _measure_expected(basis: Basis) -> Iterator[FigureLine]:
-    """What is known in theory, under every integrator at the scene's own timestep."""
-    scene = basis.pilot.scene
-    expected: dict[str, tuple[float, str]] = {
-        name: (value, "as declared") for name, value in scene.declaration.expected.items()
-    }
-    if scene.exact is not None:
-        data = initial_data(scene.scenario, basis.model)
-        known = scene.exact.states(np.zeros(0), data.qpos.copy(), data.qvel.copy()).expected
-        unknown = sorted(known.keys() - set(get_args(Expected)))
-        if unknown:
-            message = f"`{scene.exact.span.path}` expects `{unknown[0]}`, which is not measured"
-            help = f"known: {', '.join(get_args(Expected))}"
-            raise SceneError(message, scene.exact.span, help)
-        expected |= {name: (value, scene.exact.span.path) for name, value in known.items()}
-    for integrator in STANDARD if expected else ():
-        setting = replace(basis.baseline, integrator=integrator.value)
-        model = with_setting(basis.model, setting)
-        row = SweepRow("integrator", integrator.value, own=False, status="ok")
-        row = with_contacts(scene.scenario, model, row)
-        readings = _reading_figures(scene, model) if expected.keys() & _OF_READINGS else {}
-        for name, (exact, source) in expected.items():
-            unit = {"penetration": "m", "slip": "m"}.get(name, "")
-            if name in _OF_READINGS:
-                unit = "s" if name == "crossing" else _UNIT.sub(r"\1", quantity_name(model, scene))
-                value = readings.get(name)
-            elif (value := getattr(row, name)) is None and name != "restitution":
-                value = 0.0  # nothing touched
-            yield FigureLine(name, unit, integrator.value, value, exact, source)
-
-
-_OF_READINGS = frozenset(("crossing", "last", "largest", "smallest"))
-"""Quantities of what a sensor reads at every step."""
-_UNIT = re.compile(r"[^\[]*(?:\[(.*)\])?")
-
-
-def _reading_figures(scene: Scene, model: Any) -> dict[str, float]:
-    """When a sensor's reading first changes its sign, its last value, the largest and smallest."""
-    from scipy.interpolate import CubicSpline
-
-    quantity = scene.declaration.observable
-    if quantity is None or quantity.kind != "sensor" or model.sensor(quantity.name).dim != 1:
-        message = "a quantity of a reading is expected, and `measure` names no sensor of one number"
-        raise SceneError(message, scene.declaration.place("expected"))
-    every_step = replace(scene.scenario, sample=float(model.opt.timestep))
-    run = simulate(Setup(scenario=every_step), model, thickness(model))
-    if not run.judgement.ok:
-        return {}
-    readings = quantity_values(model, replace(scene, scenario=every_step), run.states)[:, 0]
-    figures = {
-        "last": float(readings[-1]),
-        "largest": float(readings.max()),
-        "smallest": float(readings.min()),
-    }
-    changes = np.flatnonzero(readings[:-1] * readings[1:] < 0)
-    if changes.size:
-        part = slice(max(0, int(changes[0]) - 3), int(changes[0]) + 5)
-        times = run.states.times[part]
-        roots = CubicSpline(times, readings[part]).roots(extrapolate=False)
-        figures["crossing"] = float(roots[np.argmin(np.abs(roots - run.states.times[changes[0]]))])
-    return figures
 
 
 def _notes(

@@ -47,8 +47,12 @@ from coursebuild.numerics.reports.case_report import (
     course_cases,
     exact_file,
 )
-from coursebuild.numerics.reports.departures import RecordCheck, case_departures
-from coursebuild.numerics.reports.records import STABILITY, ReportFailure
+from coursebuild.numerics.reports.records import (
+    STABILITY,
+    RecordCheck,
+    ReportFailure,
+    case_departures,
+)
 from coursebuild.numerics.reports.report_plots import case_quantities
 from coursebuild.numerics.reports.scene_report import SceneReport
 from coursebuild.numerics.reports.shown_errors import seconds_text, status_text

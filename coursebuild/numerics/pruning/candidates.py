@@ -1,20 +1,18 @@
 """Candidates: what could be left out of a model, and why all motions would stay the same.
 
 Entry points: `unread_elements(text, scenarios)`, of which no motion is computed;
-`unreachable_contacts(text)`, where nothing can touch; `idle_contacts`, `far_bodies`,
-`resting_joints`, `couplings`, `inner_geoms`, `other_settings`, for which only runs speak.
+`unreachable_contacts(text)`, where nothing can touch; `idle_contacts`, `contact_of_rest`,
+`inner_geoms`, `primitive_meshes`, `other_settings`, for which only runs speak.
 
 1. The proof of a kind holds only if MuJoCo compiles the model without the thing, so that no other
    element refers to it. The survey checks that nothing else in the compiled model changes.
 2. What has no proof is tried by running. The integrator and the timestep are not candidates: they
    change an error, which is judged against a reference, never against the model.
-3. What touched, along any chain, a body that can move and is left is no candidate, however little
-   that seems to have changed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from itertools import islice
 from pathlib import PurePosixPath
 from typing import Any
@@ -22,13 +20,18 @@ from typing import Any
 import mujoco
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
-from coursebuild.numerics.pilot import scales
-from coursebuild.numerics.problem import Array, Scenario
-from coursebuild.numerics.pruning.comparison import ALIKE, WatchedRun, watch
+from coursebuild.numerics.problem import Scenario
+from coursebuild.numerics.pruning.comparison import WatchedRun
 from coursebuild.numerics.pruning.model_text import ModelText, section_of, thing_kind
-from coursebuild.numerics.pruning.reachability import Pair, find_separate, iterate_pairs
+from coursebuild.numerics.pruning.reachability import (
+    Pair,
+    depths,
+    find_separate,
+    is_enclosed,
+    iterate_pairs,
+    mesh_vertices,
+)
 from coursebuild.numerics.pruning.xml_edits import (
     Element,
     ModelEdit,
@@ -37,8 +40,6 @@ from coursebuild.numerics.pruning.xml_edits import (
     set_option,
 )
 from coursebuild.numerics.reports.diet_report import name_list
-from coursebuild.numerics.scene import Scene
-from coursebuild.numerics.simulation import initial_data
 
 MOST_PAIRS = 100_000
 """With so many pairs of geoms no contact is examined."""
@@ -193,7 +194,7 @@ def _unread_kind(text: ModelText, element: Element, scenarios: Collection[Scenar
         return "sensor-unread"
     if section == "actuator" and ids and _is_forceless_actuator(text.model, ids, scenarios):
         return "actuator-idle"
-    if section == "tendon" and ids and _is_forceless_tendon(text.model, ids):
+    if section == "tendon" and ids and is_forceless_tendon(text.model, ids):
         return "tendon-idle"
     if section == "keyframe" and tag == "key":
         return "unused-keyframe"
@@ -247,7 +248,8 @@ _FORCES_OF_TENDONS = (
 """Properties that make a tendon exert a force of its own."""
 
 
-def _is_forceless_tendon(model: Any, ids: Collection[int]) -> bool:
+def is_forceless_tendon(model: Any, ids: Collection[int]) -> bool:
+    """Whether no force acts along these tendons, in any state."""
     return not any(
         np.any(getattr(model, f"tendon_{name}")[i]) for name in _FORCES_OF_TENDONS for i in ids
     )
@@ -294,214 +296,6 @@ def _without_contact(
     ]
 
 
-def far_bodies(
-    text: ModelText,
-    code_names: Collection[str],
-    scenarios: Collection[Scenario],
-    runs: Collection[WatchedRun],
-) -> list[Item]:
-    """Bodies that the scene is not about.
-
-    It is about trees of bodies that are driven or couple with others, are set in motion, or
-    contain a name that code uses; where there are none, about mechanisms rather than single free
-    bodies; where there are none, about those with names. Where all are alike none is far.
-    """
-    model, tree = text.model, text.model.body_treeid
-    used_names = {name for inner in text.elements for name in _references(inner, code_names)}
-    used_names |= set(code_names)
-    used_names |= {
-        name.rstrip("0123456789") for name in used_names
-    }  # what is repeated has a number
-    ranks: dict[int, int] = {}
-    for case in scenarios:
-        velocity = np.array(case.qvel)
-        if not case.qvel and case.keyframe >= 0:
-            velocity = model.key_qvel[case.keyframe]
-        ranks |= dict.fromkeys(model.dof_treeid[np.flatnonzero(velocity)].tolist(), 3)
-    roots: dict[Element, list[int]] = {}
-    for element, ids in text.things("body"):
-        names = {inner.get("name") for inner in element.walk()} - {None, ""}
-        for number in {int(tree[i]) for i in ids} - {-1}:
-            is_free_body = model.tree_bodynum[number] == 1 and model.tree_dofnum[number] == 6
-            rank = 3 if names & used_names else 0 if is_free_body else 2
-            ranks[number] = max(rank, ranks.get(number, 0), 1 if element.get("name") else 0)
-            if int(model.tree_bodyadr[number]) in ids:
-                roots.setdefault(element, []).append(number)
-    most = max(ranks.values(), default=0)
-    far = {
-        element: set(numbers)
-        for element, numbers in roots.items()
-        if all(ranks[number] < most for number in numbers)
-        and not any(inner.tag in ("camera", "light") for inner in element.walk())
-    }
-    touching = {
-        frozenset(tree[model.geom_bodyid[[*pair]]].tolist())
-        for run in runs
-        for pair in run.touching_pairs
-    }
-    while True:  # what touched a body that is left may have moved it, and so on
-        gone = {number for numbers in far.values() for number in numbers}
-        near = {
-            number
-            for trees in touching
-            if -1 not in trees and len(trees & gone) == 1 < len(trees)
-            for number in trees & gone
-        }
-        if not near:
-            break
-        far = {element: numbers for element, numbers in far.items() if not numbers & near}
-    return [
-        Item("far-body", display_name(element), element, (element, *_users(text, element)))
-        for element in far
-    ]
-
-
-_NOT_REFERENCES = frozenset(("name", "class", "childclass", "material", "mesh", "file", "type"))
-
-
-def _references(element: Element, code_names: Collection[str]) -> Iterator[str]:
-    """The names that an element refers to; excluded pairs and unread sensors do not count."""
-    is_optional = (
-        section_of(element) in ("contact", "sensor") and element.get("name") not in code_names
-    )
-    if not is_optional:
-        yield from (
-            attribute.value
-            for attribute in element.attributes
-            if attribute.name not in _NOT_REFERENCES
-        )
-
-
-def _users(
-    text: ModelText,
-    thing: Element,
-    sections: Collection[str] = ("contact", "sensor"),
-    references: str = "",
-) -> list[Element]:
-    """The elements of some sections that refer to something, and go with it.
-
-    `references`: the attributes that may do so; any where none is named.
-    """
-    names = {element.get("name") for element in thing.walk()} - {None, ""}
-    users = [
-        element
-        for element in text.elements
-        if section_of(element) in sections
-        and any(
-            attribute.value in names
-            for attribute in element.attributes
-            if (attribute.name in references.split() if references else attribute.name != "name")
-        )
-    ]
-    actuators = [user for user in users if section_of(user) == "actuator"]
-    return users + [s for a in actuators for s in _users(text, a, ("sensor",), "actuator")]
-
-
-_USERS = ("sensor", "actuator", "equality")
-_OF_JOINTS, _OF_TENDONS = "joint joint1 joint2 jointinparent", "tendon tendon1 tendon2"
-"""Attributes that refer to joints, and to tendons."""
-_TURNS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
-"""Attributes by which a body is turned."""
-_STILL = 1e-9
-"""rad or m: a joint that begins so near to where it is drawn needs no other drawing."""
-
-
-def resting_joints(text: ModelText, runs: Sequence[WatchedRun]) -> list[Item]:
-    """The joints of each body that never move, though they might: without them it is welded.
-
-    Where a rest is only luck, as that of a pole on its tip, a start that is off by a millionth
-    shows it.
-    """
-    model = text.model
-    if not runs or not model.nv:
-        return []
-    still = np.all(
-        [run.displacements <= ALIKE * _visible(model, run.scene) for run in runs], axis=0
-    )
-    for run in runs:
-        nudged = initial_data(run.scene.scenario, model)
-        off = _LUCK * np.random.default_rng(3).choice((-1.0, 1.0), model.nv) * still
-        mujoco.mj_integratePos(model, nudged.qpos, off, 1.0)
-        scenario = replace(run.scene.scenario, qpos=tuple(nudged.qpos))
-        run = watch(model, replace(run.scene, scenario=scenario))
-        still &= run.displacements <= ALIKE * _visible(model, run.scene)
-    starts = [initial_data(run.scene.scenario, model).qpos for run in runs]
-    items = []
-    for body, body_ids in text.things("body"):
-        joints = {}
-        for joint in body.children:
-            ids = text.ids(joint) if thing_kind(joint) == "joint" else ()
-            if ids and all(np.all(still[model.dof_jntid == i]) for i in ids):
-                joints[joint] = ids
-        moved = [joint for joint in joints if _is_drawn_elsewhere(model, joints[joint], starts)]
-        edits: tuple[ModelEdit, ...] = ()
-        if moved and (
-            len(body_ids) != 1
-            or len(joints) < int(model.body_jntnum[body_ids[0]])
-            or body.parent is None
-            or body.parent.tag not in ("body", "worldbody")
-            or any(np.max(np.abs(start - starts[0])) > _STILL for start in starts)
-        ):
-            joints = {joint: ids for joint, ids in joints.items() if joint not in moved}
-        elif moved:
-            edits = _draw_at(model, body, body_ids[0], starts[0])
-        if joints:
-            users = [u for joint in joints for u in _users(text, joint, _USERS, _OF_JOINTS)]
-            name = name_list([display_name(joint) for joint in joints])
-            drops = tuple((body, turn) for turn in _TURNS[1:] if edits and body.attribute(turn))
-            removals = (*joints, *users)
-            items.append(Item("resting-joint", name, next(iter(joints)), removals, drops, edits))
-    return items
-
-
-_LUCK = 1e-6
-"""rad or m: by how much joints that rest are off where their rest is tried."""
-
-
-def _visible(model: Any, scene: Scene) -> Array:
-    """What is just visible of each degree of freedom (nv,): rad, or m."""
-    angle = np.radians(scene.bench.visible_angle)
-    units = scales(model)
-    return np.where(units == 1.0, angle, scene.bench.visible * units)
-
-
-def _is_drawn_elsewhere(model: Any, ids: Iterable[int], starts: Iterable[Any]) -> bool:
-    """Whether one of these joints begins elsewhere than the model is drawn."""
-    off = np.zeros(model.nv)
-    for start in starts:
-        mujoco.mj_differentiatePos(model, off, 1.0, model.qpos0, start)
-        if any(np.max(np.abs(off[model.dof_jntid == i])) > _STILL for i in ids):
-            return True
-    return False
-
-
-def _draw_at(model: Any, body: Element, number: int, start: Any) -> tuple[ModelEdit, ...]:
-    """Draw a body where it is at the beginning."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = start
-    mujoco.mj_kinematics(model, data)
-    parent = int(model.body_parentid[number])
-    back, place, turn = np.zeros(4), np.zeros(3), np.zeros(4)
-    mujoco.mju_negQuat(back, data.xquat[parent])
-    mujoco.mju_rotVecQuat(place, data.xpos[number] - data.xpos[parent], back)
-    mujoco.mju_mulQuat(turn, back, data.xquat[number])
-    values = {"pos": place, "quat": turn}
-    texts = [(key, " ".join(f"{x:.17g}" for x in value)) for key, value in values.items()]
-    return set_attributes(body, texts)
-
-
-def couplings(text: ModelText) -> list[Item]:
-    """Equalities, and tendons that could exert a force: each is tried, whatever it carries."""
-    return [
-        Item("coupling-idle", display_name(element), element, (element, *users))
-        for kind in ("equality", "tendon")
-        for element, ids in text.things(kind)
-        if kind == "equality" or not _is_forceless_tendon(text.model, ids)
-        for users in [_users(text, element, _USERS, _OF_TENDONS) if kind == "tendon" else []]
-        if not any(section_of(user) == "actuator" for user in users)
-    ]
-
-
 def inner_geoms(text: ModelText) -> list[Item]:
     """Geoms that lie wholly inside another one of their body, and collide as it does.
 
@@ -509,7 +303,7 @@ def inner_geoms(text: ModelText) -> list[Item]:
     """
     model, items = text.model, []
     for element, ids in text.things("geom"):
-        if not all(_is_enclosed(model, i) for i in ids):
+        if not all(is_enclosed(model, i) for i in ids):
             continue
         body = element.parent
         has_inertia = body is not None and any(child.tag == "inertial" for child in body.children)
@@ -532,79 +326,6 @@ def contact_of_rest(text: ModelText, items: Sequence[Item]) -> list[Item]:
     edits += set_option(text.main, "flag", "contact", "disable")
     kinds = " and ".join(dict.fromkeys(f"`{item.kind}`" for item in items))
     return [Item("contact-left", f"what {kinds} names", None, removals, drops, tuple(edits))]
-
-
-def _is_enclosed(model: Any, inner: int) -> bool:
-    """Whether a geom lies inside another one of its body."""
-    centre, turn = model.geom_pos[inner], np.zeros(9)
-    mujoco.mju_quat2Mat(turn, model.geom_quat[inner])
-    points, radius = _outline(model, inner)
-    points = centre + points @ turn.reshape(3, 3).T
-    for outer in np.flatnonzero(model.geom_bodyid == model.geom_bodyid[inner]):
-        masks = (model.geom_contype, model.geom_conaffinity)
-        if outer == inner or any(mask[outer] & mask[inner] != mask[inner] for mask in masks):
-            continue
-        mujoco.mju_quat2Mat(turn, model.geom_quat[outer])
-        local = (points - model.geom_pos[outer]) @ turn.reshape(3, 3)
-        if len(points) and _depths(model, int(outer), local).min() >= radius:
-            return True
-    return False
-
-
-_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-
-
-def _outline(model: Any, geom: int) -> tuple[Array, float]:
-    """Points (n, 3) in a geom's frame, and a radius about them, whose hull contains it."""
-    size = model.geom_size[geom]
-    match mujoco.mjtGeom(int(model.geom_type[geom])):
-        case mujoco.mjtGeom.mjGEOM_SPHERE:
-            return np.zeros((1, 3)), float(size[0])
-        case mujoco.mjtGeom.mjGEOM_CAPSULE:
-            return np.array([[0, 0, -size[1]], [0, 0, size[1]]]), float(size[0])
-        case mujoco.mjtGeom.mjGEOM_CYLINDER:
-            return _CORNERS * (size[0], size[0], size[1]), 0.0
-        case mujoco.mjtGeom.mjGEOM_BOX | mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-            return _CORNERS * size, 0.0
-        case mujoco.mjtGeom.mjGEOM_MESH:
-            return mesh_vertices(model, int(model.geom_dataid[geom])), 0.0
-        case _:
-            return np.zeros((0, 3)), 0.0
-
-
-def mesh_vertices(model: Any, mesh: int) -> Array:
-    """The vertices (n, 3) of a mesh, in its own frame, m."""
-    first = int(model.mesh_vertadr[mesh])
-    vertices: Array = model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])]
-    return vertices.astype(np.float64)
-
-
-def _depths(model: Any, geom: int, points: Array) -> Array:
-    """How deep points (n, 3), in a geom's frame, lie in it, m; negative for those outside."""
-    size, along = model.geom_size[geom], np.abs(points)
-    radial = np.linalg.norm(points[:, :2], axis=1)
-    match mujoco.mjtGeom(int(model.geom_type[geom])):
-        case mujoco.mjtGeom.mjGEOM_SPHERE:
-            return np.asarray(size[0] - np.linalg.norm(points, axis=1))
-        case mujoco.mjtGeom.mjGEOM_BOX:
-            return np.asarray((size - along).min(axis=1))
-        case mujoco.mjtGeom.mjGEOM_CAPSULE:
-            beyond = np.maximum(along[:, 2] - size[1], 0.0)
-            return np.asarray(size[0] - np.hypot(radial, beyond))
-        case mujoco.mjtGeom.mjGEOM_CYLINDER:
-            return np.asarray(np.minimum(size[0] - radial, size[1] - along[:, 2]))
-        case mujoco.mjtGeom.mjGEOM_ELLIPSOID:  # not less than it is
-            return np.asarray((1 - np.linalg.norm(points / size, axis=1)) * size.min())
-        case mujoco.mjtGeom.mjGEOM_MESH:  # of its hull, which is what collides
-            mesh = int(model.geom_dataid[geom])
-            first, count = int(model.mesh_polyadr[mesh]), int(model.mesh_polynum[mesh])
-            faces = slice(first, first + count)
-            normals = model.mesh_polynormal[faces].astype(np.float64)
-            corners = model.mesh_polyvert[model.mesh_polyvertadr[faces]]
-            heights = (normals * mesh_vertices(model, mesh)[corners]).sum(axis=1)
-            return np.asarray((heights - points @ normals.T).min(axis=1, initial=np.inf))
-        case _:
-            return np.full(len(points), -np.inf)
 
 
 _FIT = 0.05
@@ -640,7 +361,7 @@ def primitive_meshes(text: ModelText) -> list[Item]:
             mujoco.mju_quat2Mat(turn, variant.geom_quat[i])
             places = model.geom_pos[i] + vertices @ whole_turn.reshape(3, 3).T
             local = (places - variant.geom_pos[i]) @ turn.reshape(3, 3)
-            fits.append((float(np.abs(_depths(variant, i, local)).max()), shape, edits))
+            fits.append((float(np.abs(depths(variant, i, local)).max()), shape, edits))
         if fits:
             off, shape, edits = min(fits)
             name = f"{display_name(element)} ({shape}, off by {off:.2g} m)"

@@ -329,9 +329,10 @@ class _Gauge:
             values = np.nan_to_num(gaps, nan=np.inf)
             worst = int(values.argmax())
             if (seen := float(values[worst]) / size) > self.seen:
-                name = _body_name(self._base, int(self._bodies[worst]))
-                at = f"at {float(data.time):.3g} s"
-                self.seen, self.shown = seen, f"{name} is off by {values[worst]:.2g} {unit} {at}"
+                number = int(self._bodies[worst])
+                name = self._base.body(number).name or f"number {number}"
+                off = f"off by {values[worst]:.2g} {unit} at {float(data.time):.3g} s"
+                self.seen, self.shown = seen, f"the body {name} is {off}"
         readings = data.sensordata[self._readings]
         gaps = np.nan_to_num(np.abs(readings - variant_data.sensordata), nan=np.inf)
         np.maximum(self._gaps, gaps, out=self._gaps)
@@ -347,11 +348,6 @@ class _Gauge:
         sensor = int(np.searchsorted(self._base.sensor_adr, self._readings[worst], "right")) - 1
         name = self._base.sensor(sensor).name or str(sensor)
         return float(seen[worst]), f"the sensor {name} is off by {gaps[worst]:.2g}"
-
-
-def _body_name(model: Any, body: int) -> str:
-    name = model.body(body).name
-    return f"the body {name}" if name else f"body number {body}"
 
 
 def _contacts(model: Any, data: Any, left: dict[int, int]) -> list[tuple[object, ...]]:

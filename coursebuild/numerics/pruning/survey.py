@@ -27,19 +27,17 @@ from msgspec.structs import replace
 from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import Keep
 from coursebuild.numerics.costs import Clock
+from coursebuild.numerics.pruning.bystanders import couplings, far_bodies, resting_joints
 from coursebuild.numerics.pruning.candidates import (
     KINDS,
     SETTINGS,
     Item,
     contact_of_rest,
-    couplings,
-    far_bodies,
     idle_contacts,
     inner_geoms,
     message_of,
     other_settings,
     primitive_meshes,
-    resting_joints,
     unreachable_contacts,
     unread_elements,
 )
@@ -263,17 +261,15 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         own_fields = {field for item in items for field in KINDS[item.kind].fields.split()}
         if unrelated_fields(change, kinds) - own_fields:
             return False
-        if "tree_sleep_policy" in change and self._may_sleep():
+        sleeps = int(self.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
+        may_sleep = sleeps or any(reader.touches({"enableflags"}) for reader in self.readers)
+        if may_sleep and "tree_sleep_policy" in change:
             return False
         change |= self.trials.state_difference(trial)
         if self._find_noticing_reader((), kinds, change) is not None:
             return False
         result = self.trials.compare(trial)
         return result is not None and result.identical
-
-    def _may_sleep(self) -> bool:
-        sleep_flag = int(self.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
-        return bool(sleep_flag or any(reader.touches({"enableflags"}) for reader in self.readers))
 
     def _try_by_running(self, candidates: Iterable[Sequence[Item]]) -> list[_PrunedGroup]:
         """Take out of each list of items as many of a kind as change no motion."""

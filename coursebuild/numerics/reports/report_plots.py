@@ -92,6 +92,9 @@ def work_precision(report: ScenarioReport) -> Chart | None:
     timed = [row for row in report.rows if row.cost is not None and row.cost.value > 0]
     is_counted = any(row.evaluations for row in report.rows)
     work = "evaluations of the forward dynamics" if is_counted else "steps"
+    base = "the scene’s own setting"
+    if report.cost_of is not None:
+        base = setting_text(report.cost_of, report.own_setting)
     integrators = {row.setting.integrator for row in report.rows}
     lines = tuple(
         _line(report, quantity, timed, name) for name in INTEGRATORS if name in integrators
@@ -102,21 +105,12 @@ def work_precision(report: ScenarioReport) -> Chart | None:
             f"against {'cost' if timed else work}"
         ),
         text=" ".join(_describe(report, quantity, lines)),
-        axes=(
-            _cost_axis(report) if timed else work,
-            f"error: {quantity.label}",
-        ),
+        axes=(f"cost, relative to {base}" if timed else work, f"error: {quantity.label}"),
         lines=lines,
         least=quantity.least,
         unit_label="just visible" if quantity.name == "seen" else "",
         marks=tuple(_marks(report, lines)),
     )
-
-
-def _cost_axis(report: ScenarioReport) -> str:
-    base = report.cost_of
-    name = "the scene’s own setting" if base is None else setting_text(base, report.own_setting)
-    return f"cost, relative to {name}"
 
 
 def _line(

@@ -38,8 +38,7 @@ from coursebuild.features.bench.commands.measurement import (
 )
 from coursebuild.features.bench.grids import Grid, machine_text, power
 from coursebuild.features.bench.scenario_view import scenario_view
-from coursebuild.numerics.reports.departures import RecordCheck, scene_departures
-from coursebuild.numerics.reports.records import BENCH, ReportFailure
+from coursebuild.numerics.reports.records import BENCH, RecordCheck, ReportFailure, scene_departures
 from coursebuild.numerics.reports.scene_report import (
     ScenarioReport,
     SceneReport,
