@@ -270,29 +270,29 @@ def mark_luck(
         limits: the largest stable timesteps (s) under the scene's own solver, by integrator.
         least: errors that are no larger are not resolved.
     """
-    own = next(row.setting for row in rows if row.own)
-    marked = []
+    own_setting = next(row.setting for row in rows if row.own)
+    marked_rows = []
     for row in rows:
         setting, place = row.setting, _error(row)
         limit = limits.get(setting.integrator, math.inf)
-        luck, is_usual = "", setting.solver_settings == own.solver_settings
+        luck, is_usual = "", setting.solver_settings == own_setting.solver_settings
         if place is not None and is_usual and setting.timestep > limit * (1 + 1e-9):
             luck = f"it is beyond its largest stable timestep, {seconds_text(limit, 3)}"
-        for other in rows:
-            work, error = _more_work(other.setting, setting), _error(other)
+        for rival in rows:
+            work, error = _more_work(rival.setting, setting), _error(rival)
             if luck or not work or place is None or error is None:
                 continue
             if error > max(place * (1 + ERROR_SLACK), least):
                 luck = f"its error rises with {work}"
-        marked.append(replace(row, lucky=luck))
-    return tuple(marked)
+        marked_rows.append(replace(row, lucky=luck))
+    return tuple(marked_rows)
 
 
-def _more_work(more: MeasuredSetting, less: MeasuredSetting) -> str:
+def _more_work(dear: MeasuredSetting, cheap: MeasuredSetting) -> str:
     """What a setting takes more of than another, in words; empty unless it is that alone."""
-    if more == replace(less, timestep=more.timestep) and more.timestep < less.timestep:
+    if dear == replace(cheap, timestep=dear.timestep) and dear.timestep < cheap.timestep:
         return "shorter timesteps"
-    if more == replace(less, iterations=more.iterations) and more.iterations > less.iterations:
+    if dear == replace(cheap, iterations=dear.iterations) and dear.iterations > cheap.iterations:
         return "more iterations"
     return ""
 

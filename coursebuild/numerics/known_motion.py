@@ -131,8 +131,8 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
     least, gaps = ROUNDING, []
     for name, states in motions.items():
         subject = f"`{exact.span.path}`, `{name}`," if len(motions) > 1 else f"`{exact.span.path}`"
-        checked = _check_exact(model, pilot, (exact, subject), states, reference, quick=quick)
-        least = least.at_least(checked)
+        precision = _check_exact(model, pilot, (exact, subject), states, reference, quick=quick)
+        least = least.at_least(precision)
         gaps.append(_gap(model, states, next(iter(motions.values()))))
     # The formula comes first, and the equations bound it, where there are both.
     states, source = next(iter(motions.values())), exact.span.path
@@ -141,11 +141,11 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
 
 
 def find_nearby(
-    model: Any, pilot: Pilot, known: KnownMotion, *, quick: bool
+    model: Any, pilot: Pilot, declared_reference: KnownMotion, *, quick: bool
 ) -> EngineStates | None:
     """The states of a scene's reference from another start; `None` where nobody knows them.
 
-    `known`: the reference from the start that is declared, which was checked.
+    `declared_reference`: the reference from the start that is declared, which was checked.
     """
     if pilot.scene.declaration.closed_form:
         return None
@@ -153,7 +153,7 @@ def find_nearby(
         reference = _find_computed(model, pilot, quick=quick)
     except SceneError:
         return None
-    exact = pilot.scene.exact if known.kind == "closed" else None
+    exact = pilot.scene.exact if declared_reference.kind == "closed" else None
     if exact is None:
         return reference.states
     return next(iter(_exact_states(model, pilot, exact, reference).values()))
@@ -172,16 +172,13 @@ def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
             reference = _integrate(model, pilot, quick)
         except NoConvergenceError as error:
             note = f"no integration: {error}"
-        if reference is not None and not tends_to(
-            model,
-            _with_duration(pilot.setup, float(reference.states.times[-1])),
-            reference.states,
-            min(pilot.scene.timesteps),
-            PARTING_DISTANCE,
-        ):
-            reference, note = None, f"no integration: {_TENDS_ELSEWHERE}"
-            if declaration.reference == "ode":
-                raise _no_integration(_TENDS_ELSEWHERE, declaration)
+        if reference is not None:
+            setup = _with_duration(pilot.setup, float(reference.states.times[-1]))
+            states, step = reference.states, min(pilot.scene.timesteps)
+            if not tends_to(model, setup, states, step, PARTING_DISTANCE):
+                reference, note = None, f"no integration: {_TENDS_ELSEWHERE}"
+        if reference is None and note.endswith(_TENDS_ELSEWHERE) and declaration.reference == "ode":
+            raise _no_integration(_TENDS_ELSEWHERE, declaration)
     elif declaration.reference == "ode":
         raise _no_integration(f"there is {' and '.join(pilot.jumps)}", declaration)
     if reference is None:

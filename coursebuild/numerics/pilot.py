@@ -301,8 +301,12 @@ def settings(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[Measured
         for integrator in STANDARD
         for step in reversed(ladder)
     ]
-    own = ladder.index(pilot.scene.timestep)
-    for step in ladder[own : own + 1] if quick else ladder[max(0, own - 1) : own + 2]:
+    own_index = ladder.index(pilot.scene.timestep)
+    for step in (
+        ladder[own_index : own_index + 1]
+        if quick
+        else ladder[max(0, own_index - 1) : own_index + 2]
+    ):
         variants += _solving_variants(model, replace(baseline, timestep=step), pilot, quick=quick)
     return tuple(dict.fromkeys(variants))
 
@@ -336,10 +340,10 @@ def _solving_variants(
     ]
 
 
-def apply(model: Any, setting: MeasuredSetting, own: Any) -> None:
-    """Give a `mjModel` a setting; what is empty in it is as in the scene's own model, `own`."""
+def apply(model: Any, setting: MeasuredSetting, own_model: Any) -> None:
+    """Give a `mjModel` a setting; what is empty in it is as in `own_model`, the scene's."""
     for name in ("solver", "iterations", "cone", "disableflags", "enableflags", *_OPTIONS):
-        setattr(model.opt, name, getattr(own.opt, name))
+        setattr(model.opt, name, getattr(own_model.opt, name))
     set_integrator(model, Integrator(setting.integrator), setting.timestep)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     if setting.solver:

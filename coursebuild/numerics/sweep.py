@@ -309,13 +309,13 @@ def measure_expected(model: Any, scene: Scene, baseline: MeasuredSetting) -> Ite
     }
     if scene.exact is not None:
         data = initial_data(scene.scenario, model)
-        known = scene.exact.states(np.zeros(1), data.qpos.copy(), data.qvel.copy()).expected
-        unknown = sorted(known.keys() - set(get_args(Expected)))
+        quantities = scene.exact.states(np.zeros(1), data.qpos.copy(), data.qvel.copy()).expected
+        unknown = sorted(quantities.keys() - set(get_args(Expected)))
         if unknown:
             message = f"`{scene.exact.span.path}` expects `{unknown[0]}`, which is not measured"
             help = f"known: {', '.join(get_args(Expected))}"
             raise SceneError(message, scene.exact.span, help)
-        expected |= {name: (value, scene.exact.span.path) for name, value in known.items()}
+        expected |= {name: (value, scene.exact.span.path) for name, value in quantities.items()}
     for integrator in STANDARD if expected else ():
         setting = replace(baseline, integrator=integrator.value)
         variant = with_setting(model, setting)

@@ -45,6 +45,7 @@ from coursebuild.numerics.measure import (
     energy_drift,
     errors,
     fit_orders,
+    mean_energy,
     measure_slip,
     momentum_drift,
     quantity_name,
@@ -75,7 +76,7 @@ from coursebuild.numerics.scene import Scene, thickness
 from coursebuild.numerics.simulation import (
     EngineStates,
     Run,
-    advance,
+    count_iterations,
     initial_data,
     motion_of,
     refsafe_active,
@@ -144,17 +145,17 @@ def measure_scenario(
     )
     basis = Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
     measurements = _measure_settings(basis, settings(model, pilot, quick=quick), tell)
-    measured = [row for row, _ in measurements]
+    measured_rows = [row for row, _ in measurements]
     noticeable = [sees for _, sees in measurements]
     cost_of = None
     if clock is not None:
         tell(f"{scene.name}: times")
-        measured, cost_of = _with_costs(basis, measured, clock, quick)
+        measured_rows, cost_of = _with_costs(basis, measured_rows, clock, quick)
     tell(f"{scene.name}: stable timesteps")
     largest = stable_rows(model, pilot, quick=quick)
     limits = {row.integrator: row.largest for row in largest if row.largest is not None}
     least = basis.least_figure if quantity_name(model, scene) else basis.least_seen
-    rows = front(mark_luck(measured, limits, least))
+    rows = front(mark_luck(measured_rows, limits, least))
     judgement = verdict(
         rows, noticeable, least, lambda setting: _holds(basis, rows, setting, quick)
     )
@@ -187,46 +188,46 @@ def measure_scenario(
 
 
 def _measure_settings(
-    basis: Basis, every: Sequence[MeasuredSetting], tell: Callable[[str], None]
+    basis: Basis, choices: Sequence[MeasuredSetting], tell: Callable[[str], None]
 ) -> list[tuple[WorkPrecisionRow, bool | None]]:
     """The rows of settings in their order, and what is noticed of each.
 
     What changes no bit at the own timestep is not crossed with others.
     """
-    own, found, same = basis.baseline, {}, set()
+    baseline, rows_by_setting, idle_solving = basis.baseline, {}, set()
     base_states: EngineStates | None = None
     # Other solvers come last, and of them those at the own timestep first.
     for setting in sorted(
-        every,
+        choices,
         key=lambda s: (
-            s != own,
-            s.solver_settings != own.solver_settings,
-            s.timestep != own.timestep,
+            s != baseline,
+            s.solver_settings != baseline.solver_settings,
+            s.timestep != baseline.timestep,
         ),
     ):
-        if setting.solver_settings in same and setting.timestep != own.timestep:
+        if setting.solver_settings in idle_solving and setting.timestep != baseline.timestep:
             continue
         tell(f"{basis.pilot.scene.name}: {setting_text(setting)}")
         row, sees, states = _measure_setting(basis, setting)
         base_states = states if row.own else base_states
-        is_alike = (setting.timestep, setting.integrator) == (own.timestep, own.integrator)
-        if states is not None and base_states is not None and is_alike and not row.own:
+        is_alike = setting == replace(setting, timestep=baseline.timestep)
+        is_alike = is_alike and setting.integrator == baseline.integrator and not row.own
+        if states is not None and base_states is not None and is_alike:
             pairs = ((states.qpos, base_states.qpos), (states.qvel, base_states.qvel))
             row = replace(row, same=all(np.array_equal(a, b) for a, b in pairs))
-            same |= {setting.solver_settings} if row.same else set()
-        found[setting] = row, sees
-    return [found[setting] for setting in every if setting in found]
+            idle_solving |= {setting.solver_settings} if row.same else set()
+        rows_by_setting[setting] = row, sees
+    return [rows_by_setting[setting] for setting in choices if setting in rows_by_setting]
 
 
 def _least_known(model: Any, scene: Scene, reference: KnownMotion) -> tuple[float, float]:
     """Below which nothing is known of what is seen, and of the declared quantity."""
     states, second_states = reference.states, reference.second_states
-    seen = FLOORS * visible_error(model, scene, states, second_states)
+    least_seen = FLOORS * visible_error(model, scene, states, second_states)
     if not quantity_name(model, scene):
-        return seen, 0.0
-    values = (quantity_values(model, scene, s) for s in (states, second_states))
-    exact, second = values
-    return seen, FLOORS * float(np.linalg.norm(exact - second, axis=1).max())
+        return least_seen, 0.0
+    gaps = quantity_values(model, scene, states) - quantity_values(model, scene, second_states)
+    return least_seen, FLOORS * float(np.linalg.norm(gaps, axis=1).max())
 
 
 def _holds(
@@ -240,14 +241,14 @@ def _holds(
         data = initial_data(scenario, model)
         mujoco.mj_integratePos(model, data.qpos, position, 1.0)
         start = {"qpos": tuple(data.qpos), "qvel": tuple(data.qvel + velocity)}
-        moved = replace(scenario, **start)
-        setup = replace(pilot.setup, scenario=moved)
-        near = replace(pilot, scene=replace(scene, scenario=moved), setup=setup)
+        nudged_scenario = replace(scenario, **start)
+        setup = replace(pilot.setup, scenario=nudged_scenario)
+        near = replace(pilot, scene=replace(scene, scenario=nudged_scenario), setup=setup)
         points = []
         for row in places:
             base = with_setting(model, replace(basis.baseline, cone=row.setting.cone))
-            known = basis.cones[row.setting.cone].reference
-            exact = find_nearby(base, near, known, quick=quick)
+            reference = basis.cones[row.setting.cone].reference
+            exact = find_nearby(base, near, reference, quick=quick)
             if exact is None:
                 return True
             run = simulate(setup, with_setting(model, row.setting), thickness(model))
@@ -256,9 +257,9 @@ def _holds(
             states = run.states.head(len(exact.times))
             error = visible_error(model, scene, states, exact)
             if quantity_name(model, scene):
-                values = (quantity_values(model, near.scene, s) for s in (states, exact))
-                one, other = values
-                error = float(np.linalg.norm(one - other, axis=1).max())
+                gaps = quantity_values(model, near.scene, states)
+                gaps -= quantity_values(model, near.scene, exact)
+                error = float(np.linalg.norm(gaps, axis=1).max())
             least = basis.least_figure if quantity_name(model, scene) else basis.least_seen
             points.append(FrontPoint(row.cost, max(error, least)))
         if not points[0].beats(points[1]):
@@ -322,16 +323,16 @@ def _with_costs(
     usable = [index for index, row in enumerate(rows) if row.status == "ok"]
     if not usable:
         return timed_rows, None
-    settings, own = [rows[index].setting for index in usable], basis.baseline
-    alike = [s for s in settings if s == replace(own, timestep=s.timestep)]
+    settings, baseline = [rows[index].setting for index in usable], basis.baseline
+    alike = [s for s in settings if s == replace(baseline, timestep=s.timestep)]
     base = max(alike, key=lambda s: s.timestep, default=settings[0])
-    base = own if own in settings else base
+    base = baseline if baseline in settings else base
     scene = basis.pilot.scene
     timings = costs(basis.model, scene, settings, settings.index(base), clock, quick=quick)
     for index, timing in zip(usable, timings, strict=True):
         seconds = timing.nanoseconds.scale(1e-9 / scene.scenario.duration)
         timed_rows[index] = replace(rows[index], cost=timing.ratio, seconds=seconds)
-    return timed_rows, None if base == own else base
+    return timed_rows, None if base == baseline else base
 
 
 def _fit_orders(basis: Basis, rows: Sequence[WorkPrecisionRow]) -> tuple[OrderRow, ...]:
@@ -391,7 +392,7 @@ def _measure_setting(
         reasons=run.judgement.reasons,
         energy_drift=None if energy is None else energy_drift(run.energy, energy),
         momentum_drift=momentum_drift(run.momentum) if basis.momentum_conserved else None,
-        mean_energy=_mean_energy(run, cone.reference.horizon, basis.late_energy),
+        mean_energy=mean_energy(run, cone.reference.horizon, basis.late_energy),
         penetration=run.penetration,
     )
     if not run.judgement.ok:
@@ -400,20 +401,10 @@ def _measure_setting(
         has_grown = math.isfinite(growth) and growth > 1
         return replace(row, growth=growth if has_grown else None), None, None
     if pilot.constrained:
-        row = replace(row, iterations=_count_iterations(basis, row))
+        # A step of RK4 has four times the iterations of its last evaluation.
+        count = count_iterations(with_setting(model, setting), pilot.scene.scenario)
+        row = replace(row, iterations=count * row.evaluations / steps)
     return *_with_errors(basis, row, run), run.states
-
-
-def _count_iterations(basis: Basis, row: WorkPrecisionRow) -> float:
-    """Iterations of the solver in the scenario; a step of RK4 has four times those of its last."""
-    scenario, model = basis.pilot.scene.scenario, with_setting(basis.model, row.setting)
-    data, count = initial_data(scenario, model), 0
-    for command in scenario.commands(row.setting.timestep):
-        if command:
-            data.ctrl[:] = command
-        advance(model, data)
-        count += int(data.solver_niter.sum())
-    return float(count) * row.evaluations / max(row.steps, 1)
 
 
 def _with_errors(
@@ -445,14 +436,6 @@ def _with_errors(
         slip=creep,
     )
     return row, noticeable
-
-
-def _mean_energy(run: Run, horizon: float, expected: float | None) -> float | None:
-    """Mean kinetic energy from the horizon to the end, relative to the expected one, less 1."""
-    energies = run.energy[1:][run.states.times > horizon * (1 + 1e-9), 1]
-    if expected is None or len(energies) < 2 or not np.isfinite(energies).all():
-        return None
-    return float(energies.mean()) / expected - 1
 
 
 def _quantity_error(

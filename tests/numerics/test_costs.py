@@ -235,10 +235,10 @@ def test_a_verdict_where_an_error_is_not_known_or_nothing_was_timed() -> None:
     )
 
 
-def ladder(*errors: float, own: int = 0) -> tuple[WorkPrecisionRow, ...]:
+def ladder(*errors: float, own_number: int = 0) -> tuple[WorkPrecisionRow, ...]:
     """Rows of Euler at 4, 2, 1, … ms with these errors, each twice as dear as the one before."""
     rows = [
-        row("Euler", 0.004 / 2**n, cost=2.0 ** (n - own), seen=error, own=n == own)
+        row("Euler", 0.004 / 2**n, cost=2.0 ** (n - own_number), seen=error, own=n == own_number)
         for n, error in enumerate(errors)
     ]
     return mark_luck(rows, {"Euler": 0.0025}, 1e-6)

@@ -125,7 +125,7 @@ def stability(
             measurement = _record(options, measurement, whole=not names)
     if not own_models:
         return measurement
-    return _joined(measurement, bench.bench(options, own_models, record=record))
+    return _join_reports(measurement, bench.bench(options, own_models, record=record))
 
 
 def _split(options: Options, names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -134,7 +134,7 @@ def _split(options: Options, names: tuple[str, ...]) -> tuple[tuple[str, ...], t
     return models, tuple(name for name in names if name not in models)
 
 
-def _joined(
+def _join_reports(
     measurement: Measurement[CaseReport], of_course: Measurement[SceneReport]
 ) -> Measurement[CaseReport]:
     """What was measured on hard cases, with those of the course's own models."""
@@ -182,7 +182,7 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
         measurement = _check_problems(options, built_in)
     if not own_models:
         return measurement
-    return _joined(measurement, bench.check(options, own_models))
+    return _join_reports(measurement, bench.check(options, own_models))
 
 
 def _check_problems(options: Options, names: tuple[str, ...]) -> Measurement[CaseReport]:

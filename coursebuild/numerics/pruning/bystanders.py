@@ -74,12 +74,12 @@ def far_bodies(
         for pair in run.touching_pairs
     }
     while True:  # what touched a body that is left may have moved it, and so on
-        gone = {number for numbers in far.values() for number in numbers}
+        far_trees = {number for numbers in far.values() for number in numbers}
         near = {
             number
             for trees in touching
-            if -1 not in trees and len(trees & gone) == 1 < len(trees)
-            for number in trees & gone
+            if -1 not in trees and len(trees & far_trees) == 1 < len(trees)
+            for number in trees & far_trees
         }
         if not near:
             break
@@ -167,17 +167,19 @@ def resting_joints(text: ModelText, runs: Sequence[WatchedRun]) -> list[Item]:
             ids = text.ids(joint) if thing_kind(joint) == "joint" else ()
             if ids and all(np.all(still[model.dof_jntid == i]) for i in ids):
                 joints[joint] = ids
-        moved = [joint for joint in joints if _is_drawn_elsewhere(model, joints[joint], starts)]
+        bent_joints = [
+            joint for joint in joints if _is_drawn_elsewhere(model, joints[joint], starts)
+        ]
         edits: tuple[ModelEdit, ...] = ()
-        if moved and (
+        if bent_joints and (
             len(body_ids) != 1
             or len(joints) < int(model.body_jntnum[body_ids[0]])
             or body.parent is None
             or body.parent.tag not in ("body", "worldbody")
             or any(np.max(np.abs(start - starts[0])) > _STILL for start in starts)
         ):
-            joints = {joint: ids for joint, ids in joints.items() if joint not in moved}
-        elif moved:
+            joints = {joint: ids for joint, ids in joints.items() if joint not in bent_joints}
+        elif bent_joints:
             edits = _draw_at(model, body, body_ids[0], starts[0])
         if joints:
             users = [u for joint in joints for u in _users(text, joint, _USERS, _OF_JOINTS)]

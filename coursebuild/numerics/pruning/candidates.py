@@ -308,8 +308,8 @@ def inner_geoms(text: ModelText) -> list[Item]:
         body = element.parent
         has_inertia = body is not None and any(child.tag == "inertial" for child in body.children)
         if has_inertia or (element.get("mass") or element.get("density")) == "0":
-            removed = (element,)
-            items.append(Item("geom-inside", display_name(element), element, removed))
+            removals = (element,)
+            items.append(Item("geom-inside", display_name(element), element, removals))
         elif any(model.geom_contype[i] or model.geom_conaffinity[i] for i in ids):
             edits = set_attributes(element, _UNTOUCHABLE)
             items.append(Item("geom-inside", display_name(element), element, edits=edits))
@@ -345,12 +345,14 @@ def primitive_meshes(text: ModelText) -> list[Item]:
         ):
             continue
         fits, body = [], element.parent
-        own = (
+        siblings = (
             [child for child in body.children if child.tag in ("geom", "inertial")] if body else []
         )
         mass = (("mass", f"{float(model.body_mass[model.geom_bodyid[ids[0]]]):.17g}"),)
         for shape in _SHAPES:  # with the mass that the mesh has
-            edits = set_attributes(element, (("type", shape), *(mass if len(own) == 1 else ())))
+            edits = set_attributes(
+                element, (("type", shape), *(mass if len(siblings) == 1 else ()))
+            )
             try:
                 variant = text.compile(edits)
             except ValueError:
@@ -397,7 +399,7 @@ def other_settings(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
     if not any(run.constrained for run in runs):
         return []
     option = text.model.opt
-    own = {
+    is_spared = {
         "iterations": option.iterations <= 10,
         "tolerance": option.tolerance >= 1e-6,
         "noslip_iterations": option.noslip_iterations == 0,
@@ -406,5 +408,5 @@ def other_settings(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
     return [
         Item(name, value, None, edits=set_option(text.main, tag, name, value))
         for tag, name, value in _OTHER_SETTINGS
-        if not own.get(name, False)
+        if not is_spared.get(name, False)
     ]

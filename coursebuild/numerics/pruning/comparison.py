@@ -218,8 +218,8 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
             gauge.look(data, twin)
             horizon = float(data.time) if gauge.seen > ALIKE else horizon
     judgement = judge(model, data, steps_made * scene.timestep, peaks)
-    seen = frozenset(touching), constrained, displacements, speeds, horizon
-    return WatchedRun(scene, judgement, *seen)
+    observations = frozenset(touching), constrained, displacements, speeds, horizon
+    return WatchedRun(scene, judgement, *observations)
 
 
 def nearby_scenes(model: Any, run: WatchedRun, count: int) -> Iterator[Scene]:
@@ -298,10 +298,10 @@ def _follow(base: Any, variant: Any, index: IndexMap, run: WatchedRun) -> Motion
     judgement = judge(variant, variant_data, scene.scenario.duration)
     if not judgement.ok:
         return MotionComparison(False, math.inf, f"the run is lost: {'; '.join(judgement.reasons)}")
-    seen, shown = gauge.with_sensors()
-    if shown and math.isfinite(run.horizon):
-        shown += f", until {run.horizon:.3g} s, beyond which nobody can predict the motion"
-    return MotionComparison(identical, seen, shown)
+    difference, words = gauge.with_sensors()
+    if words and math.isfinite(run.horizon):
+        words += f", until {run.horizon:.3g} s, beyond which nobody can predict the motion"
+    return MotionComparison(identical, difference, words)
 
 
 _MOTION = {"qpos": "nq", "qvel": "nv", "act": "na", "sensordata": "nsensordata"}
@@ -328,11 +328,11 @@ class _Gauge:
         for gaps, size, unit in ((places, self._length, "m"), (turns, self._angle, "rad")):
             values = np.nan_to_num(gaps, nan=np.inf)
             worst = int(values.argmax())
-            if (seen := float(values[worst]) / size) > self.seen:
+            if (share := float(values[worst]) / size) > self.seen:
                 number = int(self._bodies[worst])
                 name = self._base.body(number).name or f"number {number}"
                 off = f"off by {values[worst]:.2g} {unit} at {float(data.time):.3g} s"
-                self.seen, self.shown = seen, f"the body {name} is {off}"
+                self.seen, self.shown = share, f"the body {name} is {off}"
         readings = data.sensordata[self._readings]
         gaps = np.nan_to_num(np.abs(readings - variant_data.sensordata), nan=np.inf)
         np.maximum(self._gaps, gaps, out=self._gaps)
@@ -341,13 +341,13 @@ class _Gauge:
     def with_sensors(self) -> tuple[float, str]:
         """The largest of bodies and sensors, whose readings count relative to their largest."""
         gaps = np.where(self._gaps > _ROUNDING * np.maximum(self._largest, 1.0), self._gaps, 0.0)
-        seen = gaps / (self._share * np.maximum(self._largest, _ROUNDING))
-        if seen.max(initial=0.0) <= self.seen:
+        shares = gaps / (self._share * np.maximum(self._largest, _ROUNDING))
+        if shares.max(initial=0.0) <= self.seen:
             return self.seen, self.shown
-        worst = int(seen.argmax())
+        worst = int(shares.argmax())
         sensor = int(np.searchsorted(self._base.sensor_adr, self._readings[worst], "right")) - 1
         name = self._base.sensor(sensor).name or str(sensor)
-        return float(seen[worst]), f"the sensor {name} is off by {gaps[worst]:.2g}"
+        return float(shares[worst]), f"the sensor {name} is off by {gaps[worst]:.2g}"
 
 
 def _contacts(model: Any, data: Any, left: dict[int, int]) -> list[tuple[object, ...]]:

@@ -252,18 +252,18 @@ def mesh_vertices(model: Any, mesh: int) -> Vector:
 
 def depths(model: Any, geom: int, points: Vector) -> Vector:
     """How deep points (n, 3), in a geom's frame, lie in it, m; negative for those outside."""
-    size, along = model.geom_size[geom], np.abs(points)
+    size, distances = model.geom_size[geom], np.abs(points)
     radial = np.linalg.norm(points[:, :2], axis=1)
     match mujoco.mjtGeom(int(model.geom_type[geom])):
         case mujoco.mjtGeom.mjGEOM_SPHERE:
             return np.asarray(size[0] - np.linalg.norm(points, axis=1))
         case mujoco.mjtGeom.mjGEOM_BOX:
-            return np.asarray((size - along).min(axis=1))
+            return np.asarray((size - distances).min(axis=1))
         case mujoco.mjtGeom.mjGEOM_CAPSULE:
-            beyond = np.maximum(along[:, 2] - size[1], 0.0)
-            return np.asarray(size[0] - np.hypot(radial, beyond))
+            excess = np.maximum(distances[:, 2] - size[1], 0.0)
+            return np.asarray(size[0] - np.hypot(radial, excess))
         case mujoco.mjtGeom.mjGEOM_CYLINDER:
-            return np.asarray(np.minimum(size[0] - radial, size[1] - along[:, 2]))
+            return np.asarray(np.minimum(size[0] - radial, size[1] - distances[:, 2]))
         case mujoco.mjtGeom.mjGEOM_ELLIPSOID:  # not less than it is
             return np.asarray((1 - np.linalg.norm(points / size, axis=1)) * size.min())
         case mujoco.mjtGeom.mjGEOM_MESH:  # of its hull, which is what collides

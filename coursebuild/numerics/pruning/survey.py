@@ -177,10 +177,10 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         if not any(group.finding.kind == "contact-off" for group in groups):
             candidates += [idle_contacts(text, runs), inner_geoms(text), primitive_meshes(text)]
         groups += self._try_by_running(candidates)
-        gone = ("far-body", "resting-joint", "coupling-idle")
-        removed = [i for group in groups for i in group.items if i.kind in gone]
+        removed_kinds = ("far-body", "resting-joint", "coupling-idle")
+        removed_items = [i for group in groups for i in group.items if i.kind in removed_kinds]
         if not any(group.finding.kind in ("contact-off", "contact-idle") for group in groups):
-            groups += self._try_by_running([contact_of_rest(text, removed)])
+            groups += self._try_by_running([contact_of_rest(text, removed_items)])
         groups = self._confirm(groups)
         groups += self._try_by_running([item] for item in other_settings(text, runs))
         self.tell("all together")
@@ -237,8 +237,11 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             if not item.element or elements.isdisjoint(item.element.ancestors())
         ]
         groups = self._group_items([*outer, *kept_items])
-        same = MotionComparison(True, 0.0)
-        return [self._make_group(similar, reason, PROVED_LABEL, same) for reason, similar in groups]
+        no_difference = MotionComparison(True, 0.0)
+        return [
+            self._make_group(similar, reason, PROVED_LABEL, no_difference)
+            for reason, similar in groups
+        ]
 
     def _is_unread(self, item: Item) -> bool:
         names = {item.name} | {node.get("class") or "" for e in item.removals for node in e.walk()}
@@ -299,8 +302,10 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         removable = largest_subset(items, moves_alike)
         if not removable:
             smallest = min(results, key=lambda result: result.difference, default=None)
-            shown = "it cannot go alone" if smallest is None else f"without it {smallest.shown}"
-            self._reject(items, None if smallest is None else smallest.difference, shown)
+            reason_text = (
+                "it cannot go alone" if smallest is None else f"without it {smallest.shown}"
+            )
+            self._reject(items, None if smallest is None else smallest.difference, reason_text)
             return None
         if not moves_alike(removable):
             return None
@@ -412,9 +417,11 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         # What is quicker in the whole model need not be so in what is left of it.
         for group, setting in zip(by_time, is_setting, strict=True):
             if setting and moves_alike([*best, group]):
-                other = self._measure_groups([*best, group])
-                if other and (other.time or 0.0) > 1.03 * ((saving and saving.time) or 1.0):
-                    best, saving = [*best, group], other
+                other_saving = self._measure_groups([*best, group])
+                if other_saving and (other_saving.time or 0.0) > 1.03 * (
+                    (saving and saving.time) or 1.0
+                ):
+                    best, saving = [*best, group], other_saving
         trial = self._prune(best) if best else None
         result = None if trial is None else self.trials.compare(trial)
         return (None, None) if result is None else (saving, result.difference)

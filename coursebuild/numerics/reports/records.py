@@ -249,9 +249,9 @@ def scene_departures(
     One that was recorded before solvers were crossed with timesteps has fewer settings.
     """
     if not any(row.evaluations for scenario in record.scenarios for row in scenario.rows):
-        known = {row.setting for scenario in record.scenarios for row in scenario.rows}
+        settings = {row.setting for scenario in record.scenarios for row in scenario.rows}
         scenarios = tuple(
-            replace(scenario, rows=tuple(row for row in scenario.rows if row.setting in known))
+            replace(scenario, rows=tuple(row for row in scenario.rows if row.setting in settings))
             for scenario in measurement.scenarios
         )
         measurement = replace(measurement, scenarios=scenarios)

@@ -81,10 +81,10 @@ def test_equations_of_motion_are_integrated(course: Path) -> None:
 
 def test_two_motions_of_the_course_are_told_apart(course: Path) -> None:
     """A formula and equations: the one that errs is named, and the engine decides."""
-    both = EXACT.format(velocity=", qvel - 9.81 * time") + "\n\n" + EQUATIONS
-    assert report(course, both.format("")).floor < 1e-11
+    exact = EXACT.format(velocity=", qvel - 9.81 * time") + "\n\n" + EQUATIONS
+    assert report(course, exact.format("")).floor < 1e-11
     with pytest.raises(CannotMeasureError) as caught:
-        report(course, both.format(" * (1 + 1e-5)"))
+        report(course, exact.format(" * (1 + 1e-5)"))
     diagnostic = caught.value.diagnostic
     assert diagnostic.message == (
         "`models/ball.exact.py`, `acceleration`, is not this scene's motion"

@@ -120,13 +120,13 @@ def run_sweep(
     clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
     scenario = next(s for s in compiled_scene.scenarios if sweep.scenario in (None, s.name))
     threads = tuple(part for part in sweep.variations if part.parameter == THREADS)
-    others = tuple(part for part in sweep.variations if part.parameter != THREADS)
+    single_thread = tuple(part for part in sweep.variations if part.parameter != THREADS)
     reports = []
     with report_errors(compiled_scene.scene):
-        for variations in filter(None, (others, threads)):
+        for variations in filter(None, (single_thread, threads)):
             part = replace(sweep, variations=variations)
             # One processor, unless what is measured is how it goes on several.
-            with one_processor() if variations is others else nullcontext():
+            with one_processor() if variations is single_thread else nullcontext():
                 report = measure_sweep(compiled_scene.spec, scenario, part, clocks, quick=quick)
             reports.append(report)
     return replace(reports[0], rows=tuple(row for report in reports for row in report.rows))
