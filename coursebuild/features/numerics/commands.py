@@ -57,6 +57,7 @@ from coursebuild.numerics.reports.report_plots import case_quantities
 from coursebuild.numerics.reports.scene_report import SceneReport
 from coursebuild.numerics.reports.shown_errors import seconds_text, status_text
 from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.scenes import find_scenes
 from coursebuild.pipeline.shown_reports import read_record
 from coursebuild.report.text import BOLD, Column, Style, table
 from coursebuild.report.values import json_text
@@ -129,8 +130,17 @@ def stability(
 
 
 def _split(options: Options, names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The names of models of the course, and those of hard cases."""
+    """The names of models of the course, and those of hard cases.
+
+    Raises:
+        UsageError: a model is named of which the course knows nothing in theory.
+    """
     models = tuple(name for name in names if (options.root / f"models/{name}.xml").is_file())
+    for scene in find_scenes(options.root, models).value if models else ():
+        has_theory = any(scenario.expected for scenario in scene.declarations.scenarios)
+        if not has_theory and not (options.root / exact_file(scene.name)).is_file():
+            help = f"give its motion in {exact_file(scene.name)}, or `expected` of a scenario"
+            raise UsageError(f"nothing is known of `{scene.name}` in theory", help=help)
     return models, tuple(name for name in names if name not in models)
 
 
@@ -138,18 +148,11 @@ def _join_reports(
     measurement: Measurement[CaseReport], of_course: Measurement[SceneReport]
 ) -> Measurement[CaseReport]:
     """What was measured on hard cases, with those of the course's own models."""
-    reports = list(measurement.reports)
-    failures = [*measurement.failures, *of_course.failures]
-    for scene in of_course.reports:
-        cases = course_cases(scene)
-        reports += cases
-        if not cases:
-            help = f"give its motion in {exact_file(scene.model)}, or `expected` of a scenario"
-            failures.append(ReportFailure(f"nothing is known of `{scene.model}` in theory", help))
+    course_reports = [case for scene in of_course.reports for case in course_cases(scene)]
     return Measurement(
-        reports=tuple(reports),
+        reports=(*measurement.reports, *course_reports),
         diagnostics=of_course.diagnostics,
-        failures=tuple(failures),
+        failures=(*measurement.failures, *of_course.failures),
         checked=(*measurement.checked, *of_course.checked),
         remarks=(*measurement.remarks, *of_course.remarks),
     )

@@ -380,8 +380,9 @@ def _scenario(report: ScenarioReport, bench: BenchTable) -> _Table:
     for row in report.rows:
         figures = {"own setting": _Figure(row.own)}
         figures |= _run(row, share, place, speed, predictable=predictable)
-        figures |= _error("figure", row.figure, share, place)
-        figures["visible error"] = _Figure(row.seen, share, _INVISIBLE)
+        if row.parted is None:  # else the last digit of the start decides how far apart they are
+            figures |= _error("figure", row.figure, share, place)
+            figures["visible error"] = _Figure(row.seen, share, _INVISIBLE)
         figures["model error"] = _Figure(row.model_error, share, place + _ROUNDING)
         if row.status == "ok" and predictable:
             figures["slip"] = _Figure(row.slip, share, _ROUNDING)
