@@ -217,7 +217,7 @@ def _is_doubtful(line: ScriptLine, run_store: RunStore, *, repeat: bool) -> bool
 def _diagnose_nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Diagnostic]:
     """Diagnose that there is nothing to publish, or that nothing was verified."""
     place = course.map.span(0, 0)
-    if all(lesson.status == "planned" for lesson in course.lessons):
+    if not course.is_manual and all(lesson.status == "planned" for lesson in course.lessons):
         message = "the course has no written lesson"
         help = "write a file in content/lessons, and give its entry in the map a `status`"
         yield diagnose("no-lessons", place, message, help=help)

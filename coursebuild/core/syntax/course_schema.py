@@ -225,6 +225,10 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
         tuple[FeaturePath, ...],
         Meta(description="features of the course's own, as files in `features/`"),
     ] = ()
+    folds: Annotated[
+        Literal["open", "closed"],
+        Meta(description="whether folded parts are printed in full, in `export page` and `pdf`"),
+    ] = "open"
     packages: Annotated[
         tuple[FolderPath, ...],
         Meta(
@@ -307,6 +311,13 @@ class PageTable(Struct, frozen=True, forbid_unknown_fields=True):
     id: Annotated[Slug, Meta(description="the page's name in links and in its address")]
     title: Annotated[Text, Meta(description="plain text")]
     file: Annotated[Text, Meta(description="its Markdown file, anywhere in the project")]
+    section: Annotated[
+        str,
+        Meta(
+            description="the heading under which it stands in a list of pages beside it; "
+            "without one it has no such list"
+        ),
+    ] = ""
     menu: Annotated[bool, Meta(description="whether it is in the menu of every page")] = True
     names: Annotated[bool, Meta(description="whether names in its code have to be known")] = True
 

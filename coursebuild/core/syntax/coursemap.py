@@ -122,6 +122,7 @@ def _build_course(
         base_url=settings.base_url or "",
         repository=settings.repository or "",
         licence=settings.licence,
+        folds=settings.folds,
         id=settings.id or "",
         engine=settings.engine,
         engine_span=table.place("engine"),
@@ -133,7 +134,9 @@ def _build_course(
         silences=fields.silence,
         levels=levels,
         pages=tuple(
-            Page(node.span, page.id, page.title, page.file, None, page.menu, page.names)
+            Page(
+                node.span, page.id, page.title, page.file, None, page.menu, page.names, page.section
+            )
             for node, page in zip(root.objects("page"), fields.page, strict=True)
         ),
         models=(),

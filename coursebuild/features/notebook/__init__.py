@@ -145,6 +145,8 @@ def _footnote_cells(writer: DocumentWriter) -> Iterator[Cell]:
         notes = (hang(f"{n.number}. ", writer.blocks(n.blocks)) for n in footnotes)
         title = f"## {writer.words('markup.footnotes')}"
         yield _text_cell("footnotes", "\n\n".join((title, *notes)))
+    if references := writer.references():
+        yield _text_cell("references", references)
     for note in footnotes:
         for script in _find_scripts(note.blocks):
             yield from _script_cells(writer, "footnotes", script)
