@@ -209,6 +209,8 @@ class PageCopy(Struct, frozen=True, kw_only=True):
     """Whether only written lessons have it, and not all pages with text of their own."""
     download: bool = False
     """Whether a browser saves it instead of showing it."""
+    services: Callable[[Course, str], tuple[tuple[str, str], ...]] = lambda course, path: ()
+    """The names of services that can open the copy at a site path, with their addresses."""
 
 
 class PagePart(Struct, frozen=True, kw_only=True):

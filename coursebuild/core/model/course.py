@@ -162,6 +162,8 @@ class Page(Struct, frozen=True):
     """Whether it is in the menu of every page."""
     names: bool = True
     """Whether names in its inline code have to be known."""
+    section: str = ""
+    """The heading under which it stands among the pages; empty where it is in no list."""
 
     @property
     def is_home(self) -> bool:
@@ -220,6 +222,29 @@ class NamedPath(Struct, frozen=True):
 
     path: str
     span: Span
+
+
+class Launch(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where readers can run the notebooks of lessons, which lie in a repository of the site."""
+
+    repository: Annotated[
+        fields.WebPlace | None,
+        Meta(description="with the built site; without it, that of `[course]`"),
+    ] = None
+    branch: Annotated[fields.Text, Meta(description="the branch with the built site")] = "gh-pages"
+    folder: Annotated[
+        str, Meta(description="the folder of the built site in it, as in `docs`; else the top")
+    ] = ""
+    colab: Annotated[bool, Meta(description="a button for Google Colab; needs GitHub")] = False
+    binder: Annotated[
+        fields.WebPlace | None,
+        Meta(description="a button for this Binder, as in `https://mybinder.org`"),
+    ] = None
+    jupyterhub: Annotated[
+        fields.WebPlace | None,
+        Meta(description="a button for this JupyterHub, which needs nbgitpuller"),
+    ] = None
+    codespaces: Annotated[bool, Meta(description="a button for GitHub Codespaces")] = False
 
 
 class Limits(Struct, frozen=True, forbid_unknown_fields=True):
@@ -303,6 +328,8 @@ class Course(Struct, frozen=True):
     folds: Literal["open", "closed"] = "open"
     """Whether what authors fold is printed in full."""
     limits: Limits = Limits()
+    launch: Launch | None = None
+    """Where notebooks can be run; its `repository` is set."""
     theme: Theme = Theme()
     words: Words = Words()
     bibliography: Source | None = None
@@ -330,6 +357,11 @@ class Course(Struct, frozen=True):
     def lessons(self) -> tuple[Lesson, ...]:
         """All lessons in the order of the map."""
         return tuple(lesson for level in self.levels for lesson in level.lessons)
+
+    @property
+    def is_manual(self) -> bool:
+        """Whether it is made of pages alone, in sections."""
+        return not self.lessons and any(page.section for page in self.pages)
 
     @property
     def written_levels(self) -> tuple[Level, ...]:

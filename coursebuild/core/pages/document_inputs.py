@@ -234,6 +234,11 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
             (copy.text, place.href(urls.copy_path(place.path, copy.ending)), copy.download)
             for copy in page_copies()
         ),
+        "services": tuple(
+            service
+            for copy in page_copies()
+            for service in copy.services(library.course, urls.copy_path(place.path, copy.ending))
+        ),
         "edit": edit_address(library, lesson.path),
     }
     data = lesson_data(library, lesson)
@@ -268,6 +273,10 @@ def stub_inputs(library: Library, lesson: Lesson) -> PageInputs:
 def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, object]:
     """The values that the pages of written and planned lessons share."""
     order, position = library.order, library.positions[lesson.id]
+    # A reader is led to what can be read.
+    earlier = (x for x in reversed(order[:position]) if x.document is not None)
+    later = (x for x in order[position + 1 :] if x.document is not None)
+    previous, following = next(earlier, None), next(later, None)
     return {
         "lesson": lesson_link(library, place, lesson, whole=True),
         "level": level_view(library, place, library.levels[lesson.level]),
@@ -277,10 +286,8 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
         ),
         "graph": neighbourhood(library, place, lesson),
         "referrers": owner_links(place, library.referrers.get(lesson.id, ())),
-        "previous": lesson_link(library, place, order[position - 1]) if position else None,
-        "following": lesson_link(library, place, order[position + 1])
-        if position + 1 < len(order)
-        else None,
+        "previous": previous and lesson_link(library, place, previous),
+        "following": following and lesson_link(library, place, following),
     }
 
 

@@ -10,9 +10,7 @@ from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
-HELP = "https://github.com/OWNER/coursebuild/blob/main/docs/reference/rules.md#{}"
-"""The address at which a rule is explained."""
-
+from coursebuild import MANUAL
 
 Severity: TypeAlias = Literal["error", "warning"]
 """An error keeps the site from being published; a warning can be silenced, with a reason."""
@@ -25,6 +23,11 @@ class Rule(Struct, frozen=True):
     severity: Severity
     summary: str
     """Its meaning in one sentence, for the catalogue's page."""
+
+
+def rule_address(name: str) -> str:
+    """The address at which the manual explains a rule; empty where that is not known."""
+    return MANUAL and f"{MANUAL}rules.html#{name}"
 
 
 _SUMMARIES = {
@@ -54,7 +57,7 @@ _SUMMARIES = {
     "reason.",
     "unproven-name": "An entry of `unproven` in the course map names no script, or one that "
     "always runs.",
-    "no-lessons": "The course has no lesson to publish.",
+    "no-lessons": "The course has no lesson to publish, and no page in a `section`.",
     "no-scripts": "No script can run here, so nothing is verified.",
     # the theme
     "theme-file": "A file that the theme names is not there, or is not what it must be.",
