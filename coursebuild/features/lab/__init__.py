@@ -2,8 +2,8 @@
 
 A `lab` fence holds JSON (`schema`). `parse` makes a `Lab` of it (`model`), `relations` compares
 it with the course and its models, `page` shows it. `trial` runs it in the engine that browsers use
-and natively; `picture` draws what was recorded, and `export` writes the lab as a Python script. Labs of formulas and equations, which need no engine, are read and tried in
-`equations`.
+and natively; `picture` draws what was recorded, and `export` writes the lab as a Python script.
+Labs of formulas and equations, which need no engine, are read and tried in `equations`.
 """
 
 from __future__ import annotations
