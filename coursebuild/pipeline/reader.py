@@ -37,9 +37,9 @@ from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.formulas import equations_of
 from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.materials import renderer_for
+from coursebuild.core.pages.numbering import items_of
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.renderer import Renderer, Texts, known_mathml
 from coursebuild.core.pages.urls import Place
@@ -249,7 +249,7 @@ class Reader:
             notes = summarize(whole.document, mathml)
             bare = replace(
                 without_prose(whole.document),
-                equations=equations_of(whole.document, mathml),
+                numbered_items=items_of(whole.document, mathml),
                 summaries=notes.value,
             )
             scripts = document_scripts(whole.document)

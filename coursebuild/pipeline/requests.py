@@ -178,7 +178,7 @@ def document_fingerprint(document: Document) -> str:
     html = [node.span.text for node in blocks if isinstance(node, HtmlBlock)]
     html += [node.span.text for node in inlines if isinstance(node, RawInline)]
     return fingerprint(
-        (document.blocks, document.footnotes, document.equations, html), _WITHOUT_PLACES
+        (document.blocks, document.footnotes, document.numbered_items, html), _WITHOUT_PLACES
     )
 
 

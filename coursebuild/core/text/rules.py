@@ -91,7 +91,7 @@ _SUMMARIES = {
     "fence-kind-near": "The kind of a code block looks like a misspelt one.",
     "fence-unread": "A code block of a kind that nothing reads holds a JSON object.",
     "feature-broken": "A feature of the course's own cannot be loaded.",
-    "feature-missing": "A fence needs a feature that is not installed.",
+    "feature-missing": "A fence or the list of sources needs something that is not installed.",
     "math-syntax": "A formula does not parse.",
     "math-command": "A command of a formula has lost its backslash.",
     "math-brackets": "A formula has more opening brackets than closing ones, or fewer.",
@@ -104,7 +104,8 @@ _SUMMARIES = {
     "control-character": "A text has a character that no reader can see.",
     "merge-conflict": "A file of the course holds both versions of a merge, with the marks between "
     "them.",
-    "equation-label": "The label of a formula cannot be read, or stands where none may.",
+    "label-attribute": "The label of a formula, figure, table, listing or lab cannot be read, or "
+    "stands where none may.",
     # terms and symbols
     "term-attribute": "The attribute by which a text defines a term cannot be read.",
     "term-place": "A term is defined outside a paragraph of the text.",

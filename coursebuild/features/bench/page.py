@@ -247,8 +247,8 @@ def _diet(words: Strings, place: urls.Place, diet: DietReport) -> DietView:
 
 def _finding(words: Strings, finding: Finding) -> FindingView:
     label = escape(finding.label)
-    if finding.difference:
-        label += Markup(" ({})").format(unbroken(power(finding.difference, 2)))
+    if finding.difference:  # a figure alone where its words were not recorded
+        label += Markup(" ({})").format(finding.shown or unbroken(power(finding.difference, 2)))
     saving = _saving(words, finding.saving)
     return FindingView(finding, sentence(finding.message), label, saving)
 

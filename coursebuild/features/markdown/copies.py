@@ -76,6 +76,7 @@ def _document_copy(inputs: PageInputs, page: PageContext) -> str:
         *head(inputs, words, writer.locate),
         writer.blocks(document.blocks),
         writer.footnotes(document.footnotes),
+        writer.references(),
         *_footer(inputs, words, writer.locate),
     )
     return "\n\n".join(filter(None, parts))
