@@ -19,7 +19,11 @@ from markdown_it.token import Token
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-PAGES = sorted(path for path in DOCS.rglob("*.md") if path.name != "rules.md")
+PAGES = sorted(
+    path
+    for path in DOCS.rglob("*.md")
+    if path.name != "rules.md" and not path.is_relative_to(DOCS / "public")
+)
 """The pages written by hand; the page of the rules is generated."""
 
 

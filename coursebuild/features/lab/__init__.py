@@ -58,6 +58,7 @@ FEATURE = Feature(
             name="lab",
             block=Lab,
             parse=parse_fence,
+            label="lab",
             draw=draw_lab,
             markdown=lab_markdown,
             index=index_lab,
