@@ -407,7 +407,7 @@ def _describe_ratios(cost: float, error: float) -> str:
 
 def _describe_error(error: float | None) -> str:
     if error is None:
-        return "; whether a learner would notice its error is not known"
+        return "; whether its error can be seen is not known"
     if error >= 1:
-        return f"; a learner would notice its error, which is {error:.2g} times what can be seen"
-    return f"; a learner would not notice its error, which is {error:.2g} of what can be seen"
+        return f"; its error can be seen: it is {error:.2g} times what an eye can tell"
+    return f"; its error cannot be seen: it is {error:.2g} of what an eye can tell"

@@ -189,7 +189,7 @@ def test_errors_of_zero_and_nothing_at_all() -> None:
 
 OWN_BEST = "no other setting is cheaper without being less accurate"
 OWN_FAILS = "the scene does not run under its own setting, Euler at 2 ms: the state is not finite"
-ERROR_SEEN = "a learner would notice its error, which is 2.5 times what can be seen"
+ERROR_SEEN = "its error can be seen: it is 2.5 times what an eye can tell"
 
 
 @pytest.mark.parametrize(
@@ -198,7 +198,7 @@ ERROR_SEEN = "a learner would notice its error, which is 2.5 times what can be s
         (
             ((1, 1e-3), (4, 1e-7)),
             None,
-            f"{OWN_BEST}; a learner would not notice its error, which is 0.001 of what can be seen",
+            f"{OWN_BEST}; its error cannot be seen: it is 0.001 of what an eye can tell",
         ),
         (
             ((1, 2.5), (0.94, 2.5e-6)),

@@ -68,11 +68,12 @@ FOREIGN = {
         "a formula is `$x$` or stands between two `$$`, and a link to one is `[](#eq:name)`",
     ),
     "attributes": MarkupKind(
-        r"\{:?[ \t]*[.#][A-Za-z][\w:.-]*[^{}\n\0]*\}?|\{:[^{}\n\0]+\}|\{#?eq:[^{}\n\0]*\}?"
+        r"\{:?[ \t]*[.#][A-Za-z][\w:.-]*[^{}\n\0]*\}?|\{:[^{}\n\0]+\}"
+        r"|\{#?(?:eq|fig|lab|lst|tab):[^{}\n\0]*\}?"
         r"|(?<![{\w&\0])[#.][A-Za-z][\w:.-]*\}",
-        "only headings have attributes, and formulas labels: `{#eq:name}`",
-        "in a heading, `## Title {#id .class}` ends the line; write HTML where a text needs a "
-        "class or a size",
+        "only headings have attributes, and only formulas, captions and fences have labels",
+        "in a heading, `## Title {#id .class}` ends the line; a label ends a caption, "
+        "`Figure: … {#fig:name}`, or a fence's first line; write HTML for a class or a size",
     ),
     "reference": MarkupKind(
         r"(?<![\w\]\0\\])\[[^\[\]\n\0]+\]\[[^\[\]\n\0]*\](?!\()",
@@ -86,13 +87,15 @@ FOREIGN = {
     ),
     "citation": MarkupKind(
         r"(?<!\\)\[(?:[^\[\]\n\0@]*[\s-])?@[\w:./-]+[^\[\]\n\0]*\]",
-        "there is no list of sources",
-        "link to the source, or put it into a footnote: `[^name]`",
+        "no source is cited in this way",
+        "a citation is `[@key]` or `[see @key, p. 12; @other]`; the sources are listed in "
+        "content/references.bib",
     ),
     "crossref": MarkupKind(
         r"(?<![\w.@])@(?:fig|tbl|eq|sec|lst|thm)[-:][\w-]+",
         "a cross-reference is not written in this way",
-        "link to a heading or a formula by its id: `[text](#id)`, `[](#eq:name)`",
+        "link to a heading by its id, `[text](#id)`, and to what has a number without a text: "
+        "`[](#fig:name)`, `[](#eq:name)`",
     ),
     "highlight": MarkupKind(
         r"(?<![=\w])==[^\s=](?:[^=\n\0]*[^\s=])?==(?![=\w])",

@@ -17,9 +17,16 @@ import re
 from collections.abc import Iterator, Sequence
 
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
-from coursebuild.core.syntax.fence import Fence, check_foreign_key, kind_of, split_words
+from coursebuild.core.syntax.fence import (
+    INDENTED_FENCE,
+    Fence,
+    check_foreign_key,
+    kind_of,
+    split_words,
+)
 from coursebuild.core.syntax.markup_kinds import BROKEN, FOREIGN, IN_HTML, ONCE, MarkupKind
 from coursebuild.core.syntax.nodes import shorten
+from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, misspelt, nearest
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -326,6 +333,21 @@ _OBJECT = re.compile(r'\s*\{\s*"[^"\n]*"\s*:[\s\S]*\}\s*\Z')
 def is_known_kind(kind: str) -> bool:
     """Whether a block of a kind is more than code to be shown."""
     return kind in CORE_FENCES or kind in fence_names()
+
+
+def check_indented_fence(code: Excerpt, state: ParsingState) -> None:
+    """Report a fence that is shown as text because it is indented."""
+    opening = INDENTED_FENCE.match(code.text)
+    if opening is None:
+        return
+    is_closed = re.search(rf"^{opening[1]}\s*\Z", code.text.rstrip(), re.MULTILINE) is not None
+    if is_closed and not is_known_kind(opening[2]):
+        return
+    message = "this fence is indented by a tab or four blanks, so its block is shown as text"
+    help = "take the white space before it away"
+    place = code.span(opening.start(1), opening.end())
+    state.report(diagnose("fence-indented", place, message, help=help))
+    state.closes_indented = not is_closed
 
 
 def check_kind(fence: Fence) -> Iterator[Diagnostic]:
