@@ -232,7 +232,7 @@ BROKEN = {
     "item": MarkupKind(
         r"^\d{1,2}(?:[.)][.,)]|[,;]) (?=(?-i:[A-Z\0]))|^\d{1,2}[.)](?=(?-i:[A-Z][a-z]))"
         r"|\A1 (?=(?:[^\n]*\n)+?2\. )|^-(?=(?-i:[A-Z][a-z]))"
-        r"|^[0=_] (?=(?-i:[A-Z][a-z]|\0\0?[A-Z]))",
+        r"|(?:^[=_]|(?<=\n)0) (?=(?-i:[A-Z][a-z]))|^[0=_] (?=(?-i:\0\0?[A-Z]))",
         "no item of a list begins here",
         "an item is `- text` or `1. text`, with one blank after the mark",
     ),
