@@ -31,6 +31,7 @@ from coursebuild.core.text.diagnostics import (
     diagnose,
     did_you_mean,
     misspelt,
+    propose,
 )
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import check_unit
@@ -199,7 +200,8 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
         if _WHOLE_ID.fullmatch(word.text) and name is None:
             name = word
         elif misspelt(word.text, [".further"]):
-            return _reject(title, word, f"no class `{word.text}`", "did you mean `.further`?")
+            fix = propose(word.text, ".further")
+            return _reject(title, word, f"no class `{word.text}`", fix)
         elif _CLASS.fullmatch(word.text):
             classes.append(word.text[1:])
         elif word.text.startswith("#") and name is not None:

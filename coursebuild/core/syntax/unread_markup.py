@@ -19,7 +19,7 @@ from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.fence import Fence, check_foreign_key, kind_of, split_words
 from coursebuild.core.syntax.markup_kinds import BROKEN, FOREIGN, IN_HTML, ONCE, MarkupKind
 from coursebuild.core.syntax.nodes import shorten
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, misspelt, nearest
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, misspelt, nearest, propose
 from coursebuild.core.text.source import Excerpt, Span
 
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
@@ -199,8 +199,10 @@ def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:
         message = f"`{shorten(markup)}` does not say where the number is from"
         likely = nearest(key.lower(), ("out", "given", "code"))
         help = 'write `{out}`, `{out=examples/x.py}`, `{given}` or `{given="its source"}`'
-        help = help + escaping if likely in (None, key) else f"did you mean `{likely}`?"
-        return diagnose("binding-attribute", span, message, help=help)
+        if likely in (None, key):
+            return diagnose("binding-attribute", span, message, help=help + escaping)
+        fix = propose(key, likely, ("out", "given", "code"))
+        return diagnose("binding-attribute", span, message, help=fix)
     if before == "$":
         help = 'write `{symbol="what it stands for" unit="m/s"}`' + escaping
         message = f"`{shorten(markup)}` says nothing about the formula before it"
@@ -333,7 +335,7 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
         yield diagnose("fence-info", kind.span(), message, help=help)
     elif (likely := _find_misspelt(name, kinds)) is not None:
         message = f"`{kind.text}` is not a known kind of block"
-        help = f"did you mean `{likely}`?"
+        help = propose(kind.text, likely, kinds)
         yield diagnose("fence-kind-near", kind.span(), message, help=help)
     elif not package and (diagnostic := _check_unread_json(fence)) is not None:
         yield diagnostic

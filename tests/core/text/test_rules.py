@@ -10,9 +10,11 @@ the engine that tries the labs, for mistakes that no course can make happen, or 
 
 from __future__ import annotations
 
+import difflib
 import re
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +23,13 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.registry import installed_features
-from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.scripts.edit import apply_edits
+from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.rules import RULES, Rule
+from coursebuild.core.text.source import Source
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.pipeline.check import check
+from coursebuild.pipeline.fix import choose_fixes
 from coursebuild.pipeline.outputs import update
 from coursebuild.pipeline.publication import build, export
 from coursebuild.report import Style, diagnostic_text
@@ -156,18 +161,56 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
 
 
 def print_diagnostics(case: Case, root: Path, workshop: Workshop) -> str:
-    """All that the tool prints of a case, without colours."""
+    """All that the tool prints of a case, without colours, and what its fixes write.
+
+    With them the mistakes are gone, and there is none of another rule.
+    """
     diagnostics = run_case(case, root, workshop)
+    fixes = choose_fixes(diagnostics, unsafe=True)
+    if fixes:
+        fixed_texts = {s.path: apply_edits(s.text, edits) for s, edits in by_source(fixes).items()}
+        after = run_case(case, root.with_name(f"{root.name}-fixed"), workshop, fixed_texts)
+        rules = {d.rule for d in diagnostics}
+        new = [diagnostic_text(d, Style()) for d in after if d.is_error and d.rule not in rules]
+        assert new == [], f"{case.title}:\n" + "\n\n".join(new)
+        left = Counter((d.rule, d.message) for d in after)
+        left.subtract((d.rule, d.message) for d in diagnostics)
+        assert all(left[fix.rule, fix.message] < 0 for fix in fixes), "a fix mends nothing"
     text = "\n\n".join(diagnostic_text(d, Style()) for d in diagnostics)
     assert str(root) not in text, "a message names a folder of this machine"
     # Which part of a line a traceback underlines is different in each version of Python.
     text = re.sub(r"^ +[~^][ ~^]*\n", "", text, flags=re.MULTILINE)
-    return without_page_lines(text) + "\n"
+    return without_page_lines(text) + "\n" + "".join(print_fixes(fixes))
 
 
-def run_case(case: Case, root: Path, workshop: Workshop) -> tuple[Diagnostic, ...]:
+def print_fixes(fixes: Sequence[Diagnostic]) -> Iterator[str]:
+    """The lines that `--fix` changes, and those that it changes only with `--unsafe`."""
+    for option, is_safe in (("--fix", True), ("--fix --unsafe", False)):
+        for source, edits in by_source(f for f in fixes if f.safe is is_safe).items():
+            lines, new_lines = (
+                source.text.splitlines(),
+                apply_edits(source.text, edits).splitlines(),
+            )
+            diff = list(difflib.unified_diff(lines, new_lines, n=0, lineterm=""))[2:]
+            changed = "".join(f"{line}\n" for line in diff if not line.startswith("@@"))
+            yield f"\n{option} writes {source.path}\n{changed}"
+
+
+def by_source(fixes: Iterable[Diagnostic]) -> dict[Source, list[Edit]]:
+    edits: dict[Source, list[Edit]] = {}
+    for edit in (edit for fix in fixes for edit in fix.edits):
+        edits.setdefault(edit.span.source, []).append(edit)
+    return edits
+
+
+def run_case(
+    case: Case, root: Path, workshop: Workshop, fixed_texts: Mapping[str, str] = {}
+) -> tuple[Diagnostic, ...]:
+    """The diagnostics of a case; with texts that fixes have made, of what comes of it."""
     layout = Layout.of(case.input)
     layout.write(root)
+    for path, text in fixed_texts.items():
+        (root / path).write_bytes(text.encode())
     options = workshop.options(root)
     if layout.later:
         check(options)
