@@ -171,8 +171,10 @@ def _check_link(
     if name not in names:
         if isinstance(target, LessonTarget) and target.id in targets.levels:
             help = f"{target.id} is a level: {_link_help('level', target.id)}"
+            help = Fix(help, "Level", "Lesson")
         elif isinstance(target, LevelTarget) and target.id in targets.lessons:
             help = f"{target.id} is a lesson: {_link_help('lesson', target.id)}"
+            help = Fix(help, "Lesson", "Level")
         else:
             help = _suggest_lesson(target, targets) or did_you_mean(name, names)
         yield diagnose(rule, span, missing, help=help)

@@ -26,6 +26,8 @@ from coursebuild.core.model import (
 from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
+    Edit,
+    Fix,
     Note,
     Parsed,
     diagnose,
@@ -299,16 +301,29 @@ def check_heading(
         diagnostics.append(diagnose("front-matter", span.first_line(), message, help=help))
     if lesson and level == 1:
         help = "the title comes from the course map; begin with `## `"
+        help = Fix(help, edits=_deepen(span, 1))
         if span.text.rstrip().endswith("\n======="):
             help = "a merge conflict may have left the line of `=` behind: delete it"
         message = "a lesson has no heading of level 1"
         diagnostics.append(diagnose("heading-top", span, message, help=help))
     elif level == 1 and previous is not None and previous > 1:
-        message, help = "a heading of level 1 stands below others", "begin it with `## `"
+        message = "a heading of level 1 stands below others"
+        help = Fix("begin it with `## `", edits=_deepen(span, 1), safe=True)
         diagnostics.append(diagnose("heading-top", span, message, help=help))
     if previous is not None and level > previous + 1:
         message = f"a heading of level {level} follows one of level {previous}"
         if lesson and previous == 1:
             message = f"a heading of level {level} comes before any of level 2"
-        diagnostics.append(diagnose("heading-skip", span, message))
+        help = f"begin it with `{'#' * (previous + 1)} `"
+        fix = Fix(help, edits=_deepen(span, previous + 1 - level))
+        diagnostics.append(diagnose("heading-skip", span, message, help=fix))
     return diagnostics
+
+
+def _deepen(heading: Span, levels: int) -> tuple[Edit, ...]:
+    """The edit that gives a heading so many more levels, if it begins with `#`."""
+    marks = re.match("#+", heading.text)
+    if marks is None:
+        return ()
+    place = heading.source.span(heading.start, heading.start + marks.end())
+    return (Edit(place, "#" * (marks.end() + levels)),)

@@ -41,7 +41,7 @@ from coursebuild.core.syntax.fence import (
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
 from coursebuild.core.syntax.unread_markup import check_kind
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, Parsed, diagnose, write
 from coursebuild.core.text.source import Excerpt, Span
 
 DEFAULT_TIMEOUT, MAX_TIMEOUT = 60.0, 86400.0
@@ -110,6 +110,8 @@ def _build_script(
     if fence.nested:
         mistake, help = "a text of a quiz or lab cannot hold a script", ""
     if mistake:
+        if "is not below" in mistake and not fence.nested:
+            help = Fix(help, f"examples/{path.rpartition('/')[2]}", path)
         diagnostics.append(diagnose("script-path", file.value_span, mistake, help=help))
     timeout = _read_timeout(keys.get("timeout"), diagnostics)
     requires = _read_modules(keys.get("requires"), diagnostics)
@@ -118,7 +120,7 @@ def _build_script(
     record = keys.get("record")
     if record is not None and record.value != "once":
         message = f"`{record.value}` is not a way to record"
-        help = "write `record=once`"
+        help = Fix("write `record=once`", "once")
         diagnostics.append(diagnose("fence-key-value", record.value_span, message, help=help))
     figures = tuple(_read_figures(keys.get("figure"), diagnostics))
     if keys.get("figure") is None and keys.get("norun") is None:
@@ -161,7 +163,9 @@ def _read_timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
     message = f"`{word.value}` is not a number of seconds above 0"
     if seconds > MAX_TIMEOUT:
         message = f"`{word.value}` s is more than a day"
-    diagnostics.append(diagnose("fence-key-value", word.value_span, message))
+    seconds_text = re.fullmatch(rf"({_NUMBER.pattern})\s?s(?:ec)?", word.value)
+    help = "" if seconds_text is None else write(seconds_text[1])
+    diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=help))
     return DEFAULT_TIMEOUT
 
 
@@ -314,8 +318,32 @@ def _check_syntax(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
         help = f"`{row.text.split()[0]}` is a command of Jupyter: leave it out"
     if not help and not script:
         help = "write `fragment` after `python` if it is not meant to be complete"
-    message, help = _lower_first(message), _lower_first(help)
-    yield diagnose("python-syntax", row.span(start, end), message, help=help)
+    message, place = _lower_first(message), row.span(start, end)
+    fix = Fix(_lower_first(help), edits=_python_edits(row, message, place), safe=True)
+    yield diagnose("python-syntax", place, message, help=fix)
+
+
+_PYTHON_CHARACTERS = {**dict.fromkeys("“”„", '"'), **dict.fromkeys("‘’", "'")} | {
+    **{"\u2212": "-", "×": "*", "÷": "/", "·": "*", "\xa0": " ", "，": ",", "\u200b": ""}
+}
+"""Characters of texts, and what Python has for them."""
+
+
+def _python_edits(row: Excerpt, message: str, place: Span) -> tuple[Edit, ...]:
+    """The edits that mend a line of Python, where it is clear what is wrong."""
+    start = Span(place.source, place.start, place.start)
+    if message == "expected ':'":
+        return (Edit(start, ":"),)
+    if re.match(r"invalid (?:non-printable )?character ", message):
+        char, at = place.text[:1], row.text.find(place.text[:1]) + 1
+        new = _PYTHON_CHARACTERS.get(char)
+        end = re.search("[“”‘’]", row.text[at:]) if new in ('"', "'") else None
+        places = [at - 1, *([] if end is None else [at + end.start()])]
+        return tuple(Edit(row.span(p, p + 1), new) for p in places if new is not None)
+    printed = re.fullmatch(r"(\s*print) (?!\()([^#]*\S)\s*", row.text)
+    if message.startswith("missing parentheses in call to 'print'") and printed is not None:
+        return (Edit(row.span(printed.end(1), printed.end(2)), f"({printed[2]})"),)
+    return ()
 
 
 def _find_mixed_tab(rows: Sequence[Excerpt]) -> Span | None:
@@ -415,6 +443,11 @@ def _read_unclosed(fence: Fence, state: ParsingState) -> CodeBlock:
     likely_start = None if fence.info.text else find_likely_start(fence.head)
     if likely_end is not None:
         notes.append(Note("its block seems to end here", likely_end))
+        source, end = likely_end.source, likely_end.end
+        edit = Edit(source.span(end, end), f"\n{fence.prefix}{marks}")
+        if not likely_end.text.strip("`~ "):  # marks that are too few
+            edit = Edit(likely_end, marks)
+        help = Fix(help, edits=(edit,))
     if likely_start is not None:
         notes.append(Note("or a block that begins here has lost its first line", likely_start))
     state.report(diagnose("fence-unclosed", fence.head, message, help=help, notes=notes))

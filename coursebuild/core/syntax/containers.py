@@ -24,6 +24,7 @@ from coursebuild.core.model import Cell, Inline, Table
 from coursebuild.core.syntax.spans import PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
+    Fix,
     Note,
     Parsed,
     diagnose,
@@ -66,6 +67,7 @@ def read_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None
         start = match.start(3)
         message = f"`{match[3][0]}` cannot follow the kind of a callout"
         help = "write `[!kind] Title`, or `[!kind]- Title` for a callout that starts folded"
+        help = Fix(help, "" if match[3][0] == "+" else None, safe=True)  # it starts unfolded
         place = paragraph.span(start, start + 1)
         diagnostic = diagnose("callout-unknown", place, message, help=help)
     elif name.text.lower() in kinds:
@@ -94,8 +96,11 @@ def _read_broken_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head
     place = trim(paragraph.slice(0, match.start(4)))
     head = Head(kind, place.span(), title, False, trim(paragraph.slice(match.end())))
     help = f"write `> [!{kind}] Title`, or a backslash before the bracket that is meant to be seen"
+    follows = paragraph.text[len(paragraph.text[: match.start(4)].rstrip()) :]
+    blank = "" if not title.text or follows[:1].isspace() else " "
+    fix = Fix(help, f"[!{kind}]{blank}", safe=True)
     message = f"`{place.text}` does not begin a callout"
-    return Parsed(head, (diagnose("callout-unknown", place.span(), message, help=help),))
+    return Parsed(head, (diagnose("callout-unknown", place.span(), message, help=fix),))
 
 
 _PIPE = re.compile(r"\\?\|")
@@ -211,7 +216,7 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
             start = source.line_start(line)
             message = f"`{slip[1]}` would be shown as written: this line continues a quotation"
             place = source.span(start + slip.start(1), start + slip.end(1))
-            help = "begin the line with `> `"
+            help = Fix("begin the line with `> `", ">", safe=True)
             yield diagnose("markup-unread", place, message, help=help)
 
 
@@ -247,6 +252,7 @@ def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterat
             place = source.span(before.span.start, before.span.start + number.end())
             message = f"`{number[0]}` would be shown as written: no item of a list begins here"
             help = f"write `{number[0]}.`, as the list below goes on with {block.start}"
+            help = Fix(help, f"{number[0]}.", safe=True)
             yield diagnose("markup-unread", place, message, help=help)
         column, list_column = (
             part.start - source.line_start(part.line) for part in (before.span, block.span)
@@ -284,7 +290,7 @@ def check_item(span: Span) -> Iterator[Diagnostic]:
         elif match := re.match(rf"{re.escape(prefix)}({slip})", text):
             place = source.span(start, start + len(match[1]))
             message = f"`{match[1]}` would be shown as written: no item of a list begins here"
-            help = f"begin the line with `{mark} `"
+            help = Fix(f"begin the line with `{mark} `", mark, safe=True)
             yield diagnose("markup-unread", place, message, help=help)
 
 

@@ -55,7 +55,7 @@ from coursebuild.core.syntax.recording import (
 )
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
 from coursebuild.core.syntax.unread_markup import check_unread_markup, is_known_kind
-from coursebuild.core.text.diagnostics import Parsed, diagnose
+from coursebuild.core.text.diagnostics import Edit, Fix, Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 
@@ -236,7 +236,7 @@ class TextReader:
         if is_closed and not is_known_kind(opening[2]):
             return
         message = "this fence is indented by a tab or four blanks, so its block is shown as text"
-        help = "take the white space before it away"
+        help = Fix("take the white space before it away", edits=_outdent(code), safe=True)
         place = code.span(opening.start(1), opening.end())
         self.state.report(diagnose("fence-indented", place, message, help=help))
         self.state.closes_indented = not is_closed
@@ -424,3 +424,14 @@ class NestedTextParser:
     def _references(self) -> References:
         """A copy of the document's link definitions, as those in a text hold in it only."""
         return dict(self._state.references)
+
+
+def _outdent(code: Excerpt) -> tuple[Edit, ...]:
+    """The edits that take the white space away by which a block is indented code."""
+    edits = []
+    for line in code.lines():
+        start = line.span().start
+        white = re.search(r"(?:    |\t)$", code.source.text[:start][-4:])
+        if line.text.strip() and white is not None:
+            edits.append(Edit(code.source.span(start - len(white[0]), start), ""))
+    return tuple(edits)

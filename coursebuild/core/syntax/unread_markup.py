@@ -17,9 +17,16 @@ from collections.abc import Iterator, Sequence
 
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.fence import Fence, check_foreign_key, kind_of, split_words
-from coursebuild.core.syntax.markup_kinds import BROKEN, FOREIGN, IN_HTML, ONCE, MarkupKind
+from coursebuild.core.syntax.markup_kinds import (
+    BROKEN,
+    FOREIGN,
+    IN_HTML,
+    ONCE,
+    REWRITES,
+    MarkupKind,
+)
 from coursebuild.core.syntax.nodes import shorten
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, misspelt, nearest, propose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, misspelt, nearest, propose
 from coursebuild.core.text.source import Excerpt, Span
 
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
@@ -176,6 +183,10 @@ def _diagnose(
             pass
     message = f"`{shorten(markup)}` would be shown as written: {kind.reason}"
     rule = "markup-foreign" if name in FOREIGN else kind.rule
+    for pattern, replacement, is_safe in REWRITES.get(name, ()):
+        rewritable = re.compile(pattern).match(whole, at)
+        if rewritable is not None and rewritable[0] == span.text == markup and "\n" not in markup:
+            help = Fix(help, rewritable.expand(replacement), safe=is_safe)
     return diagnose(rule, span, message, help=help)
 
 
@@ -324,7 +335,8 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     yield from (diagnostic for word in words if (diagnostic := check_foreign_key(kind.text, word)))
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown but never run, and this one has a `file`"
-        help = "a script is a block of kind `python`"
+        new = "python" if re.fullmatch("i?py(?:thon)?3?", name) else None
+        help: str = Fix("a script is a block of kind `python`", new, safe=True)
         yield diagnose("script-kind", kind.span(), message, help=help)
     elif name in _FOREIGN_KINDS or name.startswith("{"):
         message = f"a block of kind `{kind.text}` is shown as code here"
@@ -332,6 +344,8 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     elif "=" in name:
         message = f"the kind of this block is missing before `{kind.text}`"
         help = "the first word says what a block is, as in ```` ```python file=examples/a.py ````"
+        is_script = name.startswith("file=") and name.endswith(".py")
+        help = Fix(help, f"python {kind.text}" if is_script else None, safe=True)
         yield diagnose("fence-info", kind.span(), message, help=help)
     elif (likely := _find_misspelt(name, kinds)) is not None:
         message = f"`{kind.text}` is not a known kind of block"
@@ -348,9 +362,9 @@ def _help_with_foreign(name: str) -> str:
         return _FOREIGN_KINDS[name]
     if is_known_kind(language):
         example = " file=examples/….py" if language == "python" else ""
-        return f"write ```` ```{language}{example} ````"
+        return Fix(f"write ```` ```{language}{example} ````", language)
     if language and _is_language(language):
-        return f"code to be shown is of kind `{language}`; scripts are in Python"
+        return Fix(f"code to be shown is of kind `{language}`; scripts are in Python", language)
     return "a callout is a quotation: `> [!note]`, and `> ` before each line"
 
 

@@ -75,6 +75,11 @@ class Fix(str):
         return (Edit(place.source.span(start, end), self.new), *self.edits)
 
 
+def write(text: str, old: str = "") -> Fix:
+    """The fix that writes a text, and nothing else can be meant."""
+    return Fix(f"write `{text}`", text, old, safe=True)
+
+
 class Diagnostic(Struct, frozen=True):
     """One mistake or doubt, at one place."""
 

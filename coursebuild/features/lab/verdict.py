@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from coursebuild.core.checks.compiled import line_span
 from coursebuild.core.run.mjcf import error_line, readable_error
 from coursebuild.core.run.script_environment import engine_version
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.features.lab.compile import LabCode
 from coursebuild.features.lab.model import MJCF, Entry, Lab
 from coursebuild.features.lab.reply import Parity, TrialFailure, TrialReply
@@ -165,7 +165,8 @@ def _check_depth_claim(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     if lab.verify.deep and not any(failure.kind == "deep" for failure in trial.failures):
         message = "the lab says `deep`, but no bodies lay deep in each other"
         span = lab.place(("verify", "deep"))
-        yield diagnose("lab-shallow", span, message, help="take `deep` away")
+        fix = Fix("take `deep` away", "false", "true", safe=True)
+        yield diagnose("lab-shallow", span, message, help=fix)
 
 
 def _check_framing(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
@@ -187,10 +188,12 @@ _SMALL = 0.1
 def _make_diagnostic(lab: Lab, failure: TrialFailure) -> Diagnostic:
     kind: str = failure.kind
     message = (failure.message or "something that has no text").rstrip(".")
-    span, special_help = lab.place(failure.entry), None
+    special_help: str | None = None
+    span = lab.place(failure.entry)
     match kind:
         case "throws" if function := _OF_MATH.search(message):
-            special_help = f"did you mean `Math.{function[1].replace('pi', 'PI')}`?"
+            name = f"Math.{function[1].replace('pi', 'PI')}"
+            special_help = Fix(f"did you mean `{name}`?", name, function[1], safe=True)
         case "nan" if failure.entry[0] == "expect":
             special_help = ""
         case "expect" if (expr := lab.fields.expect[int(failure.entry[1])].expr) is not None:

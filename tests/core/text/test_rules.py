@@ -4,6 +4,7 @@ A case holds a smallest course that breaks the rule (see `support.rule_cases`) a
 that the tool then prints. `[update]`, `[build]` or `[check --no-cache]` in a title says which
 command finds the mistake, where it is not `check`. `[engine of 3.13.0]` and `[after 1 s]` change
 the engine that tries the labs, for mistakes that no course can make happen, or not soon enough.
+`[then RULE]` names what comes to light once a mistake is mended. What `--fix` writes stands below.
 `pytest tests/core/text --rewrite-fixtures` writes the expected parts and
 `docs/reference/rules.md` anew.
 """
@@ -171,6 +172,7 @@ def print_diagnostics(case: Case, root: Path, workshop: Workshop) -> str:
         fixed_texts = {s.path: apply_edits(s.text, edits) for s, edits in by_source(fixes).items()}
         after = run_case(case, root.with_name(f"{root.name}-fixed"), workshop, fixed_texts)
         rules = {d.rule for d in diagnostics}
+        rules |= set(re.findall(r"\[then ([\w-]+)\]", case.title))
         new = [diagnostic_text(d, Style()) for d in after if d.is_error and d.rule not in rules]
         assert new == [], f"{case.title}:\n" + "\n\n".join(new)
         left = Counter((d.rule, d.message) for d in after)
