@@ -190,8 +190,8 @@ def check_formulas(
             at = tex.text.find(command[1])
             place = span if at < 0 else tex.span(at, at + len(command[1]))
             likely = nearest(command[1], _COMMANDS, cutoff=0.75)
-            fix = Fix("") if likely is None else propose(command[1], likely, _COMMANDS)
-            help = Fix(fix, edits=fix.edits_at(place), safe=fix.safe)
+            if likely is not None:
+                help = propose(command[1], likely, _COMMANDS).placed(place)
         diagnostics.append(diagnose("math-syntax", span, message, help=help))
     return tuple(diagnostics)
 

@@ -52,6 +52,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
+    Edit,
     Fix,
     Note,
     diagnose,
@@ -171,10 +172,10 @@ def _check_link(
     if name not in names:
         if isinstance(target, LessonTarget) and target.id in targets.levels:
             help = f"{target.id} is a level: {_link_help('level', target.id)}"
-            help = Fix(help, "Level", "Lesson")
+            help = Fix(help, edits=_rename_kind(span, "Lesson", "Level"))
         elif isinstance(target, LevelTarget) and target.id in targets.lessons:
             help = f"{target.id} is a lesson: {_link_help('lesson', target.id)}"
-            help = Fix(help, "Lesson", "Level")
+            help = Fix(help, edits=_rename_kind(span, "Level", "Lesson"))
         else:
             help = _suggest_lesson(target, targets) or did_you_mean(name, names)
         yield diagnose(rule, span, missing, help=help)
@@ -205,6 +206,13 @@ def _link_help(kind: str, id: str) -> str:
     if kind == "lesson":
         return f"write `Lesson {id}` in the text, or link to `lesson:{id}`"
     return f"link to `{kind}:{id}`"
+
+
+def _rename_kind(span: Span, old: str, new: str) -> tuple[Edit, ...]:
+    """The edit of the word before the number in a mention."""
+    start = span.start - len(old) - 1
+    place = span.source.span(start, start + len(old)) if start >= 0 else span
+    return (Edit(place, new),) if place.text == old else ()
 
 
 _LESSON_NAME = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")

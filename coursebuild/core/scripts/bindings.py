@@ -260,7 +260,7 @@ def _orphan_diagnostic(
         target = f" to `{path}`, which is not a script of the course"
         help = did_you_mean(path, outputs.scripts)
         if isinstance(help, Fix):
-            help = Fix(help, edits=help.edits_at(binding.span), safe=help.safe)
+            help = help.placed(binding.span)
     message = f"`{binding.text}` is bound{target}"
     return diagnose("binding-orphan", binding.text_span, message, help=help)
 

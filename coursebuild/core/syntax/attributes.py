@@ -81,7 +81,9 @@ def _read_pairs(
             return diagnose(rule, rest.span(), message, help=help)
         key, span = pair[1], braces.span(*pair.span(1))
         if key not in keys:
-            suggestion = did_you_mean(key, keys) if len(keys) > 1 else ""
+            suggestion = did_you_mean(key, keys)
+            if len(keys) == 1:
+                suggestion = Fix(help, keys[0] if misspelt(key, keys) else None, key, safe=True)
             return diagnose(rule, span, f"`{key}` is not a known key here", help=suggestion or help)
         if key in values:
             return diagnose(rule, span, f"`{key}` is given twice", help=help)
@@ -153,10 +155,14 @@ def read_label(braces: Excerpt, report: Report) -> Label | None:
     is_closed = braces.text.endswith("}")
     match = _ID.match(braces.text) if is_closed else None
     if match is None:
-        message = "the label of this formula is never closed"
+        message, new = "the label of this formula is never closed", None
+        if not is_closed and re.fullmatch(r"\{#eq:[\w-]+", braces.text):
+            new = f"{braces.text}}}"
         if is_closed:
             message = f"`{braces.text}` is not a label of a formula"
-        report(diagnose("equation-label", braces.span(), message, help=_LABEL_HELP))
+            new = f"{{#eq:{braces.text[2:]}" if re.fullmatch(r"\{#[\w-]+\}", braces.text) else None
+        fix = Fix(_LABEL_HELP, new, safe=not is_closed)
+        report(diagnose("equation-label", braces.span(), message, help=fix))
         return None
     end = match.end()
     values = _read_pairs(braces.slice(end - 1), ("check", "given"), "equation-label", _MARK_HELP)
@@ -196,7 +202,8 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
         return Parsed(Attributes(content))
     title, braces = trim(content.slice(0, match.start())), trim(content.slice(match.start()))
     if not match[1]:
-        return _reject(title, braces, "the attributes of this heading are never closed")
+        fix = Fix(_HELP, braces.text + "}", safe=True)
+        return _reject(title, braces, "the attributes of this heading are never closed", fix)
     name, classes, inner = None, list[str](), braces.slice(1, len(braces.text) - 1)
     for word in (inner.slice(*match.span()) for match in _WORD.finditer(inner.text)):
         if _WHOLE_ID.fullmatch(word.text) and name is None:

@@ -151,6 +151,7 @@ def record_fence(
     if mark is not None:
         message = "a recorded output is not an illustration"
         help = f"leave `{ILLUSTRATION}` out, or write `text {ILLUSTRATION}` without a caption"
+        help = Fix(help, edits=mark.removal)
         diagnostics.append(diagnose("recording-keys", mark.span, message, help=help))
     own_words = tuple(word for word in keys.value.words if word is not mark)
     comparison = _read_comparison(FenceKeys(None, own_words), diagnostics)

@@ -216,6 +216,7 @@ def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:
         return diagnose("binding-attribute", span, message, help=fix)
     if before == "$":
         help = 'write `{symbol="what it stands for" unit="m/s"}`' + escaping
+        help = Fix(help, "symbol" if misspelt(key, ["symbol"]) else None, key, safe=True)
         message = f"`{shorten(markup)}` says nothing about the formula before it"
         return diagnose("symbol-attribute", span, message, help=help)
     if before not in ("]", ")"):
@@ -223,7 +224,9 @@ def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:
     message = f"`{shorten(markup)}` would be shown as written: "
     if before == "]":
         message += "the only attribute of words in brackets is `{term}`"
-        return diagnose("term-attribute", span, message, help="write `[word]{term}`" + escaping)
+        new = "term" if misspelt(key, ["term"]) else None
+        fix = Fix("write `[word]{term}`" + escaping, new, key, safe=True)
+        return diagnose("term-attribute", span, message, help=fix)
     message += "links and images have no attributes"
     help = "write HTML, `<a …>` or `<img …>`, where one needs a class or a size" + escaping
     return diagnose("markup-foreign", span, message, help=help)
@@ -260,7 +263,7 @@ def find_repetitions(content: Excerpt) -> Iterator[Diagnostic]:
         if is_begun and line[0].startswith(half, at) and line[0].count(half.rstrip()) == 2:
             span = content.span(line.start() + at, line.start() + at + len(half))
             message = f"`{shorten(half)}` stands here twice"
-            yield diagnose("text-repeated", span, message, help="delete it once")
+            yield diagnose("text-repeated", span, message, help=Fix("delete it once", ""))
 
 
 def check_inline_code(content: Excerpt, start: int, end: int, code: str) -> Iterator[Diagnostic]:

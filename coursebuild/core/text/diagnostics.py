@@ -74,6 +74,10 @@ class Fix(str):
         end = start + len(self.old) if self.old else place.end
         return (Edit(place.source.span(start, end), self.new), *self.edits)
 
+    def placed(self, place: Span) -> Fix:
+        """The same for a diagnostic that marks something else than this place."""
+        return Fix(self, edits=self.edits_at(place), safe=self.safe)
+
 
 def write(text: str, old: str = "") -> Fix:
     """The fix that writes a text, and nothing else can be meant."""
@@ -165,19 +169,25 @@ def misspelt(word: str, names: Iterable[str]) -> str | None:
 
     A letter may be dropped, added, changed or swapped with the next one, or be a capital.
     """
-    return next(_names_meant(word, names), None)
+    return next((name for name, _ in _misspelt_names(word, names)), None)
 
 
-def _names_meant(word: str, names: Iterable[str]) -> Iterator[str]:
-    """All names of which a word may be a misspelling, in their order."""
+def _misspelt_names(word: str, names: Iterable[str]) -> Iterator[tuple[str, tuple[int, int]]]:
+    """All names of which a word may be a misspelling, in their order, and how much they differ.
+
+    The first number does not count capitals as letters of their own, the second does.
+    """
+    for name in sorted(set(names) - {word}):
+        difference = _difference(word.lower(), name.lower())
+        if difference <= (1 if len(name) < 5 else 2) and difference < len(name):
+            yield name, (difference, _difference(word, name))
+
+
+def _difference(first: str, second: str) -> int:
     import difflib
 
-    lower = word.lower()
-    for name in sorted(set(names) - {word}):
-        blocks = difflib.SequenceMatcher(None, lower, name.lower(), False).get_matching_blocks()
-        difference = max(len(word), len(name)) - sum(block.size for block in blocks)
-        if difference <= (1 if len(name) < 5 else 2) and difference < len(name):
-            yield name
+    blocks = difflib.SequenceMatcher(None, first, second, False).get_matching_blocks()
+    return max(len(first), len(second)) - sum(block.size for block in blocks)
 
 
 def did_you_mean(name: str, known_names: Iterable[str]) -> str:
@@ -203,14 +213,17 @@ def propose(
 ) -> Fix:
     """The fix that writes the likely one of `names` for a name.
 
-    It is safe where the name differs by a letter or two, and from that one only. Names that differ
-    in their numbers or single letters are of different things: there the help has no edit.
+    It is safe where the name differs from that one by a letter or two, and from others by more.
+    Names that differ in numbers or single letters are of different things: there the help has no
+    edit.
     """
     help = form.format(likely)
     if _IDS.findall(name.lower()) != _IDS.findall(likely.lower()):
         return Fix(help)
-    is_safe = len(likely) > 2 and [*_names_meant(name, {*names, likely})] == [likely]
-    return Fix(help, likely, name, safe=is_safe)
+    candidates = dict(_misspelt_names(name, {*names, likely}))
+    difference = candidates.pop(likely, None)
+    is_safe = difference is not None and all(difference < other for other in candidates.values())
+    return Fix(help, likely, name, safe=is_safe and len(likely) > 2)
 
 
 def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
