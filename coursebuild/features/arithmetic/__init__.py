@@ -107,10 +107,23 @@ FEATURE = Feature(
     unproven=unproven,
     rules=(
         Rule("formula-arithmetic", "error", "A number in a formula is not what comes out."),
-        Rule("formula-identity", "error", "A formula that says `check` does not hold, or may not."),
         Rule(
-            "symbol-value", "error", "A symbol has two values in one section, or cannot have one."
+            "formula-identity",
+            "error",
+            "A formula that says `check` does not hold, or may not.",
+            "Either side may be the wrong one.",
         ),
-        Rule("formula-unread", "warning", "Arithmetic in a formula is not understood."),
+        Rule(
+            "symbol-value",
+            "error",
+            "A symbol has two values in one section, or cannot have one.",
+            "Only its author knows which value holds.",
+        ),
+        Rule(
+            "formula-unread",
+            "warning",
+            "Arithmetic in a formula is not understood.",
+            "Nothing has to be wrong in it.",
+        ),
     ),
 )

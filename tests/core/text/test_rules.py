@@ -34,6 +34,7 @@ from coursebuild.pipeline.fix import choose_fixes
 from coursebuild.pipeline.outputs import update
 from coursebuild.pipeline.publication import build, export
 from coursebuild.report import Style, diagnostic_text
+from coursebuild.report.text import visible
 from support.fixture_cases import Case, read_cases, rewrite
 from support.rule_cases import Layout, Workshop, parts
 
@@ -85,6 +86,10 @@ reason = "the levels are those of the book"
 path = "content/lessons/4.*"   # optional
 ```
 
+Where it is known what to write, a diagnostic has an edit. `coursebuild check --fix` makes those
+that can only have been meant, `--fix --unsafe` also the likely ones, and `coursebuild undo` takes
+them back. The rule of a mistake that nothing mends by itself says why.
+
 {_contents("error")}
 
 {_contents("warning")}
@@ -100,13 +105,22 @@ def _contents(severity: str) -> str:
 
 def _entry(rule: Rule, example: Example | None) -> str:
     parts = [f"\n## {rule.name}\n\n{rule.severity.capitalize()}. {rule.summary}\n"]
+    if rule.no_fix:
+        parts.append(f"\nNothing mends it by itself. {rule.no_fix}\n")
     if example is None:
         return parts[0]
     for file in example.files:
         parts.append(f"\n`{file.path}`{file.remark}\n")
         if file.text:
             parts.append(f"\n{_fence(_LANGUAGES.get(file.path.rpartition('.')[2], ''), file.text)}")
-    parts.append(f"\n`coursebuild {example.command}` says:\n\n{_fence('', example.output)}")
+    output, *writings = re.split(r"\n\n(?=--fix)", example.output)
+    parts.append(f"\n`coursebuild {example.command}` says:\n\n{_fence('', output)}")
+    for writing in writings:
+        head, diff = writing.split("\n", 1)
+        option, _, path = head.partition(" writes ")
+        parts.append(
+            f"\n`coursebuild check {option}` writes in `{path}`:\n\n{_fence('diff', diff)}"
+        )
     return "".join(parts)
 
 
@@ -194,7 +208,7 @@ def print_fixes(fixes: Sequence[Diagnostic]) -> Iterator[str]:
                 apply_edits(source.text, edits).splitlines(),
             )
             diff = list(difflib.unified_diff(lines, new_lines, n=0, lineterm=""))[2:]
-            changed = "".join(f"{line}\n" for line in diff if not line.startswith("@@"))
+            changed = "".join(f"{visible(line)}\n" for line in diff if not line.startswith("@@"))
             yield f"\n{option} writes {source.path}\n{changed}"
 
 
@@ -275,6 +289,15 @@ def test_what_the_author_sees(
 
 def test_every_rule_has_its_fixture_and_every_fixture_its_rule() -> None:
     assert set(FILES) == set(RULES)
+
+
+def test_a_rule_without_edits_says_why() -> None:
+    with_edits = {
+        name for name, cases in CASES.items() if any("\n--fix" in case.expected for case in cases)
+    }
+    without_edits = {name for name, rule in RULES.items() if rule.no_fix}
+    assert sorted(RULES.keys() - with_edits - without_edits) == [], "neither edit nor reason"
+    assert sorted(with_edits & without_edits) == [], "edit and reason"
 
 
 def test_each_case_of_a_fixture_shows_its_rule() -> None:
