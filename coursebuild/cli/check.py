@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
+from msgspec.structs import replace
+
 from coursebuild.cli.arguments import (
     add_format,
     add_lessons,
@@ -96,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _fix(arguments)
 
     def work(options: Options) -> Report:
-        return check(
+        report = check(
             options,
             tuple(arguments.lessons),
             shard=read_shard(arguments.shard, arguments.timings),
@@ -104,6 +106,9 @@ def run(arguments: argparse.Namespace) -> int:
             sensitivity=arguments.sensitivity,
             truth=arguments.truth,
         )
+        safe = sum(diagnostic.safe for diagnostic in report.diagnostics)
+        hint = f"`coursebuild check --fix` mends {safe} of {len(report.diagnostics)}"
+        return replace(report, remarks=(*report.remarks, *([hint] if safe else [])))
 
     # Other formats say how long it took, which the report of before would not.
     if arguments.format != "text" or arguments.long or _special_options(arguments):

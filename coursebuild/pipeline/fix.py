@@ -1,6 +1,6 @@
 """`coursebuild check --fix`: make the edits that diagnostics carry, and check what comes of them.
 
-Entry points: `fix(options, names)`; `choose_fixes`, also for an editor.
+Entry points: `fix(options, names)`; for an editor and the preview `choose_fixes`, `may_edit`.
 
 1. The course is read; the edits of its diagnostics are made in memory, and it is read again: a fix
    stays if its mistake is gone and the course has no more errors than before. Else each half of the
@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from pathlib import Path
 
 from msgspec.structs import replace
 
@@ -65,6 +66,16 @@ def choose_fixes(
             taken.setdefault(path, []).append((start, end))
         chosen.append(diagnostic)
     return tuple(sorted(chosen, key=lambda d: d.order))
+
+
+def may_edit(root: Path, path: str) -> bool:
+    """Whether fixes may change a file: one of the course's texts, itself and not behind a link."""
+    try:
+        target = check_writable(root, path)
+    except EffectError:
+        return False
+    folders = (root.resolve() / name for name in ("content", "models"))
+    return path.startswith(("content/", "models/")) and any(map(target.is_relative_to, folders))
 
 
 def fix(options: Options, names: tuple[str, ...] = (), *, unsafe: bool = False) -> Report:
@@ -168,14 +179,7 @@ class _Fixer:
     def _may_edit(self, edit: Edit) -> bool:
         """Whether the file of an edit may be changed."""
         path = edit.span.path
-        if self.names and path not in self.paths:
-            return False
-        try:
-            target = check_writable(self.options.root, path)
-        except EffectError:
-            return False
-        folders = [self.options.root / name for name in ("content", "models")]
-        return path.startswith(("content/", "models/")) and any(map(target.is_relative_to, folders))
+        return (not self.names or path in self.paths) and may_edit(self.options.root, path)
 
     def _texts_with(self, fixes: Iterable[Diagnostic]) -> dict[str, str]:
         """The texts with these fixes."""

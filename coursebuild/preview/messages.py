@@ -3,7 +3,7 @@
 Entry points: `page_news(session, path)`, as JSON; `accept(session, path, id)`.
 
 1. The mistakes of the course: first those that keep the page from being drawn, then others of its
-   document. Each says whether the page shows it in its place.
+   document. Each says whether the page shows it in its place, and has the fix that its edits are.
 2. For each script of the page its state; for each recorded output or figure that differs, both
    versions; for each bound number that does not hold, the right one.
 3. An offer's id is made from what the file holds and what it would hold. It is accepted only as
@@ -40,6 +40,8 @@ from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.scripts.findings import find_instability
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
+from coursebuild.core.text.source import Source
+from coursebuild.pipeline.fix import may_edit
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.recordings import read_recorded
 from coursebuild.preview.session import Session
@@ -61,10 +63,10 @@ class Offer(Struct, frozen=True):
     new: bytes
 
     @classmethod
-    def of(cls, edit: Edit) -> Offer:
-        """The offer of an edit of a lesson."""
-        source = edit.span.source
-        new = apply_edits(source.text, [edit])
+    def of(cls, *edits: Edit) -> Offer:
+        """The offer of edits of one text."""
+        source = edits[0].span.source
+        new = apply_edits(source.text, edits)
         return cls(source.path, source.text.encode(), new.encode())
 
     @property
@@ -96,7 +98,7 @@ def accept(session: Session, path: str, id: str) -> str:
     """
     with session.condition:
         news = _collect_news(session, path)
-        parts = (*news["outputs"], *news["figures"], *news["numbers"])
+        parts = (*news["outputs"], *news["figures"], *news["numbers"], *news["problems"])
         offers = (part["offer"] for part in parts if part.get("offer"))
         offer = next((offer for offer in offers if offer.id == id), None)
         if offer is None:
@@ -119,7 +121,12 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
     diagnostics = sorted(report.diagnostics, key=rank)[:_MAX_DIAGNOSTICS]
     news: dict[str, Any] = {
         "problems": [
-            {**_describe_mistake(d, document_path), "blocks": d in blocking} for d in diagnostics
+            {
+                **_describe_mistake(d, document_path),
+                **_offer_fix(session, d),
+                "blocks": d in blocking,
+            }
+            for d in diagnostics
         ],
         "more": max(0, len(report.diagnostics) - _MAX_DIAGNOSTICS),
         "kept": session.files.is_outdated(path),
@@ -165,6 +172,17 @@ def _describe_mistake(diagnostic: Diagnostic, document_path: str) -> dict[str, A
         "end": max(end, span.column - 1),
         "inPlace": span.path == document_path and diagnostic.rule in _IN_PLACE,
     }
+
+
+def _offer_fix(session: Session, diagnostic: Diagnostic) -> dict[str, Any]:
+    """Describe the fix of a mistake: the first line that it writes, and the offer."""
+    sources = {edit.span.source for edit in diagnostic.edits}
+    if len(sources) != 1 or not may_edit(session.root, diagnostic.edits[0].span.path):
+        return {}
+    first = min(diagnostic.edits, key=lambda edit: edit.span.start)
+    offer = Offer.of(*diagnostic.edits)
+    line = Source(offer.path, offer.new.decode()).line_text(first.span.line)
+    return {"offer": offer, "fixed": line}
 
 
 # --- scripts and outputs

@@ -28,8 +28,9 @@ let tool = null
 let latestNews = null
 let head = document.cloneNode(true)
 const twin = new Twin(document.body)
-const panel = new Panel(sayHere, (place) => ask('open', { place }))
-const marks = new Marks(sayHere, (id) => ask('accept', { page, id }))
+const accept = (id) => ask('accept', { page, id })
+const panel = new Panel(sayHere, (place) => ask('open', { place }), accept)
+const marks = new Marks(sayHere, accept)
 
 /** Bring the page to the server's state, again and again while that changes. */
 async function take() {

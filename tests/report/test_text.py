@@ -10,7 +10,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import TrialLine
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.report import Report, ScriptLine, Style, Summary, diagnostic_text, render_report
 from coursebuild.report.text import clip, visible
@@ -187,7 +187,7 @@ ERROR = diagnose(
     SOURCE.span(6, 11),
     "it is 100% wrong",
     label="here",
-    help="mend it",
+    help=Fix("mend it", "right", "wr", safe=True),
     notes=[Note("see", SOURCE.span(0, 5)), Note("and")],
 )
 WARNING = diagnose("image-alt", SOURCE.span(0, 5), "no text")
@@ -236,6 +236,17 @@ def test_json_has_diagnostics_scripts_labs_and_a_summary() -> None:
                 "end_column": None,
             },
         ],
+        "edits": [
+            {
+                "path": "content/lessons/1.1-a,b.md",
+                "line": 2,
+                "column": 1,
+                "end_line": 2,
+                "end_column": 3,
+                "text": "right",
+            }
+        ],
+        "safe": True,
     }
     assert value["scripts"][1] == {
         "path": "examples/b.py",
@@ -312,6 +323,25 @@ def test_sarif_names_rule_region_and_related_places() -> None:
         "endColumn": 6,
     }
     assert [related["message"]["text"] for related in result["relatedLocations"]] == ["see"]
+    (fix,) = result["fixes"]
+    assert fix["description"] == {"text": "mend it"}
+    assert fix["artifactChanges"] == [
+        {
+            "artifactLocation": {"uri": "content/lessons/1.1-a,b.md", "uriBaseId": "ROOT"},
+            "replacements": [
+                {
+                    "deletedRegion": {
+                        "startLine": 2,
+                        "startColumn": 1,
+                        "endLine": 2,
+                        "endColumn": 3,
+                    },
+                    "insertedContent": {"text": "right"},
+                }
+            ],
+        }
+    ]
+    assert "fixes" not in run["results"][0]
 
 
 def test_annotations_escape_what_their_syntax_uses() -> None:
