@@ -311,7 +311,8 @@ def _check_syntax(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
 
     if isinstance(error, IndentationError) and (tab := _find_mixed_tab(rows)) is not None:
         message = "this line is indented by a tab, and others by blanks"
-        yield diagnose("python-syntax", tab, message, help="indent all lines by blanks")
+        fix = Fix("indent all lines by blanks", edits=_expand_tabs(rows), safe=True)
+        yield diagnose("python-syntax", tab, message, help=fix)
         return
     message, _, help = _LINE_REFERENCE.sub(lesson_line, error.msg).partition(". ")
     if row.text.lstrip().startswith(("%", "!")):
@@ -356,6 +357,18 @@ def _find_mixed_tab(rows: Sequence[Excerpt]) -> Span | None:
             at = match[0].index("\t")
             return row.span(at, at + 1)
     return None
+
+
+def _expand_tabs(rows: Sequence[Excerpt]) -> tuple[Edit, ...]:
+    """The edits that put blanks in the place of tabs before code, if it is read then."""
+    leads = [row.text[: len(row.text) - len(row.text.lstrip())] for row in rows]
+    width = min((len(lead) for lead in leads if lead and "\t" not in lead), default=4)
+    new_leads = [lead.replace("\t", " " * width) for lead in leads]
+    lines = [new + row.text.lstrip() for new, row in zip(new_leads, rows, strict=True)]
+    if _compile_error("\n".join(lines)) is not None:
+        return ()
+    pairs = zip(rows, leads, new_leads, strict=True)
+    return tuple(Edit(row.span(0, len(a)), b) for row, a, b in pairs if a != b)
 
 
 def _lower_first(sentence: str) -> str:

@@ -273,7 +273,7 @@ _NO_FIX = {
     "What the code of the course does has to change.": """
     figure-missing figure-window lab-diverged lab-endless lab-expect lab-far lab-goal lab-parity
     lab-penetration lab-reset lab-shared lab-timeout lab-value lab-warning mjcf-compiles mjcf-error
-    mjcf-message model-error model-timeout output-noise script-connects script-diverged
+    mjcf-message model-timeout output-noise script-connects script-diverged
     script-encoding script-killed script-output-limit script-penetration script-silent
     script-timeout script-unrepeatable script-writes
     """,
