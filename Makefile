@@ -23,7 +23,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # What an installation depends on. It is editable: a change of Python code or of a template needs
 # none. Folders are listed because they change when a file in them is removed.
-BUILD_INPUTS := pyproject.toml requirements.txt requirements-build.txt hatch_build.py $(wildcard site/.npmrc site/*.json site/*.mjs site/*.py) \
+BUILD_INPUTS := pyproject.toml requirements-course.txt requirements-build.txt hatch_build.py $(wildcard site/.npmrc site/*.json site/*.mjs site/*.py) \
   $(shell find site/css site/js 2>/dev/null)
 
 # An environment does not outlive a move of its folder, whose path is in its scripts, nor the Python
@@ -78,8 +78,8 @@ OF_THIS_ENGINE := tests/core/text/test_format_mistakes.py tests/mjcourse/test_ag
 
 test-oldest: $(VENV)/.dev npm
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(OLDEST)
-	$(BIN)/uv pip compile --quiet --resolution lowest-direct pyproject.toml --extra lsp -o $(OLDEST)/packages.txt
-	$(BIN)/uv pip install --quiet --python $(OLDEST) -c $(OLDEST)/packages.txt --group dev --editable '.[lsp]'
+	$(BIN)/uv pip compile --quiet --resolution lowest-direct pyproject.toml --extra lsp --extra figures --extra measure -o $(OLDEST)/packages.txt
+	$(BIN)/uv pip install --quiet --python $(OLDEST) -c $(OLDEST)/packages.txt --group dev --editable '.[figures,lsp,measure]'
 	PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" $(OLDEST)/bin/python -m pytest $(QUICK) \
 	  $(addprefix --deselect ,$(OF_THIS_ENGINE))
 
@@ -108,8 +108,9 @@ dist: $(VENV)/.dev
 
 lock: $(VENV)/.dev
 	$(LOCK) pyproject.toml -o requirements.txt
+	$(LOCK) pyproject.toml --extra figures --extra measure -c requirements.txt -o requirements-course.txt
 	$(LOCK) --group build -c requirements.txt -o requirements-build.txt
-	$(LOCK) pyproject.toml --extra cache --extra lsp --group dev -c requirements.txt -c requirements-build.txt \
+	$(LOCK) pyproject.toml --all-extras --group dev -c requirements-course.txt -c requirements-build.txt \
 	  -o requirements-dev.txt
 
 clean:
@@ -133,7 +134,7 @@ $(VENV)/.made:
 
 $(VENV)/.site: $(VENV)/.made $(BUILD_INPUTS)
 	@echo 'installing coursebuild and what it needs (the first time takes minutes)'
-	@$(INSTALL) --require-hashes -r requirements.txt -r requirements-build.txt
+	@$(INSTALL) --require-hashes -r requirements-course.txt -r requirements-build.txt
 	@$(INSTALL) --no-deps --no-build-isolation --editable .
 	@touch $@
 

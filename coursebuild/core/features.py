@@ -278,6 +278,8 @@ class TrialContext(Struct, frozen=True):
     """Diagnostics so far: a block with one need not be tried."""
     static: bool = False
     """Whether pages will be made from the results."""
+    say: Callable[[str], None] = lambda _: None
+    """Tells the user of what takes long."""
 
 
 TrialOutcome: TypeAlias = tuple[tuple[TrialResult, ...], tuple[Diagnostic, ...]]

@@ -108,7 +108,13 @@ def verify(
     )
     trial_runs = RunStore(options.root, options.store)  # another thread uses it
     context = TrialContext(
-        options.root, course, dict(models), trial_runs, model_diagnostics, static
+        options.root,
+        course,
+        dict(models),
+        trial_runs,
+        model_diagnostics,
+        static,
+        options.progress.say,
     )
     runs, (trial_results, trial_diagnostics) = _run_with_trials(
         run_scripts, trials, context, options.progress

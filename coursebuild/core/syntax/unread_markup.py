@@ -12,6 +12,7 @@ holds is no mistake: prices, `C#`, sets in braces, powers, footnote stars, stars
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterator, Sequence
 
@@ -39,13 +40,18 @@ from coursebuild.core.text.diagnostics import (
 from coursebuild.core.text.source import Excerpt, Span
 
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
-_SIGNS = re.compile(
-    r"[{}\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f]|[!?=:._']{2}|:\w|[´‘’]{3}"
-    r"|\((?:out|given)\)|\A_\Z|\A[a-rt-z](?!\w)|^\d{1,2}[.,;)][^\d\s]|^\d{1,2}[,;] |^-[A-Z]"
-    r"|^[0=_] |^h\d\. |^[A-Z?!]> |^1 |^import |Lesson \d",
-    re.MULTILINE,
+_MARKS = r"{}\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f"
+_SIGN = re.compile(
+    rf"[{_MARKS}!?=:._'´‘’(](?:(?<=[{_MARKS}])|(?<=[!?=:._'])[!?=:._']|(?<=:)\w"
+    r"|(?<=[´‘’])[´‘’]{2}|(?<=\()(?:out|given)\))"
 )
-"""What all unread markup has at least once, so that most texts are passed over quickly."""
+_FIRST_SIGN = re.compile(
+    r"\d{1,2}[.,;)][^\d\s]|\d{1,2}[,;] |-[A-Z]|[0=_] |h\d\. |[A-Z?!]> |1 |import |_\Z"
+)
+"""What all unread markup has at least once, in a text or where a line of it begins, so that most
+texts are passed over quickly; or it mentions a lesson, or is a letter directly after a formula."""
+_MENTION = re.compile(BROKEN["mention"].pattern)
+_LETTER = re.compile(r"[a-rt-z](?!\w)")
 _DOLLAR = re.compile(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
 """A dollar sign that no amount of money follows."""
 _TEX = re.compile(r"\\[A-Za-z]{2,}|[A-Za-z)}\]][_^](?:[0-9]|\{)")
@@ -59,14 +65,17 @@ _LONE_DOLLAR = re.compile(
 """Dollar signs that were surely meant for a formula, with a character of it."""
 
 
-def _one_pattern(kinds: dict[str, MarkupKind]) -> re.Pattern[str]:
-    """A pattern for all kinds, with a group for each."""
+_KINDS = {**BROKEN, **FOREIGN}
+
+
+@functools.cache
+def _pattern(*, html: bool) -> re.Pattern[str]:
+    """A pattern for all kinds, with a group for each; few courses need it."""
+    kinds = IN_HTML if html else _KINDS
     parts = (f"(?P<{name}>{kind.pattern})" for name, kind in kinds.items())
     return re.compile("|".join(parts), re.MULTILINE | re.IGNORECASE)
 
 
-_KINDS = {**BROKEN, **FOREIGN}
-_ANY_KIND, _ANY_IN_HTML = _one_pattern(_KINDS), _one_pattern(IN_HTML)
 _CELL = re.compile(r"\{[=.]?(?:bash|julia|js|ojs|python|py|r|sql)\}\s|r [A-Za-z_.][\w.]*[($\[]")
 """How an expression begins that Quarto or R Markdown would compute."""
 
@@ -89,14 +98,14 @@ def check_unread_markup(
     """
     whole = content.text
     has_escaped_bracket = "\\(" in whole or "\\[" in whole
-    if not has_escaped_bracket and not any(_SIGNS.search(text) for _, text in texts):
+    if not has_escaped_bracket and not any(_may_be_unread(whole, *text) for text in texts):
         return
     masked = _mask_all_but(texts, whole)
     dollars = [*_check_dollars(content, texts, masked)]
     yield from dollars
     reported = set[str]()
-    kinds, pattern = (IN_HTML, _ANY_IN_HTML) if html else (_KINDS, _ANY_KIND)
-    for match in pattern.finditer(masked):
+    kinds = IN_HTML if html else _KINDS
+    for match in _pattern(html=html).finditer(masked):
         name = match.lastgroup or ""
         is_of_formula = name == "letter" or re.match(r"\\[A-Za-z]", match[0])
         if name in reported or (dollars and is_of_formula):
@@ -105,6 +114,15 @@ def check_unread_markup(
         if diagnostic is not None:
             reported |= ONCE.intersection([name])
             yield diagnostic
+
+
+def _may_be_unread(whole: str, at: int, text: str) -> bool:
+    return (
+        _SIGN.search(text) is not None
+        or any(map(_FIRST_SIGN.match, text.split("\n")))
+        or ("Lesson " in text and _MENTION.search(text) is not None)
+        or (at > 0 and whole[at - 1] == "$" and _LETTER.match(text) is not None)
+    )
 
 
 def _check_dollars(

@@ -231,7 +231,7 @@ _SUMMARIES = {
     "lab-shared": "A lab changes what all labs of a page share: objects of JavaScript or of the "
     "engine.",
     "lab-timeout": "A lab takes too long, or too much memory, to be tried.",
-    "lab-engine": "An engine ended while a lab was tried, or the two are of different versions.",
+    "lab-engine": "An engine ended while a lab was tried, or refused its model.",
     # quizzes
     "quiz-id-repeated": "Two quizzes of the course have the same id.",
     "question-id-repeated": "Two questions of a quiz have the same id.",

@@ -1,8 +1,8 @@
 """All lessons in one file: as an e-book (EPUB 3), and as one page."""
 
 from coursebuild.core.features import Exporter, Feature
+from coursebuild.features.book.chapters import page_file
 from coursebuild.features.book.epub import epub_files
-from coursebuild.features.book.page import page_file
 
 EPUB = Exporter(
     name="epub",

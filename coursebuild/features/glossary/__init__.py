@@ -5,8 +5,7 @@
 """
 
 from coursebuild.core.features import Feature, PageKind
-from coursebuild.features.glossary.page import glossary_values
-from coursebuild.features.glossary.terms import document_terms
+from coursebuild.features.glossary.terms import document_terms, glossary_values
 
 FEATURE = Feature(
     name="glossary",

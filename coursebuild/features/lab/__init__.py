@@ -19,20 +19,20 @@ from coursebuild.core.features import (
     Trials,
 )
 from coursebuild.features.lab.equations.declared import OdeLab, PlotLab
-from coursebuild.features.lab.files import publish_labs
 from coursebuild.features.lab.inputs import lab_trials, trial_inputs
-from coursebuild.features.lab.markdown import lab_markdown
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.page import (
     draw_lab,
     draw_model,
     index_lab,
+    lab_markdown,
     lab_picture,
     model_picture,
     model_view,
 )
 from coursebuild.features.lab.parse import parse_fence
 from coursebuild.features.lab.relations import check_labs, check_model_names
+from coursebuild.features.lab.reply import publish_labs
 from coursebuild.features.lab.schema import SimLab, refine_schema
 
 

@@ -18,7 +18,6 @@ from collections.abc import Callable, Iterator
 from typing import TypeAlias
 from urllib.parse import urlsplit
 
-from coursebuild.core.model import Lesson
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import PageContext, SiteContext
@@ -154,15 +153,13 @@ def write_llms(library: Library) -> bytes:
     parts.append(words("exports.llms"))
     for level in course.written_levels:
         label = f"{words('level.label', id=level.id)}: {level.title}"
-        rows = (_lesson_row(library, lesson) for lesson in level.lessons)
+        rows = (
+            _row(library, urls.lesson_path(lesson), f"{lesson.id} {lesson.title}", lesson.summary)
+            for lesson in level.lessons
+        )
         parts.append("\n".join((f"## {escape_line(label)}", "", *rows)))
     parts += _optional_part(library)
     return visible("\n\n".join(parts) + "\n").encode()
-
-
-def _lesson_row(library: Library, lesson: Lesson) -> str:
-    path = urls.lesson_path(lesson)
-    return _row(library, path, f"{lesson.id} {lesson.title}", lesson.summary)
 
 
 def _optional_part(library: Library) -> list[str]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import ast
 import functools
 import re
+from collections import Counter
 from collections.abc import Iterator
 from typing import Literal, TypeAlias
 
@@ -22,6 +23,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
+from coursebuild.core.pages.listings import python_nodes
 from coursebuild.core.text.source import Span
 
 Kind: TypeAlias = Literal[
@@ -42,7 +44,7 @@ _FILE = re.compile(r"(?:content|examples|models)/(?!.*[A-Z]{3})[\w./-]*\w\.[a-z]
 _NEAR_FILE = re.compile(r"(?!.*[A-Z]{3})[\w.-]+/[\w./-]*\w\.(?:md|py|toml|xml)")
 """What is a file of the course only if it is like the name of one."""
 _CODE_WORD = re.compile(
-    r"\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
+    r"\b\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
 )
 """A word of code that inline code could mean."""
 _CODE = (
@@ -50,6 +52,8 @@ _CODE = (
 ) | model.Recording
 _PLAIN = re.compile(r"(?<![\w.\\/-])[A-Za-z]\w+[^\W_](?:\.(?:md|py|toml|xml)\b)?(?![\w./\\-])")
 """A word of inline code that is no part of a path."""
+_MOST_PLAIN = 3
+"""How many uses of a plain word are kept of a document: what is used again is no slip."""
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
 
 
@@ -108,6 +112,7 @@ def document_names(document: model.Document) -> DocumentNames | None:
     words: set[str] = set()
     names = CodeNames((), frozenset(), {}, {}, {}, {})
     inner: set[int] = set()
+    plain_counts = Counter[str]()
     for block in model.document_blocks(document):
         if isinstance(block, model.FeatureBlock):
             inner |= {id(part) for part in model.walk_blocks(block.child_blocks())}
@@ -126,6 +131,10 @@ def document_names(document: model.Document) -> DocumentNames | None:
                 link_parts |= {id(child) for child in model.walk_inlines(inline.children)}
             elif isinstance(inline, model.CodeSpan) and not inline.literal:
                 for claim, place in claims_of(inline):
+                    if claim.kind == "plain":
+                        plain_counts[claim.name] += 1
+                        if plain_counts[claim.name] > _MOST_PLAIN:
+                            continue
                     claims.append(
                         replace(
                             claim, linked=may_link and claim.linked and id(inline) not in link_parts
@@ -142,38 +151,34 @@ def document_names(document: model.Document) -> DocumentNames | None:
 
 def _read_script(script: model.Script, names: CodeNames) -> None:
     """Add what a script defines and imports."""
-    try:
-        tree = ast.parse(script.code.text)
-    except (SyntaxError, ValueError, RecursionError):
-        return
     members: dict[str, set[str]] = {}
-    for node in ast.walk(tree):
-        definition: str | None = None
-        match node:
-            case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
-                definition = node.name
-            case ast.Name(id=definition, ctx=ast.Store()):
-                pass
-            case ast.arg(arg=definition):
-                pass
-            case ast.Import():
-                for alias in node.names:
-                    name = alias.asname or alias.name.partition(".")[0]
-                    names.imports[name] = alias.name if alias.asname else name
-            case ast.ImportFrom(module=str(module), level=0):
-                for alias in node.names:
-                    names.imports[alias.asname or alias.name] = f"{module}.{alias.name}"
-            case ast.Attribute(value=ast.Name(id=name), attr=attribute):
-                members.setdefault(name, set()).add(attribute)
-            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call(func=function)):
-                classes = _STRUCTURES.intersection(ast.unparse(function).split("."))
+    for node in python_nodes(script.code.text.rstrip("\n")):
+        definition = ""
+        kind = type(node)
+        if kind is ast.Name:
+            definition = node.id if type(node.ctx) is ast.Store else ""
+        elif kind is ast.Attribute:
+            if type(node.value) is ast.Name:
+                members.setdefault(node.value.id, set()).add(node.attr)
+        elif kind is ast.arg:
+            definition = node.arg
+        elif kind in (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef):
+            definition = node.name
+        elif kind is ast.Import:
+            for alias in node.names:
+                name = alias.asname or alias.name.partition(".")[0]
+                names.imports[name] = alias.name if alias.asname else name
+        elif kind is ast.ImportFrom and node.module and not node.level:
+            for alias in node.names:
+                names.imports[alias.asname or alias.name] = f"{node.module}.{alias.name}"
+        elif kind is ast.Assign and type(node.value) is ast.Call:
+            target = node.targets[0]
+            if type(target) is ast.Name and len(node.targets) == 1:
+                classes = _STRUCTURES.intersection(ast.unparse(node.value.func).split("."))
                 if classes:
-                    names.variables[name] = classes.pop()
-            case _:
-                pass
-        if definition is not None:
-            line = getattr(node, "lineno", 1)
-            names.definitions.setdefault(definition, (script.path, line))
+                    names.variables[target.id] = classes.pop()
+        if definition:
+            names.definitions.setdefault(definition, (script.path, node.lineno))
     for name, attributes in members.items():
         names.members[name] = names.members.get(name, frozenset()) | attributes
 

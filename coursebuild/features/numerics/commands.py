@@ -24,6 +24,7 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_cache, add_format, add_quiet
 from coursebuild.core.engine.tool import code_digest
+from coursebuild.core.files.errors import require
 from coursebuild.core.pages import urls
 from coursebuild.core.run.script_environment import engine_version, machine, one_processor
 from coursebuild.core.text.diagnostics import nearest
@@ -80,6 +81,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, or check by measuring again."""
+    require("scipy", "measure", "`coursebuild stability`")
     names = tuple(arguments.problems)
 
     def measure(options: Options) -> Measurement[Any]:

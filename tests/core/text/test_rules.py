@@ -2,9 +2,9 @@
 
 A case holds a smallest course that breaks the rule (see `support.rule_cases`) and all diagnostics
 that the tool then prints. `[update]`, `[build]` or `[check --no-cache]` in a title says which
-command finds the mistake, where it is not `check`. `[engine of 3.13.0]` and `[after 1 s]` change
-the engine that tries the labs, for mistakes that no course can make happen, or not soon enough.
-`[then RULE]` names what comes to light once a mistake is mended. What `--fix` writes stands below.
+command finds the mistake, where it is not `check`. `[after 1 s]` gives labs less time, for mistakes
+that no course can make happen soon enough. `[then RULE]` names what comes to light once a mistake
+is mended. What `--fix` writes stands below.
 `pytest tests/core/text --rewrite-fixtures` writes the expected parts and
 `docs/reference/rules.md` anew.
 """
@@ -148,20 +148,18 @@ RUN = re.compile(r"file=examples/|models/|```mjcf|```lab")
 """Marks of a course with something to run or compile."""
 
 
-class ChangedEngine:
-    """The browser's engine, of another version or with less time for a trial, as a title asks."""
+class HurriedEngine:
+    """The browser's engine, with less time for a trial where a title asks for it."""
 
     def __init__(self, engine: LabEngine, title: str) -> None:
         self._engine = engine
-        self._version = re.search(r"\[engine of ([\d.]+)\]", title)
         self._time = re.search(r"\[after ([\d.]+) s\]", title)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._engine, name)
 
     def trial(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
-        reply = self._engine.trial(request, mjb, float(self._time[1]) if self._time else seconds)
-        return {**reply, "version": self._version[1]} if self._version else reply
+        return self._engine.trial(request, mjb, float(self._time[1]) if self._time else seconds)
 
 
 def command_of(case: Case) -> str:
@@ -232,7 +230,7 @@ def run_case(
         check(options)
         layout.write_later(root)
     if "```lab" in case.input and command_of(case) == "check":
-        return workshop.try_labs(root, lambda engine: ChangedEngine(engine, case.title))
+        return workshop.try_labs(root, lambda engine: HurriedEngine(engine, case.title))
     match command_of(case):
         case "check":
             return check(options).diagnostics

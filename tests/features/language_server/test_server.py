@@ -472,5 +472,6 @@ def test_without_pygls_the_command_says_what_to_install(tmp_path: Path, stores: 
         "from coursebuild.cli import main; sys.exit(main())"
     )
     process = folder.start("lsp", code=code, stderr=subprocess.PIPE)
-    message = b"coursebuild: the language server needs pygls: `pip install 'coursebuild[lsp]'`\n"
-    assert (process.communicate()[1], process.returncode) == (message, 2)
+    message = b"coursebuild: the language server needs the package pygls\n"
+    message += b"  help: run `pip install 'coursebuild[lsp]'`\n"
+    assert (process.communicate()[1], process.returncode) == (message, 1)

@@ -21,6 +21,7 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_cache, add_format, add_quiet
 from coursebuild.core.engine.tool import code_digest
+from coursebuild.core.files.errors import require
 from coursebuild.core.run.script_environment import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands import measuring
@@ -82,6 +83,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure models, or check their recorded reports."""
+    require("scipy", "measure", "`coursebuild bench`")
     names, quick = tuple(arguments.scenes), arguments.quick
 
     def measure(options: Options) -> Measurement[Any]:
