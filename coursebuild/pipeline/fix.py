@@ -54,18 +54,20 @@ def choose_fixes(
     diagnostics: Iterable[Diagnostic], *, unsafe: bool = False
 ) -> tuple[Diagnostic, ...]:
     """The diagnostics whose edits can be made together: none touches another, safe ones first."""
-    chosen: list[Diagnostic] = []
-    taken: dict[str, list[tuple[int, int]]] = {}
+    fixes: list[Diagnostic] = []
+    taken_places: dict[str, list[tuple[int, int]]] = {}
     for diagnostic in sorted(diagnostics, key=lambda d: (not d.safe, d.order)):
         if not diagnostic.edits or not (diagnostic.safe or unsafe):
             continue
         places = [(e.span.path, e.span.start, e.span.end) for e in diagnostic.edits]
-        if any(a <= end and start <= b for p, start, end in places for a, b in taken.get(p, ())):
+        if any(
+            a <= end and start <= b for p, start, end in places for a, b in taken_places.get(p, ())
+        ):
             continue
         for path, start, end in places:
-            taken.setdefault(path, []).append((start, end))
-        chosen.append(diagnostic)
-    return tuple(sorted(chosen, key=lambda d: d.order))
+            taken_places.setdefault(path, []).append((start, end))
+        fixes.append(diagnostic)
+    return tuple(sorted(fixes, key=lambda d: d.order))
 
 
 def may_edit(root: Path, path: str) -> bool:
@@ -136,22 +138,24 @@ class _Fixer:
     def run(self) -> Report:
         """Mend what can be mended, and return the report on the course as it is then."""
         for _ in range(_ROUNDS):
-            found = self._read(self.texts)
-            if self._mend(found, found):
+            diagnostics = self._read(self.texts)
+            if self._mend(diagnostics, diagnostics):
                 continue
-            checked = read_and_verify(self.options, self.reader, self.names, texts=self.texts)
-            report = checked if isinstance(checked, Report) else checked.report()
-            if not self._mend(report.diagnostics, found):
+            outcome = read_and_verify(self.options, self.reader, self.names, texts=self.texts)
+            report = outcome if isinstance(outcome, Report) else outcome.report()
+            if not self._mend(report.diagnostics, diagnostics):
                 break
         return report
 
     def _read(self, texts: Mapping[str, str]) -> tuple[Diagnostic, ...]:
         """What is wrong with the course with these texts, as far as reading it shows."""
-        parsed = load(self.options.root, self.reader, texts, code=self.code)
-        if parsed.value is not None and self.names:
-            paths = select(parsed.value, self.names, self.options.root) or frozenset()
-            self.paths = {*paths, parsed.value.map.path}
-        return judge(parsed.value, parsed.diagnostics, strict=self.options.strict).diagnostics
+        parsed_course = load(self.options.root, self.reader, texts, code=self.code)
+        if parsed_course.value is not None and self.names:
+            paths = select(parsed_course.value, self.names, self.options.root) or frozenset()
+            self.paths = {*paths, parsed_course.value.map.path}
+        return judge(
+            parsed_course.value, parsed_course.diagnostics, strict=self.options.strict
+        ).diagnostics
 
     def _mend(self, diagnostics: Collection[Diagnostic], before: Collection[Diagnostic]) -> bool:
         """Make the fixes of these diagnostics that do no harm; return whether there were any.
@@ -203,7 +207,9 @@ class _Fixer:
     def _is_harmless(self, fixes: Sequence[Diagnostic], before: Collection[Diagnostic]) -> bool:
         """Whether the mistakes are gone with these fixes, and there are no more errors."""
         after = self._read(self._texts_with(fixes))
-        counts_before, counts_after = (Counter(map(_mistake, found)) for found in (before, after))
+        counts_before, counts_after = (
+            Counter(map(_mistake, diagnostics)) for diagnostics in (before, after)
+        )
         expected = counts_before - Counter(map(_mistake, fixes))
         are_gone = all(counts_after[_mistake(f)] <= expected[_mistake(f)] for f in fixes)
         return are_gone and _count_errors(after) <= _count_errors(before)

@@ -26,7 +26,7 @@ MENDED = (
 def test_fix_mends_all_that_has_one_cure_and_undo_takes_it_back(make: Make) -> None:
     """Also what comes to light only when something else is mended, and no other byte."""
     before = ("\ufeff" + SLIPS).replace("\n", "\r\n")
-    folder = make(before, GOOD)
+    folder = make(before, "## Two\n\nText.\n")
     result = folder.main("check", "--fix")
     assert result.status == 0, result.out
     assert folder.text(folder.lesson()) == ("\ufeff" + MENDED).replace("\n", "\r\n")
@@ -48,12 +48,12 @@ def test_undo_leaves_what_was_edited_since(make: Make) -> None:
     )
     folder.write("models/servo.xml", "<mujoco/>")
     assert folder.main("check", "--fix").status == 0
-    folder.write(folder.lesson(), edited := folder.text(folder.lesson()) + "More.\n")
+    folder.write(folder.lesson(), new_text := folder.text(folder.lesson()) + "More.\n")
     result = folder.main("undo")
     assert result.status == 1
     assert result.out == f"restored {folder.lesson(2)}\n"
     assert result.err == f"coursebuild: {folder.lesson()} was edited since, so it stays as it is\n"
-    assert folder.text(folder.lesson()) == edited
+    assert folder.text(folder.lesson()) == new_text
     assert folder.text(folder.lesson(2)).startswith("[a](lesson:one)")
 
 
@@ -109,11 +109,11 @@ def test_fix_overwrites_nothing_that_was_edited_while_scripts_ran(make: Make) ->
         kill_at_end(folder.start("check", "--fix", stderr=errors.fileno())) as process,
     ):
         wait_until(lambda: b"running scripts" in (folder.tmp / "fix").read_bytes(), "the script")
-        folder.write(folder.lesson(), edited := folder.text(folder.lesson()) + "More.\n")
+        folder.write(folder.lesson(), new_text := folder.text(folder.lesson()) + "More.\n")
         folder.write("go", "")
         assert process.wait(600) == 1
     assert b"was changed in the meantime" in (folder.tmp / "fix").read_bytes()
-    assert folder.text(folder.lesson()) == edited
+    assert folder.text(folder.lesson()) == new_text
     assert folder.main("undo").status == 1
 
 

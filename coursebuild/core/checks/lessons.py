@@ -24,7 +24,6 @@ from coursebuild.core.model import (
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.registry import features
-from coursebuild.core.syntax.fence import stands_in_fence
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
     Fix,
@@ -191,9 +190,20 @@ def check_formulas(
             place = span if at < 0 else tex.span(at, at + len(command[1]))
             likely = nearest(command[1], _COMMANDS, cutoff=0.75)
             if likely is not None:
-                help = propose(command[1], likely, _COMMANDS).placed(place)
+                help = propose(command[1], likely, _COMMANDS).at(place)
         diagnostics.append(diagnose("math-syntax", span, message, help=help))
     return tuple(diagnostics)
+
+
+def _stands_in_fence(place: Span) -> bool:
+    """Whether a place is inside a fenced block, as far as its lines above show."""
+    opening = ""
+    for match in re.finditer(r"^[ \t>]*(`{3,}|~{3,})", place.source.text[: place.start], re.M):
+        if not opening:
+            opening = match[1]
+        elif match[1].startswith(opening):
+            opening = ""
+    return bool(opening)
 
 
 def _check_letters(tex: Excerpt, commands: frozenset[str]) -> Iterator[Diagnostic]:
@@ -204,7 +214,7 @@ def _check_letters(tex: Excerpt, commands: frozenset[str]) -> Iterator[Diagnosti
             message = f"`{letters[0]}` would be shown as a product of letters"
             help = f"write `\\{letters[0]}`, or `\\mathrm{{{letters[0]}}}` for a name"
             place = tex.span(*letters.span())
-            is_string = stands_in_fence(place)  # there a backslash may need another
+            is_string = _stands_in_fence(place)  # there a backslash may need another
             fix = Fix(help, None if is_string else f"\\{letters[0]}")
             yield diagnose("math-command", place, message, help=fix)
     if (prime := re.search(r"(?:^|[(\[=+,;&-])\s*(')", text)) is not None:

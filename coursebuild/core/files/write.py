@@ -259,7 +259,7 @@ def change_files(
                 journal.unlink()
             raise
         if journal is not None and keep:
-            journal.replace(_kept(journal))
+            journal.replace(_undo_journal(journal))
         elif journal is not None:
             journal.unlink()
     return keep and journal is not None
@@ -277,7 +277,7 @@ def take_back(
     """
     journal = journal_path(root)
     try:
-        data = _kept(journal).read_bytes() if journal is not None else b""
+        data = _undo_journal(journal).read_bytes() if journal is not None else b""
         changes = msgspec.msgpack.decode(
             unseal(_NAME, data, store_key(str(root))) or b"", type=tuple[FileChange, ...]
         )
@@ -292,11 +292,11 @@ def take_back(
             edited_paths.append(change.path)
     change_files(root, unedited, on_wait)
     if journal is not None and unedited:
-        _kept(journal).unlink()
+        _undo_journal(journal).unlink()
     return [change.path for change in unedited], edited_paths
 
 
-def _kept(journal: Path) -> Path:
+def _undo_journal(journal: Path) -> Path:
     """Where the journal of changes lies that can be taken back."""
     return journal.with_name(f"{journal.name}.last")
 

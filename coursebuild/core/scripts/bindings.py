@@ -260,7 +260,7 @@ def _orphan_diagnostic(
         target = f" to `{path}`, which is not a script of the course"
         help = did_you_mean(path, outputs.scripts)
         if isinstance(help, Fix):
-            help = help.placed(binding.span)
+            help = help.at(binding.span)
     message = f"`{binding.text}` is bound{target}"
     return diagnose("binding-orphan", binding.text_span, message, help=help)
 

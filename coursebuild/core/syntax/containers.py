@@ -21,9 +21,11 @@ from msgspec import Struct
 
 from coursebuild.core import model
 from coursebuild.core.model import Cell, Inline, Table
+from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.syntax.spans import PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
+    Edit,
     Fix,
     Note,
     Parsed,
@@ -101,6 +103,29 @@ def _read_broken_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head
     fix = Fix(help, f"[!{kind}]{blank}", safe=True)
     message = f"`{place.text}` does not begin a callout"
     return Parsed(head, (diagnose("callout-unknown", place.span(), message, help=fix),))
+
+
+def quote_admonition(head: Span, kind: str) -> tuple[Edit, ...]:
+    """The edits that make a quotation of an admonition of MkDocs, whose lines are indented."""
+    source, number = head.source, head.line
+    start, text = source.line_start(number), source.line_text(number)
+    match = re.fullmatch(r'(!!!|\?\?\?\+?)[ \t]*[\w-]+(?:[ \t]+"([^"]*)")?[ \t]*', text)
+    if match is None or kind not in CALLOUTS:
+        return ()
+    title = f"> [!{kind}]{'-' if match[1] == '???' else ''} {match[2] or ''}".rstrip()
+    edits, empty_lines = [Edit(source.span(start, start + len(text)), title)], list[Span]()
+    for line in range(number + 1, len(source.line_starts) + 1):
+        start, text = source.line_start(line), source.line_text(line)
+        indentation = re.match(r" {4}|\t", text)
+        if not text.strip():
+            empty_lines.append(source.span(start, start + len(text)))
+        elif indentation is None:
+            break
+        else:
+            edits += [Edit(empty, ">") for empty in empty_lines]
+            edits.append(Edit(source.span(start, start + indentation.end()), "> "))
+            empty_lines = []
+    return tuple(edits) if len(edits) > 1 else ()
 
 
 _PIPE = re.compile(r"\\?\|")

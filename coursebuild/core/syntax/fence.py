@@ -298,17 +298,6 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
     return Fence(span, head, info, body, body_span, prefix, is_closed, nested, inner)
 
 
-def stands_in_fence(place: Span) -> bool:
-    """Whether a place is inside a fenced block, as far as its lines above show."""
-    opening = ""
-    for match in re.finditer(r"^[ \t>]*(`{3,}|~{3,})", place.source.text[: place.start], re.M):
-        if not opening:
-            opening = match[1]
-        elif match[1].startswith(opening):
-            opening = ""
-    return bool(opening)
-
-
 _MOST_LINES = 300
 """Lines above a fence among which the first one of its block is looked for."""
 _TEXT_AGAIN = re.compile(r"\n[ \t]*\n(?=[A-Z#>$*`|\[]|\d+\. |- )")

@@ -117,7 +117,9 @@ class _Reader:
             char = self.text[at : at + 1]
             if comment := _COMMENT.match(self.text, at):
                 first_line = comment[0].split("\n", 1)[0]
-                self.report(at, at + len(first_line), "JSON has no comments", self.without(comment))
+                self.report(
+                    at, at + len(first_line), "JSON has no comments", self.comment_fix(comment)
+                )
                 self.offset = comment.end()
             elif odd := odd_character(char):
                 help = Fix("replace it by a plain space, or remove it", " ", safe=True)
@@ -293,7 +295,7 @@ class _Reader:
         places = (at for match in matches for at in (match.start(), match.end() - 1))
         return tuple(Edit(self.body.span(at, at + 1), '"') for at in places)
 
-    def without(self, comment: re.Match[str]) -> Fix:
+    def comment_fix(self, comment: re.Match[str]) -> Fix:
         """The fix that removes a comment, and its line if that holds nothing else."""
         edit = Edit(self.body.span(*comment.span()), "")
         return Fix("remove it", edits=(edit,))

@@ -16,8 +16,8 @@ import functools
 import re
 from collections.abc import Iterator, Sequence
 
-from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
+from coursebuild.core.syntax.containers import quote_admonition
 from coursebuild.core.syntax.fence import Fence, check_foreign_key, kind_of, split_words
 from coursebuild.core.syntax.markup_kinds import (
     BROKEN,
@@ -30,7 +30,6 @@ from coursebuild.core.syntax.markup_kinds import (
 from coursebuild.core.syntax.nodes import shorten
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
-    Edit,
     Fix,
     diagnose,
     misspelt,
@@ -195,7 +194,7 @@ def _diagnose(
         case "callout":
             word = re.sub(r"[^\w-]", "", markup).lower()
             help = help.replace("note", word or "note")
-            help = Fix(help, edits=_quote_admonition(span, word), safe=True)
+            help = Fix(help, edits=quote_admonition(span, word), safe=True)
         case "character" if span.text == "\0":
             return None  # it is reported wherever it stands
         case "character":
@@ -216,29 +215,6 @@ def _diagnose(
         if rewritable is not None and rewritable[0] == span.text == markup and "\n" not in markup:
             help = Fix(help, rewritable.expand(replacement), safe=is_safe)
     return diagnose(rule, span, message, help=help)
-
-
-def _quote_admonition(head: Span, kind: str) -> tuple[Edit, ...]:
-    """The edits that make a quotation of an admonition of MkDocs, whose lines are indented."""
-    source, number = head.source, head.line
-    start, text = source.line_start(number), source.line_text(number)
-    match = re.fullmatch(r'(!!!|\?\?\?\+?)[ \t]*[\w-]+(?:[ \t]+"([^"]*)")?[ \t]*', text)
-    if match is None or kind not in CALLOUTS:
-        return ()
-    title = f"> [!{kind}]{'-' if match[1] == '???' else ''} {match[2] or ''}".rstrip()
-    edits, empty_lines = [Edit(source.span(start, start + len(text)), title)], list[Span]()
-    for line in range(number + 1, len(source.line_starts) + 1):
-        start, text = source.line_start(line), source.line_text(line)
-        indentation = re.match(r" {4}|\t", text)
-        if not text.strip():
-            empty_lines.append(source.span(start, start + len(text)))
-        elif indentation is None:
-            break
-        else:
-            edits += [Edit(empty, ">") for empty in empty_lines]
-            edits.append(Edit(source.span(start, start + indentation.end()), "> "))
-            empty_lines = []
-    return tuple(edits) if len(edits) > 1 else ()
 
 
 def _is_closing(match: re.Match[str]) -> bool:

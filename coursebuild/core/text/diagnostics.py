@@ -74,7 +74,7 @@ class Fix(str):
         end = start + len(self.old) if self.old else place.end
         return (Edit(place.source.span(start, end), self.new), *self.edits)
 
-    def placed(self, place: Span) -> Fix:
+    def at(self, place: Span) -> Fix:
         """The same for a diagnostic that marks something else than this place."""
         return Fix(self, edits=self.edits_at(place), safe=self.safe)
 
@@ -222,7 +222,7 @@ def propose(
         return Fix(help)
     candidates = dict(_misspelt_names(name, {*names, likely}))
     difference = candidates.pop(likely, None)
-    is_safe = difference is not None and all(difference < other for other in candidates.values())
+    is_safe = difference is not None and all(difference < number for number in candidates.values())
     return Fix(help, likely, name, safe=is_safe and len(likely) > 2)
 
 

@@ -106,7 +106,7 @@ def check_sources(course: model.Course, numbers: Iterable[NamedNumber]) -> Itera
             if isinstance(help, Fix):  # the path stands behind the number
                 source, end = number.span.source, number.span.end
                 line_end = source.line_start(number.span.end_line + 1)
-                help = help.placed(source.span(end, line_end))
+                help = help.at(source.span(end, line_end))
             yield diagnose("given-source", number.span, message, help=help)
             continue
         if number.path not in numbers_by_path:

@@ -153,20 +153,20 @@ def actions(
         for d in diagnostics
         if d.edits and _overlap(d.span, place)
     ]
-    here = (d for d in diagnostics if all(edit.span.source == place.source for edit in d.edits))
-    if safe_fixes := choose_fixes(here):
+    fixable = (d for d in diagnostics if all(edit.span.source == place.source for edit in d.edits))
+    if safe_fixes := choose_fixes(fixable):
         edits = [edit for diagnostic in safe_fixes for edit in diagnostic.edits]
         title = f"fix all in this file ({len(safe_fixes)})"
         fix_all = _make_action(texts.places, title, edits, safe_fixes)
         fix_all.kind = types.CodeActionKind.SourceFixAll
         actions.append(fix_all)
     actions += [*_accept_outputs(texts, place, diagnostics), *_bind_numbers(texts, place)]
-    asked = tuple(str(getattr(kind, "value", kind)) for kind in params.context.only or ("",))
+    asked_kinds = tuple(str(getattr(kind, "value", kind)) for kind in params.context.only or ("",))
     kinds = [str(getattr(action.kind, "value", action.kind)) for action in actions]
     return [
         action
         for action, kind in zip(actions, kinds, strict=True)
-        if any(not name or f"{kind}.".startswith(f"{name}.") for name in asked)
+        if any(not name or f"{kind}.".startswith(f"{name}.") for name in asked_kinds)
     ]
 
 
