@@ -1,12 +1,13 @@
 """Messages for an open page: what is wrong, and what its author may accept there.
 
-Entry points: `page_news(session, path)`, as JSON; `accept(session, path, id)`.
+Entry points: `page_news(session, path)`, as JSON; `accept(session, path, ids)`.
 
 1. The mistakes of the course: first those that keep the page from being drawn, then others of its
    document. Each says whether the page shows it in its place, and has the fix that its edits are.
 2. For each script of the page its state; for each recorded output or figure that differs, both
    versions; for each bound number that does not hold, the right one.
-3. An offer's id is made from what the file holds and what it would hold. It is accepted only as
+3. The scripts that run now, with how long they took the last time.
+4. An offer's id is made from what the file holds and what it would hold. It is accepted only as
    long as both are unchanged: nothing is ever written that the author has not seen.
 """
 
@@ -61,13 +62,15 @@ class Offer(Struct, frozen=True):
     path: str
     old: bytes | None
     new: bytes
+    edits: tuple[Edit, ...] = ()
+    """Those of a text, which may be made together with others."""
 
     @classmethod
     def of(cls, *edits: Edit) -> Offer:
         """The offer of edits of one text."""
         source = edits[0].span.source
         new = apply_edits(source.text, edits)
-        return cls(source.path, source.text.encode(), new.encode())
+        return cls(source.path, source.text.encode(), new.encode(), edits)
 
     @property
     def id(self) -> str:
@@ -91,20 +94,31 @@ def page_news(session: Session, path: str) -> str:
         return json.dumps(news, default=id, ensure_ascii=False, separators=(",", ":"))
 
 
-def accept(session: Session, path: str, id: str) -> str:
-    """Write what is offered on a page under this id; return why that failed, or an empty text.
+def accept(session: Session, path: str, ids: str) -> str:
+    """Write what is offered on a page under these ids; return why that failed, or an empty text.
 
-    The lock is held: two browsers cannot accept the same at once.
+    With spaces between them there may be several, of which all or none are still offered. The lock
+    is held: two browsers cannot accept the same at once.
     """
     with session.condition:
         news = _collect_news(session, path)
         parts = (*news["outputs"], *news["figures"], *news["numbers"], *news["problems"])
-        offers = (part["offer"] for part in parts if part.get("offer"))
-        offer = next((offer for offer in offers if offer.id == id), None)
-        if offer is None:
+        offers = {part["offer"].id: part["offer"] for part in parts if part.get("offer")}
+        accepted_offers = [offers[id] for id in ids.split() if id in offers]
+        if not accepted_offers or len(accepted_offers) < len(ids.split()):
             return "this is no longer what the page offers; look at it again"
+        edits: dict[Source, list[Edit]] = {}
+        for offer in accepted_offers:
+            for edit in offer.edits:
+                edits.setdefault(edit.span.source, []).append(edit)
+        changes = [
+            (source.path, source.text.encode(), apply_edits(source.text, edits_there).encode())
+            for source, edits_there in edits.items()
+        ]
+        changes += [(o.path, o.old, o.new) for o in accepted_offers if not o.edits]
         try:
-            write_atomic(session.root, offer.path, offer.new, expected=offer.old)
+            for file, old, new in changes:
+                write_atomic(session.root, file, new, expected=old)
         except EffectError as error:
             return error.message
         return ""
@@ -132,6 +146,10 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
         "kept": session.files.is_outdated(path),
         "busy": session.busy,
         "trouble": session.trouble,
+        "running": [
+            {"path": path, "began": round(began, 1), "last": last}
+            for path, (began, last) in sorted(session.runs.running.items())
+        ],
         "scripts": [],
         "outputs": [],
         "figures": [],

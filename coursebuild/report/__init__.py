@@ -12,7 +12,7 @@ from coursebuild.core.model.results import TrialLine
 from coursebuild.core.model.sensitivity import Sensitivity
 from coursebuild.core.text.characters import clean_xml
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.core.text.rules import HELP, RULES
+from coursebuild.core.text.rules import RULES, rule_address
 from coursebuild.core.text.source import Span
 from coursebuild.report.text import Style as Style
 from coursebuild.report.text import diagnostic_text as diagnostic_text
@@ -113,15 +113,17 @@ def _add_case(suite: Element, group: str, name: str, seconds: float) -> Element:
 def to_sarif(report: Report) -> str:
     """The report as SARIF 2.1.0; columns count code points."""
     rule_names = sorted({d.rule for d in report.diagnostics})
-    rules = [
+    rules: list[dict[str, Any]] = [
         {
             "id": name,
             "shortDescription": {"text": RULES[name].summary},
-            "helpUri": HELP.format(name),
             "defaultConfiguration": {"level": RULES[name].severity},
         }
         for name in rule_names
     ]
+    for rule in rules:
+        if address := rule_address(rule["id"]):
+            rule["helpUri"] = address
     run = {
         "tool": {"driver": {"name": "coursebuild", "rules": rules}},
         "columnKind": "unicodeCodePoints",

@@ -1,8 +1,9 @@
 """Attributes in braces after inline content and headings, and the anchors of a document.
 
-Entry points: `TERM`, `SYMBOL` and `LABEL`, which find braces, also on the next line; `read_term`,
-`read_meaning` and `read_label`, which read them; `read_attributes` (`## Title {#id .class}`),
-`Anchors` (unique ids), `slug`, `check_heading`. A value with spaces stands in quotes.
+Entry points: `TERM`, `SYMBOL` and `LABEL`, which find braces, also on the next line, as does
+`split_label`; `read_pairs`, `read_term` and `read_meaning`, which read them; `read_attributes`
+(`## Title {#id .class}`), `Anchors` (unique ids), `slug`, `check_heading`. A value with spaces
+stands in quotes.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ from msgspec import Struct, field
 from coursebuild.core.model import (
     Image,
     Inline,
-    Label,
     Meaning,
     NumberBinding,
     Text,
@@ -47,16 +47,14 @@ SYMBOL = re.compile(
 LABEL = re.compile(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
 """The attributes of a term, a symbol or a formula; group 1 is the braces, the last of which may be
 missing."""
+_LAST_LABEL = re.compile(r"(?:^|(?<=\s))\{#[^{}$\n]{0,200}\}?$")
 _PAIR = re.compile(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
-_ID = re.compile(r"\{#(eq:[\w-]+)(?=[\s}])")
 _SPACES = re.compile(r"\s+")
 _NUMBER = re.compile(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
 
 _TERM_HELP = 'write `{term}`, or `{term="headword"}` if the glossary should name it differently'
 _SYMBOL_HELP = 'write `{symbol="what it stands for" unit="m/s"}`, of which the unit may be left out'
 _VALUE_HELP = 'write `value=9.81 given="its source"`, or `value=9.81 out=examples/x.py`'
-_LABEL_HELP = "write `{#eq:name}`, of letters, digits, `-` and `_`"
-_MARK_HELP = 'write `{#eq:name check}`, or `{#eq:name given="its source"}`'
 
 
 def collapse_spaces(text: str) -> str:
@@ -64,7 +62,7 @@ def collapse_spaces(text: str) -> str:
     return _SPACES.sub(" ", text).strip()
 
 
-def _read_pairs(
+def read_pairs(
     braces: Excerpt, keys: tuple[str, ...], rule: str, help: str
 ) -> dict[str, Excerpt | None] | Diagnostic:
     """The values by key, `None` for a key alone; or a diagnostic of the first mistake."""
@@ -95,7 +93,7 @@ def _read_pairs(
 
 def read_term(braces: Excerpt, report: Report) -> str | None:
     """The name given to a term; empty if that is the term's own text, `None` after a mistake."""
-    values = _read_pairs(braces, ("term",), "term-attribute", _TERM_HELP)
+    values = read_pairs(braces, ("term",), "term-attribute", _TERM_HELP)
     if isinstance(values, Diagnostic):
         report(values)
         return None
@@ -104,7 +102,7 @@ def read_term(braces: Excerpt, report: Report) -> str | None:
         message = "the name of the term is empty"
         report(diagnose("term-attribute", braces.span(), message, help=_TERM_HELP))
         return None
-    return _value_text(name)
+    return value_text(name)
 
 
 def read_meaning(
@@ -112,16 +110,16 @@ def read_meaning(
 ) -> tuple[Meaning | None, str | None, NumberBinding | None]:
     """The meaning of a symbol, the source of given numbers, and its value, if they are there."""
     keys = ("symbol", "unit", "value", "given", "out")
-    values = _read_pairs(braces, keys, "symbol-attribute", _SYMBOL_HELP)
+    values = read_pairs(braces, keys, "symbol-attribute", _SYMBOL_HELP)
     if isinstance(values, Diagnostic):
         report(values)
         return None, None, None
-    source = _value_text(values["given"]) if "given" in values else None
+    source = value_text(values["given"]) if "given" in values else None
     value = values.get("value")
     number: NumberBinding | None = None
     if value is not None and _NUMBER.fullmatch(value.text) and not {"out", "given"} <= {*values}:
         is_bound = "out" in values
-        script = _value_text(values.get("out")) or None
+        script = value_text(values.get("out")) or None
         origin = None if is_bound else source or ""
         number = NumberBinding(braces.span(), value.text, value.span(), script, origin)
     elif "value" in values or "out" in values:
@@ -136,7 +134,7 @@ def read_meaning(
         return None, source, None
     if not values.keys() & {"symbol", "unit"}:
         return None, source, number
-    meaning, unit = _value_text(values.get("symbol")), _value_text(values.get("unit"))
+    meaning, unit = value_text(values.get("symbol")), value_text(values.get("unit"))
     if not meaning or ("unit" in values and not unit):
         missing = "unit is empty" if meaning else "meaning of the symbol is missing"
         report(diagnose("symbol-attribute", braces.span(), f"the {missing}", help=_SYMBOL_HELP))
@@ -146,32 +144,17 @@ def read_meaning(
     return Meaning(braces.span(), meaning, unit), source, number
 
 
-def _value_text(value: Excerpt | None) -> str:
+def value_text(value: Excerpt | None) -> str:
+    """The text of a value on one line; empty for none."""
     return "" if value is None else collapse_spaces(value.text)
 
 
-def read_label(braces: Excerpt, report: Report) -> Label | None:
-    """The label of a formula; `None` after a mistake."""
-    is_closed = braces.text.endswith("}")
-    match = _ID.match(braces.text) if is_closed else None
+def split_label(text: Excerpt) -> tuple[Excerpt, Excerpt | None]:
+    """A caption or an info string, and the label in braces at its end, if there is one."""
+    match = _LAST_LABEL.search(text.text) if "{#" in text.text else None
     if match is None:
-        message, new = "the label of this formula is never closed", None
-        if not is_closed and re.fullmatch(r"\{#eq:[\w-]+", braces.text):
-            new = f"{braces.text}}}"
-        if is_closed:
-            message = f"`{braces.text}` is not a label of a formula"
-            new = f"{{#eq:{braces.text[2:]}" if re.fullmatch(r"\{#[\w-]+\}", braces.text) else None
-        fix = Fix(_LABEL_HELP, new, safe=not is_closed)
-        report(diagnose("equation-label", braces.span(), message, help=fix))
-        return None
-    end = match.end()
-    values = _read_pairs(braces.slice(end - 1), ("check", "given"), "equation-label", _MARK_HELP)
-    if isinstance(values, Diagnostic):
-        report(values)
-        values = {}
-    source = _value_text(values["given"]) if "given" in values else None
-    check = braces.span(end, len(braces.text) - 1) if "check" in values else None
-    return Label(braces.span(2, end), match[1], source, check)
+        return text, None
+    return trim(text.slice(0, match.start())), text.slice(match.start())
 
 
 _CANDIDATE = re.compile(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")

@@ -35,6 +35,7 @@ from coursebuild.core.syntax.fence import (
     find_likely_start,
     split_words,
 )
+from coursebuild.core.syntax.labels import label_block
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.python_syntax import check_syntax, find_windows
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
@@ -256,6 +257,14 @@ _HEAD_RULES = frozenset(
 
 
 def read_block(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
+    """The block of a fence, with its label."""
+    block = _read_kind(fence, state, texts)
+    if fence.label is None or not fence.is_closed:
+        return block
+    return label_block(block, fence.label, fence, state)
+
+
+def _read_kind(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
     """The block of a fence; recorded outputs are read in `recording`."""
     if not fence.is_closed or fence.inner is not None:
         return _read_unclosed(fence, state)

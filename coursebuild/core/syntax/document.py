@@ -23,6 +23,7 @@ from coursebuild.core.model import (
     Document,
     FeatureBlock,
     Heading,
+    Label,
     NumberBinding,
     Paragraph,
     Recording,
@@ -169,7 +170,9 @@ def _check_placement(document: Document) -> tuple[Diagnostic, ...]:
             help = "label formulas of the text, but not those of quizzes, labs and headings"
             formulas = block_formulas(block)
             labels = (formula.label.span for formula in formulas if formula.label is not None)
-            diagnostics += [diagnose("equation-label", span, message, help=help) for span in labels]
+            diagnostics += [
+                diagnose("label-attribute", span, message, help=help) for span in labels
+            ]
     return tuple(diagnostics)
 
 
@@ -201,7 +204,7 @@ def _is_reported(first: AnchorOwner, second: AnchorOwner) -> bool:
     if isinstance(first, FeatureBlock) and isinstance(second, FeatureBlock):
         keys, other_keys = first.progress_keys(), second.progress_keys()
         return keys is not None and other_keys is not None and keys[0] == other_keys[0]
-    labelled_types = Heading | DisplayFormula  # see `attributes.Anchors`
+    labelled_types = Heading | Label | DisplayFormula  # see `attributes.Anchors`
     return (isinstance(first, labelled_types) and isinstance(second, labelled_types)) or (
         isinstance(first, Script | Term) and type(first) is type(second)
     )

@@ -23,6 +23,7 @@ from markdown_it.common.utils import unescapeAll
 from msgspec import Struct
 
 from coursebuild.core.model import Block, CodeBlock, Inline
+from coursebuild.core.syntax.attributes import split_label
 from coursebuild.core.syntax.nodes import ArrayNode, Node, StringNode
 from coursebuild.core.syntax.spans import NO_TEXT, PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
@@ -235,6 +236,17 @@ INDENTED_FENCE = re.compile(r"\s*(`{3,}|~{3,})[ \t]*([\w+-]*)[^`\n]*")
 """The first line of an indented block that was surely meant to be a fence."""
 
 
+def outdent(code: Excerpt) -> tuple[Edit, ...]:
+    """The edits that take the white space away by which a block is indented code."""
+    edits = []
+    for line in code.lines():
+        start = line.span().start
+        white = re.search(r"(?:    |\t)$", code.source.text[:start][-4:])
+        if line.text.strip() and white is not None:
+            edits.append(Edit(code.source.span(start - len(white[0]), start), ""))
+    return tuple(edits)
+
+
 class Fence(Struct, frozen=True):
     """A fenced code block."""
 
@@ -255,6 +267,8 @@ class Fence(Struct, frozen=True):
     """Whether it stands in a text of a quiz or lab, where no lines can be extracted or updated."""
     inner: Span | None
     """A line inside that was surely meant to begin another fence, which then closed this one."""
+    label: Excerpt | None = None
+    """The label in braces that ends the line, which is not part of the info string."""
 
     @property
     def kind(self) -> str:
@@ -276,7 +290,7 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
     """The fence of a `fence` token of the text `base`."""
     info_start = token.start + len(token.markup)
     info_end = info_start + len(token.info)
-    info = trim(base.slice(info_start, info_end))
+    info, label = split_label(trim(base.slice(info_start, info_end)))
     is_closed, body = token.meta["closed"], token.text
     if body is NO_TEXT:
         body = base.slice(info_end + 1, info_end + 1)
@@ -295,7 +309,7 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
         opening = rf"^ {{0,3}}({re.escape(marks[0])}{{{len(marks)},}} *\w[^`\n]*)$"
         if (match := re.search(opening, body.text, re.MULTILINE)) is not None:
             inner = body.span(*match.span(1))
-    return Fence(span, head, info, body, body_span, prefix, is_closed, nested, inner)
+    return Fence(span, head, info, body, body_span, prefix, is_closed, nested, inner, label)
 
 
 _MOST_LINES = 300

@@ -14,7 +14,7 @@ emphasis, strong, strikethrough, links and terms:
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from markdown_it.common.utils import normalizeReference
 from markdown_it.helpers import parseLinkDestination
@@ -22,6 +22,8 @@ from markdown_it.token import Token
 from msgspec import Struct, field
 
 from coursebuild.core.model import (
+    Citation,
+    CitedWork,
     CodeSpan,
     Emphasis,
     FootnoteRef,
@@ -39,7 +41,6 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.syntax.attributes import (
     collapse_spaces,
-    read_label,
     read_meaning,
     read_term,
     term_id,
@@ -47,6 +48,7 @@ from coursebuild.core.syntax.attributes import (
 from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_parser import inline_tokens
+from coursebuild.core.syntax.labels import take_label
 from coursebuild.core.syntax.mentions import (
     TextPiece,
     check_scheme,
@@ -287,6 +289,8 @@ class _TokenReader:
                 node = HardBreak(span)
             case "footnote_ref":
                 node = self._read_footnote(token, span)
+            case "citation":
+                node = Citation(span, tuple(self._read_works(token)))
             case _:
                 raise AssertionError(f"no inline for token {token.type}")
         if node is not None:
@@ -302,9 +306,7 @@ class _TokenReader:
         braces, report = self.content.slice(*token.meta["braces"]), self.report
         if not display:
             return Math(span, tex, display, None, *read_meaning(braces, report))
-        label = read_label(braces, report)
-        if label is not None:
-            self.state.anchors.take(label.id, label.span)
+        label = take_label(braces, "eq", self.state)
         return Math(span, tex, display, label)
 
     def _read_number(self, token: PositionedToken, span: Span) -> NumberBinding:
@@ -341,6 +343,17 @@ class _TokenReader:
             message = "the image has no text alternative"
             self.report(diagnose("image-alt", span, message, help=help))
         return Image(span, url, alt, str(token.attrs.get("title", "")), place)
+
+    def _read_works(self, token: PositionedToken) -> Iterator[CitedWork]:
+        """The works of a citation."""
+        at = token.start + 1
+        for part in token.content.split(";"):
+            before, _, rest = part.partition("@")
+            key, _, locator = rest.partition(",")
+            start = at + len(before) + 1
+            span = self.content.span(start, start + len(key.rstrip()))
+            yield CitedWork(span, key.strip(), collapse_spaces(before), collapse_spaces(locator))
+            at += len(part) + 1
 
     def _read_footnote(self, token: PositionedToken, span: Span) -> FootnoteRef | None:
         reference = self.state.notes.refer(token.content, span)

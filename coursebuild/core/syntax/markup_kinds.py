@@ -1,9 +1,9 @@
 """The kinds of markup that readers would see as it is written.
 
 Entry points: `BROKEN`, markup of ours that is not whole; `FOREIGN`, that of other tools; `IN_HTML`,
-what is unread between tags; `ONCE`; `REWRITES`, what to write
-instead. Patterns are searched for in a text in which NUL stands for all
-that was read, so that a mark directly after a NUL stands directly after a link, code and so on.
+what is unread between tags; `ONCE`; `REWRITES`, what to write instead; `LANGUAGES` and
+`PLAIN_TEXTS`, of blocks. Patterns are searched for in a text in which NUL stands for all that was
+read, so that a mark directly after a NUL stands directly after a link, code and so on.
 """
 
 from __future__ import annotations
@@ -69,11 +69,12 @@ FOREIGN = {
         "a formula is `$x$` or stands between two `$$`, and a link to one is `[](#eq:name)`",
     ),
     "attributes": MarkupKind(
-        r"\{:?[ \t]*[.#][A-Za-z][\w:.-]*[^{}\n\0]*\}?|\{:[^{}\n\0]+\}|\{#?eq:[^{}\n\0]*\}?"
+        r"\{:?[ \t]*[.#][A-Za-z][\w:.-]*[^{}\n\0]*\}?|\{:[^{}\n\0]+\}"
+        r"|\{#?(?:eq|fig|lab|lst|tab):[^{}\n\0]*\}?"
         r"|(?<![{\w&\0])[#.][A-Za-z][\w:.-]*\}",
-        "only headings have attributes, and formulas labels: `{#eq:name}`",
-        "in a heading, `## Title {#id .class}` ends the line; write HTML where a text needs a "
-        "class or a size",
+        "only headings have attributes, and only formulas, captions and fences have labels",
+        "in a heading, `## Title {#id .class}` ends the line; a label ends a caption, "
+        "`Figure: … {#fig:name}`, or a fence's first line; write HTML for a class or a size",
     ),
     "reference": MarkupKind(
         r"(?<![\w\]\0\\])\[[^\[\]\n\0]+\]\[[^\[\]\n\0]*\](?!\()",
@@ -87,13 +88,15 @@ FOREIGN = {
     ),
     "citation": MarkupKind(
         r"(?<!\\)\[(?:[^\[\]\n\0@]*[\s-])?@[\w:./-]+[^\[\]\n\0]*\]",
-        "there is no list of sources",
-        "link to the source, or put it into a footnote: `[^name]`",
+        "no source is cited in this way",
+        "a citation is `[@key]` or `[see @key, p. 12; @other]`; the sources are listed in "
+        "content/references.bib",
     ),
     "crossref": MarkupKind(
         r"(?<![\w.@])@(?:fig|tbl|eq|sec|lst|thm)[-:][\w-]+",
         "a cross-reference is not written in this way",
-        "link to a heading or a formula by its id: `[text](#id)`, `[](#eq:name)`",
+        "link to a heading by its id, `[text](#id)`, and to what has a number without a text: "
+        "`[](#fig:name)`, `[](#eq:name)`",
     ),
     "highlight": MarkupKind(
         r"(?<![=\w])==[^\s=](?:[^=\n\0]*[^\s=])?==(?![=\w])",
@@ -310,3 +313,10 @@ REWRITES: dict[str, tuple[tuple[str, str, bool], ...]] = {
 """What to write instead of markup, in words of `re.sub`, and whether that is surely meant."""
 ONCE = frozenset("link bracket table fence code emphasis character markdown".split())
 """One mistake often leaves several of these marks in a text; the first is reported."""
+LANGUAGES = tuple(
+    "bash console cpp css diff html ini javascript json julia markdown matlab python rust sh text "
+    "toml xml yaml".split()
+)
+"""Languages that texts often show."""
+PLAIN_TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
+"""Names of ordinary code and text that no highlighter knows."""

@@ -31,7 +31,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, m
 from coursebuild.core.text.patterns import matches_empty_text, pattern_mistake
 from coursebuild.core.text.source import Excerpt, Span
 
-FIGURE, OUTPUT_KIND = "Figure:", "output"
+FIGURE, TABLE, OUTPUT_KIND = "Figure:", "Table:", "output"
 _BODY_KINDS = ("text", OUTPUT_KIND)
 _FIRST_WORD = re.compile(r"([^\s:*`]{3,12})(?![^\s:])[^\S\n]*(:?)")
 _NEAR_CAPTION = re.compile(

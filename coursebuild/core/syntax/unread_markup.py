@@ -18,16 +18,26 @@ from collections.abc import Iterator, Sequence
 
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.containers import quote_admonition
-from coursebuild.core.syntax.fence import Fence, check_foreign_key, kind_of, split_words
+from coursebuild.core.syntax.fence import (
+    INDENTED_FENCE,
+    Fence,
+    check_foreign_key,
+    kind_of,
+    outdent,
+    split_words,
+)
 from coursebuild.core.syntax.markup_kinds import (
     BROKEN,
     FOREIGN,
     IN_HTML,
+    LANGUAGES,
     ONCE,
+    PLAIN_TEXTS,
     REWRITES,
     MarkupKind,
 )
 from coursebuild.core.syntax.nodes import shorten
+from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
     Fix,
@@ -333,14 +343,6 @@ def _mask(text: str) -> str:
 
 # --- fences
 
-_LANGUAGES = tuple(
-    "bash console cpp css diff html ini javascript json julia markdown matlab python rust sh text "
-    "toml xml yaml".split()
-)
-"""Languages that texts often show."""
-_PLAIN_TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
-"""Names of ordinary code and text that no highlighter knows."""
-
 _FOREIGN_KINDS = {"math": "a formula on a line of its own stands between two `$$`"}
 """Kinds of blocks that other tools read, with what to write here."""
 
@@ -351,6 +353,21 @@ _OBJECT = re.compile(r'\s*\{\s*"[^"\n]*"\s*:[\s\S]*\}\s*\Z')
 def is_known_kind(kind: str) -> bool:
     """Whether a block of a kind is more than code to be shown."""
     return kind in CORE_FENCES or kind in fence_names()
+
+
+def check_indented_fence(code: Excerpt, state: ParsingState) -> None:
+    """Report a fence that is shown as text because it is indented."""
+    opening = INDENTED_FENCE.match(code.text)
+    if opening is None:
+        return
+    is_closed = re.search(rf"^{opening[1]}\s*\Z", code.text.rstrip(), re.MULTILINE) is not None
+    if is_closed and not is_known_kind(opening[2]):
+        return
+    message = "this fence is indented by a tab or four blanks, so its block is shown as text"
+    help = Fix("take the white space before it away", edits=outdent(code), safe=True)
+    place = code.span(opening.start(1), opening.end())
+    state.report(diagnose("fence-indented", place, message, help=help))
+    state.closes_indented = not is_closed
 
 
 def check_kind(fence: Fence) -> Iterator[Diagnostic]:
@@ -365,8 +382,9 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     yield from (diagnostic for word in words if (diagnostic := check_foreign_key(kind.text, word)))
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown but never run, and this one has a `file`"
-        new = "python" if re.fullmatch("i?py(?:thon)?3?", name) else None
-        help: str = Fix("a script is a block of kind `python`", new, safe=True)
+        help: str = "a script is a block of kind `python`"
+        if re.fullmatch("i?py(?:thon)?3?", name):
+            help = Fix(help, "python", safe=True)
         yield diagnose("script-kind", kind.span(), message, help=help)
     elif name in _FOREIGN_KINDS or name.startswith("{"):
         message = f"a block of kind `{kind.text}` is shown as code here"
@@ -404,7 +422,7 @@ def _find_misspelt(name: str, kinds: Sequence[str]) -> str | None:
         return "lab simlab"
     if name in kinds:
         return name
-    likely = misspelt(name, kinds) or misspelt(name, _LANGUAGES)
+    likely = misspelt(name, kinds) or misspelt(name, LANGUAGES)
     return None if likely is None or _is_language(name) else likely
 
 
@@ -428,4 +446,4 @@ def _is_language(name: str) -> bool:
     try:
         return find_lexer_class_by_name(name) is not None
     except ClassNotFound:
-        return name.lower() in _PLAIN_TEXTS
+        return name.lower() in PLAIN_TEXTS

@@ -10,9 +10,7 @@ from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
-HELP = "https://github.com/OWNER/coursebuild/blob/main/docs/reference/rules.md#{}"
-"""The address at which a rule is explained."""
-
+from coursebuild import MANUAL
 
 Severity: TypeAlias = Literal["error", "warning"]
 """An error keeps the site from being published; a warning can be silenced, with a reason."""
@@ -27,6 +25,11 @@ class Rule(Struct, frozen=True):
     """Its meaning in one sentence, for the catalogue's page."""
     no_fix: str = ""
     """Why no diagnostic of it has an edit, in one sentence; empty where one may have."""
+
+
+def rule_address(name: str) -> str:
+    """The address at which the manual explains a rule; empty where that is not known."""
+    return MANUAL and f"{MANUAL}rules.html#{name}"
 
 
 _SUMMARIES = {
@@ -56,7 +59,7 @@ _SUMMARIES = {
     "reason.",
     "unproven-name": "An entry of `unproven` in the course map names no script, or one that "
     "always runs.",
-    "no-lessons": "The course has no lesson to publish.",
+    "no-lessons": "The course has no lesson to publish, and no page in a `section`.",
     "no-scripts": "No script can run here, so nothing is verified.",
     # the theme
     "theme-file": "A file that the theme names is not there, or is not what it must be.",
@@ -90,7 +93,7 @@ _SUMMARIES = {
     "fence-kind-near": "The kind of a code block looks like a misspelt one.",
     "fence-unread": "A code block of a kind that nothing reads holds a JSON object.",
     "feature-broken": "A feature of the course's own cannot be loaded.",
-    "feature-missing": "A fence needs a feature that is not installed.",
+    "feature-missing": "A fence or the list of sources needs something that is not installed.",
     "math-syntax": "A formula does not parse.",
     "math-command": "A command of a formula has lost its backslash.",
     "math-brackets": "A formula has more opening brackets than closing ones, or fewer.",
@@ -103,7 +106,8 @@ _SUMMARIES = {
     "control-character": "A text has a character that no reader can see.",
     "merge-conflict": "A file of the course holds both versions of a merge, with the marks between "
     "them.",
-    "equation-label": "The label of a formula cannot be read, or stands where none may.",
+    "label-attribute": "The label of a formula, figure, table, listing or lab cannot be read, or "
+    "stands where none may.",
     # terms and symbols
     "term-attribute": "The attribute by which a text defines a term cannot be read.",
     "term-place": "A term is defined outside a paragraph of the text.",

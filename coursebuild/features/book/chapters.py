@@ -186,10 +186,12 @@ def extension(path: str) -> str:
 _HEADING_SHIFT = 2
 """Levels that headings move down: the course is the first heading, its levels are the second."""
 _ANSWERS = frozenset(("answer", "hint"))
+_FOLDS = _ANSWERS | {"callout", "further-text", "lab-note"}
+"""With what authors fold, where the map says that it stays folded."""
 _TYPES = {**PICTURES, "avif": "image/avif", "woff2": "font/woff2"}
 
 
-def page_file(context: ExportContext) -> OutputFile:
+def page_file(context: ExportContext, *, page_numbers: bool = False) -> OutputFile:
     """Return the page."""
     course = context.course
     ids = {urls.lesson_path(lesson): lesson.id for lesson in course.written_lessons}
@@ -207,7 +209,7 @@ def page_file(context: ExportContext) -> OutputFile:
             picture,
             functools.partial(_anchor, lesson.id),
             heading_shift=_HEADING_SHIFT,
-            closed_classes=_ANSWERS,
+            closed_classes=_ANSWERS if course.folds == "open" else _FOLDS,
             section=lesson.id,
         )
         return render_lesson(context, lesson, rules, to_html, _anchor(lesson.id))
@@ -230,6 +232,7 @@ def page_file(context: ExportContext) -> OutputFile:
         level_anchor=level_anchor,
         lesson_anchor=lambda lesson: _anchor(lesson.id),
         quoted=urls.quote_anchor,
+        page_numbers=page_numbers,
         text=text,
     )
     return OutputFile("course.html", visible(html).encode())

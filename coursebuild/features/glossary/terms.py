@@ -48,9 +48,9 @@ from coursebuild.core.pages.document_inputs import (
     owner_link,
     owner_links,
 )
-from coursebuild.core.pages.formulas import number_equations
 from coursebuild.core.pages.library import Library, links
 from coursebuild.core.pages.markup import HtmlWriter
+from coursebuild.core.pages.numbering import number_items
 from coursebuild.core.text.diagnostics import Parsed
 
 
@@ -99,8 +99,8 @@ class _ExcerptWriter(HtmlWriter):
 
 def _find_terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
     writer = _ExcerptWriter(mathml)
-    equations = number_equations(document, mathml).values()
-    names = {f"#{e.id}": f"({e.number})" for e in equations if e.number}
+    items = number_items(document, mathml).values()
+    names = {f"#{i.id}": f"({i.number})" for i in items if i.number and i.kind == "eq"}
 
     def reference(target: Target) -> str:
         return names.get(unquote(target.url), "") if isinstance(target, UrlTarget) else ""

@@ -71,6 +71,9 @@ class LabView(Struct, frozen=True):
     subject: str
     """What it is of, in words that the name of its model may follow."""
     title: str
+    number: str
+    """As in "Lab 4.2.1"; like `label`, its id, empty without one."""
+    label: str
     key: str
     """Its name in the course; like `config` and `script` (addresses), empty if it cannot run."""
     config: str
@@ -113,7 +116,10 @@ def page_view(page: PageContext, block: Lab) -> LabView:
     live = trial if isinstance(trial, PublishedLab) else None
     view = lab_view(page.renderer.words, page.place, block, live)
     href = "" if model is None else page.href(ModelTarget(model))
-    return replace(view, model_href=href, start=_start(page, block))
+    view = replace(view, model_href=href, start=_start(page, block))
+    if block.label is None:
+        return view
+    return replace(view, number=page.number(block.label), label=block.label.id)
 
 
 def lab_view(words: Strings, place: Place, block: Lab, live: PublishedLab | None) -> LabView:
@@ -125,6 +131,8 @@ def lab_view(words: Strings, place: Place, block: Lab, live: PublishedLab | None
         kind=block.kind,
         subject=words(_SUBJECTS.get(block.kind, model_subject)),
         title=title,
+        number="",
+        label="",
         key=live.name if live is not None else "",
         config=place.href(live.config) if live is not None else "",
         script=place.href(live.script) if live is not None else "",

@@ -76,6 +76,7 @@ def _document_copy(inputs: PageInputs, page: PageContext) -> str:
         *head(inputs, words, writer.locate),
         writer.blocks(document.blocks),
         writer.footnotes(document.footnotes),
+        writer.references(),
         *_footer(inputs, words, writer.locate),
     )
     return "\n\n".join(filter(None, parts))
@@ -102,7 +103,8 @@ def _facts(inputs: PageInputs, lesson: LessonLink, words: Strings, locate: Locat
     if isinstance(level, LevelView):
         name = f"{words('level.label', id=level.id)}: {level.title}"
         facts.append(link(escape_line(name), locate(level.href)))
-    facts.append(escape_line(words(f"status.{lesson.status}")))
+    if lesson.status != "complete":
+        facts.append(escape_line(words(f"status.{lesson.status}")))
     if lesson.minutes:
         facts.append(escape_line(words("lesson.minutes", n=lesson.minutes)))
     if lesson.further:
@@ -158,6 +160,10 @@ def write_llms(library: Library) -> bytes:
             for lesson in level.lessons
         )
         parts.append("\n".join((f"## {escape_line(label)}", "", *rows)))
+    for section in dict.fromkeys(page.section for page in course.pages if page.section):
+        pages = (page for page in course.pages if page.section == section)
+        rows = (_row(library, urls.page_path(page), page.title, "") for page in pages)
+        parts.append("\n".join((f"## {escape_line(section)}", "", *rows)))
     parts += _optional_part(library)
     return visible("\n\n".join(parts) + "\n").encode()
 
@@ -166,7 +172,11 @@ def _optional_part(library: Library) -> list[str]:
     """Return the list of pages that can be left out where there is little room."""
     course, words = library.course, library.words
     rows = [_row(library, urls.HOME, words("site.map"), "")]
-    rows += [_row(library, urls.page_path(page), page.title, "") for page in course.pages]
+    rows += [
+        _row(library, urls.page_path(page), page.title, "")
+        for page in course.pages
+        if not page.section and not page.is_home
+    ]
     rows += [
         _row(library, urls.model_page_path(m.name), words("model.title", name=m.name), "")
         for m in course.models

@@ -101,7 +101,11 @@ class DocumentWriter:
                 text = _LAST_MARKS.sub(r"\1\\\2", self.inlines(block.children))
                 return f"{'#' * block.level} {text}".rstrip()
             case model.Paragraph():
-                return self._inlines(block.children)
+                text = self._inlines(block.children)
+                if number := self.number(block.label):
+                    text = text.removeprefix("Figure:").lstrip()
+                    text = f"**{escape_marks(number)}:** {text}"
+                return text
             case model.HtmlFlow():
                 return "".join(map(self._in_html, block.children))
             case model.ListBlock():
@@ -109,7 +113,8 @@ class DocumentWriter:
             case model.BlockQuote():
                 return block_quote(self.blocks(block.blocks))
             case model.CodeBlock():
-                return fence(re.sub(r"[\s`]", "", block.language), block.code.text)
+                code = fence(re.sub(r"[\s`]", "", block.language), block.code.text)
+                return self._below_caption(block, code)
             case model.HtmlBlock():
                 return raw_html(block, self.url).rstrip("\n")
             case model.ThematicBreak():
@@ -120,7 +125,8 @@ class DocumentWriter:
             case model.Table():
                 rows = (map(self._cell, row) for row in block.rows)
                 header, align = map(self._cell, block.header), (mark or "" for mark in block.align)
-                return table(header, rows, align)
+                text = table(header, rows, align)
+                return self._below_caption(block, text, self.inlines(block.caption))
             case model.Callout():
                 label = f"**{escape_marks(self.page.inputs.callouts[block.kind].label)}**"
                 title = self.inlines(block.title)
@@ -128,10 +134,12 @@ class DocumentWriter:
                 inner = self.blocks(block.blocks)
                 return block_quote(f"{head}\n\n{inner}" if inner else head)
             case model.PlainCode():
-                return fence("python", block.code.text)
+                return self._below_caption(block, fence("python", block.code.text))
             case model.Script():
                 href = self.locate(self.page.place.href(block.path))
                 name = link(code_span(block.path), href)
+                if number := self.number(block.label):
+                    name = f"**{escape_marks(number)}** {name}"
                 if self.notebook:
                     return self.words("exports.cell_below", path="\ue000").replace("\ue000", name)
                 command = code_span(shlex.join(("python", block.path, *block.args)))
@@ -160,11 +168,18 @@ class DocumentWriter:
                     verdict = (
                         f"*{self.words('mjcf.fails', engine=engine)}* {code_span(block.error)}"
                     )
-                return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{verdict}"
+                text = f"{label}:\n\n{fence('xml', block.code.text)}\n\n{verdict}"
+                return self._below_caption(block, text)
             case model.FeatureBlock():
-                return kind_of_block(block).markdown(self, block)
+                return self._below_caption(block, kind_of_block(block).markdown(self, block))
             case _:
                 assert_never(block)
+
+    def _below_caption(self, block: model.Labelled, text: str, caption: str = "") -> str:
+        """Write a block below its number and its caption, if it has one of the two."""
+        if number := self.number(block.label):
+            caption = f"**{escape_marks(number)}:** {caption}".rstrip()
+        return f"{caption}\n\n{text}" if caption else text
 
     def _in_html(self, inline: model.Inline) -> str:
         """Write an inline within HTML, where text is no Markdown."""
@@ -240,6 +255,8 @@ class DocumentWriter:
                 return _escape_pipes(raw_html(inline, self.url), room)
             case model.FootnoteRef():
                 return self.reference(inline.number)
+            case model.Citation():
+                return _escape_pipes(self.citation(inline), room)
             case _:
                 assert_never(inline)
 
@@ -275,8 +292,22 @@ class DocumentWriter:
 
     def formula_number(self, start: int) -> str:
         """Return the number of a formula that does not show one itself."""
-        equation = self.page.equations.get(start)
-        return equation.number if equation is not None and equation.has_margin_number else ""
+        item = self.page.numbered_items.get(start)
+        return item.number if item is not None and item.has_margin_number else ""
+
+    def number(self, label: model.Label | None) -> str:
+        """Return the name that a label gives, such as "Figure 4.2.3"; empty without one."""
+        return "" if label is None else self.page.number(label)
+
+    def citation(self, citation: model.Citation) -> str:
+        """Return a citation, with links to the references below the text."""
+        return self.html(self.page.citation(citation))
+
+    def references(self) -> str:
+        """Return the list of the sources that the document cites; perhaps empty."""
+        entries = (self.html(entry.html) for entry in self.page.inputs.citations.entries)
+        items = "\n".join(hang("- ", entry) for entry in entries)
+        return f"**{self.words('references.title')}**\n\n{items}" if items else ""
 
     def html(self, html: Markup) -> str:
         """Convert HTML of a template to Markdown."""

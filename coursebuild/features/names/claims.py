@@ -173,14 +173,24 @@ def _read_script(script: model.Script, names: CodeNames) -> None:
                 names.imports[alias.asname or alias.name] = f"{node.module}.{alias.name}"
         elif kind is ast.Assign and type(node.value) is ast.Call:
             target = node.targets[0]
-            if type(target) is ast.Name and len(node.targets) == 1:
-                classes = _STRUCTURES.intersection(ast.unparse(node.value.func).split("."))
-                if classes:
-                    names.variables[target.id] = classes.pop()
+            class_name = _find_structure(node.value.func)
+            if class_name and type(target) is ast.Name and len(node.targets) == 1:
+                names.variables[target.id] = class_name
         if definition:
             names.definitions.setdefault(definition, (script.path, node.lineno))
     for name, attributes in members.items():
         names.members[name] = names.members.get(name, frozenset()) | attributes
+
+
+def _find_structure(function: ast.expr) -> str:
+    """Return the structure of MuJoCo in a function's name, as in `mujoco.MjData`; else nothing."""
+    node: ast.AST | None = function
+    while node is not None:
+        name: str = getattr(node, "attr", getattr(node, "id", ""))
+        if name in _STRUCTURES:
+            return name
+        node = getattr(node, "func", getattr(node, "value", None))
+    return ""
 
 
 def claims_of(code: model.CodeSpan) -> Iterator[tuple[Claim, Span]]:

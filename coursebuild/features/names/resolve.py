@@ -16,12 +16,12 @@ from typing import TypeAlias
 
 from msgspec import Struct
 
+from coursebuild import MANUAL
 from coursebuild.core.model import Course, Document, document_scripts
 from coursebuild.core.model.addresses import line_anchor
 from coursebuild.core.syntax.course_schema import CourseFile
 from coursebuild.core.syntax.html import ELEMENTS
 from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest, propose
-from coursebuild.core.text.rules import HELP
 from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, DocumentNames
 from coursebuild.features.names.engine import (
     EngineName,
@@ -34,6 +34,8 @@ from coursebuild.features.names.engine import (
 )
 from coursebuild.features.names.own_names import known_keys, options_by_command, tables_of
 
+_MANUAL_ID = "coursebuild-manual"
+"""The id of the manual, in docs/content/course.toml."""
 _ROOTS = {"model": "MjModel", "data": "MjData", "opt": "MjOption", "spec": "MjSpec"}
 """The classes of variables by their usual names."""
 _HTML = ELEMENTS | frozenset(
@@ -371,10 +373,11 @@ class Resolver:
         return KnownName(self._manual("course-map"))
 
     def _manual(self, page: str) -> str:
-        path = f"docs/reference/{page}.md"
-        if any(p.path == path for p in self.course.pages):
+        """A page of the manual: in the manual's own course its file, else its address if known."""
+        path = f"reference/{page}.md"
+        if self.course.id == _MANUAL_ID and any(p.path == path for p in self.course.pages):
             return path
-        return HELP.replace("rules.md#{}", f"{page}.md")
+        return MANUAL and f"{MANUAL}{page}.html"
 
     def _file(self, path: str) -> Answer:
         if path in self.files:

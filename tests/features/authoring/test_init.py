@@ -127,7 +127,8 @@ def test_new_course_is_a_repository_unless_it_lies_in_one(
     assert not (tmp_path / "without/.git").exists()
 
 
-@[pytest.mark.site, pytest.mark.engine]
+@pytest.mark.site
+@pytest.mark.engine
 def test_doctor_reports_what_works_and_a_cure_for_the_rest(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     folder.tmp.mkdir()
@@ -153,7 +154,8 @@ def test_doctor_reports_what_works_and_a_cure_for_the_rest(tmp_path: Path) -> No
     assert not [path for path in folder.root.iterdir() if path != folder.tmp]
 
 
-@[pytest.mark.site, pytest.mark.engine]
+@pytest.mark.site
+@pytest.mark.engine
 def test_doctor_says_what_a_sandbox_lacks(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     folder.tmp.mkdir()
@@ -171,7 +173,8 @@ def test_doctor_says_what_a_sandbox_lacks(tmp_path: Path) -> None:
     assert result.status == 0
 
 
-@[pytest.mark.site, pytest.mark.engine]
+@pytest.mark.site
+@pytest.mark.engine
 def test_doctor_fails_where_a_course_cannot_be_built(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     folder.tmp.mkdir()

@@ -42,6 +42,11 @@ DOT = bytes.fromhex(
 )
 
 
+SOURCES = r"""
+@article{key:1/a, author = {<b> & "Co"}, title = {]]> <i>x</i> \'e}, doi = {10.1000/<"'&>},
+  year = 1}
+@misc{other, title = {{Only} a title}, url = {https://example.org/?a="b"&c=<d>}}
+"""
 MAP = "content/course.toml"
 SITE = 'base_url = "https://example.org/a%20b/"\n'
 ENTRY = '[[level.lesson]]\nid = "1.9"\nslug = "wild"\ntitle = "Wild"\nstatus = "complete"\n\n'
@@ -62,6 +67,7 @@ def full_course(tmp_path_factory: pytest.TempPathFactory, built_courses: BuiltCo
     folder.write("content/lessons/1.9-wild.md", WILD)
     folder.write("content/lessons/dot.png", DOT)
     folder.write("content/lessons/data.csv", b"1,2\n")
+    folder.write("content/references.bib", SOURCES)
     folder.replace(MAP, '[[level]]\nid = "A"', ENTRY + '[[level]]\nid = "A"')
     text = re.sub(r"(?m)^(base_url|language) = .*\n", "", folder.text(MAP))
     text = re.sub(r'(?m)^(title|summary) = ".*"$', lambda m: f'{m[1]} = "{HOSTILE}"', text)

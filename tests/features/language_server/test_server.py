@@ -11,6 +11,7 @@ import pytest
 from lsprotocol import types
 from pygls.exceptions import JsonRpcException
 
+from coursebuild import MANUAL
 from support.editor import Editor
 from support.scratch_course import Folder, block, wait_until_alone
 
@@ -112,9 +113,8 @@ def test_mistakes_are_reported_while_typing_and_nothing_is_saved(editor: Editor)
     assert mistake.range == types.Range(place, types.Position(5, 16))
     assert mistake.severity == types.DiagnosticSeverity.Error
     assert mistake.message.startswith("lesson 9.9 is not in the course map")
-    assert mistake.code_description and mistake.code_description.href.endswith(
-        "rules.md#link-lesson"
-    )
+    address = mistake.code_description and mistake.code_description.href
+    assert address == (f"{MANUAL}rules.html#link-lesson" if MANUAL else None)
     editor.write(SECOND_LESSON, LINKS)
     editor.until(SECOND_LESSON)
     assert editor.folder.text(SECOND_LESSON) == LINKS
@@ -395,8 +395,11 @@ def rename(editor: Editor, path: str, needle: str, name: str) -> dict[str, str]:
 
 def test_renaming_a_term_and_a_label(editor: Editor) -> None:
     text = LINKS + "\n[again][r] and [the term](lesson:1.1#term:moment-of-inertia).\n\n"
-    text += "[r]: lesson:1.1#eq:energy\n"
+    text += "[r]: lesson:1.1#eq:energy\n\n```bash {#lst:run}\nls\n```\n\nSee [](#lst:run).\n"
     editor.write(SECOND_LESSON, text)
+    assert rename(editor, SECOND_LESSON, "(#lst:ru|n)", "lst:go") == {
+        SECOND_LESSON: text.replace("lst:run", "lst:go")
+    }
     for path, needle in (
         (FIRST_LESSON, "{#eq:en|ergy}"),
         (SECOND_LESSON, "lesson:1.1#eq:en|ergy)"),
@@ -426,6 +429,7 @@ def test_renaming_a_term_and_a_label(editor: Editor) -> None:
         ("lesson:1.1#eq:en|ergy)", "energy", "a label is `eq:`"),
         ("lesson:1.1#eq:en|ergy)", "eq:", "a label is `eq:`"),
         ("{#a|ll", "a b", "a label is letters"),
+        ("{#lst:ru|n", "fig:run", "a label is `lst:`"),
     ):
         with pytest.raises(JsonRpcException, match=reason):
             rename(editor, SECOND_LESSON, needle, name)

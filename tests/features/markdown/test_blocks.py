@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coursebuild.core.model import Block, Callout, Document, Target
+from coursebuild.core.model import Block, Callout, Citation, Document, Target
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.pages.marks import (
     block_quote,
@@ -54,6 +54,9 @@ class Context(DocumentWriter):
 
     def link_text(self, target: Target) -> str:
         return ""
+
+    def citation(self, citation: Citation) -> str:
+        return escape_marks(citation.span.text)
 
     def formula_number(self, start: int) -> str:
         return ""
@@ -295,12 +298,16 @@ def test_ids_of_cells_differ_whatever_the_headings(make: Make) -> None:
     assert len(set(ids)) == len(ids) == 5
 
 
-def test_numbers_of_formulas_are_written(make: Make) -> None:
+def test_numbers_are_written(make: Make) -> None:
     text = (
         "## Part {#part}\n\n$$\na = b % so\n$$ {#eq:one}\n\nBy $$c$$ {#eq:two} and [](#eq:two), "
-        "from [](#eq:one).\n"
+        "from [](#eq:one) and [](#tab:x).\n\nTable: *Some*. {#tab:x}\n\n| a |\n| --- |\n| b |\n\n"
+        "```python fragment {#lst:x}\nx = 1\n```\n"
     )
     copy = site(make, text)["lessons/0.1-falling.md"].decode()
+    assert "[Table 0.1.1](#tab:x)" in copy
+    assert "**Table 0.1.1:** *Some*.\n\n| a |" in copy
+    assert "**Listing 0.1.1:**\n\n```python" in copy
     assert "$$\na = b % so\n\\tag{1}\n$$" in copy
     assert "[(1)](#eq:one)" in copy
 

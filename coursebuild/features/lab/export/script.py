@@ -27,10 +27,14 @@ from msgspec import Struct
 
 from coursebuild.core.features import Trial, TrialContext
 from coursebuild.core.model import Course
-from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.source import unique_name
 from coursebuild.core.values import fingerprint
-from coursebuild.features.lab.engines.native import NativeEngine, NativeError, lab_digest
+from coursebuild.features.lab.engines.native import (
+    LAB_ENGINE,
+    NativeEngine,
+    NativeError,
+    lab_digest,
+)
 from coursebuild.features.lab.export.expressions import RESERVED
 from coursebuild.features.lab.export.translate import (
     context_fields,
@@ -273,7 +277,7 @@ def export_lab(
         file_name(trial.name),
         _origin(context.course, trial.owner),
         context.course.title,
-        engine_version(),
+        LAB_ENGINE,
         round(end - start, 9),
     )
     # The record stands for the model: a change that matters changes it, too.

@@ -26,7 +26,7 @@ from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.findings import output_findings
 from coursebuild.core.scripts.numbers import scan_prose
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
-from coursebuild.core.text.rules import HELP
+from coursebuild.core.text.rules import rule_address
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.language_server.commands.texts import OpenTexts, Places
 from coursebuild.pipeline.fix import choose_fixes
@@ -125,12 +125,13 @@ def to_lsp(diagnostic: Diagnostic, places: Places) -> types.Diagnostic:
     is_error = diagnostic.is_error
     lines = [diagnostic.message, diagnostic.label, diagnostic.help and f"help: {diagnostic.help}"]
     lines += [f"note: {note.message}" for note in diagnostic.notes if note.span is None]
+    address = rule_address(diagnostic.rule)
     return types.Diagnostic(
         places.range(diagnostic.span),
         "\n".join(filter(None, lines)),
         severity=types.DiagnosticSeverity.Error if is_error else types.DiagnosticSeverity.Warning,
         code=diagnostic.rule,
-        code_description=types.CodeDescription(HELP.format(diagnostic.rule)),
+        code_description=types.CodeDescription(address) if address else None,
         source="coursebuild",
         related_information=[
             types.DiagnosticRelatedInformation(places.location(note.span), note.message)
