@@ -3,7 +3,7 @@
 Entry points: `page_news(session, path)`, as JSON; `accept(session, path, ids)`.
 
 1. The mistakes of the course: first those that keep the page from being drawn, then others of its
-   document. Each says whether the page shows it in its place.
+   document. Each says whether the page shows it in its place, and has the fix that its edits are.
 2. For each script of the page its state; for each recorded output or figure that differs, both
    versions; for each bound number that does not hold, the right one.
 3. The scripts that run now, with how long they took the last time.
@@ -42,6 +42,7 @@ from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.scripts.findings import find_instability
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
+from coursebuild.pipeline.fix import may_edit
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.recordings import read_recorded
 from coursebuild.preview.session import Session
@@ -61,15 +62,15 @@ class Offer(Struct, frozen=True):
     path: str
     old: bytes | None
     new: bytes
-    edit: Edit | None = None
-    """That of a lesson, which may be made together with others."""
+    edits: tuple[Edit, ...] = ()
+    """Those of a text, which may be made together with others."""
 
     @classmethod
-    def of(cls, edit: Edit) -> Offer:
-        """The offer of an edit of a lesson."""
-        source = edit.span.source
-        new = apply_edits(source.text, [edit])
-        return cls(source.path, source.text.encode(), new.encode(), edit)
+    def of(cls, *edits: Edit) -> Offer:
+        """The offer of edits of one text."""
+        source = edits[0].span.source
+        new = apply_edits(source.text, edits)
+        return cls(source.path, source.text.encode(), new.encode(), edits)
 
     @property
     def id(self) -> str:
@@ -101,20 +102,20 @@ def accept(session: Session, path: str, ids: str) -> str:
     """
     with session.condition:
         news = _collect_news(session, path)
-        parts = (*news["outputs"], *news["figures"], *news["numbers"])
+        parts = (*news["outputs"], *news["figures"], *news["numbers"], *news["problems"])
         offers = {part["offer"].id: part["offer"] for part in parts if part.get("offer")}
         accepted_offers = [offers[id] for id in ids.split() if id in offers]
         if not accepted_offers or len(accepted_offers) < len(ids.split()):
             return "this is no longer what the page offers; look at it again"
         edits: dict[Source, list[Edit]] = {}
         for offer in accepted_offers:
-            if offer.edit is not None:
-                edits.setdefault(offer.edit.span.source, []).append(offer.edit)
+            for edit in offer.edits:
+                edits.setdefault(edit.span.source, []).append(edit)
         changes = [
             (source.path, source.text.encode(), apply_edits(source.text, edits_there).encode())
             for source, edits_there in edits.items()
         ]
-        changes += [(o.path, o.old, o.new) for o in accepted_offers if o.edit is None]
+        changes += [(o.path, o.old, o.new) for o in accepted_offers if not o.edits]
         try:
             for file, old, new in changes:
                 write_atomic(session.root, file, new, expected=old)
@@ -134,7 +135,12 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
     diagnostics = sorted(report.diagnostics, key=rank)[:_MAX_DIAGNOSTICS]
     news: dict[str, Any] = {
         "problems": [
-            {**_describe_mistake(d, document_path), "blocks": d in blocking} for d in diagnostics
+            {
+                **_describe_mistake(d, document_path),
+                **_offer_fix(session, d),
+                "blocks": d in blocking,
+            }
+            for d in diagnostics
         ],
         "more": max(0, len(report.diagnostics) - _MAX_DIAGNOSTICS),
         "kept": session.files.is_outdated(path),
@@ -184,6 +190,17 @@ def _describe_mistake(diagnostic: Diagnostic, document_path: str) -> dict[str, A
         "end": max(end, span.column - 1),
         "inPlace": span.path == document_path and diagnostic.rule in _IN_PLACE,
     }
+
+
+def _offer_fix(session: Session, diagnostic: Diagnostic) -> dict[str, Any]:
+    """Describe the fix of a mistake: the first line that it writes, and the offer."""
+    sources = {edit.span.source for edit in diagnostic.edits}
+    if len(sources) != 1 or not may_edit(session.root, diagnostic.edits[0].span.path):
+        return {}
+    first = min(diagnostic.edits, key=lambda edit: edit.span.start)
+    offer = Offer.of(*diagnostic.edits)
+    line = Source(offer.path, offer.new.decode()).line_text(first.span.line)
+    return {"offer": offer, "fixed": line}
 
 
 # --- scripts and outputs

@@ -150,18 +150,43 @@ def _result(d: Diagnostic, rule: int) -> dict[str, Any]:
         for note in d.notes
         if note.span is not None
     ]
-    return result | ({"relatedLocations": related_locations} if related_locations else {})
+    if related_locations:
+        result["relatedLocations"] = related_locations
+    if d.edits:
+        changes: dict[str, list[dict[str, Any]]] = {}
+        for edit in d.edits:
+            replacement = {
+                "deletedRegion": _region(edit.span),
+                "insertedContent": {"text": edit.text},
+            }
+            changes.setdefault(edit.span.path, []).append(replacement)
+        fix = {
+            "description": {"text": d.help or f"write `{d.edits[0].text}`"},
+            "artifactChanges": [
+                {"artifactLocation": _artifact(path), "replacements": replacements}
+                for path, replacements in changes.items()
+            ],
+            "properties": {"safe": d.safe},
+        }
+        result["fixes"] = [fix]
+    return result
 
 
 def _location(span: Span) -> dict[str, Any]:
-    region = {
+    return {"physicalLocation": {"artifactLocation": _artifact(span.path), "region": _region(span)}}
+
+
+def _artifact(path: str) -> dict[str, str]:
+    return {"uri": path, "uriBaseId": "ROOT"}
+
+
+def _region(span: Span) -> dict[str, int]:
+    return {
         "startLine": span.line,
         "startColumn": span.column,
         "endLine": span.end_line,
         "endColumn": span.end_column,
     }
-    file = {"uri": span.path, "uriBaseId": "ROOT"}
-    return {"physicalLocation": {"artifactLocation": file, "region": region}}
 
 
 def _message(d: Diagnostic) -> str:

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from coursebuild import MANUAL
 from coursebuild.core.model.results import TrialLine
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.report import (
     FORMATS,
@@ -197,7 +197,7 @@ ERROR = diagnose(
     SOURCE.span(6, 11),
     "it is 100% wrong",
     label="here",
-    help="mend it",
+    help=Fix("mend it", "right", "wr", safe=True),
     notes=[Note("see", SOURCE.span(0, 5)), Note("and")],
 )
 WARNING = diagnose("image-alt", SOURCE.span(0, 5), "no text")

@@ -26,11 +26,14 @@ from coursebuild.core.model import (
 from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
+    Edit,
+    Fix,
     Note,
     Parsed,
     diagnose,
     did_you_mean,
     misspelt,
+    propose,
 )
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import check_unit
@@ -76,7 +79,9 @@ def read_pairs(
             return diagnose(rule, rest.span(), message, help=help)
         key, span = pair[1], braces.span(*pair.span(1))
         if key not in keys:
-            suggestion = did_you_mean(key, keys) if len(keys) > 1 else ""
+            suggestion = did_you_mean(key, keys)
+            if len(keys) == 1:
+                suggestion = Fix(help, keys[0] if misspelt(key, keys) else None, key, safe=True)
             return diagnose(rule, span, f"`{key}` is not a known key here", help=suggestion or help)
         if key in values:
             return diagnose(rule, span, f"`{key}` is given twice", help=help)
@@ -180,13 +185,15 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
         return Parsed(Attributes(content))
     title, braces = trim(content.slice(0, match.start())), trim(content.slice(match.start()))
     if not match[1]:
-        return _reject(title, braces, "the attributes of this heading are never closed")
+        fix = Fix(_HELP, braces.text + "}", safe=True)
+        return _reject(title, braces, "the attributes of this heading are never closed", fix)
     name, classes, inner = None, list[str](), braces.slice(1, len(braces.text) - 1)
     for word in (inner.slice(*match.span()) for match in _WORD.finditer(inner.text)):
         if _WHOLE_ID.fullmatch(word.text) and name is None:
             name = word
         elif misspelt(word.text, [".further"]):
-            return _reject(title, word, f"no class `{word.text}`", "did you mean `.further`?")
+            fix = propose(word.text, ".further")
+            return _reject(title, word, f"no class `{word.text}`", fix)
         elif _CLASS.fullmatch(word.text):
             classes.append(word.text[1:])
         elif word.text.startswith("#") and name is not None:
@@ -284,16 +291,29 @@ def check_heading(
         diagnostics.append(diagnose("front-matter", span.first_line(), message, help=help))
     if lesson and level == 1:
         help = "the title comes from the course map; begin with `## `"
+        help = Fix(help, edits=_deepen(span, 1))
         if span.text.rstrip().endswith("\n======="):
             help = "a merge conflict may have left the line of `=` behind: delete it"
         message = "a lesson has no heading of level 1"
         diagnostics.append(diagnose("heading-top", span, message, help=help))
     elif level == 1 and previous is not None and previous > 1:
-        message, help = "a heading of level 1 stands below others", "begin it with `## `"
+        message = "a heading of level 1 stands below others"
+        help = Fix("begin it with `## `", edits=_deepen(span, 1), safe=True)
         diagnostics.append(diagnose("heading-top", span, message, help=help))
     if previous is not None and level > previous + 1:
         message = f"a heading of level {level} follows one of level {previous}"
         if lesson and previous == 1:
             message = f"a heading of level {level} comes before any of level 2"
-        diagnostics.append(diagnose("heading-skip", span, message))
+        help = f"begin it with `{'#' * (previous + 1)} `"
+        fix = Fix(help, edits=_deepen(span, previous + 1 - level))
+        diagnostics.append(diagnose("heading-skip", span, message, help=fix))
     return diagnostics
+
+
+def _deepen(heading: Span, levels: int) -> tuple[Edit, ...]:
+    """The edit that gives a heading so many more levels, if it begins with `#`."""
+    marks = re.match("#+", heading.text)
+    if marks is None:
+        return ()
+    place = heading.source.span(heading.start, heading.start + marks.end())
+    return (Edit(place, "#" * (marks.end() + levels)),)

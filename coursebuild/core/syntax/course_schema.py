@@ -29,7 +29,7 @@ from coursebuild.core.model import Filter, LessonTable, Limits, Pace, Silence
 from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
 from coursebuild.core.model.fields import NotNegative, Slug, Text, matching
 from coursebuild.core.syntax.nodes import ObjectNode, format_name
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 
 
 def _file_field(noun: str, endings: str, example: str) -> Meta:
@@ -106,7 +106,8 @@ def check_contrast(node: ObjectNode, theme: Theme) -> Iterator[Diagnostic]:
             message = f"on {scheme} pages `{colour}` has a contrast of {ratio:.2f} : 1"
             nearest = legible(colour, grounds)
             help = f"text needs {REQUIRED_CONTRAST} : 1; `{nearest}` is the nearest that reaches it"
-            yield diagnose("theme-contrast", node.place(name), message, help=help)
+            fix = Fix(help, nearest, colour)
+            yield diagnose("theme-contrast", node.place(name), message, help=fix)
 
 
 def _theme_files(node: ObjectNode, name: str, paths: tuple[str, ...]) -> tuple[ThemeFile, ...]:

@@ -46,7 +46,15 @@ from coursebuild.core.syntax.recording import ILLUSTRATION
 from coursebuild.core.syntax.spans import read_markdown
 from coursebuild.core.syntax.tree import TextReader
 from coursebuild.core.text.conflicts import find_conflict
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, sort_diagnostics
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Edit,
+    Fix,
+    Note,
+    Parsed,
+    diagnose,
+    sort_diagnostics,
+)
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 _YAML = re.compile(
@@ -85,7 +93,10 @@ def parse_document(
     if len({stands_before for stands_before, _ in state.stars}) == 1:  # else it is a footnote
         state.diagnostics += (diagnostic for _, diagnostic in state.stars)
     if (at := source.text.find("\0")) >= 0:
-        message, help = "the text contains a NUL character", "delete it; readers would see `\ufffd`"
+        message = "the text contains a NUL character"
+        places = [match.start() for match in re.finditer("\0", source.text)]
+        edits = tuple(Edit(source.span(place, place + 1), "") for place in places)
+        help = Fix("delete it; readers would see `\ufffd`", edits=edits, safe=True)
         state.report(diagnose("control-character", source.span(at, at + 1), message, help=help))
     return Parsed(document, sort_diagnostics(state.diagnostics))
 
@@ -97,7 +108,8 @@ def _remove_front_matter(text: Excerpt, state: ParsingState) -> Excerpt:
     subject = "lesson" if state.lesson else "page"
     message = f"a {subject} has no front matter"
     help = "its title and everything else about it are in content/course.toml; begin with the text"
-    state.report(diagnose("front-matter", text.span(0, 3), message, help=help))
+    fix = Fix(help, edits=(Edit(text.span(0, match.end()), ""),))
+    state.report(diagnose("front-matter", text.span(0, 3), message, help=fix))
     return text.slice(match.end())
 
 

@@ -65,7 +65,7 @@ from coursebuild.core.syntax.unread_markup import (
     find_repetitions,
     find_stars,
 )
-from coursebuild.core.text.diagnostics import diagnose
+from coursebuild.core.text.diagnostics import Fix, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 MAX_DEPTH = 60
@@ -135,7 +135,7 @@ class _TokenReader:
                 if token.markup[:1] == "\\" and text in tuple(",;/?@"):
                     place = self.content.span(token.start, token.end)
                     message = f"the backslash before `{text}` is not shown and does nothing"
-                    help = "take it away; write two for one that readers should see"
+                    help = Fix("take it away; write two for one that readers should see", text)
                     self.report(diagnose("markup-unread", place, message, help=help))
                 if text:
                     literal = kind == "text" or text == token.markup

@@ -1,8 +1,9 @@
 """The kinds of markup that readers would see as it is written.
 
 Entry points: `BROKEN`, markup of ours that is not whole; `FOREIGN`, that of other tools; `IN_HTML`,
-what is unread between tags; `ONCE`. Patterns are searched for in a text in which NUL stands for all
-that was read, so that a mark directly after a NUL stands directly after a link, code and so on.
+what is unread between tags; `ONCE`; `REWRITES`, what to write instead; `LANGUAGES` and
+`PLAIN_TEXTS`, of blocks. Patterns are searched for in a text in which NUL stands for all that was
+read, so that a mark directly after a NUL stands directly after a link, code and so on.
 """
 
 from __future__ import annotations
@@ -285,5 +286,37 @@ IN_HTML = {
     **FOREIGN,
 }
 """What is unread between the tags of HTML, where nothing but formulas is read."""
+REWRITES: dict[str, tuple[tuple[str, str, bool], ...]] = {
+    "contents": ((r"\[TOC\]", "", True),),
+    "entity": ((r"(&\w+)", r"\1;", True),),
+    "heading": ((r"(#{2,6})(?=[^\s#])", r"\1 ", True),),
+    "highlight": ((r"==(.+)==", r"**\1**", False),),
+    "item": ((r"(-|\d{1,2}[.)])(?=\S)", r"\1 ", True),),
+    "latex": (
+        (r"\\\(\s*(.+?)\s*\\\)", r"$\1$", True),
+        (r"\\\[\s*(.+?)\s*\\\]", r"$$\1$$", True),
+        (r"\$`(.+)`\$", r"$\1$", True),
+    ),
+    "link": ((r"(!?\[[^\[\]]*\])[ \t]+(\([^()\s]+\))", r"\1\2", True),),
+    "mention": ((r"Lesson (\d+)[,;:/](\d+)", r"Lesson \1.\2", False),),
+    "script": (
+        (r"~(.+)~", r"<sub>\1</sub>", False),
+        (r"\^(.+)\^", r"<sup>\1</sup>", False),
+    ),
+    "task": ((r"([-*+])\[ ?\]", r"\1 [ ]", True), (r"([-*+])\[([xX])\]", r"\1 [\2]", True)),
+    "binding": (
+        (r"((?:out|given)\b[^{}]*\})", r"{\1", True),
+        (r"([-+\u2212]?\d[\w.,]*)(\{(?:out|given)\b[^{}]*\})", r"`\1`\2", True),
+    ),
+    "wiki": ((r"\[\[(\d+(?:\.\d+)+)(?:-[\w-]*)?\]\]", r"Lesson \1", False),),
+}
+"""What to write instead of markup, in words of `re.sub`, and whether that is surely meant."""
 ONCE = frozenset("link bracket table fence code emphasis character markdown".split())
 """One mistake often leaves several of these marks in a text; the first is reported."""
+LANGUAGES = tuple(
+    "bash console cpp css diff html ini javascript json julia markdown matlab python rust sh text "
+    "toml xml yaml".split()
+)
+"""Languages that texts often show."""
+PLAIN_TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
+"""Names of ordinary code and text that no highlighter knows."""

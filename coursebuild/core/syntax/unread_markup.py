@@ -17,17 +17,35 @@ import re
 from collections.abc import Iterator, Sequence
 
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
+from coursebuild.core.syntax.containers import quote_admonition
 from coursebuild.core.syntax.fence import (
     INDENTED_FENCE,
     Fence,
     check_foreign_key,
     kind_of,
+    outdent,
     split_words,
 )
-from coursebuild.core.syntax.markup_kinds import BROKEN, FOREIGN, IN_HTML, ONCE, MarkupKind
+from coursebuild.core.syntax.markup_kinds import (
+    BROKEN,
+    FOREIGN,
+    IN_HTML,
+    LANGUAGES,
+    ONCE,
+    PLAIN_TEXTS,
+    REWRITES,
+    MarkupKind,
+)
 from coursebuild.core.syntax.nodes import shorten
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, misspelt, nearest
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Fix,
+    diagnose,
+    misspelt,
+    nearest,
+    propose,
+)
 from coursebuild.core.text.source import Excerpt, Span
 
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
@@ -186,6 +204,7 @@ def _diagnose(
         case "callout":
             word = re.sub(r"[^\w-]", "", markup).lower()
             help = help.replace("note", word or "note")
+            help = Fix(help, edits=quote_admonition(span, word), safe=True)
         case "character" if span.text == "\0":
             return None  # it is reported wherever it stands
         case "character":
@@ -201,6 +220,10 @@ def _diagnose(
             pass
     message = f"`{shorten(markup)}` would be shown as written: {kind.reason}"
     rule = "markup-foreign" if name in FOREIGN else kind.rule
+    for pattern, replacement, is_safe in REWRITES.get(name, ()):
+        rewritable = re.compile(pattern).match(whole, at)
+        if rewritable is not None and rewritable[0] == span.text == markup and "\n" not in markup:
+            help = Fix(help, rewritable.expand(replacement), safe=is_safe)
     return diagnose(rule, span, message, help=help)
 
 
@@ -224,10 +247,13 @@ def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:
         message = f"`{shorten(markup)}` does not say where the number is from"
         likely = nearest(key.lower(), ("out", "given", "code"))
         help = 'write `{out}`, `{out=examples/x.py}`, `{given}` or `{given="its source"}`'
-        help = help + escaping if likely in (None, key) else f"did you mean `{likely}`?"
-        return diagnose("binding-attribute", span, message, help=help)
+        if likely in (None, key):
+            return diagnose("binding-attribute", span, message, help=help + escaping)
+        fix = propose(key, likely, ("out", "given", "code"))
+        return diagnose("binding-attribute", span, message, help=fix)
     if before == "$":
         help = 'write `{symbol="what it stands for" unit="m/s"}`' + escaping
+        help = Fix(help, "symbol" if misspelt(key, ["symbol"]) else None, key, safe=True)
         message = f"`{shorten(markup)}` says nothing about the formula before it"
         return diagnose("symbol-attribute", span, message, help=help)
     if before not in ("]", ")"):
@@ -235,7 +261,9 @@ def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:
     message = f"`{shorten(markup)}` would be shown as written: "
     if before == "]":
         message += "the only attribute of words in brackets is `{term}`"
-        return diagnose("term-attribute", span, message, help="write `[word]{term}`" + escaping)
+        new = "term" if misspelt(key, ["term"]) else None
+        fix = Fix("write `[word]{term}`" + escaping, new, key, safe=True)
+        return diagnose("term-attribute", span, message, help=fix)
     message += "links and images have no attributes"
     help = "write HTML, `<a …>` or `<img …>`, where one needs a class or a size" + escaping
     return diagnose("markup-foreign", span, message, help=help)
@@ -272,7 +300,7 @@ def find_repetitions(content: Excerpt) -> Iterator[Diagnostic]:
         if is_begun and line[0].startswith(half, at) and line[0].count(half.rstrip()) == 2:
             span = content.span(line.start() + at, line.start() + at + len(half))
             message = f"`{shorten(half)}` stands here twice"
-            yield diagnose("text-repeated", span, message, help="delete it once")
+            yield diagnose("text-repeated", span, message, help=Fix("delete it once", ""))
 
 
 def check_inline_code(content: Excerpt, start: int, end: int, code: str) -> Iterator[Diagnostic]:
@@ -315,14 +343,6 @@ def _mask(text: str) -> str:
 
 # --- fences
 
-_LANGUAGES = tuple(
-    "bash console cpp css diff html ini javascript json julia markdown matlab python rust sh text "
-    "toml xml yaml".split()
-)
-"""Languages that texts often show."""
-_PLAIN_TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
-"""Names of ordinary code and text that no highlighter knows."""
-
 _FOREIGN_KINDS = {"math": "a formula on a line of its own stands between two `$$`"}
 """Kinds of blocks that other tools read, with what to write here."""
 
@@ -344,7 +364,7 @@ def check_indented_fence(code: Excerpt, state: ParsingState) -> None:
     if is_closed and not is_known_kind(opening[2]):
         return
     message = "this fence is indented by a tab or four blanks, so its block is shown as text"
-    help = "take the white space before it away"
+    help = Fix("take the white space before it away", edits=outdent(code), safe=True)
     place = code.span(opening.start(1), opening.end())
     state.report(diagnose("fence-indented", place, message, help=help))
     state.closes_indented = not is_closed
@@ -362,7 +382,9 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     yield from (diagnostic for word in words if (diagnostic := check_foreign_key(kind.text, word)))
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown but never run, and this one has a `file`"
-        help = "a script is a block of kind `python`"
+        help: str = "a script is a block of kind `python`"
+        if re.fullmatch("i?py(?:thon)?3?", name):
+            help = Fix(help, "python", safe=True)
         yield diagnose("script-kind", kind.span(), message, help=help)
     elif name in _FOREIGN_KINDS or name.startswith("{"):
         message = f"a block of kind `{kind.text}` is shown as code here"
@@ -370,10 +392,12 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     elif "=" in name:
         message = f"the kind of this block is missing before `{kind.text}`"
         help = "the first word says what a block is, as in ```` ```python file=examples/a.py ````"
+        is_script = name.startswith("file=") and name.endswith(".py")
+        help = Fix(help, f"python {kind.text}" if is_script else None, safe=True)
         yield diagnose("fence-info", kind.span(), message, help=help)
     elif (likely := _find_misspelt(name, kinds)) is not None:
         message = f"`{kind.text}` is not a known kind of block"
-        help = f"did you mean `{likely}`?"
+        help = propose(kind.text, likely, kinds)
         yield diagnose("fence-kind-near", kind.span(), message, help=help)
     elif not package and (diagnostic := _check_unread_json(fence)) is not None:
         yield diagnostic
@@ -386,9 +410,9 @@ def _help_with_foreign(name: str) -> str:
         return _FOREIGN_KINDS[name]
     if is_known_kind(language):
         example = " file=examples/….py" if language == "python" else ""
-        return f"write ```` ```{language}{example} ````"
+        return Fix(f"write ```` ```{language}{example} ````", language)
     if language and _is_language(language):
-        return f"code to be shown is of kind `{language}`; scripts are in Python"
+        return Fix(f"code to be shown is of kind `{language}`; scripts are in Python", language)
     return "a callout is a quotation: `> [!note]`, and `> ` before each line"
 
 
@@ -398,7 +422,7 @@ def _find_misspelt(name: str, kinds: Sequence[str]) -> str | None:
         return "lab simlab"
     if name in kinds:
         return name
-    likely = misspelt(name, kinds) or misspelt(name, _LANGUAGES)
+    likely = misspelt(name, kinds) or misspelt(name, LANGUAGES)
     return None if likely is None or _is_language(name) else likely
 
 
@@ -422,4 +446,4 @@ def _is_language(name: str) -> bool:
     try:
         return find_lexer_class_by_name(name) is not None
     except ClassNotFound:
-        return name.lower() in _PLAIN_TEXTS
+        return name.lower() in PLAIN_TEXTS

@@ -23,6 +23,8 @@ class Rule(Struct, frozen=True):
     severity: Severity
     summary: str
     """Its meaning in one sentence, for the catalogue's page."""
+    no_fix: str = ""
+    """Why no diagnostic of it has an edit, in one sentence; empty where one may have."""
 
 
 def rule_address(name: str) -> str:
@@ -252,7 +254,45 @@ _WARNINGS = frozenset(
     """.split()
 )
 
+_MEANING = "Only its author knows what was meant."
+_NO_FIX = {
+    _MEANING: """
+    binding-volatile bench-text draft-empty fence-unread field-missing field-repeated figure-unshown
+    footnote-repeated footnote-unused heading-empty html-unbalanced image-alt io-order io-repeated
+    io-stray lesson-planned-file math-brackets math-unclosed math-unread merge-conflict nesting-deep
+    prerequisite-cycle quiz-answer quiz-gate recording-body recording-orphan symbol-formula
+    symbol-repeated table-cells term-place
+    """,
+    "Links may lead to either of the two, so its author chooses the new name.": """
+    anchor-repeated id-repeated question-id-repeated quiz-id-repeated script-repeated term-repeated
+    """,
+    "Numbers of lessons are no words, of which one could be misspelt.": "prerequisite-unknown",
+    "A file has to be written, moved, renamed or saved anew; an edit changes texts only.": """
+    feature-broken file-encoding file-unlisted file-unreadable image-forbidden image-remote
+    figure-unreadable lesson-missing lesson-unlisted link-broken map-missing no-lessons page-missing
+    page-unlisted template-broken template-outdated template-unknown text-long theme-file
+    """,
+    "What a script prints becomes part of a text by `coursebuild update`, once somebody has seen "
+    "it.": "example-edited figure-drift output-drift output-not-updatable recorded-run",
+    "What the code of the course does has to change.": """
+    figure-missing figure-window lab-diverged lab-endless lab-expect lab-far lab-goal lab-parity
+    lab-penetration lab-reset lab-shared lab-timeout lab-value lab-warning mjcf-compiles mjcf-error
+    mjcf-message model-timeout output-noise script-connects script-diverged
+    script-encoding script-killed script-output-limit script-penetration script-silent
+    script-timeout script-unrepeatable script-writes
+    """,
+    "Something has to be installed or run.": """
+    bench-unrecorded engine-version feature-missing lab-engine no-scripts output-unrepeated
+    report-stale script-python script-unproven
+    """,
+    "What a page must not have is left out by its author, or allowed in the map.": """
+    html-forbidden package-reduced
+    """,
+}
+"""Why rules have no edits: a reason, and the names of the rules."""
+_REASONS = {name: reason for reason, names in _NO_FIX.items() for name in names.split()}
+
 RULES: dict[str, Rule] = {
-    name: Rule(name, "warning" if name in _WARNINGS else "error", summary)
+    name: Rule(name, "warning" if name in _WARNINGS else "error", summary, _REASONS.get(name, ""))
     for name, summary in _SUMMARIES.items()
 }

@@ -17,7 +17,16 @@ from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownW
 from coursebuild.core.model import FeatureBlock, Inline
 from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.syntax.spans import trim
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, nearest
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Edit,
+    Fix,
+    Note,
+    Parsed,
+    diagnose,
+    nearest,
+    propose,
+)
 from coursebuild.core.text.source import Excerpt, Span
 
 LABELS = ("INPUT", "PROCESS", "OUTPUT")
@@ -109,14 +118,17 @@ def _diagnose_missing(
     """Say that a part is missing or empty, and point at lines whose label looks misspelt."""
     if label in parts:
         return diagnose("io-missing", parts[label].span, f"nothing follows `{label}:`")
-    notes = []
+    notes, fix = [], Fix("")
     for line in (line for part in all_parts for line in part.lines):
         word = _LIKE_LABEL.match(line.text)
         if word is not None and nearest(word[1].upper(), LABELS, cutoff=0.75) == label:
             span = line.span(word.start(1), word.end())
             notes.append(Note(f"`{word[1]}:` is read as text", span))
+            place = line.span(*word.span(1))
+            is_safe = propose(word[1].upper(), label, LABELS).safe or word[1].upper() == label
+            fix = Fix(f"write `{label}:`", edits=(Edit(place, label),), safe=is_safe)
     message = f"the io block has no line `{label}:`"
-    return diagnose("io-missing", fence.head, message, notes=notes)
+    return diagnose("io-missing", fence.head, message, help=fix, notes=notes)
 
 
 def _join_lines(lines: list[Excerpt]) -> Excerpt | None:

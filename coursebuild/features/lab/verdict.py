@@ -17,7 +17,7 @@ from tree_sitter import Node
 
 from coursebuild.core.checks.compiled import line_span
 from coursebuild.core.run.mjcf import error_line, readable_error
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.lab.compile import LabCode, pieces
 from coursebuild.features.lab.javascript import dotted_names, parse, text_of, walk
@@ -168,7 +168,8 @@ def _check_depth_claim(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     if lab.verify.deep and not any(failure.kind == "deep" for failure in trial.failures):
         message = "the lab says `deep`, but no bodies lay deep in each other"
         span = lab.place(("verify", "deep"))
-        yield diagnose("lab-shallow", span, message, help="take `deep` away")
+        fix = Fix("take `deep` away", "false", "true", safe=True)
+        yield diagnose("lab-shallow", span, message, help=fix)
 
 
 _SMALL = 0.1
@@ -177,10 +178,12 @@ _SMALL = 0.1
 def _make_diagnostic(lab: Lab, failure: TrialFailure) -> Diagnostic:
     kind: str = failure.kind
     message = (failure.message or "something that has no text").rstrip(".")
-    span, special_help = lab.place(failure.entry), None
+    special_help: str | None = None
+    span = lab.place(failure.entry)
     match kind:
         case "throws" if function := _OF_MATH.search(message):
-            special_help = f"did you mean `Math.{function[1].replace('pi', 'PI')}`?"
+            name = f"Math.{function[1].replace('pi', 'PI')}"
+            special_help = Fix(f"did you mean `{name}`?", name, function[1], safe=True)
         case "nan" if failure.entry[0] == "expect":
             special_help = ""
         case "expect" if (expr := lab.fields.expect[int(failure.entry[1])].expr) is not None:

@@ -21,7 +21,7 @@ from coursebuild.core.model import Course, Document, document_scripts
 from coursebuild.core.model.addresses import line_anchor
 from coursebuild.core.syntax.course_schema import CourseFile
 from coursebuild.core.syntax.html import ELEMENTS
-from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest
+from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest, propose
 from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, DocumentNames
 from coursebuild.features.names.engine import (
     EngineName,
@@ -68,9 +68,9 @@ def resolver_of(course: Course) -> Resolver:
 
 def _propose(name: str, names: Iterable[str]) -> str:
     """Propose the nearest name, if one is near; only those of about its length are compared."""
-    similar = (candidate for candidate in names if abs(len(candidate) - len(name)) <= 2)
+    similar = {candidate for candidate in names if abs(len(candidate) - len(name)) <= 2}
     likely = nearest(name, similar, cutoff=0.8)
-    return f"did you mean `{likely}`?" if likely else ""
+    return propose(name, likely, similar) if likely else ""
 
 
 class Resolver:
@@ -216,7 +216,7 @@ class Resolver:
         if (likely := min(near, default=None)) is None:
             return None
         message = f"nothing that the course knows is called `{name}`"
-        return Unknown(message, f"did you mean `{likely}`?", name)
+        return Unknown(message, propose(name, likely, near), name)
 
     def _path(self, path: str, names: CodeNames) -> Answer:
         parts = [re.sub(r"[()\[\]]+", "", part) for part in path.split(".")]
@@ -244,7 +244,7 @@ class Resolver:
             self._path(path.replace(root, likely, 1), names), KnownName
         ):
             message = f"nothing that the course knows is called `{root}`"
-            return Unknown(message, f"did you mean `{likely}`?", root)
+            return Unknown(message, propose(root, likely), root)
         return None
 
     def _class_of(self, root: str, names: CodeNames) -> str:
@@ -335,7 +335,7 @@ class Resolver:
         if name in self.words or likely is None or name in known_keys():
             return None
         message = f"no element of MuJoCo {engine.version} has an attribute `{name}`"
-        return Unknown(message, f"did you mean `{likely}`?", name)
+        return Unknown(message, propose(name, likely, engine.attributes), name)
 
     # --- coursebuild and the course
 
@@ -365,7 +365,7 @@ class Resolver:
             if likely is None:
                 return None
             return Unknown(
-                f"the course map has no table `{name}`", f"did you mean `{likely}`?", name
+                f"the course map has no table `{name}`", propose(name, likely, tables), name
             )
         if key and tables[name] and key not in tables[name]:
             help = did_you_mean(key, tables[name])

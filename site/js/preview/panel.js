@@ -128,7 +128,7 @@ export class Panel {
     return parts
   }
 
-  makeProblem({ severity, rule, place, message, label, help, notes, line, start, end, blocks }) {
+  makeProblem({ severity, rule, place, message, label, help, notes, line, start, end, blocks, offer, fixed }) {
     const item = h('li', { class: `preview-problem preview-${severity}` })
     const kind = this.say(blocks ? 'blocks' : severity)
     item.append(
@@ -142,7 +142,23 @@ export class Panel {
     if (label) item.append(h('p', { class: 'preview-label', ...OF_THE_TOOL }, ...formatCode(label)))
     for (const note of notes) item.append(h('pre', { class: 'preview-note', ...OF_THE_TOOL }, note))
     if (help) item.append(h('p', { class: 'preview-help', ...OF_THE_TOOL }, ...formatCode(help)))
+    if (offer) item.append(...this.makeFix(offer, fixed))
     return item
+  }
+
+  /** The line as a fix writes it, and the button that does. */
+  makeFix(offer, line) {
+    const answer = h('span', { class: 'preview-why', role: 'status' })
+    const button = h('button', { type: 'button', class: 'preview-accept' }, this.say('fix'))
+    button.addEventListener('click', async () => {
+      button.disabled = true
+      const refusal = await this.accept(offer)
+      if (!refusal) return
+      answer.textContent = this.say('not_written', { reason: refusal })
+      button.disabled = false
+    })
+    const written = h('pre', { class: 'preview-source', tabindex: '0', dir: 'ltr' }, h('ins', {}, line))
+    return line.trim() ? [written, h('p', {}, button, ' ', answer)] : [h('p', {}, button, ' ', answer)]
   }
 
   makePlace(text, rule) {

@@ -3,16 +3,19 @@
 A case holds a smallest course that breaks the rule (see `support.rule_cases`) and all diagnostics
 that the tool then prints. `[update]`, `[build]` or `[check --no-cache]` in a title says which
 command finds the mistake, where it is not `check`. `[after 1 s]` gives labs less time, for mistakes
-that no course can make happen soon enough.
+that no course can make happen soon enough. `[then RULE]` names what comes to light once a mistake
+is mended. What `--fix` writes stands below.
 `pytest tests/core/text --rewrite-fixtures` writes the expected parts and
 `docs/reference/rules.md` anew.
 """
 
 from __future__ import annotations
 
+import difflib
 import re
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +24,17 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.registry import installed_features
-from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.scripts.edit import apply_edits
+from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.rules import RULES, Rule
+from coursebuild.core.text.source import Source
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.pipeline.check import check
+from coursebuild.pipeline.fix import choose_fixes
 from coursebuild.pipeline.outputs import update
 from coursebuild.pipeline.publication import build, export
 from coursebuild.report import Style, diagnostic_text
+from coursebuild.report.text import visible
 from support.fixture_cases import Case, read_cases, rewrite
 from support.rule_cases import Layout, Workshop, parts
 
@@ -79,6 +86,10 @@ reason = "the levels are those of the book"
 path = "content/lessons/4.*"   # optional
 ```
 
+Where it is known what to write, a diagnostic has an edit. `coursebuild check --fix` makes those
+that can only have been meant, `--fix --unsafe` also the likely ones, and `coursebuild undo` takes
+them back. The rule of a mistake that nothing mends by itself says why.
+
 {_contents("error")}
 
 {_contents("warning")}
@@ -94,13 +105,22 @@ def _contents(severity: str) -> str:
 
 def _entry(rule: Rule, example: Example | None) -> str:
     parts = [f"\n## {rule.name}\n\n{rule.severity.capitalize()}. {rule.summary}\n"]
+    if rule.no_fix:
+        parts.append(f"\nNothing mends it by itself. {rule.no_fix}\n")
     if example is None:
         return parts[0]
     for file in example.files:
         parts.append(f"\n`{file.path}`{file.remark}\n")
         if file.text:
             parts.append(f"\n{_fence(_LANGUAGES.get(file.path.rpartition('.')[2], ''), file.text)}")
-    parts.append(f"\n`coursebuild {example.command}` says:\n\n{_fence('', example.output)}")
+    output, *writings = re.split(r"\n\n(?=--fix)", example.output)
+    parts.append(f"\n`coursebuild {example.command}` says:\n\n{_fence('', output)}")
+    for writing in writings:
+        head, diff = writing.split("\n", 1)
+        option, _, path = head.partition(" writes ")
+        parts.append(
+            f"\n`coursebuild check {option}` writes in `{path}`:\n\n{_fence('diff', diff)}"
+        )
     return "".join(parts)
 
 
@@ -154,18 +174,57 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
 
 
 def print_diagnostics(case: Case, root: Path, workshop: Workshop) -> str:
-    """All that the tool prints of a case, without colours."""
+    """All that the tool prints of a case, without colours, and what its fixes write.
+
+    With them the mistakes are gone, and there is none of another rule.
+    """
     diagnostics = run_case(case, root, workshop)
+    fixes = choose_fixes(diagnostics, unsafe=True)
+    if fixes:
+        fixed_texts = {s.path: apply_edits(s.text, edits) for s, edits in by_source(fixes).items()}
+        after = run_case(case, root.with_name(f"{root.name}-fixed"), workshop, fixed_texts)
+        rules = {d.rule for d in diagnostics}
+        rules |= set(re.findall(r"\[then ([\w-]+)\]", case.title))
+        new = [diagnostic_text(d, Style()) for d in after if d.is_error and d.rule not in rules]
+        assert new == [], f"{case.title}:\n" + "\n\n".join(new)
+        left = Counter((d.rule, d.message) for d in after)
+        left.subtract((d.rule, d.message) for d in diagnostics)
+        assert all(left[fix.rule, fix.message] < 0 for fix in fixes), "a fix mends nothing"
     text = "\n\n".join(diagnostic_text(d, Style()) for d in diagnostics)
     assert str(root) not in text, "a message names a folder of this machine"
     # Which part of a line a traceback underlines is different in each version of Python.
     text = re.sub(r"^ +[~^][ ~^]*\n", "", text, flags=re.MULTILINE)
-    return without_page_lines(text) + "\n"
+    return without_page_lines(text) + "\n" + "".join(print_fixes(fixes))
 
 
-def run_case(case: Case, root: Path, workshop: Workshop) -> tuple[Diagnostic, ...]:
+def print_fixes(fixes: Sequence[Diagnostic]) -> Iterator[str]:
+    """The lines that `--fix` changes, and those that it changes only with `--unsafe`."""
+    for option, is_safe in (("--fix", True), ("--fix --unsafe", False)):
+        for source, edits in by_source(f for f in fixes if f.safe is is_safe).items():
+            lines, new_lines = (
+                source.text.splitlines(),
+                apply_edits(source.text, edits).splitlines(),
+            )
+            diff = list(difflib.unified_diff(lines, new_lines, n=0, lineterm=""))[2:]
+            changed = "".join(f"{visible(line)}\n" for line in diff if not line.startswith("@@"))
+            yield f"\n{option} writes {source.path}\n{changed}"
+
+
+def by_source(fixes: Iterable[Diagnostic]) -> dict[Source, list[Edit]]:
+    edits: dict[Source, list[Edit]] = {}
+    for edit in (edit for fix in fixes for edit in fix.edits):
+        edits.setdefault(edit.span.source, []).append(edit)
+    return edits
+
+
+def run_case(
+    case: Case, root: Path, workshop: Workshop, fixed_texts: Mapping[str, str] = {}
+) -> tuple[Diagnostic, ...]:
+    """The diagnostics of a case; with texts that fixes have made, of what comes of it."""
     layout = Layout.of(case.input)
     layout.write(root)
+    for path, text in fixed_texts.items():
+        (root / path).write_bytes(text.encode())
     options = workshop.options(root)
     if layout.later:
         check(options)
@@ -228,6 +287,15 @@ def test_what_the_author_sees(
 
 def test_every_rule_has_its_fixture_and_every_fixture_its_rule() -> None:
     assert set(FILES) == set(RULES)
+
+
+def test_a_rule_without_edits_says_why() -> None:
+    with_edits = {
+        name for name, cases in CASES.items() if any("\n--fix" in case.expected for case in cases)
+    }
+    without_edits = {name for name, rule in RULES.items() if rule.no_fix}
+    assert sorted(RULES.keys() - with_edits - without_edits) == [], "neither edit nor reason"
+    assert sorted(with_edits & without_edits) == [], "edit and reason"
 
 
 def test_each_case_of_a_fixture_shows_its_rule() -> None:

@@ -349,9 +349,24 @@ def test_a_proposal_of_a_diagnostic_is_a_quick_fix(editor: Editor) -> None:
     text = FALL.replace("at `1.000`{out} m", "at `1.200 m`{out}")
     editor.write(FIRST_LESSON, text)
     editor.until(FIRST_LESSON, "binding-mismatch")
-    (fix,) = editor.actions(FIRST_LESSON, "`1.2|00 m`").values()
+    fix, fix_all = editor.actions(FIRST_LESSON, "`1.2|00 m`").values()
     assert (fix.title, fix.kind) == ("Write `1.000 m`", types.CodeActionKind.QuickFix)
+    assert fix.is_preferred
     assert editor.apply_edits(fix.edit.changes)[FIRST_LESSON] == text.replace("1.200", "1.000")
+    assert fix_all.title == "Fix all in this file (1)"
+
+
+def test_all_mistakes_of_a_file_are_fixed_together(editor: Editor) -> None:
+    """On request, from anywhere in the file, and only what can be meant."""
+    text = FALL.replace("## ", "[a](lesson:fall) [b](term:zzzz)\n\n> [!nte] A\n>\n> B.\n\n## ", 1)
+    editor.write(FIRST_LESSON, text)
+    editor.until(FIRST_LESSON, "link-lesson", "link-term", "callout-unknown")
+    kind = types.CodeActionKind.SourceFixAll
+    (fix_all,) = editor.actions(FIRST_LESSON, "> |B.", only=[kind]).values()
+    assert (fix_all.title, fix_all.kind) == ("Fix all in this file (1)", kind)
+    new = editor.apply_edits(fix_all.edit.changes)[FIRST_LESSON]
+    assert new == text.replace("!nte", "!note")
+    assert not editor.actions(FIRST_LESSON, "> |B.", only=[types.CodeActionKind.Refactor])
 
 
 def test_renaming_a_lesson(editor: Editor) -> None:
