@@ -272,7 +272,7 @@ def test_fewer_iterations_that_err_less_are_luck() -> None:
 
 
 def test_verdicts_claim_only_what_holds() -> None:
-    rows = front(ladder(8e-3, 4e-3, 2e-3, 1e-3, own=3)[1:])
+    rows = front(ladder(8e-3, 4e-3, 2e-3, 1e-3, own_number=3)[1:])
     assert verdict(rows, [False] * 3).on_front
     small = (
         row("Euler", 0.002, cost=1.0, seen=1e-3, own=True),

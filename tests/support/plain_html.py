@@ -71,7 +71,7 @@ class PlainWriter(HtmlWriter):
         anchor = getattr(target, "anchor", None)
         return f"{SCHEMES[type(target)]}:{name}" + (f"#{anchor}" if anchor else "")
 
-    def figure(self, image: model.Image, caption: Markup) -> Markup:
+    def figure(self, block: model.Paragraph, image: model.Image, caption: Markup) -> Markup:
         return Markup(f"<p>{self.inlines((image,))}\n{caption}</p>\n")
 
     def code(self, language: str, text: str) -> Markup:

@@ -113,7 +113,7 @@ def _footnote_reference(state: StateInline, silent: bool) -> bool:
     return True
 
 
-_CITED = r"(?:[^\[\]{}@;\n]*\s)?@(?:[\w.:/+-]*\w)(?:[^\S\n]*,[^\[\]{};@]*)?\s*"
+_CITED = r"(?:[^\[\]{}@;]*\s)?@(?:[\w.:/+-]*\w)(?:[^\S\n]*,[^\[\]{};@]*)?\s*"
 _CITATION = re.compile(rf"\[({_CITED}(?:;{_CITED})*)\](?![\[({{:])")
 
 

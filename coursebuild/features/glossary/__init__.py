@@ -1,7 +1,7 @@
 """The terms of a course: how documents define each, and a page that lists all.
 
-1. `terms` finds the terms of a document, each with two sentences of its paragraph.
-2. `page` collects those of all documents.
+`terms` finds the terms of a document, each with two sentences of its paragraph, and collects those
+of all documents.
 """
 
 from coursebuild.core.features import Feature, PageKind

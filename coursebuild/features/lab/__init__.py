@@ -1,10 +1,9 @@
 """Labs: simulations that a learner plays with, tried when the course is verified.
 
-A `lab` fence holds JSON (`schema`). `parse` makes a `Lab` of it (`model`), `checks` compares it
-with the course and its models, `page` and `markdown` show it. `trial` runs it in the engine that
-browsers use and natively; `picture` draws what was recorded, and `export` writes the lab as a
-Python script. Labs of formulas and equations, which need no engine, are read and tried in
-`equations`.
+A `lab` fence holds JSON (`schema`). `parse` makes a `Lab` of it (`model`), `relations` compares
+it with the course and its models, `page` shows it. `trial` runs it in the engine that browsers use
+and natively; `picture` draws what was recorded, and `export` writes the lab as a Python script.
+Labs of formulas and equations, which need no engine, are read and tried in `equations`.
 """
 
 from __future__ import annotations

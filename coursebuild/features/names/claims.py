@@ -154,30 +154,30 @@ def _read_script(script: model.Script, names: CodeNames) -> None:
     members: dict[str, set[str]] = {}
     for node in python_nodes(script.code.text.rstrip("\n")):
         definition = ""
-        kind = type(node)
-        if kind is ast.Name:
-            definition = node.id if type(node.ctx) is ast.Store else ""
-        elif kind is ast.Attribute:
-            if type(node.value) is ast.Name:
+        if isinstance(node, ast.Name):
+            definition = node.id if isinstance(node.ctx, ast.Store) else ""
+        elif isinstance(node, ast.Attribute):
+            if isinstance(node.value, ast.Name):
                 members.setdefault(node.value.id, set()).add(node.attr)
-        elif kind is ast.arg:
+        elif isinstance(node, ast.arg):
             definition = node.arg
-        elif kind in (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef):
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             definition = node.name
-        elif kind is ast.Import:
+        elif isinstance(node, ast.Import):
             for alias in node.names:
                 name = alias.asname or alias.name.partition(".")[0]
                 names.imports[name] = alias.name if alias.asname else name
-        elif kind is ast.ImportFrom and node.module and not node.level:
-            for alias in node.names:
-                names.imports[alias.asname or alias.name] = f"{node.module}.{alias.name}"
-        elif kind is ast.Assign and type(node.value) is ast.Call:
-            target = node.targets[0]
-            class_name = _find_structure(node.value.func)
-            if class_name and type(target) is ast.Name and len(node.targets) == 1:
+        elif isinstance(node, ast.ImportFrom):
+            if node.module and not node.level:
+                for alias in node.names:
+                    names.imports[alias.asname or alias.name] = f"{node.module}.{alias.name}"
+        elif isinstance(node, ast.Assign) and isinstance(node.value, ast.Call):
+            target, class_name = node.targets[0], _find_structure(node.value.func)
+            if class_name and isinstance(target, ast.Name) and len(node.targets) == 1:
                 names.variables[target.id] = class_name
         if definition:
-            names.definitions.setdefault(definition, (script.path, node.lineno))
+            line = getattr(node, "lineno", 1)
+            names.definitions.setdefault(definition, (script.path, line))
     for name, attributes in members.items():
         names.members[name] = names.members.get(name, frozenset()) | attributes
 

@@ -137,6 +137,7 @@ class SectionReader:
             case model.MathBlock():
                 self.add("formula", self._formula(block.tex.text))
             case model.Table():
+                self.add("text", self.text(block.caption))
                 for row in (block.header, *block.rows):
                     self.add("text", " | ".join(self.text(cell.children) for cell in row))
             case model.HtmlBlock():

@@ -57,7 +57,7 @@ export class Panel {
     clearTimeout(this.timer)
     if (news.busy && !this.news.busy) {
       this.timer = setTimeout(() => this.take(news), PATIENCE)
-      news = { ...news, busy: '' }
+      return this.take({ ...news, busy: '' })
     }
     this.take(news)
   }

@@ -30,7 +30,8 @@ NUMERIC = """<style xmlns="http://purl.org/net/xbiblio/csl" class="in-text" vers
 """
 FIRST = """## One
 
-So it is [@euler1758, p. 12], and [see @goldstein, ch. 3; @one]. Again [@euler1758], me@example.org,
+So it is [@euler1758, p. 12], and [as one may
+see in @goldstein, ch. 3; @one]. Again [@euler1758], me@example.org,
 [a link @ home](https://example.org/).
 
 | a |
@@ -61,7 +62,7 @@ def test_citations_lead_to_the_references_of_their_lesson_and_back(site: dict[st
     )
     texts = [re.sub("<.*?>", "", citation) for citation in citations]
     assert texts[1:] == [
-        "(see Goldstein, Poole and Safko 2002, chap. 3; van der Berg 2001a)",
+        "(as one may see in Goldstein, Poole and Safko 2002, chap. 3; van der Berg 2001a)",
         "(Euler 1765)",
         "(van der Berg 2001b)",
     ]

@@ -309,8 +309,9 @@ def test_a_lesson_by_its_sections(make: Make) -> None:
         ("text", "Warning: Mind"),
         ("text", "In a callout."),
     ]
-    assert pieces(inner)[:4] == [
+    assert pieces(inner)[:5] == [
         ("formula", "τ = L"),
+        ("text", "Some letters."),
         ("text", "h | k"),
         ("text", "a | b"),
         ("code", "import mujoco"),
