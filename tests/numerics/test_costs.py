@@ -226,13 +226,11 @@ def test_a_verdict_where_an_error_is_not_known_or_nothing_was_timed() -> None:
     judgement = verdict(rows_with_front((1, 2.0), (0.5, 2.0)), [None, None])
     assert judgement.noticeable is None
     assert judgement.text == (
-        "RK4 at 10 ms is better: it takes 0.5 of the time and errs no more; whether a learner "
-        "would notice its error is not known"
+        "RK4 at 10 ms is better: it takes 0.5 of the time and errs no more; "
+        "whether its error can be seen is not known"
     )
     judgement = verdict(front([row(own=True, cost=None, seen=0.5)]), [False])
-    assert judgement.text.startswith(
-        "nothing was timed, so that no setting can be called better; a "
-    )
+    assert judgement.text.startswith("nothing was timed, so that no setting can be called better; ")
 
 
 def ladder(*errors: float, own_number: int = 0) -> tuple[WorkPrecisionRow, ...]:
