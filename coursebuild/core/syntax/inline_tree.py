@@ -49,6 +49,7 @@ from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_
 from coursebuild.core.syntax.inline_parser import inline_tokens
 from coursebuild.core.syntax.mentions import (
     TextPiece,
+    check_link_text,
     check_scheme,
     classify,
     link_mentions,
@@ -241,8 +242,10 @@ class _TokenReader:
         if diagnostic is not None:
             self.report(diagnostic)
             return None
-        title = str(opening.attrs.get("title", ""))
-        return Link(span, classify(url), destination, title, children)
+        title, target = str(opening.attrs.get("title", "")), classify(url)
+        if (diagnostic := check_link_text(target, children, span)) is not None:
+            self.report(diagnostic)
+        return Link(span, target, destination, title, children)
 
     def _find_destination(self, start: int, label_end: int, end: int) -> Span:
         """The span of the destination of a link or image: in itself, or in its definition."""

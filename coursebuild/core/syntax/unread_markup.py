@@ -26,7 +26,7 @@ _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
 _SIGNS = re.compile(
     r"[{}\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f]|[!?=:._']{2}|:\w|[´‘’]{3}"
     r"|\((?:out|given)\)|\A_\Z|\A[a-rt-z](?!\w)|^\d{1,2}[.,;)][^\d\s]|^\d{1,2}[,;] |^-[A-Z]"
-    r"|^[0=_] |^h\d\. |^[A-Z?!]> |^1 |^import |Lesson \d",
+    r"|^[0=_.)] |^h\d\. |^[A-Z?!]> |^1 |^import |Lesson \d",
     re.MULTILINE,
 )
 """What all unread markup has at least once, so that most texts are passed over quickly."""
@@ -60,6 +60,15 @@ _STAR = re.compile(
     re.MULTILINE,
 )
 """A star at the start of a line before a word or after a word, or two after a number in a text."""
+_OPEN_VALUE = re.compile(r'\b([A-Za-z]\w*)=(?:"|[\w.-]+")')
+_ATTRIBUTE = re.compile(r'[A-Za-z][\w:-]*="[^"]*"')
+_NO_EQUALS = re.compile(r'([A-Za-z]\w*)\W?"[\w. -]*"')
+_LONE_DASH = re.compile(r'([A-Za-z]\w*)[-+;]"[^"]*"')
+_LATE_QUOTE = re.compile(r'\b([A-Za-z]\w*)=\.?\d[\d.]*"')
+_PAIR = re.compile(r"\([^()\[\]{}]*\)|\[[^()\[\]{}]*\]|\{[^()\[\]{}]*\}")
+"""A pair of brackets with none inside."""
+_PROSE = re.compile(r"(?<!`)`[,.;:)]\s+\w|(?<!`)`[^`]*\w`{2,}[\s,.;:)]")
+"""Code that begins with a mark of punctuation and a blank, or that holds two backticks."""
 _LETTER_BEFORE, _LETTER_AFTER = re.compile(r"(?:^|(?<=\s))\w\Z"), re.compile(r"\w")
 
 
@@ -262,14 +271,33 @@ def check_inline_code(content: Excerpt, start: int, end: int, code: str) -> Iter
         message = f"`{shorten(code)}` is shown, and not computed"
         help = "show the value, bound to what a script printed: `` `4.47`{out} ``"
         yield diagnose("markup-foreign", span, message, help=help)
+    is_cut = code.startswith("<") and not code.endswith(">")
+    value = _OPEN_VALUE.search(code) if code.count('"') % 2 and not is_cut else None
+    if _ATTRIBUTE.search(code) and not is_cut:
+        value = value or _NO_EQUALS.search(_ATTRIBUTE.sub("", code))
+    if value := value or _LATE_QUOTE.search(code) or _LONE_DASH.fullmatch(code):
+        message = f'the value of `{value[1]}` does not stand between `="` and `"`'
+        help = f'write `{value[1]}="…"`'
+        yield diagnose("markup-unread", span, message, help=help)
+    rest = code if re.fullmatch(r"[A-Za-z][\w.()\[\]{}:-]+", code) else ""
+    while (shorter := _PAIR.sub(lambda pair: "_" * len(pair[0]), rest)) != rest:
+        rest = shorter
+    if bracket := re.search(r"(?<=\w)[()\[\]{}](?=\w)", rest):
+        message = f"`{bracket[0]}` has no bracket that belongs to it"
+        yield diagnose("markup-unread", span, message, help="write the other one, or a blank")
     # A letter and a backtick change places easily, as in "i`mpratio`" and "`body_mass `while".
-    letter = _LETTER_BEFORE.search(text, max(start - 2, 0), start)
+    letter, first = _LETTER_BEFORE.search(text, max(start - 2, 0), start), start - 1
     if letter is None and text[start:end].endswith(" `"):
-        letter = _LETTER_AFTER.match(text, end)
+        letter, first = _LETTER_AFTER.match(text, end), start
     if letter is not None:
         message = f"`{letter[0]}` stands directly beside a backtick that begins or ends code"
         help = "move the backtick, or write a blank between them"
-        yield diagnose("markup-unread", content.span(*letter.span()), message, help=help)
+        place = content.span(min(first, letter.start()), letter.end())
+        yield diagnose("markup-unread", place, message, help=help)
+    elif _PROSE.match(text, start, end):
+        message = f"`{shorten(code)}` would be shown as code, and begins or ends as prose does"
+        help = "a backtick is missing or is one too many, here or before it in the paragraph"
+        yield diagnose("markup-unread", span, message, help=help)
 
 
 def _mask_all_but(texts: Sequence[tuple[int, str]], whole: str) -> str:

@@ -64,6 +64,51 @@ def resolver_of(course: Course) -> Resolver:
     return _resolvers[0]
 
 
+_ENDINGS = frozenset("s es d ed ing".split())
+"""What English writes directly after code."""
+_LETTERS = "abcdefghijklmnopqrstuvwxyz_"
+_ROWS = (
+    "1234567890-=", "qwertyuiop[]", "asdfghjkl;'", "zxcvbnm,./", "qwertzuiop", "azertyuiop",
+    "ASDFGHJKL", "QWERTYUIOP", "ZXCVBNM<>?",
+)  # fmt: skip
+_NEARBY = {
+    key: {
+        row[n]
+        for row in _ROWS
+        if key in row
+        for n in (row.index(key) - 1, row.index(key) + 1)
+        if 0 <= n < len(row) and {key, row[n]} != {"x", "z"}
+    }
+    for key in "".join(_ROWS)
+    if not key.isdigit()
+}
+"""The keys beside each on usual keyboards; `x` and `z` are names of axes."""
+
+
+@functools.lru_cache(maxsize=256)
+def _slips(name: str) -> frozenset[str]:
+    """What a hand may have meant that doubled, swapped, mistyped or dropped one letter of a name.
+
+    Of 3,238 words that strangers' pages have once in inline code, some 10 are such a slip of a name
+    of MuJoCo or of the page itself, and half of these are mistakes. Plurals are none, and short
+    names differ in their first letter.
+    """
+    slips: set[str] = set()
+    for n, letter in enumerate(name):
+        head, tail = name[:n], name[n + 1 :]
+        if n and letter == name[n - 1] and letter.isalnum():
+            slips.add(head + tail)
+        if tail:
+            slips.add(head + tail[0] + letter + tail[1:])
+        if n or len(name) > 4:
+            slips |= {head + dropped + letter + tail for dropped in (*_LETTERS, "-", "/", ".")}
+            slips |= {
+                head + other + tail for other in _NEARBY.get(letter, "") if tail or head[-1] != "e"
+            }
+    slips |= {name + letter for letter in _LETTERS if letter != "s" or name.endswith("s")}
+    return frozenset(slips - {name})
+
+
 def _propose(name: str, names: Iterable[str]) -> str:
     """Propose the nearest name, if one is near; only those of about its length are compared."""
     similar = (candidate for candidate in names if abs(len(candidate) - len(name)) <= 2)
@@ -136,6 +181,12 @@ class Resolver:
                 return self._file(claim.name)
             case "plain":
                 return self._plain(claim.name, names)
+            case "token":
+                return self._token(claim.name)
+            case "half":
+                return self._half(claim.name)
+            case "torn":
+                return self._torn(*claim.name.split(" "), names)
 
     # --- Python
 
@@ -167,54 +218,85 @@ class Resolver:
         return Unknown(message, _propose(name, candidates), name)
 
     @functools.cached_property
+    def uses(self) -> Counter[str]:
+        """How often inline code has each word and each token that may be no name."""
+        claims = (claim for names in course_names(self.course) for claim in names.claims)
+        return Counter(claim.name for claim in claims if claim.kind in ("plain", "token"))
+
+    @functools.cached_property
     def plain_words(self) -> dict[str, int]:
         """Words without the shape of a name, each with the least length that is telling."""
-        claims = (claim for names in course_names(self.course) for claim in names.claims)
-        uses = Counter(claim.name for claim in claims if claim.kind == "plain")
+        uses = self.uses
         engine, files = self.engine, (path.rpartition("/")[2] for path in self.files)
         common_words = {*known_keys(), *self.imports, *options_by_command(), *keyword.kwlist}
         common_words.update(vars(builtins), *(() if engine is None else engine.modules.values()))
         own_words = {*self.words, *files, *(word for word, count in uses.items() if count > 1)}
+        frequent_words = {word for word, count in uses.items() if count > 4}
         engine_words = engine.words if engine is not None and self.has_engine else ()
-        sets = ((common_words, 7), (own_words, 5), (engine_words, 3))
-        return {word: length for words, length in sets for word in words}
+        sets = ((common_words, 6), (own_words, 4), (engine_words, 4))
+        lengths = {word: length for words, length in sets for word in words}
+        return lengths | dict.fromkeys((w for w in frequent_words if len(w) > 3), 3)
 
     @functools.cached_property
     def long_words(self) -> frozenset[str]:
         """Names of MuJoCo, and words that the course often has as code; shorter with a digit."""
-        claims = (claim for names in course_names(self.course) for claim in names.claims)
-        uses = Counter(claim.name for claim in claims if claim.kind == "plain")
-        words = {word for word, count in uses.items() if count > 2}
+        words = {word for word, count in self.uses.items() if count > 2}
         if self.engine is not None and self.has_engine:
             words |= self.engine.words
         return frozenset(w for w in words if len(w) > 6 or (re.search("[0-9]", w) and len(w) > 3))
 
-    def find_torn(self, name: str, tail: str, names: CodeNames) -> Answer:
+    def _torn(self, name: str, tail: str, names: CodeNames) -> Answer:
         """A name of which a backtick stands before the last letters, as in "`Eule`r"."""
         whole, words = name + tail, self.plain_words.keys() | names.words
-        if whole not in words or name in words:
+        if whole not in words or (name in words and tail in _ENDINGS):
             return None
         message = f"`{name}` and the letters after its backtick are the name `{whole}`"
         return Unknown(message, f"did you mean `{whole}`?", name)
 
     def _plain(self, name: str, names: CodeNames) -> Answer:
-        if name in (lengths := self.plain_words) or name in names.words or name.isupper():
+        lengths, is_short_constant = self.plain_words, name.isupper() and len(name) < 7
+        if name in lengths or name in names.words or is_short_constant:
             return None
+        slips = _slips(name)
+        if name.isupper():
+            slips = {slip.upper() for slip in _slips(name.lower())}
+        near = {
+            word
+            for word in slips
+            if len(word) >= lengths.get(word, len(word) + 1)
+            and (word[0] == name[0] or self.uses[word] > 1)  # `fields` is no slip of `hfields`
+        }
         # Of 9,600 words of prose, 8 have another letter inside than a long name of MuJoCo, but some
         # 500 differ by a letter from any name: `weight` is no slip of `height`.
-        splits = [(name[:n], name[n:]) for n in range(len(name) - 1)]
-        swaps = {head + tail[1] + tail[0] + tail[2:] for head, tail in splits}
-        near = {word for word in swaps - {name} if len(word) >= lengths.get(word, len(word) + 1)}
         if len(name) > 5 or re.search("[0-9]", name):
-            slips = {head + tail[1:] for head, tail in splits[1:-1]}
-            for letter in "abcdefghijklmnopqrstuvwxyz_":
-                slips |= {head + letter + tail for head, tail in splits[1:]}
-                slips |= {head + letter + tail[1:] for head, tail in splits[1:-1]}
+            splits = [(name[:n], name[n:]) for n in range(1, len(name) - 1)]
+            slips = {head + tail[1:] for head, tail in splits}
+            slips |= {head + letter + tail[1:] for head, tail in splits for letter in _LETTERS}
             near |= slips & self.long_words
         if (likely := min(near, default=None)) is None:
             return None
         message = f"nothing that the course knows is called `{name}`"
         return Unknown(message, f"did you mean `{likely}`?", name)
+
+    def _token(self, name: str) -> Answer:
+        """A token that is another one of the course but for a slip in or beside a word."""
+        if self.uses[name] > 1:
+            return None
+        words = [word.span() for word in re.finditer("[A-Za-z_]{4,}", name)]
+        for other in _slips(name):
+            if self.uses[other] > 1 or other in self.files:
+                at = next(
+                    (
+                        n
+                        for n, pair in enumerate(zip(name, other, strict=False))
+                        if len({*pair}) > 1
+                    ),
+                    len(name),
+                )
+                if any(start - 1 <= at <= end + 1 for start, end in words):
+                    message = f"nothing that the course knows is called `{name}`"
+                    return Unknown(message, f"did you mean `{other}`?", name)
+        return None
 
     def _path(self, path: str, names: CodeNames) -> Answer:
         parts = [re.sub(r"[()\[\]]+", "", part) for part in path.split(".")]
@@ -237,12 +319,21 @@ class Resolver:
             return Unknown(f"`{root}` has no member `{parts[1]}`", help, parts[1])
         if root in names.definitions or root in names.words:
             return None
-        likely = misspelt(root, ("model", "data", "mujoco")) if self.has_engine else None
+        likely = misspelt(root, (*_ROOTS, "mujoco")) if self.has_engine else None
         if likely is not None and isinstance(
             self._path(path.replace(root, likely, 1), names), KnownName
         ):
             message = f"nothing that the course knows is called `{root}`"
             return Unknown(message, f"did you mean `{likely}`?", root)
+        if ENGINE_WORD.fullmatch(root):
+            message = f"MuJoCo {engine.version} has no `{root}`"
+            return Unknown(message, did_you_mean(root, engine.classes), root)
+        head, _, tail = path.partition(".")
+        for other in (f"{head[:-1]}.{head[-1]}{tail}", f"{head}{tail[0]}.{tail[1:]}"):
+            is_likely = other.partition(".")[0] in _ROOTS
+            if is_likely and isinstance(self._path(other, names), KnownName):
+                message = f"nothing that the course knows is called `{root}`"
+                return Unknown(message, f"did you mean `{other}`?", root)
         return None
 
     def _class_of(self, root: str, names: CodeNames) -> str:
@@ -314,6 +405,15 @@ class Resolver:
             return None
         message = f"MJCF of MuJoCo {engine.version} has no element `<{name}>`"
         return Unknown(message, did_you_mean(name, engine.elements), name)
+
+    def _half(self, text: str) -> Answer:
+        """An element of which a bracket is lost, or is another key."""
+        name = re.sub(r"\W", "", text.split()[0])
+        letters = {name, name[1:] if text[0] == name[0] else name}
+        elements = set() if self.engine is None or not self.has_engine else self.engine.elements
+        if (element := next((word for word in letters if word in elements), None)) is None:
+            return None
+        return Unknown(f"`{text}` is not a whole tag", f"did you mean `<{element}>`?", text)
 
     def _attribute(self, element: str, name: str) -> Answer:
         engine = self.engine
