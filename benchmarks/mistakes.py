@@ -134,8 +134,8 @@ class Checker:
             self.session.take_results(self._course, self.verification)
         if verdict != "other":
             return Outcome(change, verdict)
-        known = resolver_of(self._course).plain_words
-        reason = find_reason(change, old, claims, known)
+        known_names = resolver_of(self._course).plain_words
+        reason = find_reason(change, old, claims, known_names)
         return Outcome(change, "reason" if reason else "silent", reason)
 
     def _diagnose(self, path: str, new: str) -> list[Diagnostic]:
@@ -258,11 +258,11 @@ _QUOTED = frozenset("bash console html ini json markdown md sh text toml xml yam
 
 
 def find_reason(
-    change: Change, old: str, claims: Iterable[Diagnostic], known: Collection[str]
+    change: Change, old: str, claims: Iterable[Diagnostic], known_names: Collection[str]
 ) -> str:
     """Why a change is no mistake that can be known; empty where it should be.
 
-    `known`: the names that the course can tell.
+    `known_names`: the names that the course can tell.
     """
     new, start = change.apply(old), change.start
     end = max(start + len(change.text), start + 1)
@@ -282,7 +282,7 @@ def find_reason(
     line_start = new.rfind("\n", 0, start) + 1
     line = new[line_start : new.find("\n", end) % (len(new) + 1)]
     is_word = change.place in ("code", "list", "words") and re.fullmatch("[A-Za-z_]+", letters)
-    if is_word and (reason := _judge_code(old, new, known)):
+    if is_word and (reason := _judge_code(old, new, known_names)):
         return reason
     if change.place == "other block":
         kind = re.findall(r"^[ >]*`{3,} *([^\s`]*)", old[:start], re.MULTILINE)[-1]
@@ -302,7 +302,7 @@ def find_reason(
     return ""
 
 
-def _judge_code(old: str, new: str, known: Collection[str]) -> str:
+def _judge_code(old: str, new: str, known_names: Collection[str]) -> str:
     """Why a word of inline code that has changed is no mistake that can be known."""
     at = next(n for n, pair in enumerate(zip(old, new, strict=False)) if pair[0] != pair[1])
     words = []
@@ -312,11 +312,13 @@ def _judge_code(old: str, new: str, known: Collection[str]) -> str:
         words += [m[0] for m in re.finditer(r"\w+", text) if m.start() <= at <= m.end() and is_code]
     if len(words) != 2 or not words[1][0].isalpha():
         return ""
-    if words[1] in known:
+    if words[1] in known_names:
         return "another name that there is"
     if len(words[1]) < 4:
         return "a name of three letters in code"
-    is_alone = len(re.findall(rf"\b{re.escape(words[0])}\b", old)) == 1 and words[0] not in known
+    is_alone = (
+        len(re.findall(rf"\b{re.escape(words[0])}\b", old)) == 1 and words[0] not in known_names
+    )
     return "a name that nothing else has" if is_alone else ""
 
 

@@ -105,16 +105,16 @@ def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> D
     """The diagnostic of a text that is another lesson, or almost the name of a model or script."""
     match target, children:
         case LessonTarget(id=name), (Text(text=text),) if number := _NUMBERED.fullmatch(text):
-            said, kind = number[1], "lesson"
-        case ModelTarget(name=name), (CodeSpan(text=said),) if misspelt(said, (name,)):
+            label, kind = number[1], "lesson"
+        case ModelTarget(name=name), (CodeSpan(text=label),) if misspelt(label, (name,)):
             kind = "model"
-        case ExampleTarget(path=name), (CodeSpan(text=said),) if misspelt(said, (name,)):
+        case ExampleTarget(path=name), (CodeSpan(text=label),) if misspelt(label, (name,)):
             kind = "script"
         case _:
             return None
-    message = f"the text of this link says `{said}`, and it leads to the {kind} `{name}`"
+    message = f"the text of this link says `{label}`, and it leads to the {kind} `{name}`"
     help = "name the same in both"
-    return diagnose("link-text", span, message, help=help) if said != name else None
+    return diagnose("link-text", span, message, help=help) if label != name else None
 
 
 _LESSON = r"[0-9]+(?:\.[0-9]+)+(?!\w)"

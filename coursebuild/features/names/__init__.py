@@ -19,13 +19,11 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
-from coursebuild.features.names.claims import GUESSES, document_names
+from coursebuild.features.names.claims import GUESSES, course_names, document_names, names_of
 from coursebuild.features.names.engine import EngineTable, KnownName, engine_names, list_names
 from coursebuild.features.names.resolve import (
     Resolver,
     Unknown,
-    course_names,
-    names_of,
     resolver_of,
 )
 

@@ -16,14 +16,15 @@ from typing import TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.model import Course, Document, document_scripts
+from coursebuild.core.model import Course, document_scripts
 from coursebuild.core.model.addresses import line_anchor
 from coursebuild.core.syntax.course_schema import CourseFile
 from coursebuild.core.syntax.html import ELEMENTS
-from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest
+from coursebuild.core.text.diagnostics import LETTERS, did_you_mean, misspelt, nearest, slips_of
 from coursebuild.core.text.rules import HELP
-from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, DocumentNames
+from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, course_names
 from coursebuild.features.names.engine import (
+    ITEM_CLASSES,
     EngineName,
     EngineNames,
     EngineTable,
@@ -62,51 +63,6 @@ def resolver_of(course: Course) -> Resolver:
     if not _resolvers or _resolvers[0].course is not course:
         _resolvers[:] = [Resolver(course)]
     return _resolvers[0]
-
-
-_ENDINGS = frozenset("s es d ed ing".split())
-"""What English writes directly after code."""
-_LETTERS = "abcdefghijklmnopqrstuvwxyz_"
-_ROWS = (
-    "1234567890-=", "qwertyuiop[]", "asdfghjkl;'", "zxcvbnm,./", "qwertzuiop", "azertyuiop",
-    "ASDFGHJKL", "QWERTYUIOP", "ZXCVBNM<>?",
-)  # fmt: skip
-_NEARBY = {
-    key: {
-        row[n]
-        for row in _ROWS
-        if key in row
-        for n in (row.index(key) - 1, row.index(key) + 1)
-        if 0 <= n < len(row) and {key, row[n]} != {"x", "z"}
-    }
-    for key in "".join(_ROWS)
-    if not key.isdigit()
-}
-"""The keys beside each on usual keyboards; `x` and `z` are names of axes."""
-
-
-@functools.lru_cache(maxsize=256)
-def _slips(name: str) -> frozenset[str]:
-    """What a hand may have meant that doubled, swapped, mistyped or dropped one letter of a name.
-
-    Of 3,238 words that strangers' pages have once in inline code, some 10 are such a slip of a name
-    of MuJoCo or of the page itself, and half of these are mistakes. Plurals are none, and short
-    names differ in their first letter.
-    """
-    slips: set[str] = set()
-    for n, letter in enumerate(name):
-        head, tail = name[:n], name[n + 1 :]
-        if n and letter == name[n - 1] and letter.isalnum():
-            slips.add(head + tail)
-        if tail:
-            slips.add(head + tail[0] + letter + tail[1:])
-        if n or len(name) > 4:
-            slips |= {head + dropped + letter + tail for dropped in (*_LETTERS, "-", "/", ".")}
-            slips |= {
-                head + other + tail for other in _NEARBY.get(letter, "") if tail or head[-1] != "e"
-            }
-    slips |= {name + letter for letter in _LETTERS if letter != "s" or name.endswith("s")}
-    return frozenset(slips - {name})
 
 
 def _propose(name: str, names: Iterable[str]) -> str:
@@ -186,7 +142,7 @@ class Resolver:
             case "half":
                 return self._half(claim.name)
             case "torn":
-                return self._torn(*claim.name.split(" "), names)
+                return self._torn(claim.name, names)
 
     # --- Python
 
@@ -245,21 +201,20 @@ class Resolver:
             words |= self.engine.words
         return frozenset(w for w in words if len(w) > 6 or (re.search("[0-9]", w) and len(w) > 3))
 
-    def _torn(self, name: str, tail: str, names: CodeNames) -> Answer:
+    def _torn(self, torn: str, names: CodeNames) -> Answer:
         """A name of which a backtick stands before the last letters, as in "`Eule`r"."""
+        name, tail = torn.split(" ")
         whole, words = name + tail, self.plain_words.keys() | names.words
-        if whole not in words or (name in words and tail in _ENDINGS):
+        if whole not in words or (name in words and tail in ("s", "es", "d", "ed", "ing")):
             return None
         message = f"`{name}` and the letters after its backtick are the name `{whole}`"
         return Unknown(message, f"did you mean `{whole}`?", name)
 
     def _plain(self, name: str, names: CodeNames) -> Answer:
-        lengths, is_short_constant = self.plain_words, name.isupper() and len(name) < 7
-        if name in lengths or name in names.words or is_short_constant:
+        lengths, is_constant = self.plain_words, name.isupper()
+        if name in lengths or name in names.words or (is_constant and len(name) < 7):
             return None
-        slips = _slips(name)
-        if name.isupper():
-            slips = {slip.upper() for slip in _slips(name.lower())}
+        slips = {slip.upper() for slip in slips_of(name.lower())} if is_constant else slips_of(name)
         near = {
             word
             for word in slips
@@ -270,9 +225,9 @@ class Resolver:
         # 500 differ by a letter from any name: `weight` is no slip of `height`.
         if len(name) > 5 or re.search("[0-9]", name):
             splits = [(name[:n], name[n:]) for n in range(1, len(name) - 1)]
-            slips = {head + tail[1:] for head, tail in splits}
-            slips |= {head + letter + tail[1:] for head, tail in splits for letter in _LETTERS}
-            near |= slips & self.long_words
+            words = {head + tail[1:] for head, tail in splits}
+            words |= {head + letter + tail[1:] for head, tail in splits for letter in LETTERS}
+            near |= words & self.long_words
         if (likely := min(near, default=None)) is None:
             return None
         message = f"nothing that the course knows is called `{name}`"
@@ -283,19 +238,13 @@ class Resolver:
         if self.uses[name] > 1:
             return None
         words = [word.span() for word in re.finditer("[A-Za-z_]{4,}", name)]
-        for other in _slips(name):
-            if self.uses[other] > 1 or other in self.files:
-                at = next(
-                    (
-                        n
-                        for n, pair in enumerate(zip(name, other, strict=False))
-                        if len({*pair}) > 1
-                    ),
-                    len(name),
-                )
+        for candidate in slips_of(name):
+            if self.uses[candidate] > 1 or candidate in self.files:
+                pairs = enumerate(zip(name, candidate, strict=False))
+                at = next((n for n, (a, b) in pairs if a != b), len(name))
                 if any(start - 1 <= at <= end + 1 for start, end in words):
                     message = f"nothing that the course knows is called `{name}`"
-                    return Unknown(message, f"did you mean `{other}`?", name)
+                    return Unknown(message, f"did you mean `{candidate}`?", name)
         return None
 
     def _path(self, path: str, names: CodeNames) -> Answer:
@@ -329,11 +278,11 @@ class Resolver:
             message = f"MuJoCo {engine.version} has no `{root}`"
             return Unknown(message, did_you_mean(root, engine.classes), root)
         head, _, tail = path.partition(".")
-        for other in (f"{head[:-1]}.{head[-1]}{tail}", f"{head}{tail[0]}.{tail[1:]}"):
-            is_likely = other.partition(".")[0] in _ROOTS
-            if is_likely and isinstance(self._path(other, names), KnownName):
+        for candidate in (f"{head[:-1]}.{head[-1]}{tail}", f"{head}{tail[0]}.{tail[1:]}"):
+            is_likely = candidate.partition(".")[0] in _ROOTS
+            if is_likely and isinstance(self._path(candidate, names), KnownName):
                 message = f"nothing that the course knows is called `{root}`"
-                return Unknown(message, f"did you mean `{other}`?", root)
+                return Unknown(message, f"did you mean `{candidate}`?", root)
         return None
 
     def _class_of(self, root: str, names: CodeNames) -> str:
@@ -362,7 +311,7 @@ class Resolver:
                 return Unknown(message, did_you_mean(name, members), name)
             class_name = member.type
             if class_name.endswith("List"):
-                class_name = _ITEMS.get(class_name, "") if "[]" in part else ""
+                class_name = ITEM_CLASSES.get(class_name, "") if "[]" in part else ""
         if member is None:
             return None
         href = class_href(self.engine, first_class)
@@ -493,25 +442,6 @@ class Resolver:
         lessons = (lesson.path for lesson in course.lessons)
         sources = (source.path for source in course.sources)
         return frozenset((*course.files, *scripts, *sources, *lessons))
-
-
-_ITEMS = {
-    "MjContactList": "MjContact",
-    "MjSolverStatList": "MjSolverStat",
-    "MjTimerStatList": "MjTimerStat",
-    "MjWarningStatList": "MjWarningStat",
-}
-
-
-def names_of(document: Document) -> DocumentNames | None:
-    """Return the names of a document that the course has read."""
-    names = (document.summaries or {}).get("names")
-    return names if isinstance(names, DocumentNames) else None
-
-
-def course_names(course: Course) -> tuple[CodeNames, ...]:
-    """Return the names of each document of a course."""
-    return tuple(note.names for note in map(names_of, course.documents) if note is not None)
 
 
 @functools.lru_cache(maxsize=256)
